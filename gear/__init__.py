@@ -1,0 +1,1 @@
+"""gear: driving datasets with physical adversarial patches in them, rendered by MuJoCo."""

@@ -1,0 +1,1 @@
+"""Contracts: the protocols and specs that plugins and rooms agree on. Imports values only."""

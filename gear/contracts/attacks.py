@@ -1,0 +1,59 @@
+"""The attack protocol. torch appears in types alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.contracts.models import Model
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Patch:
+    """One printed patch.
+
+    Attributes:
+        name: `patch_0`, `patch_1`, …, for the surface of the same number.
+        rgb: (H, W, 3) float32, sRGB in 0..1.
+    """
+
+    name: str
+    rgb: npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Budget:
+    """What an attack may spend.
+
+    Attributes:
+        steps: optimisation steps.
+        queries: forward passes, for attacks without gradients.
+    """
+
+    steps: int
+    queries: int | None = None
+
+
+class Compositor(Protocol):
+    """Puts patches into pictures, differentiably."""
+
+    def compose(self, patches: Sequence[Tensor], samples: Sequence[int], view: str) -> Tensor:
+        """(B, 3, H, W) pictures in 0..1 of the samples with the (3, h, w) patches on their surfaces."""
+        ...
+
+
+class Attack(Protocol):
+    """Optimises patches against a model."""
+
+    def optimise(
+        self, model: Model, dataset: Sequence[Any], compositor: Compositor, *, budget: Budget, rng: np.random.Generator
+    ) -> tuple[Patch, ...]:
+        """One patch a surface; the model is left as it was."""
+        ...

@@ -1,0 +1,52 @@
+"""The defense protocol."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.contracts.models import Model
+from gear.values.frames import UInt8Image
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class DefenseResult:
+    """What a defense makes of one sample.
+
+    Attributes:
+        views: cleaned pictures by camera name, shapes and dtypes as they came.
+        mask: where the patch is believed to be, by camera name, (H, W) float32 in 0..1, or None.
+        score: how sure the defense is that there is an attack, in 0..1, or None.
+    """
+
+    views: Mapping[str, UInt8Image]
+    mask: Mapping[str, npt.NDArray[np.float32]] | None = None
+    score: float | None = None
+
+
+class Defense(Protocol):
+    """Guards a model. Holds no state between calls but what `fit` returns."""
+
+    def fit(
+        self,
+        clean: Sequence[Mapping[str, UInt8Image]],
+        patched: Sequence[Mapping[str, UInt8Image]],
+        model: Model | None,
+        rng: np.random.Generator,
+    ) -> Any:
+        """Calibrates on samples; returns the state for `apply`, None where there is nothing to learn."""
+        ...
+
+    def apply(
+        self, views: Mapping[str, UInt8Image], model: Model | None, state: Any, rng: np.random.Generator
+    ) -> DefenseResult:
+        """Cleans one sample; never writes to its input."""
+        ...
+
+    def wrap(self, model: Model) -> Model:
+        """The model inside the defense, for defenses of several passes; others return it as it is."""
+        ...

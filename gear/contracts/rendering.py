@@ -1,0 +1,86 @@
+"""What a renderer is given and what it gives back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal, Protocol
+
+from gear.values.frames import FloatImage, IdImage, UInt8Image, UInt16Image
+from gear.values.scene import CameraRecord, Vec3
+
+if TYPE_CHECKING:
+    import mujoco
+
+Quality = Literal["film", "fast"]
+"""`film`: 2x2 supersampled, averaged in linear light. `fast`: one sample a pixel, gear's own edge filter."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Stage:
+    """A compiled world with everything in its place.
+
+    Attributes:
+        model: the render model; never changed by a sample.
+        data: posed; kinematics, lights and cameras are up to date.
+        paint_rgb: linear albedo (0..1) by geom id, for geoms whose colour this sample chose.
+        faces: sRGB albedo, (H, W, 3) uint8, by geom id of the surface's face; all of the world's one face size.
+    """
+
+    model: mujoco.MjModel
+    data: mujoco.MjData
+    paint_rgb: Mapping[int, Vec3] = field(default_factory=dict)
+    faces: Mapping[int, UInt8Image] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RendererInfo:
+    """Who renders. Written into every manifest.
+
+    Attributes:
+        name: `filament` or `classic`.
+        backend: graphics interface: `vulkan`, `osmesa`, `egl`.
+        driver: what the driver calls itself, with version.
+        device: what the device calls itself.
+        is_software: whether the CPU renders.
+    """
+
+    name: str
+    backend: str
+    driver: str
+    device: str
+    is_software: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RawView:
+    """What a renderer returns for one camera; aligned arrays, row 0 at the top.
+
+    Attributes:
+        linear_rgb: (H, W, 3) uint16, 0..`LINEAR_FULL_SCALE`, linear in every surface's albedo; None where colour was not asked for.
+        depth_m: (H, W) float32 planar z, NaN for nothing; None where truth was not asked for.
+        geom_id: (H, W) int32, -1 for nothing; None as above.
+    """
+
+    linear_rgb: UInt16Image | None
+    depth_m: FloatImage | None
+    geom_id: IdImage | None
+
+
+class Renderer(Protocol):
+    """One renderer for one compiled model. Frames depend on the stage and the camera alone, never on what was rendered before."""
+
+    @property
+    def info(self) -> RendererInfo:
+        """Who renders."""
+        ...
+
+    def render(
+        self, stage: Stage, cameras: Sequence[CameraRecord], *, colour: bool = True, truth: bool = True
+    ) -> tuple[RawView, ...]:
+        """One raw view a camera, in order, all of the same moment."""
+        ...
+
+    def close(self) -> None:
+        """Frees the context; safe to call twice."""
+        ...

@@ -1,0 +1,119 @@
+"""Specs: what a plugin offers, as data. Cheap to make, nothing heavy imported; `build` imports what it needs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Generic, Literal, TypeVar
+
+from gear.contracts.attacks import Attack
+from gear.contracts.defenses import Defense
+from gear.contracts.models import Model
+from gear.contracts.tasks import Task
+
+ConfigT = TypeVar("ConfigT")
+ProductT = TypeVar("ProductT", covariant=True)
+
+PROTOCOL_VERSION = 1
+"""Raised when a protocol changes so that old plugins no longer fit."""
+
+Gradient = Literal["differentiable", "surrogate", "none"]
+"""How gradients pass a defense: exactly, through a declared stand-in, or not at all."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spec(Generic[ConfigT, ProductT]):
+    """What every plugin says of itself.
+
+    Attributes:
+        name: lower case, `[a-z][a-z0-9_]*`; how users ask for it.
+        summary: one line.
+        config: frozen dataclass of its options, every one with a default.
+        build: makes the product from the options; heavy imports belong inside it.
+        protocol: the protocol version that it was written for.
+    """
+
+    name: str
+    summary: str
+    config: type[ConfigT]
+    build: Callable[[ConfigT], ProductT]
+    protocol: int = PROTOCOL_VERSION
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TaskSpec(Spec[ConfigT, Task[Any, Any]]):
+    """A task: a dataset format with its ground truth.
+
+    Attributes:
+        views: names of the cameras of its default rig, the reference first.
+        layout: one line on the files that it writes.
+        original_name: what CARLA-GeAR calls it in its configs and JSON, or "" if it does not know it.
+    """
+
+    views: tuple[str, ...]
+    layout: str
+    original_name: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModelSpec(Spec[ConfigT, Model]):
+    """A network.
+
+    Attributes:
+        tasks: names of the tasks that it can do.
+        views: names of the cameras that it looks at.
+        taps: names of the feature maps that it exposes.
+        has_gradients: whether `forward` is differentiable to the pixels.
+    """
+
+    tasks: tuple[str, ...]
+    views: tuple[str, ...]
+    taps: tuple[str, ...] = ()
+    has_gradients: bool = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AttackSpec(Spec[ConfigT, Attack]):
+    """An attack.
+
+    Attributes:
+        tasks: tasks that it can attack; empty for any.
+        needs_gradients: whether the model must have gradients.
+        needs_probes: whether the dataset must carry the probes of the exact compositor.
+        max_surfaces: how many surfaces it can optimise jointly.
+    """
+
+    tasks: tuple[str, ...] = ()
+    needs_gradients: bool = True
+    needs_probes: bool = True
+    max_surfaces: int = 16
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DefenseSpec(Spec[ConfigT, Defense]):
+    """A defense.
+
+    Attributes:
+        tasks: tasks that it can guard; empty for any.
+        outputs: what it gives: cleaned images, a mask of the patch, a score of being attacked.
+        gradient: how gradients pass it.
+        taps: feature maps that it needs of the model.
+        needs_calibration: whether `fit` must be called before `apply`.
+    """
+
+    tasks: tuple[str, ...] = ()
+    outputs: frozenset[Literal["images", "mask", "score"]] = frozenset({"images"})
+    gradient: Gradient = "none"
+    taps: tuple[str, ...] = ()
+    needs_calibration: bool = False
+
+
+AnySpec = Spec[Any, Any]
+Kind = Literal["task", "model", "attack", "defense"]
+KINDS: tuple[Kind, ...] = ("task", "model", "attack", "defense")
+SPEC_TYPES: dict[Kind, type[AnySpec]] = {
+    "task": TaskSpec,
+    "model": ModelSpec,
+    "attack": AttackSpec,
+    "defense": DefenseSpec,
+}

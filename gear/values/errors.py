@@ -1,0 +1,131 @@
+"""Errors that a user can mend. A `GearError` is shown as one line; anything else is a bug and keeps its traceback."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from pathlib import Path
+
+
+class GearError(Exception):
+    """Something that the user can put right. Its text says what, where and what to do next, in one line."""
+
+
+class FieldError(ValueError):
+    """A value that a config class refuses; the reader turns it into a `ConfigError` with its place."""
+
+    def __init__(self, field: str, problem: str) -> None:
+        super().__init__(field, problem)
+        self.field = field
+        self.problem = problem
+
+    def __str__(self) -> str:
+        return f"{self.field}: {self.problem}"
+
+
+class ConfigError(GearError):
+    """A config that cannot be read. `path:line:column: key: problem`."""
+
+    def __init__(self, path: Path | str, line: int, column: int, key: str, problem: str) -> None:
+        super().__init__(str(path), line, column, key, problem)
+        self.path, self.line, self.column, self.key, self.problem = str(path), line, column, key, problem
+
+    def __str__(self) -> str:
+        place = f"{self.path}:{self.line}:{self.column}" if self.line else self.path
+        return f"{place}: {self.key}: {self.problem}" if self.key else f"{place}: {self.problem}"
+
+
+class UnknownNameError(GearError):
+    """A name that nothing answers to, with what was meant, if that can be guessed."""
+
+    def __init__(self, kind: str, name: str, known: Iterable[str] = (), hint: str = "") -> None:
+        names = tuple(sorted(known))
+        super().__init__(kind, name, names, hint)
+        self.kind, self.name, self.known, self.hint = kind, name, names, hint
+
+    def __str__(self) -> str:
+        close = difflib.get_close_matches(self.name.casefold(), [n.casefold() for n in self.known], n=1, cutoff=0.5)
+        meant = [n for n in self.known if close and n.casefold() == close[0]]
+        text = f"no {self.kind} named {self.name!r}"
+        if meant:
+            text += f"; did you mean {meant[0]}?"
+        elif self.known:
+            text += f"; there are: {', '.join(self.known)}"
+        return f"{text} {self.hint}".rstrip()
+
+
+class DuplicateNameError(GearError):
+    """Two plugins claim one name and the name was asked for without its package."""
+
+    def __init__(self, kind: str, name: str, choices: Iterable[str]) -> None:
+        super().__init__(kind, name, tuple(choices))
+        self.kind, self.name, self.choices = kind, name, tuple(choices)
+
+    def __str__(self) -> str:
+        return f"more than one {self.kind} is named {self.name!r}; say which: {', '.join(self.choices)}"
+
+
+class PluginError(GearError):
+    """A plugin that broke, with whose it is."""
+
+    def __init__(self, plugin: str, stage: str, problem: str) -> None:
+        super().__init__(plugin, stage, problem)
+        self.plugin, self.stage, self.problem = plugin, stage, problem
+
+    def __str__(self) -> str:
+        return f"plugin {self.plugin} failed at {self.stage}: {self.problem}"
+
+
+class BackendError(GearError):
+    """A renderer that cannot start here, with what to install or which other one to use."""
+
+    def __init__(self, backend: str, problem: str, remedy: str) -> None:
+        super().__init__(backend, problem, remedy)
+        self.backend, self.problem, self.remedy = backend, problem, remedy
+
+    def __str__(self) -> str:
+        return f"renderer {self.backend}: {self.problem}; {self.remedy}"
+
+
+class PatchError(GearError):
+    """A patch that cannot be used."""
+
+    def __init__(self, path: Path | str, problem: str) -> None:
+        super().__init__(str(path), problem)
+        self.path, self.problem = str(path), problem
+
+    def __str__(self) -> str:
+        return f"patch {self.path}: {self.problem}"
+
+
+class DatasetError(GearError):
+    """A dataset on disk that cannot be read, extended or written."""
+
+    def __init__(self, path: Path | str, problem: str) -> None:
+        super().__init__(str(path), problem)
+        self.path, self.problem = str(path), problem
+
+    def __str__(self) -> str:
+        return f"{self.path}: {self.problem}"
+
+
+class TownError(GearError):
+    """A town, actor or surface whose MJCF does not keep gear's conventions."""
+
+    def __init__(self, path: Path | str, problem: str) -> None:
+        super().__init__(str(path), problem)
+        self.path, self.problem = str(path), problem
+
+    def __str__(self) -> str:
+        return f"{self.path}: {self.problem} (see docs/mjcf-conventions.md)"
+
+
+class PlacementError(GearError):
+    """A scene into which its actors cannot be placed."""
+
+    def __init__(self, scene: str, problem: str) -> None:
+        super().__init__(scene, problem)
+        self.scene, self.problem = scene, problem
+
+    def __str__(self) -> str:
+        return f"scene {self.scene}: {self.problem}"

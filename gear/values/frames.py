@@ -1,0 +1,123 @@
+"""What the renderer saw: frames of aligned RGB, depth and geom ids, and what each geom is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.values.geometry import RigidTransform
+from gear.values.labels import KittiType
+from gear.values.scene import CameraRecord
+
+UInt8Image = npt.NDArray[np.uint8]
+UInt16Image = npt.NDArray[np.uint16]
+FloatImage = npt.NDArray[np.float32]
+IdImage = npt.NDArray[np.int32]
+
+LINEAR_FULL_SCALE = 1020
+"""Linear frames count 0..1020: four 8-bit samples added, so that 2x2 supersampling keeps ten bits."""
+
+STATIC_OBJECT_BASE = 1000
+"""Countable things of the town (traffic lights, benches…) have object ids from here on; actors have smaller ones."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class View:
+    """One camera's picture and its exact truth, pixel-aligned.
+
+    Attributes:
+        camera: pinhole and pose.
+        linear_rgb: (H, W, 3) uint16, linear in scene light, 0..`LINEAR_FULL_SCALE`.
+        rgb: (H, W, 3) uint8, sRGB after gear's camera, row 0 at the top.
+        depth_m: (H, W) float32, planar z, NaN where nothing was hit; sampled at pixel centres, no anti-aliasing.
+        geom_id: (H, W) int32, -1 where nothing was hit; sampled at the same points as `depth_m`.
+    """
+
+    camera: CameraRecord
+    linear_rgb: UInt16Image
+    rgb: UInt8Image
+    depth_m: FloatImage
+    geom_id: IdImage
+
+    def __post_init__(self) -> None:
+        size = (self.camera.height_px, self.camera.width_px)
+        for name, shape in (("linear_rgb", (*size, 3)), ("rgb", (*size, 3)), ("depth_m", size), ("geom_id", size)):
+            got = getattr(self, name).shape
+            if got != shape:
+                raise ValueError(f"{name} must have shape {shape}, got {got}")
+            getattr(self, name).setflags(write=False)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class GeomTable:
+    """What each geom of the render model is in this sample; arrays are indexed by geom id.
+
+    Attributes:
+        label_code: (ngeom,) uint8, codes of `gear.values.labels`; 255 for geoms that are never seen.
+        object_id: (ngeom,) int32, the actor's id, `STATIC_OBJECT_BASE` + n for countable things of the town, -1 for the rest.
+        surface_index: (ngeom,) int16, index into `SceneRecord.surfaces` for the face that takes the patch, else -1.
+    """
+
+    label_code: npt.NDArray[np.uint8]
+    object_id: npt.NDArray[np.int32]
+    surface_index: npt.NDArray[np.int16]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Shape:
+    """The visible triangles of an asset, in its own frame.
+
+    Attributes:
+        vertices_m: (N, 3) float64.
+        faces: (M, 3) int32.
+        face_label_code: (M,) uint8.
+        box_centre_m: (3,) middle of the tight box along the frame's axes.
+        box_size_m: (3,) its length (x), width (y), height (z).
+    """
+
+    vertices_m: npt.NDArray[np.float64]
+    faces: npt.NDArray[np.int32]
+    face_label_code: npt.NDArray[np.uint8]
+    box_centre_m: npt.NDArray[np.float64]
+    box_size_m: npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class SceneObject:
+    """A countable thing: an actor, or a traffic light, bench… of the town.
+
+    Attributes:
+        id: as in `GeomTable.object_id`.
+        asset: MJCF it comes from, or the body's name for things of the town.
+        label_code: what it mainly is (a cyclist is a bicycle, with rider geoms on it).
+        kitti_type: KITTI's type of the whole, or None.
+        is_ego: whether it carries the cameras (never labelled).
+        world_from_object: pose.
+        shape: its triangles.
+    """
+
+    id: int
+    asset: str
+    label_code: int
+    kitti_type: KittiType | None
+    is_ego: bool
+    world_from_object: RigidTransform
+    shape: Shape
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Frame:
+    """All views of one sample with the tables to read them.
+
+    Attributes:
+        views: by camera name.
+        geoms: what each geom id is.
+        objects: countable things by object id (all that the scene holds, seen or not).
+    """
+
+    views: Mapping[str, View]
+    geoms: GeomTable
+    objects: Mapping[int, SceneObject] = field(default_factory=dict)

@@ -1,0 +1,160 @@
+"""Rigid transforms that know their frames, and the pinhole.
+
+Frames: world is x east, y north, z up. Cameras are x right, y down, z forward. Actors are x forward, y left, z up, origin on the
+ground in the middle of the footprint. Surfaces are x right, y down as their viewer sees them, z into the board.
+Pixels: index pixels, the centre of the first pixel is (0, 0), so a symmetric pinhole has cx = (W - 1) / 2.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+class FrameMismatchError(ValueError):
+    """Two transforms that do not meet in one frame."""
+
+
+def frozen(array: npt.ArrayLike, shape: tuple[int, ...] | None = None) -> Array:
+    """A read-only float64 copy; `shape` is demanded where given.
+
+    Raises:
+        ValueError: the shape is another.
+    """
+    copy = np.array(array, dtype=np.float64)
+    if shape is not None and copy.shape != shape:
+        raise ValueError(f"array must have shape {shape}, got {copy.shape}")
+    copy.setflags(write=False)
+    return copy
+
+
+def wrap_angle_rad(angle_rad: float) -> float:
+    """The same angle in [-pi, pi)."""
+    return (angle_rad + math.pi) % (2 * math.pi) - math.pi
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RigidTransform:
+    """`dst_from_src`: takes coordinates in frame `src` to coordinates in frame `dst`.
+
+    Attributes:
+        dst, src: frame names, checked whenever transforms are chained.
+        matrix: (4, 4) float64, read-only; the rotation is proper.
+    """
+
+    dst: str
+    src: str
+    matrix: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "matrix", frozen(self.matrix, (4, 4)))
+
+    @staticmethod
+    def from_parts(dst: str, src: str, rotation: npt.ArrayLike, translation_m: npt.ArrayLike) -> RigidTransform:
+        """From a (3, 3) rotation and a (3,) translation in metres."""
+        matrix = np.eye(4)
+        matrix[:3, :3] = rotation
+        matrix[:3, 3] = translation_m
+        return RigidTransform(dst, src, matrix)
+
+    @staticmethod
+    def from_yaw(dst: str, src: str, position_m: npt.ArrayLike, yaw_rad: float) -> RigidTransform:
+        """Turned about z by `yaw_rad`, counter-clockwise seen from above, then moved to `position_m`."""
+        c, s = math.cos(yaw_rad), math.sin(yaw_rad)
+        return RigidTransform.from_parts(dst, src, [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]], position_m)
+
+    @property
+    def rotation(self) -> Array:
+        """(3, 3)."""
+        return self.matrix[:3, :3]
+
+    @property
+    def translation_m(self) -> Array:
+        """(3,): where the origin of `src` lies in `dst`."""
+        return self.matrix[:3, 3]
+
+    @property
+    def yaw_rad(self) -> float:
+        """Heading of the x axis about z, counter-clockwise."""
+        return math.atan2(self.matrix[1, 0], self.matrix[0, 0])
+
+    def inverse(self) -> RigidTransform:
+        """`src_from_dst`."""
+        rotation = self.rotation.T
+        return RigidTransform.from_parts(self.src, self.dst, rotation, -rotation @ self.translation_m)
+
+    def __matmul__(self, other: RigidTransform) -> RigidTransform:
+        if self.src != other.dst:
+            raise FrameMismatchError(
+                f"cannot chain {self.dst}_from_{self.src} @ {other.dst}_from_{other.src}: {self.src!r} is not {other.dst!r}"
+            )
+        return RigidTransform(self.dst, other.src, self.matrix @ other.matrix)
+
+    def apply(self, points_m: npt.ArrayLike) -> Array:
+        """(..., 3) points in `src` to (..., 3) points in `dst`."""
+        return np.asarray(points_m, dtype=np.float64) @ self.rotation.T + self.translation_m
+
+
+CAMERA_FROM_ACTOR_AXES = frozen([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
+"""Rotation from actor axes (x forward, y left, z up) to camera axes (x right, y down, z forward)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Intrinsics:
+    """A symmetric pinhole in index pixels.
+
+    Attributes:
+        width_px, height_px: size of the picture.
+        focal_px: fx = fy.
+    """
+
+    width_px: int
+    height_px: int
+    focal_px: float
+
+    @staticmethod
+    def from_hfov(width_px: int, height_px: int, hfov_rad: float) -> Intrinsics:
+        """From the horizontal field of view."""
+        return Intrinsics(width_px, height_px, width_px / (2 * math.tan(hfov_rad / 2)))
+
+    @property
+    def cx_px(self) -> float:
+        """Principal point, index pixels."""
+        return (self.width_px - 1) / 2
+
+    @property
+    def cy_px(self) -> float:
+        """Principal point, index pixels."""
+        return (self.height_px - 1) / 2
+
+    @property
+    def hfov_rad(self) -> float:
+        """Horizontal field of view."""
+        return 2 * math.atan(self.width_px / (2 * self.focal_px))
+
+    @property
+    def vfov_rad(self) -> float:
+        """Vertical field of view (MuJoCo's fovy)."""
+        return 2 * math.atan(self.height_px / (2 * self.focal_px))
+
+    @property
+    def matrix(self) -> Array:
+        """(3, 3) K in index pixels."""
+        return frozen([[self.focal_px, 0, self.cx_px], [0, self.focal_px, self.cy_px], [0, 0, 1]])
+
+    def project(self, points_camera_m: npt.ArrayLike) -> Array:
+        """(..., 3) camera points with z > 0 to (..., 2) index pixels."""
+        points = np.asarray(points_camera_m, dtype=np.float64)
+        scaled = points[..., :2] / points[..., 2:3] * self.focal_px
+        return np.asarray(scaled + (self.cx_px, self.cy_px))
+
+    def unproject(self, pixels: npt.ArrayLike, depth_m: npt.ArrayLike) -> Array:
+        """(..., 2) index pixels and (...) planar depths to (..., 3) camera points."""
+        uv = np.asarray(pixels, dtype=np.float64)
+        z = np.asarray(depth_m, dtype=np.float64)[..., None]
+        return np.concatenate([(uv - (self.cx_px, self.cy_px)) / self.focal_px * z, z], axis=-1)

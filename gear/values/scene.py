@@ -1,0 +1,225 @@
+"""The scene is data: a `SceneRecord` says everything about one sample, and is saved beside it.
+
+A record is a pure function of (config, seed, index). Nothing in it depends on the patch.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from gear.values.geometry import Intrinsics, RigidTransform
+
+Vec3 = tuple[float, float, float]
+Quat = tuple[float, float, float, float]
+Role = Literal["ego", "npc", "parked", "carrier", "pedestrian"]
+
+POSE_DIGITS = 6
+"""Poses are rounded to micrometres (and 1e-9 in quaternions) so that records are equal across machines."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pose:
+    """Where a frame stands in another one: the field's name says which, `dst_from_src`.
+
+    Attributes:
+        position_m: origin of `src` in `dst`.
+        quat_wxyz: unit quaternion of the rotation.
+    """
+
+    position_m: Vec3
+    quat_wxyz: Quat = (1.0, 0.0, 0.0, 0.0)
+
+    @staticmethod
+    def from_transform(transform: RigidTransform) -> Pose:
+        """Rounded as records are."""
+        position = tuple(round(float(v), POSE_DIGITS) + 0.0 for v in transform.translation_m)
+        quat = tuple(round(float(v), 9) + 0.0 for v in _quat_from_rotation(transform.rotation))
+        return Pose(position_m=(position[0], position[1], position[2]), quat_wxyz=(quat[0], quat[1], quat[2], quat[3]))
+
+    def transform(self, dst: str, src: str) -> RigidTransform:
+        """`dst_from_src`."""
+        w, x, y, z = np.asarray(self.quat_wxyz) / np.linalg.norm(self.quat_wxyz)
+        rotation = [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+        return RigidTransform.from_parts(dst, src, rotation, self.position_m)
+
+
+def _quat_from_rotation(rotation: np.ndarray) -> np.ndarray:
+    """(3, 3) to wxyz with w >= 0, by the numerically largest component."""
+    m = rotation
+    squares = np.array(
+        [1 + m[0, 0] + m[1, 1] + m[2, 2], 1 + m[0, 0] - m[1, 1] - m[2, 2], 1 - m[0, 0] + m[1, 1] - m[2, 2],
+         1 - m[0, 0] - m[1, 1] + m[2, 2]]
+    )  # fmt: skip
+    k = int(np.argmax(squares))
+    s = 2 * np.sqrt(squares[k])
+    if k == 0:
+        q = np.array([s / 4, (m[2, 1] - m[1, 2]) / s, (m[0, 2] - m[2, 0]) / s, (m[1, 0] - m[0, 1]) / s])
+    elif k == 1:
+        q = np.array([(m[2, 1] - m[1, 2]) / s, s / 4, (m[0, 1] + m[1, 0]) / s, (m[0, 2] + m[2, 0]) / s])
+    elif k == 2:
+        q = np.array([(m[0, 2] - m[2, 0]) / s, (m[0, 1] + m[1, 0]) / s, s / 4, (m[1, 2] + m[2, 1]) / s])
+    else:
+        q = np.array([(m[1, 0] - m[0, 1]) / s, (m[0, 2] + m[2, 0]) / s, (m[1, 2] + m[2, 1]) / s, s / 4])
+    return -q if q[0] < 0 else q
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Weather:
+    """CARLA's weather parameters with CARLA's meaning and units.
+
+    Attributes:
+        cloudiness, precipitation, precipitation_deposits, wind_intensity, fog_density, wetness: percent, 0..100.
+        sun_azimuth_deg: where the sun stands, counter-clockwise from east in gear's world.
+        sun_altitude_deg: above the horizon; 90 is the zenith.
+        fog_distance_m: where the fog begins.
+        fog_falloff: how quickly fog thins with height; 0 is no thinning.
+        scattering_intensity, mie_scattering_scale, rayleigh_scattering_scale: strength of light scattering in the air.
+    """
+
+    name: str
+    cloudiness: float = 0.0
+    precipitation: float = 0.0
+    precipitation_deposits: float = 0.0
+    wind_intensity: float = 0.0
+    sun_azimuth_deg: float = 225.0
+    sun_altitude_deg: float = 45.0
+    fog_density: float = 0.0
+    fog_distance_m: float = 0.75
+    fog_falloff: float = 0.1
+    wetness: float = 0.0
+    scattering_intensity: float = 1.0
+    mie_scattering_scale: float = 0.03
+    rayleigh_scattering_scale: float = 0.0331
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ActorRecord:
+    """One vehicle or person.
+
+    Attributes:
+        id: stable within a sequence, >= 1.
+        asset: name of its MJCF.
+        role: why it is there; `carrier` bears a surface, `ego` carries the cameras.
+        world_from_actor: its frame is x forward, y left, z up, origin on the ground in the middle of the footprint.
+        velocity_world_mps: linear velocity.
+        paint_rgb: linear albedo of its `.paint` geoms, or None for the asset's own.
+    """
+
+    id: int
+    asset: str
+    role: Role
+    world_from_actor: Pose
+    velocity_world_mps: Vec3 = (0.0, 0.0, 0.0)
+    paint_rgb: Vec3 | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SurfaceRecord:
+    """One rectangle that takes a patch.
+
+    Attributes:
+        name: `surface_0`, `surface_1`, …: takes `patch_0`, `patch_1`, ….
+        asset: MJCF of the board that bears it, or of the actor.
+        actor_id: the actor whose body is its parent, or None for the world.
+        parent_from_surface: frame x right, y down as its viewer sees it, z into the board, origin in the middle of the face.
+        width_m, height_m: size of the face.
+    """
+
+    name: str
+    asset: str
+    actor_id: int | None
+    parent_from_surface: Pose
+    width_m: float
+    height_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraRecord:
+    """One pinhole camera of one sample. World-from-camera axes: x right, y down, z forward."""
+
+    name: str
+    width_px: int
+    height_px: int
+    focal_px: float
+    world_from_camera: Pose
+
+    @property
+    def intrinsics(self) -> Intrinsics:
+        """The pinhole in index pixels."""
+        return Intrinsics(self.width_px, self.height_px, self.focal_px)
+
+    @property
+    def world_from_camera_transform(self) -> RigidTransform:
+        """`world_from_camera`."""
+        return self.world_from_camera.transform("world", "camera")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SceneRecord:
+    """Everything about one sample but its patch.
+
+    Attributes:
+        version: of this data model.
+        town, scene, split: where it belongs.
+        seed, index: what it was drawn from; `index` counts all frames of a split.
+        sequence, frame, time_s: its place in time; a sequence is one frame long unless the split drives.
+        weather: light and air.
+        actors: the ego car first; ids are unique.
+        surfaces: what takes patches, in patch order.
+        cameras: the rig, placed.
+    """
+
+    version: int = 1
+    town: str
+    scene: str
+    split: str
+    seed: int
+    index: int
+    sequence: int
+    frame: int
+    time_s: float
+    weather: Weather
+    actors: tuple[ActorRecord, ...]
+    surfaces: tuple[SurfaceRecord, ...]
+    cameras: tuple[CameraRecord, ...]
+
+    @property
+    def ego(self) -> ActorRecord:
+        """The car that carries the cameras."""
+        return next(actor for actor in self.actors if actor.role == "ego")
+
+    def actor(self, actor_id: int) -> ActorRecord:
+        """By id.
+
+        Raises:
+            KeyError: there is none.
+        """
+        for actor in self.actors:
+            if actor.id == actor_id:
+                return actor
+        raise KeyError(actor_id)
+
+    def camera(self, name: str) -> CameraRecord:
+        """By name.
+
+        Raises:
+            KeyError: there is none.
+        """
+        for camera in self.cameras:
+            if camera.name == name:
+                return camera
+        raise KeyError(name)
+
+    def world_from_surface(self, surface: SurfaceRecord) -> RigidTransform:
+        """The surface's frame in the world, on its board or on its moving actor."""
+        if surface.actor_id is None:
+            return surface.parent_from_surface.transform("world", surface.name)
+        world_from_actor = self.actor(surface.actor_id).world_from_actor.transform("world", "actor")
+        return world_from_actor @ surface.parent_from_surface.transform("actor", surface.name)

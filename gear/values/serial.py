@@ -1,0 +1,103 @@
+"""Frozen dataclasses to JSON and back, by their declared types. No pickles, no guessing."""
+
+from __future__ import annotations
+
+import dataclasses
+import types
+from functools import cache
+from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+
+from gear.values.errors import FieldError
+
+Json = Any
+"""Whatever `json.loads` gives: None, bool, int, float, str, list, dict with string keys."""
+
+T = TypeVar("T")
+
+
+def to_json(value: Any) -> Json:
+    """Dataclasses become dicts, tuples become lists, everything else must be JSON already."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {field.name: to_json(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    if isinstance(value, (tuple, list)):
+        return [to_json(item) for item in value]
+    if isinstance(value, dict):
+        return {str(key): to_json(item) for key, item in value.items()}
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    raise TypeError(f"{type(value).__name__} has no JSON form")
+
+
+@cache
+def _hints(cls: type[Any]) -> dict[str, Any]:
+    return get_type_hints(cls)
+
+
+def from_json(kind: type[T], value: Json, where: str = "") -> T:
+    """Reads `value` into the declared type.
+
+    Raises:
+        FieldError: a key is unknown or missing, or a value has another type; says where.
+    """
+    return cast(T, _read(kind, value, where))
+
+
+def _read(kind: Any, value: Json, where: str) -> Any:
+    origin = get_origin(kind)
+    if kind is Any:
+        return value
+    if origin in (Union, types.UnionType):
+        options = get_args(kind)
+        if value is None and type(None) in options:
+            return None
+        return _read(next(option for option in options if option is not type(None)), value, where)
+    if origin is Literal:
+        if value not in get_args(kind):
+            raise FieldError(where, f"expected one of {', '.join(map(str, get_args(kind)))}, got {value!r}")
+        return value
+    if origin is tuple:
+        return _read_tuple(get_args(kind), value, where)
+    if origin is dict:
+        if not isinstance(value, dict):
+            raise FieldError(where, f"expected a mapping, got {value!r}")
+        item_kind = get_args(kind)[1]
+        return {key: _read(item_kind, item, f"{where}.{key}") for key, item in value.items()}
+    if dataclasses.is_dataclass(kind):
+        return _read_dataclass(cast(type[Any], kind), value, where)
+    return _read_scalar(kind, value, where)
+
+
+def _read_tuple(kinds: tuple[Any, ...], value: Json, where: str) -> tuple[Any, ...]:
+    if not isinstance(value, list):
+        raise FieldError(where, f"expected a list, got {value!r}")
+    if len(kinds) == 2 and kinds[1] is Ellipsis:
+        return tuple(_read(kinds[0], item, f"{where}[{i}]") for i, item in enumerate(value))
+    if len(kinds) != len(value):
+        raise FieldError(where, f"expected {len(kinds)} items, got {len(value)}")
+    return tuple(_read(k, item, f"{where}[{i}]") for i, (k, item) in enumerate(zip(kinds, value, strict=True)))
+
+
+def _read_dataclass(kind: type[Any], value: Json, where: str) -> Any:
+    if not isinstance(value, dict):
+        raise FieldError(where, f"expected a mapping, got {value!r}")
+    hints = _hints(kind)
+    fields = {field.name: field for field in dataclasses.fields(kind)}
+    for key in value:
+        if key not in fields:
+            raise FieldError(f"{where}.{key}".lstrip("."), "unknown key")
+    given = {key: _read(hints[key], item, f"{where}.{key}".lstrip(".")) for key, item in value.items()}
+    for name, field in fields.items():
+        has_default = field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING
+        if name not in given and not has_default:
+            raise FieldError(f"{where}.{name}".lstrip("."), "missing")
+    return kind(**given)
+
+
+def _read_scalar(kind: Any, value: Json, where: str) -> Any:
+    if kind is float and isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    if kind in (int, float) and isinstance(value, bool):
+        raise FieldError(where, f"expected {kind.__name__}, got {value!r}")
+    if not isinstance(value, kind):
+        raise FieldError(where, f"expected {getattr(kind, '__name__', kind)}, got {value!r}")
+    return value

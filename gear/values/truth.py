@@ -1,0 +1,82 @@
+"""Measured ground truth: what of an object or a surface is visible, and where it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+BoxPx = tuple[float, float, float, float]
+"""left, top, right, bottom in edge pixels: the picture spans [0, W] x [0, H]; a mask over columns a..b has left a, right b + 1."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ObjectTruth:
+    """One object (or one labelled part of it, such as a rider) in one view.
+
+    Attributes:
+        object_id: as in `GeomTable.object_id`.
+        label_code: of the part that was measured.
+        visible_px: pixels of it in the id buffer.
+        visible_box: tight box of those pixels, None if there are none.
+        amodal_px: pixels that it would cover alone, inside and outside the picture.
+        amodal_in_image_px: those of them inside the picture.
+        amodal_box: tight box of the whole silhouette, may exceed the picture.
+        mask: (h, w) bool of the visible pixels inside `visible_box`.
+    """
+
+    object_id: int
+    label_code: int
+    visible_px: int
+    visible_box: BoxPx | None
+    amodal_px: int
+    amodal_in_image_px: int
+    amodal_box: BoxPx
+    mask: npt.NDArray[np.bool_]
+
+    @property
+    def visible_fraction(self) -> float:
+        """Visible share of the whole silhouette, 0..1."""
+        return min(1.0, self.visible_px / self.amodal_px) if self.amodal_px else 0.0
+
+    @property
+    def occluded_fraction(self) -> float:
+        """Share of the silhouette inside the picture that something else covers, 0..1."""
+        return max(0.0, 1.0 - self.visible_px / self.amodal_in_image_px) if self.amodal_in_image_px else 0.0
+
+    @property
+    def truncated_fraction(self) -> float:
+        """Share of the silhouette outside the picture, 0..1."""
+        return 1.0 - self.amodal_in_image_px / self.amodal_px if self.amodal_px else 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SurfaceTruth:
+    """One patch surface in one view; JSON-ready.
+
+    Attributes:
+        name: as in `SurfaceRecord.name`.
+        camera: name of the view.
+        camera_from_surface: (4, 4) row-major, as 16 numbers.
+        corners_px: index pixels of the corners (top left, top right, bottom right, bottom left of the patch) or None where one lies
+            behind the camera.
+        image_from_unit: homography as 9 row-major numbers from patch coordinates (u right, v down, 0..1 over the face) to index
+            pixels; None as above.
+        visible_px: pixels of the face in the id buffer.
+        visible_fraction: of the face's silhouette, inside and outside the picture.
+        distance_m: camera to the middle of the face.
+        incidence_deg: between the face's outward normal and the way to the camera; 0 is head-on, above 90 is seen from behind.
+        mask_rle: COCO run-length encoding of the visible mask, compressed string, for size (H, W).
+    """
+
+    name: str
+    camera: str
+    camera_from_surface: tuple[float, ...]
+    corners_px: tuple[tuple[float, float], ...] | None
+    image_from_unit: tuple[float, ...] | None
+    visible_px: int
+    visible_fraction: float
+    distance_m: float
+    incidence_deg: float
+    mask_rle: str
