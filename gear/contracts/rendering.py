@@ -57,7 +57,8 @@ class RawView:
     """What a renderer returns for one camera; aligned arrays, row 0 at the top.
 
     Attributes:
-        linear_rgb: (H, W, 3) uint16, 0..`LINEAR_FULL_SCALE`, linear in every surface's albedo; None where colour was not asked for.
+        linear_rgb: (H, W, 3) uint16, 0..`LINEAR_FULL_SCALE`, linear in every surface's albedo; None where colour was
+            not asked for.
         depth_m: (H, W) float32 planar z, NaN for nothing; None where truth was not asked for.
         geom_id: (H, W) int32, -1 for nothing; None as above.
     """
@@ -68,7 +69,10 @@ class RawView:
 
 
 class Renderer(Protocol):
-    """One renderer for one compiled model. Frames depend on the stage and the camera alone, never on what was rendered before."""
+    """One renderer for one compiled model.
+
+    Frames depend on the stage and the camera alone, never on what was rendered before.
+    """
 
     @property
     def info(self) -> RendererInfo:

@@ -60,7 +60,8 @@ class Encoded:
 
     Attributes:
         files: bytes by path relative to the dataset's root, `/` between folders.
-        facts: what of the sample goes into the sidecar, so that `decode` and `finalise` need no second computation; JSON.
+        facts: what of the sample goes into the sidecar, so that `decode` and `finalise` need no second computation;
+            JSON.
     """
 
     files: Mapping[str, bytes]
@@ -103,7 +104,8 @@ class Evaluator(Protocol[SampleT_contra, PredictionT_contra]):
 class Task(Protocol[SampleT, PredictionT]):
     """A dataset format with its ground truth. Holds options only, no state between calls.
 
-    `encode` and `finalise` are pure: they return bytes, and the dataset room writes them atomically, hashes and resumes.
+    `encode` and `finalise` are pure: they return bytes, and the dataset room writes them atomically, hashes and
+    resumes.
     """
 
     def rig(self) -> Rig:
@@ -135,5 +137,8 @@ class Task(Protocol[SampleT, PredictionT]):
         ...
 
     def preview(self, sample: SampleT) -> Mapping[str, UInt8Image]:
-        """Pictures a person would look at, by name: the image with its labels, boxes, depth drawn in; (H, W, 3) uint8 each."""
+        """Pictures a person would look at, by name.
+
+        The image with its labels, boxes, depth drawn in; (H, W, 3) uint8 each.
+        """
         ...

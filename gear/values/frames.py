@@ -57,7 +57,8 @@ class GeomTable:
 
     Attributes:
         label_code: (ngeom,) uint8, codes of `gear.values.labels`; 255 for geoms that are never seen.
-        object_id: (ngeom,) int32, the actor's id, `STATIC_OBJECT_BASE` + n for countable things of the town, -1 for the rest.
+        object_id: (ngeom,) int32, the actor's id, `STATIC_OBJECT_BASE` + n for countable things of the town, -1 for
+            the rest.
         surface_index: (ngeom,) int16, index into `SceneRecord.surfaces` for the face that takes the patch, else -1.
     """
 

@@ -1,6 +1,7 @@
 """Rigid transforms that know their frames, and the pinhole.
 
-Frames: world is x east, y north, z up. Cameras are x right, y down, z forward. Actors are x forward, y left, z up, origin on the
+Frames: world is x east, y north, z up. Cameras are x right, y down, z forward. Actors are x forward, y left, z up,
+origin on the
 ground in the middle of the footprint. Surfaces are x right, y down as their viewer sees them, z into the board.
 Pixels: index pixels, the centre of the first pixel is (0, 0), so a symmetric pinhole has cx = (W - 1) / 2.
 """
@@ -91,7 +92,8 @@ class RigidTransform:
     def __matmul__(self, other: RigidTransform) -> RigidTransform:
         if self.src != other.dst:
             raise FrameMismatchError(
-                f"cannot chain {self.dst}_from_{self.src} @ {other.dst}_from_{other.src}: {self.src!r} is not {other.dst!r}"
+                f"cannot chain {self.dst}_from_{self.src} @ {other.dst}_from_{other.src}:"
+                f" {self.src!r} is not {other.dst!r}"
             )
         return RigidTransform(self.dst, other.src, self.matrix @ other.matrix)
 
@@ -145,13 +147,13 @@ class Intrinsics:
     @property
     def matrix(self) -> Array:
         """(3, 3) K in index pixels."""
-        return frozen([[self.focal_px, 0, self.cx_px], [0, self.focal_px, self.cy_px], [0, 0, 1]])
+        return frozen([[self.focal_px, 0.0, self.cx_px], [0.0, self.focal_px, self.cy_px], [0.0, 0.0, 1.0]])
 
     def project(self, points_camera_m: npt.ArrayLike) -> Array:
         """(..., 3) camera points with z > 0 to (..., 2) index pixels."""
         points = np.asarray(points_camera_m, dtype=np.float64)
         scaled = points[..., :2] / points[..., 2:3] * self.focal_px
-        return np.asarray(scaled + (self.cx_px, self.cy_px))
+        return np.asarray(scaled + np.array([self.cx_px, self.cy_px]))
 
     def unproject(self, pixels: npt.ArrayLike, depth_m: npt.ArrayLike) -> Array:
         """(..., 2) index pixels and (...) planar depths to (..., 3) camera points."""

@@ -1,4 +1,7 @@
-"""What a thing is: gear's labels and their names in Cityscapes, COCO and KITTI. `docs/mjcf-conventions.md` is this table in words."""
+"""What a thing is.
+
+Gear's labels and their names in Cityscapes, COCO and KITTI. `docs/mjcf-conventions.md` is this table in words.
+"""
 
 from __future__ import annotations
 

@@ -63,7 +63,8 @@ class Rig:
 
     Attributes:
         cameras: the first one is the reference: the board must be in its view.
-        follows_road: False keeps the rig level (yaw only), as the CARLA-GeAR loaders demand; True takes the car's pitch and roll.
+        follows_road: False keeps the rig level (yaw only), as the CARLA-GeAR loaders demand; True takes the car's
+            pitch and roll.
     """
 
     cameras: tuple[CameraMount, ...]

@@ -128,7 +128,8 @@ class SurfaceRecord:
         name: `surface_0`, `surface_1`, …: takes `patch_0`, `patch_1`, ….
         asset: MJCF of the board that bears it, or of the actor.
         actor_id: the actor whose body is its parent, or None for the world.
-        parent_from_surface: frame x right, y down as its viewer sees it, z into the board, origin in the middle of the face.
+        parent_from_surface: frame x right, y down as its viewer sees it, z into the board, origin in the middle of
+            the face.
         width_m, height_m: size of the face.
     """
 

@@ -29,7 +29,8 @@ def to_json(value: Any) -> Json:
 
 
 @cache
-def _hints(cls: type[Any]) -> dict[str, Any]:
+def type_hints(cls: Any) -> dict[str, Any]:
+    """Resolved annotations of a class, computed once."""
     return get_type_hints(cls)
 
 
@@ -63,7 +64,7 @@ def _read(kind: Any, value: Json, where: str) -> Any:
         item_kind = get_args(kind)[1]
         return {key: _read(item_kind, item, f"{where}.{key}") for key, item in value.items()}
     if dataclasses.is_dataclass(kind):
-        return _read_dataclass(cast(type[Any], kind), value, where)
+        return _read_dataclass(kind, value, where)
     return _read_scalar(kind, value, where)
 
 
@@ -77,10 +78,10 @@ def _read_tuple(kinds: tuple[Any, ...], value: Json, where: str) -> tuple[Any, .
     return tuple(_read(k, item, f"{where}[{i}]") for i, (k, item) in enumerate(zip(kinds, value, strict=True)))
 
 
-def _read_dataclass(kind: type[Any], value: Json, where: str) -> Any:
+def _read_dataclass(kind: Any, value: Json, where: str) -> Any:
     if not isinstance(value, dict):
         raise FieldError(where, f"expected a mapping, got {value!r}")
-    hints = _hints(kind)
+    hints = type_hints(kind)
     fields = {field.name: field for field in dataclasses.fields(kind)}
     for key in value:
         if key not in fields:

@@ -8,7 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 BoxPx = tuple[float, float, float, float]
-"""left, top, right, bottom in edge pixels: the picture spans [0, W] x [0, H]; a mask over columns a..b has left a, right b + 1."""
+"""left, top, right, bottom in edge pixels.
+
+The picture spans [0, W] x [0, H]; a mask over columns a..b has left a, right b + 1.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -59,14 +62,17 @@ class SurfaceTruth:
         name: as in `SurfaceRecord.name`.
         camera: name of the view.
         camera_from_surface: (4, 4) row-major, as 16 numbers.
-        corners_px: index pixels of the corners (top left, top right, bottom right, bottom left of the patch) or None where one lies
+        corners_px: index pixels of the corners (top left, top right, bottom right, bottom left of the patch) or None
+            where one lies
             behind the camera.
-        image_from_unit: homography as 9 row-major numbers from patch coordinates (u right, v down, 0..1 over the face) to index
+        image_from_unit: homography as 9 row-major numbers from patch coordinates (u right, v down, 0..1 over the
+            face) to index
             pixels; None as above.
         visible_px: pixels of the face in the id buffer.
         visible_fraction: of the face's silhouette, inside and outside the picture.
         distance_m: camera to the middle of the face.
-        incidence_deg: between the face's outward normal and the way to the camera; 0 is head-on, above 90 is seen from behind.
+        incidence_deg: between the face's outward normal and the way to the camera; 0 is head-on, above 90 is seen
+            from behind.
         mask_rle: COCO run-length encoding of the visible mask, compressed string, for size (H, W).
     """
 
