@@ -1,0 +1,164 @@
+"""The collection config: what to collect, where, and with which patch. And the simulation config: how much of it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import ClassVar, Literal
+
+from gear.config.nodes import Mapping, Node, Place
+from gear.contracts.rendering import Quality
+from gear.values.errors import FieldError
+
+SPLIT_NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WeatherConfig:
+    """A preset and what differs from it. Units are CARLA's: percent, degrees, metres.
+
+    Attributes:
+        preset: name of a weather preset.
+        cloudiness, precipitation, precipitation_deposits, wind_intensity, fog_density, wetness: percent, 0 to 100.
+        sun_azimuth_deg: counter-clockwise from east.
+        sun_altitude_deg: above the horizon, -90 to 90.
+        fog_distance_m: where the fog begins.
+        fog_falloff: how quickly fog thins with height.
+        scattering_intensity, mie_scattering_scale, rayleigh_scattering_scale: strength of scattering, not negative.
+    """
+
+    SHORTHAND: ClassVar[str] = "preset"
+    PERCENT: ClassVar[tuple[str, ...]] = (
+        "cloudiness",
+        "precipitation",
+        "precipitation_deposits",
+        "wind_intensity",
+        "fog_density",
+        "wetness",
+    )
+
+    preset: str = "ClearNoon"
+    cloudiness: float | None = None
+    precipitation: float | None = None
+    precipitation_deposits: float | None = None
+    wind_intensity: float | None = None
+    sun_azimuth_deg: float | None = None
+    sun_altitude_deg: float | None = None
+    fog_density: float | None = None
+    fog_distance_m: float | None = None
+    fog_falloff: float | None = None
+    wetness: float | None = None
+    scattering_intensity: float | None = None
+    mie_scattering_scale: float | None = None
+    rayleigh_scattering_scale: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in self.PERCENT:
+            value = getattr(self, name)
+            if value is not None and not 0 <= value <= 100:
+                raise FieldError(name, f"is a percentage, 0 to 100, got {value:g}")
+        if self.sun_altitude_deg is not None and not -90 <= self.sun_altitude_deg <= 90:
+            raise FieldError("sun_altitude_deg", f"must be -90 to 90 degrees, got {self.sun_altitude_deg:g}")
+        for name in ("fog_distance_m", "fog_falloff", "scattering_intensity", "mie_scattering_scale",
+                     "rayleigh_scattering_scale"):  # fmt: skip
+            value = getattr(self, name)
+            if value is not None and value < 0:
+                raise FieldError(name, f"must not be negative, got {value:g}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SplitConfig:
+    """How much of one split, drawn from which seed.
+
+    Attributes:
+        seed: the one seed that enters.
+        samples: sequences; each is one picture long unless `frames` says otherwise.
+        frames: frames of one driving sequence.
+        interval_s: time between two frames of a sequence.
+    """
+
+    seed: int
+    samples: int
+    frames: int = 1
+    interval_s: float = 0.1
+
+    def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise FieldError("seed", f"must not be negative, got {self.seed}")
+        if not 1 <= self.samples <= 1_000_000:
+            raise FieldError("samples", f"must be 1 to 1000000, got {self.samples}")
+        if not 1 <= self.frames <= 100_000:
+            raise FieldError("frames", f"must be 1 to 100000, got {self.frames}")
+        if not 0.001 <= self.interval_s <= 10:
+            raise FieldError("interval_s", f"must be 0.001 to 10 s, got {self.interval_s:g}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulationConfig:
+    """Seeds and counts of every split, and the most that a scene may hold.
+
+    Attributes:
+        splits: by name; `test_night` takes the entry of `test` unless it has its own.
+        max_vehicles, max_pedestrians: upper limits on NPCs; a scene's own limits hold below them.
+    """
+
+    splits: dict[str, SplitConfig]
+    max_vehicles: int = 7
+    max_pedestrians: int = 200
+
+    def __post_init__(self) -> None:
+        for name in ("max_vehicles", "max_pedestrians"):
+            if not 0 <= getattr(self, name) <= 1000:
+                raise FieldError(name, f"must be 0 to 1000, got {getattr(self, name)}")
+        for split in self.splits:
+            if not SPLIT_NAME.fullmatch(split):
+                raise FieldError("splits", f"{split!r} is not a split's name (lower case words joined by _)")
+
+
+RendererName = Literal["filament", "classic"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CollectionConfig:
+    """One dataset split to collect.
+
+    Attributes:
+        task: name of a task plugin.
+        town: name of a town, or path of its MJCF.
+        scenes: name of a scene library, or path of its YAML; empty for the town's own.
+        scene: name of a scene of that library.
+        split: `train`, `val`, `test`, `debug`, `finetuning`, `video`, or one of those with `_anything` behind it.
+        root: folder of the dataset; empty for `data/<task>/<town>-<scene>-<weather>/<patch>`.
+        patch: `none`, `random`, a picture, a patch folder, or the name of an installed patch.
+        weather: a preset, or a preset and what differs.
+        renderer: `filament` (physically based) or `classic`.
+        quality: `film` (2x2 supersampled) or `fast`.
+        seed, samples: instead of the simulation config's.
+        simulation: name or path of the simulation config.
+        options: the task's own options (`gear plugins show TASK`).
+    """
+
+    task: str
+    town: str = "town10"
+    scenes: str = ""
+    scene: str = "billboard01"
+    split: str = "test"
+    root: str = ""
+    patch: str = "none"
+    weather: WeatherConfig = field(default_factory=WeatherConfig)
+    renderer: RendererName = "filament"
+    quality: Quality = "film"
+    seed: int | None = None
+    samples: int | None = None
+    simulation: str = "default"
+    options: Node = field(default_factory=lambda: Mapping({}, Place("defaults")))
+
+    def __post_init__(self) -> None:
+        if not SPLIT_NAME.fullmatch(self.split):
+            raise FieldError("split", f"{self.split!r} is not a split's name (lower case words joined by _)")
+        if self.seed is not None and self.seed < 0:
+            raise FieldError("seed", f"must not be negative, got {self.seed}")
+        if self.samples is not None and not 1 <= self.samples <= 1_000_000:
+            raise FieldError("samples", f"must be 1 to 1000000, got {self.samples}")
+        if not self.scene:
+            raise FieldError("scene", "must be a scene's name, such as billboard01")

@@ -1,0 +1,40 @@
+"""Configs back to YAML, with every default filled in: what `gear show-config` prints and every dataset keeps."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from gear.config.nodes import Items, Mapping, Node, Scalar
+from gear.values.serial import Json, to_json
+
+
+def to_yaml(config: Any) -> str:
+    """YAML text that reads back as the same config."""
+    return str(yaml.safe_dump(to_json(_plain(config)), sort_keys=False, allow_unicode=True, default_flow_style=None))
+
+
+def node_to_json(node: Node) -> Json:
+    """Texts stay texts."""
+    if isinstance(node, Scalar):
+        return None if node.is_null else node.text
+    if isinstance(node, Items):
+        return [node_to_json(item) for item in node.items]
+    return {key: node_to_json(item) for key, (_, item) in node.entries.items()}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, (Scalar, Items, Mapping)):
+        return node_to_json(value)
+    if isinstance(value, Path):
+        return str(value)
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {field.name: _plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    if isinstance(value, (tuple, list)):
+        return [_plain(item) for item in value]
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    return value

@@ -1,0 +1,122 @@
+"""YAML as a tree of texts with places. The dataclass that reads it decides the types, never YAML."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+
+from gear.values.errors import ConfigError
+
+MAX_BYTES = 4 << 20
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a node stands; line and column count from 1, line 0 is "not in a file"."""
+
+    path: str
+    line: int = 0
+    column: int = 0
+
+    def error(self, key: str, problem: str) -> ConfigError:
+        """A `ConfigError` here."""
+        return ConfigError(self.path, self.line, self.column, key, problem)
+
+
+@dataclass(frozen=True, slots=True)
+class Scalar:
+    """A text; `is_null` where YAML says nothing, `null` or `~` without quotes."""
+
+    text: str
+    is_null: bool
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Items:
+    """A list."""
+
+    items: tuple[Node, ...]
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Mapping:
+    """Keys with their places and values, in order; a repeated key is refused on reading."""
+
+    entries: dict[str, tuple[Place, Node]]
+    place: Place
+
+
+Node = Scalar | Items | Mapping
+
+
+def parse_file(path: Path) -> Node:
+    """Reads a YAML file.
+
+    Raises:
+        ConfigError: the file is missing, too large, not UTF-8 or not YAML, or repeats a key.
+    """
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise ConfigError(path, 0, 0, "", f"a config of more than {MAX_BYTES >> 20} MiB is no config")
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(path, 0, 0, "", f"cannot read it: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(path, 0, 0, "", "is not UTF-8 text") from error
+    return parse_text(text, str(path))
+
+
+def parse_text(text: str, name: str) -> Node:
+    """Reads YAML text; `name` stands for the file in errors."""
+    try:
+        root = yaml.compose(text, Loader=yaml.SafeLoader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line, column = (mark.line + 1, mark.column + 1) if mark else (0, 0)
+        raise ConfigError(name, line, column, "", f"is not YAML: {error.problem or error.context}") from error
+    except yaml.YAMLError as error:
+        raise ConfigError(name, 0, 0, "", f"is not YAML: {error}") from error
+    if root is None:
+        return Mapping({}, Place(name, 1, 1))
+    return _convert(root, name, "", {})
+
+
+def parse_value(text: str, name: str) -> Node:
+    """Reads one value as given on the command line: `12`, `fog`, `[1, 2]`, `{a: 1}`."""
+    return parse_text(text, name) if text.strip() else Scalar("", True, Place(name))
+
+
+def _convert(node: yaml.Node, name: str, key: str, done: dict[int, Node | None]) -> Node:
+    """`done` keeps what an alias points to, so that aliases of aliases cost nothing; None marks what is being read."""
+    place = Place(name, node.start_mark.line + 1, node.start_mark.column + 1)
+    if id(node) in done:
+        known = done[id(node)]
+        if known is None:
+            raise place.error(key, "an alias that contains itself")
+        return known
+    done[id(node)] = None
+    done[id(node)] = converted = _convert_new(node, place, key, done)
+    return converted
+
+
+def _convert_new(node: yaml.Node, place: Place, key: str, done: dict[int, Node | None]) -> Node:
+    if isinstance(node, yaml.ScalarNode):
+        if node.tag.startswith("tag:yaml.org,2002:python"):
+            raise place.error(key, "Python tags are not read")
+        return Scalar(node.value, node.tag == "tag:yaml.org,2002:null" and node.style is None, place)
+    if isinstance(node, yaml.SequenceNode):
+        return Items(tuple(_convert(item, place.path, f"{key}[{i}]", done) for i, item in enumerate(node.value)), place)
+    entries: dict[str, tuple[Place, Node]] = {}
+    for key_node, value_node in node.value:
+        key_place = Place(place.path, key_node.start_mark.line + 1, key_node.start_mark.column + 1)
+        if not isinstance(key_node, yaml.ScalarNode):
+            raise key_place.error(key, "keys are plain words")
+        full = f"{key}.{key_node.value}" if key else key_node.value
+        if key_node.value in entries:
+            raise key_place.error(full, f"given twice (first in line {entries[key_node.value][0].line})")
+        entries[key_node.value] = (key_place, _convert(value_node, place.path, full, done))
+    return Mapping(entries, place)

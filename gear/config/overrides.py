@@ -1,0 +1,45 @@
+"""`--set key.path=value` on top of a file, through the same reader."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from gear.config.nodes import Mapping, Node, Place, parse_value
+from gear.values.errors import ConfigError
+
+
+def with_overrides(node: Node, settings: Iterable[str]) -> Node:
+    """The tree with every `a.b.c=value` put in; later ones win.
+
+    Raises:
+        ConfigError: a setting has no `=`, or goes through something that has no keys.
+    """
+    for setting in settings:
+        key, separator, text = setting.partition("=")
+        name = f"--set {setting}"
+        if not separator or not key.strip():
+            raise ConfigError(name, 0, 0, "", "expected KEY=VALUE, such as --set weather.cloudiness=30")
+        node = with_value(node, tuple(key.strip().split(".")), parse_value(text, name))
+    return node
+
+
+def with_value(node: Node, path: tuple[str, ...], value: Node) -> Node:
+    """The tree with one value replaced or added."""
+    if not path:
+        return value
+    place = Place(value.place.path)
+    if not isinstance(node, Mapping):
+        node = Mapping({}, place)
+    key_place, below = node.entries.get(path[0], (place, Mapping({}, place)))
+    entry = (key_place, with_value(below, path[1:], value))
+    return Mapping({**node.entries, path[0]: entry}, node.place)
+
+
+def merged(base: Node, above: Node) -> Node:
+    """Two trees: keys of `above` win, mappings are merged, everything else is replaced."""
+    if not (isinstance(base, Mapping) and isinstance(above, Mapping)):
+        return above
+    entries = dict(base.entries)
+    for key, (place, item) in above.entries.items():
+        entries[key] = (place, merged(entries[key][1], item) if key in entries else item)
+    return Mapping(entries, above.place)

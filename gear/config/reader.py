@@ -1,0 +1,153 @@
+"""Nodes into frozen dataclasses, by the declared type of each field."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import math
+import types
+from pathlib import Path
+from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin
+
+from gear.config.nodes import Items, Mapping, Node, Place, Scalar
+from gear.values.errors import FieldError
+from gear.values.serial import type_hints
+
+T = TypeVar("T")
+
+TRUE_WORDS = ("true", "yes", "on")
+FALSE_WORDS = ("false", "no", "off")
+
+
+def read_node(kind: type[T], node: Node, key: str = "") -> T:
+    """Reads `node` as a `kind`.
+
+    A dataclass may name in `SHORTHAND` the field that a bare word fills: `weather: ClearNoon`. A field of type `Node`
+    is kept as it is, for whoever knows its type later.
+
+    Raises:
+        ConfigError: a key is unknown, missing or repeated, a value has another type, or the class refuses it.
+    """
+    return cast(T, _read(kind, node, key))
+
+
+def _read(kind: Any, node: Node, key: str) -> Any:
+    if kind == Node:
+        return node
+    origin = get_origin(kind)
+    if origin in (Union, types.UnionType):
+        options = get_args(kind)
+        if isinstance(node, Scalar) and node.is_null and type(None) in options:
+            return None
+        return _read(next(option for option in options if option is not type(None)), node, key)
+    if origin is Literal:
+        return _read_choice(get_args(kind), node, key)
+    if origin is tuple:
+        return _read_tuple(get_args(kind), node, key)
+    if origin is dict:
+        mapping = _expect_mapping(node, key)
+        item_kind = get_args(kind)[1]
+        return {name: _read(item_kind, item, join(key, name)) for name, (_, item) in mapping.entries.items()}
+    if dataclasses.is_dataclass(kind):
+        return _read_dataclass(kind, node, key)
+    return _read_scalar(kind, node, key)
+
+
+def join(key: str, name: str) -> str:
+    """`key.name`."""
+    return f"{key}.{name}" if key else name
+
+
+def _expect_mapping(node: Node, key: str) -> Mapping:
+    if isinstance(node, Scalar) and node.is_null:
+        return Mapping({}, node.place)
+    if not isinstance(node, Mapping):
+        raise node.place.error(key, f"expected keys and values, got {_shown(node)}")
+    return node
+
+
+def _read_dataclass(kind: Any, node: Node, key: str) -> Any:
+    shorthand = getattr(kind, "SHORTHAND", None)
+    if shorthand and isinstance(node, Scalar) and not node.is_null:
+        node = Mapping({shorthand: (node.place, node)}, node.place)
+    mapping = _expect_mapping(node, key)
+    hints = type_hints(kind)
+    fields = {field.name: field for field in dataclasses.fields(kind) if field.init}
+    given: dict[str, Any] = {}
+    places: dict[str, Place] = {}
+    for name, (place, item) in mapping.entries.items():
+        if name not in fields:
+            close = difflib.get_close_matches(name, fields, n=1)
+            hint = f"did you mean {close[0]!r}?" if close else f"there are: {', '.join(fields)}"
+            raise place.error(join(key, name), f"unknown key ({hint})")
+        given[name] = _read(hints[name], item, join(key, name))
+        places[name] = item.place
+    for name, field in fields.items():
+        has_default = field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING
+        if name not in given and not has_default:
+            raise mapping.place.error(join(key, name), "missing")
+    try:
+        return kind(**given)
+    except FieldError as error:
+        raise places.get(error.field, mapping.place).error(join(key, error.field), error.problem) from error
+
+
+def _read_tuple(kinds: tuple[Any, ...], node: Node, key: str) -> tuple[Any, ...]:
+    if not isinstance(node, Items):
+        raise node.place.error(key, f"expected a list, got {_shown(node)}")
+    if len(kinds) == 2 and kinds[1] is Ellipsis:
+        return tuple(_read(kinds[0], item, f"{key}[{i}]") for i, item in enumerate(node.items))
+    if len(kinds) != len(node.items):
+        raise node.place.error(key, f"expected {len(kinds)} items, got {len(node.items)}")
+    return tuple(_read(k, item, f"{key}[{i}]") for i, (k, item) in enumerate(zip(kinds, node.items, strict=True)))
+
+
+def _read_choice(choices: tuple[Any, ...], node: Node, key: str) -> Any:
+    text = _text(node, key, "one of " + ", ".join(map(str, choices)))
+    for choice in choices:
+        if str(choice) == text:
+            return choice
+    close = difflib.get_close_matches(text, [str(choice) for choice in choices], n=1)
+    hint = f"; did you mean {close[0]}?" if close else ""
+    raise node.place.error(key, f"expected one of {', '.join(map(str, choices))}, got {text!r}{hint}")
+
+
+def _read_scalar(kind: Any, node: Node, key: str) -> Any:
+    text = _text(node, key, kind.__name__)
+    if kind is str:
+        return text
+    if kind is Path:
+        return Path(text)
+    if kind is bool:
+        if text.casefold() in TRUE_WORDS:
+            return True
+        if text.casefold() in FALSE_WORDS:
+            return False
+    elif kind is int:
+        try:
+            return int(text)
+        except ValueError:
+            pass
+    elif kind is float:
+        try:
+            number = float(text)
+        except ValueError:
+            pass
+        else:
+            if math.isfinite(number):
+                return number
+    else:
+        raise TypeError(f"{key}: a config field cannot have type {kind!r}")
+    raise node.place.error(key, f"expected {kind.__name__}, got {text!r}")
+
+
+def _text(node: Node, key: str, expected: str) -> str:
+    if not isinstance(node, Scalar) or node.is_null:
+        raise node.place.error(key, f"expected {expected}, got {_shown(node)}")
+    return node.text
+
+
+def _shown(node: Node) -> str:
+    if isinstance(node, Scalar):
+        return "nothing" if node.is_null else repr(node.text)
+    return "a list" if isinstance(node, Items) else "keys and values"

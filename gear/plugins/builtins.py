@@ -1,0 +1,10 @@
+"""The plugins that gear brings, by module. They come in by the same hooks as everybody else's."""
+
+from __future__ import annotations
+
+BUILTINS: tuple[str, ...] = (
+    "gear.plugins.tasks.semseg",
+    "gear.plugins.tasks.detect2d",
+    "gear.plugins.tasks.stereo3d",
+    "gear.plugins.tasks.depth",
+)
