@@ -1,0 +1,1 @@
+"""Surfaces that take a patch, made in code: `python -m authoring.surfaces` writes mjcf/surfaces/."""
