@@ -1,0 +1,190 @@
+"""MuJoCo's own OpenGL renderer, through EGL or OSMesa.
+
+It lights with display values: no tone curve, no gamma. So that the same MJCF looks right, the renderer's own copy of the
+model holds colours as they are to be displayed: textures marked sRGB are not decoded, linear albedos of materials and geoms
+are encoded. Its frames are linear in a face's 8-bit values (Filament's are linear in the albedo that these encode).
+
+How a face's texture reaches the screen: OpenGL's trilinear filtering of box-filtered mip levels with repeating borders.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from gear.contracts.rendering import Quality, RawView, RendererInfo, Stage
+from gear.render.display import displayed_model, encode_srgb
+from gear.render.faces import checked_faces
+from gear.render.glcontext import choose_backend, driver_and_device, open_context
+from gear.render.pinhole import FAR_M, NEAR_M, Frustum, depth_from_reversed
+from gear.render.samples import four_times, ids_from_rgb, smooth_edges
+from gear.render.visible import geoms_only
+from gear.values.errors import BackendError
+from gear.values.frames import FloatImage, IdImage, UInt8Image
+from gear.values.scene import CameraRecord
+
+_SAMPLES = {"film": 4, "fast": 0}
+_EXTRA_GEOMS = 100
+_FLAGS = mujoco.mjtRndFlag
+
+
+class ClassicRenderer:
+    """One OpenGL context with one model in it. Not for use from several threads."""
+
+    def __init__(self, model: mujoco.MjModel, *, quality: Quality = "film") -> None:
+        """Starts the context.
+
+        Raises:
+            BackendError: there is no OpenGL driver.
+        """
+        self._closed = True
+        self._shared_model = model
+        self._quality = quality
+        self._model = displayed_model(model)
+        self._model.vis.quality.offsamples = _SAMPLES[quality]
+        self._worn: dict[int, npt.NDArray[np.uint8]] = {}
+        self._size = (0, 0)
+        backend = choose_backend()
+        self._gl = open_context(backend)
+        try:
+            self._context = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_100)
+        except mujoco.FatalError as error:
+            self._gl.free()
+            raise BackendError("classic", f"{backend} has too little OpenGL ({error})", "update the driver") from error
+        self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
+        driver, device = driver_and_device()
+        self._info = RendererInfo(
+            name="classic", backend=backend, driver=driver, device=device, is_software=_is_software(device)
+        )
+        self._scene = mujoco.MjvScene(self._model, maxgeom=self._model.ngeom + _EXTRA_GEOMS)
+        self._option = geoms_only()
+        self._closed = False
+
+    @property
+    def info(self) -> RendererInfo:
+        """Who renders."""
+        return self._info
+
+    def render(
+        self, stage: Stage, cameras: Sequence[CameraRecord], *, colour: bool = True, truth: bool = True
+    ) -> tuple[RawView, ...]:
+        """One raw view a camera; see `gear.contracts.rendering.Renderer`.
+
+        Raises:
+            ValueError: the stage belongs to another model, or a face does not fit its texture.
+        """
+        if stage.model is not self._shared_model:
+            raise ValueError("the stage was compiled as another model than the renderer was opened for")
+        self._gl.make_current()
+        mujoco.mjv_updateScene(
+            self._model, stage.data, self._option, None, mujoco.MjvCamera(), mujoco.mjtCatBit.mjCAT_ALL, self._scene
+        )
+        self._dress(stage)
+        return tuple(self._view(camera, colour=colour, truth=truth) for camera in cameras)
+
+    def close(self) -> None:
+        """Frees the context; safe to call twice."""
+        if self._closed:
+            return
+        self._closed = True
+        self._gl.make_current()
+        self._context.free()
+        self._gl.free()
+
+    def _dress(self, stage: Stage) -> None:
+        """Puts on paint and faces: paint into the scene's geoms, which are new each time; faces are put back by hand."""
+        faces = dict(checked_faces(self._shared_model, stage.faces).values())
+        for texture in sorted(self._worn.keys() | faces.keys()):
+            self._upload(texture, faces.get(texture))
+        coloured = stage.paint_rgb.keys() | stage.faces.keys()
+        for geom in self._scene.geoms[: self._scene.ngeom] if coloured else ():
+            if geom.objtype != mujoco.mjtObj.mjOBJ_GEOM or geom.objid not in coloured:
+                continue
+            paint = stage.paint_rgb.get(geom.objid)
+            geom.rgba[:3] = 1.0 if paint is None else encode_srgb(np.array(paint))
+
+    def _upload(self, texture: int, srgb: UInt8Image | None) -> None:
+        """Gives a texture of the model's copy new texels, or its own ones back where there are none."""
+        model = self._model
+        begin = int(model.tex_adr[texture])
+        texels = model.tex_data[begin : begin + 3 * int(model.tex_height[texture]) * int(model.tex_width[texture])]
+        own = self._worn.pop(texture, None)
+        if own is None:
+            own = texels.copy()
+        content = own if srgb is None else srgb.reshape(-1)
+        if srgb is not None:
+            self._worn[texture] = own
+        if not np.array_equal(texels, content):
+            texels[:] = content
+            mujoco.mjr_uploadTexture(model, self._context, texture)
+
+    def _view(self, camera: CameraRecord, *, colour: bool, truth: bool) -> RawView:
+        self._aim(camera)
+        geom_id, depth_m, linear_rgb = None, None, None
+        if truth or (colour and self._quality == "fast"):
+            geom_id, depth_m = self._truth(camera)
+        if colour:
+            linear_rgb = four_times(self._colour(camera))
+            if geom_id is not None and depth_m is not None and self._quality == "fast":
+                linear_rgb = smooth_edges(linear_rgb, geom_id, depth_m)
+        return RawView(linear_rgb=linear_rgb, depth_m=depth_m if truth else None, geom_id=geom_id if truth else None)
+
+    def _aim(self, camera: CameraRecord) -> None:
+        frustum = Frustum.of(camera)
+        for gl_camera in self._scene.camera:
+            gl_camera.pos[:] = frustum.position_world_m
+            gl_camera.forward[:] = frustum.forward_world
+            gl_camera.up[:] = frustum.up_world
+            gl_camera.frustum_center = 0.0
+            gl_camera.frustum_width = frustum.half_width_m
+            gl_camera.frustum_bottom = -frustum.half_height_m
+            gl_camera.frustum_top = frustum.half_height_m
+            gl_camera.frustum_near = NEAR_M
+            gl_camera.frustum_far = FAR_M
+        if self._size != (camera.width_px, camera.height_px):
+            self._size = (camera.width_px, camera.height_px)
+            mujoco.mjr_resizeOffscreen(*self._size, self._context)
+
+    def _colour(self, camera: CameraRecord) -> UInt8Image:
+        pixels = np.empty((camera.height_px, camera.width_px, 3), np.uint8)
+        self._render_and_read(camera, pixels, None, seen=(_FLAGS.mjRND_SHADOW, _FLAGS.mjRND_SKYBOX, _FLAGS.mjRND_FOG))
+        return pixels[::-1]
+
+    def _truth(self, camera: CameraRecord) -> tuple[IdImage, FloatImage]:
+        """Ids and depth from one pass."""
+        pixels = np.empty((camera.height_px, camera.width_px, 3), np.uint8)
+        depth = np.empty((camera.height_px, camera.width_px), np.float32)
+        self._render_and_read(camera, pixels, depth, seen=(_FLAGS.mjRND_SEGMENT, _FLAGS.mjRND_IDCOLOR))
+        geoms = self._scene.geoms[: self._scene.ngeom]
+        # Pixels count the place in the scene, plus one; the last entry is what index -1, nothing, finds.
+        geom_of_place = np.full(self._scene.ngeom + 1, -1, np.int32)
+        for geom in geoms:
+            if geom.objtype == mujoco.mjtObj.mjOBJ_GEOM:
+                geom_of_place[geom.segid] = geom.objid
+        place = ids_from_rgb(np.ascontiguousarray(pixels[::-1]))
+        return geom_of_place[place], depth_from_reversed(np.ascontiguousarray(depth[::-1]))
+
+    def _render_and_read(
+        self,
+        camera: CameraRecord,
+        pixels: UInt8Image,
+        depth: FloatImage | None,
+        *,
+        seen: tuple[mujoco.mjtRndFlag, ...],
+    ) -> None:
+        """One pass with the flags that are named set and all others cleared."""
+        self._scene.flags[:] = 0
+        for flag in (*seen, _FLAGS.mjRND_CULL_FACE):
+            self._scene.flags[flag] = 1
+        viewport = mujoco.MjrRect(0, 0, camera.width_px, camera.height_px)
+        mujoco.mjr_render(viewport, self._scene, self._context)
+        mujoco.mjr_readPixels(pixels, depth, viewport, self._context)
+
+
+def _is_software(device: str) -> bool:
+    """Mesa's CPU drivers by the names they give themselves."""
+    return any(word in device.casefold() for word in ("llvmpipe", "softpipe", "swrast", "software"))

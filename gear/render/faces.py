@@ -1,0 +1,39 @@
+"""Which texture a surface's face wears."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import mujoco
+import numpy as np
+
+from gear.values.frames import UInt8Image
+
+
+def texture_of_face(model: mujoco.MjModel, geom_id: int) -> int:
+    """Index of the colour texture of a geom's material.
+
+    Raises:
+        ValueError: the geom has none, so it cannot be a face.
+    """
+    material = int(model.geom_matid[geom_id])
+    texture = int(model.mat_texid[material, mujoco.mjtTextureRole.mjTEXROLE_RGB]) if material >= 0 else -1
+    if texture < 0:
+        raise ValueError(f"geom {geom_id} ({model.geom(geom_id).name!r}) has no colour texture, so it is no face")
+    return texture
+
+
+def checked_faces(model: mujoco.MjModel, faces: Mapping[int, UInt8Image]) -> dict[int, tuple[int, UInt8Image]]:
+    """Faces by geom id with the model's texture that each one replaces.
+
+    Raises:
+        ValueError: a face is not uint8 or not of its texture's size.
+    """
+    checked = {}
+    for geom_id, srgb in faces.items():
+        texture = texture_of_face(model, geom_id)
+        shape = (int(model.tex_height[texture]), int(model.tex_width[texture]), 3)
+        if srgb.shape != shape or srgb.dtype != np.uint8:
+            raise ValueError(f"face of geom {geom_id} must be uint8 {shape}, got {srgb.dtype} {srgb.shape}")
+        checked[geom_id] = (texture, srgb)
+    return checked

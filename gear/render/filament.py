@@ -1,0 +1,251 @@
+"""The physically based renderer: Filament on Vulkan, through MuJoCo's `mjrf`.
+
+Pictures are taken without Filament's post-processing: it dithers by frame number and finds edges by contrast, so a frame
+would depend on what was rendered before it and a patch could change pixels that it does not reach. Without it every frame
+is linear and the same each time; supersampling and gear's own camera take its place.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from gear.contracts.rendering import Quality, RawView, RendererInfo, Stage
+from gear.render.faces import checked_faces
+from gear.render.pinhole import FAR_M, NEAR_M, Frustum, depth_from_reversed
+from gear.render.quiet import native_output
+from gear.render.samples import four_times, ids_from_rgb, smooth_edges, sum_2x2
+from gear.render.visible import geoms_only
+from gear.render.vulkan import VulkanUnavailableError, vulkan_devices
+from gear.values.errors import BackendError
+from gear.values.frames import FloatImage, IdImage, UInt8Image, UInt16Image
+from gear.values.scene import CameraRecord
+
+_REMEDY = "apt-get install mesa-vulkan-drivers libvulkan1, or use --renderer classic"
+_FACE_TEXTURES_KEPT = 16
+_WHITE = np.ones(4, np.float32)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Target:
+    """A render target with the buffer that its pixels are read into."""
+
+    handle: Any
+    read: Any
+    pixels: npt.NDArray[Any]
+
+
+class FilamentRenderer:
+    """One Vulkan context with one model in it. Not for use from several threads."""
+
+    def __init__(self, model: mujoco.MjModel, *, quality: Quality = "film") -> None:
+        """Starts the context.
+
+        Raises:
+            BackendError: there is no Vulkan driver, or this MuJoCo has no Filament.
+        """
+        self._closed = True
+        self._model = model
+        self._quality = quality
+        self._mjrf, chatter, software_by_device = _start()
+        with native_output() as lines:
+            mjrf = self._mjrf
+            self._context = mjrf.Context(mjrf.ContextConfig(graphics_api=mjrf.GraphicsApi.GRAPHICS_API_VULKAN))
+        self._info = _info(chatter + lines, software_by_device)
+        self._resources = mjrf.ModelResources(self._context, model)
+        self._scene = self._context.create_scene(mjrf.SceneParams())
+        self._scene.configure_from_model(model)
+        self._lights = mjrf.ModelLights(self._scene, self._resources)
+        self._renderables = mjrf.ModelRenderables(self._scene, self._resources)
+        self._renderables.set_options(geoms_only())
+        self._targets: dict[tuple[int, int, str], _Target] = {}
+        self._face_textures: OrderedDict[bytes, Any] = OrderedDict()
+        self._retired_textures: list[Any] = []
+        self._closed = False
+
+    @property
+    def info(self) -> RendererInfo:
+        """Who renders."""
+        return self._info
+
+    def render(
+        self, stage: Stage, cameras: Sequence[CameraRecord], *, colour: bool = True, truth: bool = True
+    ) -> tuple[RawView, ...]:
+        """One raw view a camera; see `gear.contracts.rendering.Renderer`.
+
+        Raises:
+            ValueError: the stage belongs to another model, or a face does not fit its texture.
+        """
+        if stage.model is not self._model:
+            raise ValueError("the stage was compiled as another model than the renderer was opened for")
+        self._lights.update(stage.data)
+        self._renderables.update(stage.data)
+        self._dress(stage)
+        return tuple(self._view(camera, colour=colour, truth=truth) for camera in cameras)
+
+    def close(self) -> None:
+        """Frees the context; safe to call twice."""
+        if self._closed:
+            return
+        self._closed = True
+        # What lives inside the context must go before it, users before what they use.
+        del self._renderables, self._lights, self._scene
+        self._targets.clear()
+        self._face_textures.clear()
+        self._retired_textures.clear()
+        del self._resources, self._context
+
+    def _dress(self, stage: Stage) -> None:
+        """Puts on paint and faces. `ModelRenderables.update` has just taken off what the last stage wore."""
+        for geom_id, rgb in stage.paint_rgb.items():
+            renderable = self._renderable(geom_id)
+            material = renderable.get_material()
+            material.color = np.array([*rgb, 1.0], np.float32)
+            renderable.set_material(material)
+        for geom_id, (_, srgb) in checked_faces(self._model, stage.faces).items():
+            renderable = self._renderable(geom_id)
+            material = renderable.get_material()
+            material.color = _WHITE
+            material.color_texture = self._face_texture(srgb)
+            renderable.set_material(material)
+
+    def _renderable(self, geom_id: int) -> Any:
+        return self._renderables.get_renderable(mujoco.mjtObj.mjOBJ_GEOM, geom_id, -1)
+
+    def _face_texture(self, srgb: UInt8Image) -> Any:
+        content = np.ascontiguousarray(srgb).tobytes()
+        key = hashlib.blake2b(content + repr(srgb.shape).encode(), digest_size=16).digest()
+        if key in self._face_textures:
+            self._face_textures.move_to_end(key)
+            return self._face_textures[key]
+        mjrf = self._mjrf
+        texture = self._context.create_texture(
+            mjrf.TextureConfig(
+                width=srgb.shape[1],
+                height=srgb.shape[0],
+                format=mjrf.PixelFormat.PIXEL_FORMAT_RGB8,
+                color_space=mjrf.ColorSpace.COLORSPACE_SRGB,
+                sampler_type=mjrf.SamplerType.TEXTURE_2D,
+            )
+        )
+        data = mjrf.TextureData()
+        data.set_image(content)
+        texture.upload(data)
+        self._face_textures[key] = texture
+        if len(self._face_textures) > _FACE_TEXTURES_KEPT:
+            # The material that wears it is only let go by the next frame.
+            self._retired_textures.append(self._face_textures.popitem(last=False)[1])
+        return texture
+
+    def _view(self, camera: CameraRecord, *, colour: bool, truth: bool) -> RawView:
+        geom_id, depth_m, linear_rgb = None, None, None
+        if truth or (colour and self._quality == "fast"):
+            geom_id, depth_m = self._geom_id(camera), self._depth_m(camera)
+        if colour:
+            linear_rgb = self._linear_rgb(camera, geom_id, depth_m)
+        return RawView(linear_rgb=linear_rgb, depth_m=depth_m if truth else None, geom_id=geom_id if truth else None)
+
+    def _linear_rgb(self, camera: CameraRecord, geom_id: IdImage | None, depth_m: FloatImage | None) -> UInt16Image:
+        if geom_id is None or depth_m is None or self._quality == "film":
+            return sum_2x2(self._pixels(camera, "DEFAULT", "RGB8", scale=2))
+        return smooth_edges(four_times(self._pixels(camera, "DEFAULT", "RGB8")), geom_id, depth_m)
+
+    def _depth_m(self, camera: CameraRecord) -> FloatImage:
+        return depth_from_reversed(self._pixels(camera, "DEPTH", "R32F").copy())
+
+    def _geom_id(self, camera: CameraRecord) -> IdImage:
+        return ids_from_rgb(self._pixels(camera, "SEGMENTATION_BY_ID", "RGB8"))
+
+    def _pixels(self, camera: CameraRecord, mode: str, pixel_format: str, *, scale: int = 1) -> npt.NDArray[Any]:
+        """One pass; the buffer that it returns is overwritten by the next pass of that size and format."""
+        width, height = camera.width_px * scale, camera.height_px * scale
+        target = self._target(width, height, pixel_format)
+        request = self._mjrf.RenderRequest()
+        request.scene = self._scene
+        request.target = target.handle
+        request.camera = self._camera(Frustum.of(camera))
+        request.viewport = self._mjrf.Rect(left=0, bottom=0, width=width, height=height)
+        request.draw_mode = getattr(self._mjrf.DrawMode, f"DRAW_MODE_{mode}")
+        request.post_processing = False
+        request.reflections = False
+        request.haze = False
+        request.headlight = False
+        request.shadows = request.skybox = mode == "DEFAULT"
+        self._context.wait_for_frame(self._context.render([request], [target.read]))
+        self._retired_textures.clear()
+        return target.pixels
+
+    def _camera(self, frustum: Frustum) -> Any:
+        return self._mjrf.Camera(
+            pos=frustum.position_world_m.astype(np.float32),
+            forward=frustum.forward_world.astype(np.float32),
+            up=frustum.up_world.astype(np.float32),
+            frustum_bottom=-frustum.half_height_m,
+            frustum_top=frustum.half_height_m,
+            frustum_width=frustum.half_width_m,
+            frustum_center=0.0,
+            frustum_near=NEAR_M,
+            frustum_far=FAR_M,
+        )
+
+    def _target(self, width: int, height: int, pixel_format: str) -> _Target:
+        key = (width, height, pixel_format)
+        if key not in self._targets:
+            formats = self._mjrf.PixelFormat
+            config = self._mjrf.RenderTargetConfig(
+                width=width,
+                height=height,
+                color_format=getattr(formats, f"PIXEL_FORMAT_{pixel_format}"),
+                depth_format=formats.PIXEL_FORMAT_DEPTH32F,
+            )
+            handle = self._context.create_render_target(config)
+            is_float = pixel_format == "R32F"
+            pixels = np.zeros((height, width) if is_float else (height, width, 3), np.float32 if is_float else np.uint8)
+            read = self._mjrf.ReadRequest(target=handle)
+            read.set_buffer(pixels)
+            self._targets[key] = _Target(handle, read, pixels)
+        return self._targets[key]
+
+
+def _start() -> tuple[Any, list[str], dict[str, bool]]:
+    """`mjrf`, chatter so far, and which devices are software.
+
+    Raises:
+        BackendError: Filament cannot start here.
+    """
+    with native_output() as chatter:
+        try:
+            devices = vulkan_devices()
+        except VulkanUnavailableError as error:
+            raise BackendError("filament", str(error), _REMEDY) from error
+        try:
+            import mujoco.studio._studio  # registers Filament's materials
+            from mujoco import mjrf
+        except ImportError as error:
+            problem = f"this MuJoCo {mujoco.__version__} has no Filament ({error})"
+            remedy = "pip install 'mujoco>=4.0,<4.1', or use --renderer classic"
+            raise BackendError("filament", problem, remedy) from error
+    return mjrf, chatter, {device.name: device.is_software for device in devices}
+
+
+def _info(chatter: list[str], software_by_device: dict[str, bool]) -> RendererInfo:
+    """From what Filament says of the device that it chose; where it is silent, from the first device."""
+    text = "\n".join(chatter)
+    driver = re.search(r"Vulkan device driver: (.+)", text)
+    chosen = re.search(r"Selected physical device '(.+)' from", text)
+    device = chosen.group(1) if chosen else next(iter(software_by_device))
+    return RendererInfo(
+        name="filament",
+        backend="vulkan",
+        driver=driver.group(1).strip() if driver else "unknown",
+        device=device,
+        is_software=software_by_device.get(device, "llvmpipe" in device),
+    )

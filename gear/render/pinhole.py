@@ -1,0 +1,62 @@
+"""The pinhole as renderers want it, and their depth buffers as metres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.values.frames import FloatImage
+from gear.values.geometry import Array
+from gear.values.scene import CameraRecord
+
+NEAR_M = 0.1
+FAR_M = 2000.0
+"""What lies nearer or farther is not seen. Depth is kept reversed in 32-bit floats: the range costs no precision."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frustum:
+    """A symmetric view volume in the world.
+
+    Attributes:
+        position_world_m, forward_world, up_world: (3,) each, the latter two of unit length.
+        half_width_m, half_height_m: half the size of the picture on the near plane.
+    """
+
+    position_world_m: Array
+    forward_world: Array
+    up_world: Array
+    half_width_m: float
+    half_height_m: float
+
+    @staticmethod
+    def of(camera: CameraRecord) -> Frustum:
+        """The frustum whose W x H raster has its first pixel's centre at index (0, 0), so that cx = (W - 1) / 2."""
+        world_from_camera = camera.world_from_camera_transform
+        return Frustum(
+            position_world_m=world_from_camera.translation_m,
+            forward_world=world_from_camera.rotation[:, 2],
+            up_world=-world_from_camera.rotation[:, 1],
+            half_width_m=NEAR_M * camera.width_px / (2 * camera.focal_px),
+            half_height_m=NEAR_M * camera.height_px / (2 * camera.focal_px),
+        )
+
+
+def depth_from_reversed(reversed_depth: npt.NDArray[np.float32]) -> FloatImage:
+    """Planar z in metres from a reversed depth buffer (1 at `NEAR_M`, 0 at `FAR_M` and where nothing was drawn).
+
+    Args:
+        reversed_depth: (H, W) float32; overwritten.
+
+    Returns:
+        The same array: z = n f / (n + d (f - n)), NaN where d is 0.
+    """
+    depth_m = reversed_depth
+    nothing = depth_m <= 0
+    np.multiply(depth_m, np.float32(FAR_M - NEAR_M), out=depth_m)
+    np.add(depth_m, np.float32(NEAR_M), out=depth_m)
+    np.divide(np.float32(NEAR_M * FAR_M), depth_m, out=depth_m)
+    depth_m[nothing] = np.nan
+    return depth_m

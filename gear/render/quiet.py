@@ -1,0 +1,44 @@
+"""Keeps a native library's chatter off the user's terminal, and nothing else."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+
+_CHATTER = re.compile(
+    r"Using 'soft' CircularBuffer|FEngine |Backend feature level|Vulkan device driver|Selected physical device"
+)
+
+
+@contextmanager
+def native_output(descriptors: tuple[int, ...] = (1, 2)) -> Iterator[list[str]]:
+    """Catches what native code prints to stdout and stderr, at the level of file descriptors.
+
+    Yields:
+        A list that holds the lines of known chatter afterwards; every other line is passed on to where it was meant
+        for.
+    """
+    chatter: list[str] = []
+    sys.stdout.flush()
+    sys.stderr.flush()
+    with ExitStack() as files:
+        kept = [(fd, os.dup(fd), files.enter_context(tempfile.TemporaryFile())) for fd in descriptors]
+        try:
+            for fd, _, file in kept:
+                os.dup2(file.fileno(), fd)
+            yield chatter
+        finally:
+            for fd, original, file in kept:
+                os.dup2(original, fd)
+                os.close(original)
+                file.seek(0)
+                for line in file.read().splitlines(keepends=True):
+                    text = line.decode("utf-8", "replace")
+                    if _CHATTER.search(text):
+                        chatter.append(text.strip())
+                    elif text.strip():
+                        os.write(fd, line)
