@@ -1,8 +1,9 @@
 """MuJoCo's own OpenGL renderer, through EGL or OSMesa.
 
-It lights with display values: no tone curve, no gamma. So that the same MJCF looks right, the renderer's own copy of the
-model holds colours as they are to be displayed: textures marked sRGB are not decoded, linear albedos of materials and geoms
-are encoded. Its frames are linear in a face's 8-bit values (Filament's are linear in the albedo that these encode).
+It lights with display values: no tone curve, no gamma. So that the same MJCF looks right, the renderer's own copy of
+the model holds colours as they are to be displayed: textures marked sRGB are not decoded, linear albedos of materials
+and geoms are encoded. Its frames are linear in a face's 8-bit values (Filament's are linear in the albedo that these
+encode).
 
 How a face's texture reaches the screen: OpenGL's trilinear filtering of box-filtered mip levels with repeating borders.
 """
@@ -96,7 +97,7 @@ class ClassicRenderer:
         self._gl.free()
 
     def _dress(self, stage: Stage) -> None:
-        """Puts on paint and faces: paint into the scene's geoms, which are new each time; faces are put back by hand."""
+        """Puts on paint, into geoms that the scene makes anew each time, and faces, which it puts back."""
         faces = dict(checked_faces(self._shared_model, stage.faces).values())
         for texture in sorted(self._worn.keys() | faces.keys()):
             self._upload(texture, faces.get(texture))

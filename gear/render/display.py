@@ -18,9 +18,9 @@ def encode_srgb(linear: npt.ArrayLike) -> npt.NDArray[np.float64]:
 def displayed_model(model: mujoco.MjModel) -> mujoco.MjModel:
     """A copy whose colours are display values.
 
-    OpenGL would decode a texture that is marked sRGB, light it, and show the linear result as it is: far too dark. In the
-    copy such textures are not marked, and the linear colours of geoms and materials are encoded. Lights of the kind `image`,
-    which OpenGL does not have, are off, and so is the headlight.
+    OpenGL would decode a texture that is marked sRGB, light it, and show the linear result as it is: far too dark. In
+    the copy such textures are not marked, and the linear colours of geoms and materials are encoded. Lights of the
+    kind `image`, which OpenGL does not have, are off, and so is the headlight.
     """
     shown = copy.copy(model)
     shown.tex_colorspace[:] = mujoco.mjtColorSpace.mjCOLORSPACE_LINEAR

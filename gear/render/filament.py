@@ -1,8 +1,8 @@
 """The physically based renderer: Filament on Vulkan, through MuJoCo's `mjrf`.
 
-Pictures are taken without Filament's post-processing: it dithers by frame number and finds edges by contrast, so a frame
-would depend on what was rendered before it and a patch could change pixels that it does not reach. Without it every frame
-is linear and the same each time; supersampling and gear's own camera take its place.
+Pictures are taken without Filament's post-processing: it dithers by frame number and finds edges by contrast, so a
+frame would depend on what was rendered before it and a patch could change pixels that it does not reach. Without it
+every frame is linear and the same each time; supersampling and gear's own camera take its place.
 """
 
 from __future__ import annotations
