@@ -1,0 +1,41 @@
+"""Buildings for the distance: a box whose storeys are strips of one texture."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from authoring.kit.facade import belt, facades
+from authoring.kit.parts import Sink
+from authoring.materials.atlas import FAR_WIDTH_M, far_rows
+
+_STOREYS_M = {"glass_office": (3.7, 5.2), "concrete_office": (3.6, 4.4), "warehouse_loft": (4.0, 4.8), "stone_classic": (3.6, 4.6)}
+_TRIMS = {"glass_office": "anthracite", "concrete_office": "concrete_light", "modern_residential": "anthracite"}
+
+
+def far_building(
+    sink: Sink, style: str, width_m: float, depth_m: float, floors: int, *, rng: np.random.Generator
+) -> None:
+    """A box of at most forty drawn storeys with a coping, a roof and a stair head; under 200 triangles."""
+    floor_m, ground_m = _STOREYS_M.get(style, (3.2, 4.0))
+    top_m = ground_m + (floors - 1) * floor_m
+    strips = max(1, min(floors - 1, 18))
+    shift = float(rng.integers(8)) / 8
+    for facade in facades(sink, width_m, depth_m).values():
+        u1 = shift + max(1, round(facade.width_m / FAR_WIDTH_M * 8)) / 8
+        levels = [0.0, *np.linspace(ground_m, top_m, strips + 1)] if floors > 1 else [0.0, top_m]
+        for index, (low, high) in enumerate(zip(levels[:-1], levels[1:], strict=True)):
+            v0, v1 = far_rows(style, ground=index == 0)
+            corners = [
+                facade.at(0, low),
+                facade.at(facade.width_m, low),
+                facade.at(facade.width_m, high),
+                facade.at(0, high),
+            ]
+            sink.polygon("far_facades", corners, [(shift, v0), (u1, v0), (u1, v1), (shift, v1)])
+    trim = _TRIMS.get(style, "limestone")
+    belt(sink, trim, width_m, depth_m, [(0.0, top_m - 0.3), (0.3, top_m), (0.3, top_m + 0.5), (-0.3, top_m + 0.5)])
+    x, y = width_m / 2, depth_m / 2
+    roof = [(-x, -y, top_m + 0.4), (x, -y, top_m + 0.4), (x, y, top_m + 0.4), (-x, y, top_m + 0.4)]
+    sink.quad("roof_gravel", roof, tile_m=2.0)
+    head_x = float(rng.uniform(-0.4, 0.4)) * (x - 2)
+    sink.swatch_box("concrete_dark", (head_x - 1.6, -1.3, top_m + 0.4), (head_x + 1.6, 1.3, top_m + 2.8), skip="z")

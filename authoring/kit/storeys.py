@@ -1,0 +1,126 @@
+"""Buildings made of storeys with windows in bays: every style except the curtain wall."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from authoring.kit.facade import SIDES, Facade, Opening, belt, facades
+from authoring.kit.ground import ground_floor
+from authoring.kit.openings import balcony, window
+from authoring.kit.parts import Sink
+from authoring.kit.roofs import flat_roof, gable_roof, mansard, roof_machinery
+from authoring.kit.styles import Style
+
+
+def storeyed_building(
+    sink: Sink,
+    style: Style,
+    width_m: float,
+    depth_m: float,
+    floors: int,
+    sides: Sequence[str],
+    *,
+    rng: np.random.Generator,
+) -> None:
+    """Walls, windows, ground floor, ornament and roof of one building."""
+    top_m = style.ground_m + (floors - 1) * style.floor_m
+    for side, facade in facades(sink, width_m, depth_m).items():
+        if side in sides:
+            _street_side(facade, style, floors, top_m, main=side == sides[0], rng=rng)
+        else:
+            _plain_side(facade, style, floors, top_m, rng=rng)
+    _ornament(sink, style, width_m, depth_m, floors, top_m, sides)
+    if style.roof == "mansard":
+        mansard(sink, width_m, depth_m, top_m, sides=sides, dormer_pitch_m=style.bay_m, rng=rng)
+    elif style.roof == "gable" and depth_m < 16:
+        gable_roof(sink, width_m, depth_m, top_m, wall=style.wall, rise_m=min(3.6, depth_m * 0.3))
+    else:
+        flat_roof(sink, width_m, depth_m, top_m, wall=style.wall, coping=style.trim)
+        roof_machinery(sink, width_m, depth_m, top_m, rng=rng, water_tank=style.water_tank)
+
+
+def bays(width_m: float, bay_m: float, margin_m: float) -> list[float]:
+    """The centres of as many bays as fit, spread evenly."""
+    usable = width_m - 2 * margin_m
+    count = max(1, int(usable / bay_m))
+    pitch = usable / count
+    return [margin_m + (i + 0.5) * pitch for i in range(count)]
+
+
+def _street_side(
+    facade: Facade, style: Style, floors: int, top_m: float, *, main: bool, rng: np.random.Generator
+) -> None:
+    width = facade.width_m
+    holes = ground_floor(facade, style, main=main, rng=rng)
+    facade.wall(style.base, 0.0, 0.0, width, style.ground_m, holes)
+    centres = bays(width, style.bay_m, 0.7)
+    has_balcony = rng.random(len(centres)) < style.balconies
+    pitch = centres[1] - centres[0] if len(centres) > 1 else width - 1.4
+    half = min(style.window.width_m, pitch - (0.12 if style.fins else 0.5)) / 2
+    for floor in range(1, floors):
+        level = style.ground_m + (floor - 1) * style.floor_m
+        openings = []
+        for centre, outside in zip(centres, has_balcony, strict=True):
+            deep = bool(outside) and (floor > 1 or style.ground != "shops")
+            sill = 0.1 if deep else style.window.sill_m
+            top = min(style.window.sill_m + style.window.height_m, style.floor_m - 0.35)
+            openings.append(Opening(centre - half, level + sill, centre + half, level + top))
+            if deep:
+                reach, slab = (1.5, "concrete_light") if style.railing != "bars" or pitch > 3.4 else (0.7, style.trim)
+                balcony(facade, centre - min(half + 0.45, pitch / 2 - 0.05), centre + min(half + 0.45, pitch / 2 - 0.05), level, reach, railing=style.railing, slab=slab)
+        facade.wall(style.wall, 0.0, level, width, level + style.floor_m, openings)
+        for opening in openings:
+            window(facade, opening, style.window, rng=rng)
+    if style.fins and floors > 1:
+        for left, right in zip([0.35, *centres], [*centres, width - 0.35], strict=True):
+            u = (left + right) / 2 if left != 0.35 and right != width - 0.35 else (0.2 if left == 0.35 else width - 0.2)
+            facade.box(style.trim, (u - 0.13, u + 0.13), (style.ground_m, top_m), (0.0, 0.4))
+
+
+def _plain_side(facade: Facade, style: Style, floors: int, top_m: float, *, rng: np.random.Generator) -> None:
+    """A party wall or a courtyard side: few windows, no ornament."""
+    width = facade.width_m
+    openings = []
+    if width > 8 and rng.random() < 0.7:
+        for centre in bays(width, style.bay_m * 1.8, 2.0):
+            for floor in range(1, floors):
+                low = style.ground_m + (floor - 1) * style.floor_m + 0.9
+                openings.append(Opening(centre - 0.5, low, centre + 0.5, low + 1.4))
+    facade.wall(style.wall, 0.0, 0.0, width, top_m, openings)
+    for opening in openings:
+        window(facade, opening, style.window, rng=rng)
+
+
+def _ornament(
+    sink: Sink, style: Style, width_m: float, depth_m: float, floors: int, top_m: float, sides: Sequence[str]
+) -> None:
+    def ring(profile: list[tuple[float, float]]) -> None:
+        belt(sink, style.trim, width_m, depth_m, profile, sides=sides)
+
+    first = style.ground_m
+    levels = [first + f * style.floor_m for f in range(floors - 1)] if style.string_courses == "all" else [first]
+    if style.string_courses != "none" and floors > 1:
+        for level in levels:
+            ring([(0.0, level - 0.14), (0.06, level - 0.1), (0.1, level), (0.1, level + 0.06), (0.0, level + 0.1)])
+    if style.cornice == "simple":
+        ring([(0.0, top_m - 0.3), (0.12, top_m - 0.22), (0.28, top_m - 0.05), (0.3, top_m + 0.05), (0.0, top_m + 0.1)])
+    elif style.cornice in ("bracket", "classic"):
+        reach = 0.55 if style.cornice == "bracket" else 0.7
+        ring([(0.0, top_m - 0.75), (0.07, top_m - 0.72), (0.09, top_m - 0.5), (0.09, top_m - 0.3)])
+        ring([(0.09, top_m - 0.3), (reach - 0.1, top_m - 0.12), (reach, top_m), (reach, top_m + 0.1), (0.0, top_m + 0.16)])
+        for side, facade in facades(sink, width_m, depth_m).items():
+            if side in sides:
+                count = max(2, int(facade.width_m / (0.9 if style.cornice == "bracket" else 0.7)))
+                for u in np.linspace(0.3, facade.width_m - 0.3, count):
+                    facade.box(style.trim, (u - 0.08, u + 0.08), (top_m - 0.5, top_m - 0.12), (0.09, reach - 0.14), skip="bt")
+    if style.quoins:
+        for index, side in enumerate(SIDES):
+            if side not in sides:
+                continue
+            facade = facades(sink, width_m, depth_m)[side]
+            for number, low in enumerate(np.arange(style.ground_m + 0.2, top_m - 1.3, 0.5)):
+                long = 0.75 if (number + index) % 2 else 0.45
+                for u in ((0.0, long), (facade.width_m - long, facade.width_m)):
+                    facade.box(style.trim, u, (float(low), float(low) + 0.44), (0.0, 0.035))
