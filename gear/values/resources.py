@@ -1,0 +1,22 @@
+"""Where gear's own data lies: inside the package once installed, beside it in a checkout."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+
+@cache
+def data_dir(name: str) -> Path:
+    """The folder `name` (`mjcf`, `configs`) of gear's data.
+
+    An installed wheel carries it as `gear/data/<name>`; in a checkout it is `<name>` at the top.
+
+    Raises:
+        FileNotFoundError: the installation is incomplete.
+    """
+    package = Path(__file__).resolve().parents[1]
+    for folder in (package / "data" / name, package.parent / name):
+        if folder.is_dir():
+            return folder
+    raise FileNotFoundError(f"gear's data folder {name!r} is missing beside {package}; install gear again")

@@ -1,0 +1,1 @@
+"""The world: towns, actors and boards in MJCF, composed once, placed often."""

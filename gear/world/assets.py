@@ -1,0 +1,176 @@
+"""Finding MJCF by name or by path, and reading what a file says of itself without compiling it."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Literal, cast
+
+from gear.values.errors import TownError, UnknownNameError
+from gear.values.labels import LABEL_BY_NAME, Label
+from gear.values.resources import data_dir
+from gear.values.scene import Vec3
+
+ActorKind = Literal["car", "van", "truck", "bus", "motorcycle", "bicycle", "person"]
+Gait = Literal["walk", "stand", ""]
+
+KIND_WEIGHTS: dict[ActorKind, float] = {
+    "car": 1.0,
+    "van": 0.7,
+    "truck": 0.4,
+    "bus": 0.35,
+    "motorcycle": 0.5,
+    "bicycle": 0.7,
+    "person": 1.0,
+}
+"""How common one asset of a kind is, before the asset's own `actor.weight`."""
+
+FOLDERS = {"town": "towns", "vehicle": "vehicles", "pedestrian": "pedestrians", "surface": "surfaces"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ActorFacts:
+    """What an actor's file says of itself.
+
+    Attributes:
+        name: of the asset: its file's stem.
+        path: its MJCF.
+        kind: what it is.
+        gait: `walk` or `stand` for people, empty for vehicles.
+        weight: how common it is among all assets of its folder.
+        palette: linear albedo choices of its paint, with how common each is.
+    """
+
+    name: str
+    path: Path
+    kind: ActorKind
+    gait: Gait
+    weight: float
+    palette: tuple[tuple[Vec3, float], ...]
+
+    @property
+    def label(self) -> Label:
+        """What it mainly is."""
+        return LABEL_BY_NAME[self.kind]
+
+
+def read_actor_facts(path: Path) -> ActorFacts:
+    """Reads the `<custom>` section of an actor's MJCF.
+
+    Raises:
+        TownError: it is no MJCF or breaks the conventions.
+    """
+    try:
+        custom = ET.parse(path).getroot().find("custom")
+    except (ET.ParseError, OSError) as error:
+        raise TownError(path, f"cannot be read as MJCF: {error}") from error
+    entries = {} if custom is None else {item.get("name", ""): item.get("data", "") for item in custom}
+    kind = entries.get("actor.kind", "")
+    if kind not in KIND_WEIGHTS:
+        raise TownError(path, f"actor.kind must be one of {', '.join(KIND_WEIGHTS)}, got {kind!r}")
+    gait = entries.get("actor.pose", "stand" if kind == "person" else "")
+    if gait not in ("walk", "stand", ""):
+        raise TownError(path, f"actor.pose must be walk or stand, got {gait!r}")
+    weight = _numbers(path, "actor.weight", entries.get("actor.weight", "1"))
+    palette = _numbers(path, "paint.palette", entries.get("paint.palette", ""))
+    if len(weight) != 1 or weight[0] < 0:
+        raise TownError(path, f"actor.weight must be one number, not negative, got {entries['actor.weight']!r}")
+    if len(palette) % 4 or any(value < 0 for value in palette):
+        raise TownError(path, "paint.palette must be groups of four: r g b weight, none negative")
+    colours = tuple(((palette[i], palette[i + 1], palette[i + 2]), palette[i + 3]) for i in range(0, len(palette), 4))
+    return ActorFacts(
+        name=path.stem,
+        path=path,
+        kind=kind,
+        gait=cast(Gait, gait),
+        weight=weight[0] * KIND_WEIGHTS[kind],
+        palette=colours,
+    )
+
+
+def _numbers(path: Path, name: str, text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(word) for word in text.split())
+    except ValueError as error:
+        raise TownError(path, f"{name} must be numbers, got {text!r}") from error
+
+
+@dataclass(frozen=True)
+class AssetLibrary:
+    """The MJCF that goes with one town.
+
+    A town inside a folder `towns` may bring its own `vehicles`, `pedestrians` and `surfaces` beside that folder; each
+    kind that it brings replaces gear's.
+
+    Attributes:
+        town: path of the town's MJCF.
+    """
+
+    town: Path
+
+    @staticmethod
+    def for_town(town: str | Path) -> AssetLibrary:
+        """By a town's name, or by the path of its MJCF.
+
+        Raises:
+            UnknownNameError: there is no such town.
+        """
+        text = str(town)
+        if text.endswith(".xml") or "/" in text:
+            path = Path(text).expanduser()
+            if not path.is_file():
+                raise UnknownNameError("town", text, _names(data_dir("mjcf") / "towns"), "(or give the path of a MJCF)")
+            return AssetLibrary(path.resolve())
+        path = data_dir("mjcf") / "towns" / f"{text}.xml"
+        if not path.is_file():
+            raise UnknownNameError("town", text, _names(path.parent))
+        return AssetLibrary(path)
+
+    @property
+    def town_name(self) -> str:
+        """Name of the town: its file's stem."""
+        return self.town.stem
+
+    def folder(self, kind: Literal["vehicle", "pedestrian", "surface"]) -> Path:
+        """Where assets of a kind are."""
+        own = self.town.parent.parent / FOLDERS[kind]
+        if self.town.parent.name == "towns" and own.is_dir():
+            return own
+        return data_dir("mjcf") / FOLDERS[kind]
+
+    def path(self, kind: Literal["vehicle", "pedestrian", "surface"], name: str) -> Path:
+        """An asset's MJCF.
+
+        Raises:
+            UnknownNameError: there is none of that name.
+        """
+        path = self.folder(kind) / f"{name}.xml"
+        if not path.is_file():
+            raise UnknownNameError(kind, name, _names(path.parent))
+        return path
+
+    @cached_property
+    def vehicles(self) -> dict[str, ActorFacts]:
+        """All vehicles by name, in alphabetical order."""
+        return self._actors("vehicle")
+
+    @cached_property
+    def pedestrians(self) -> dict[str, ActorFacts]:
+        """All people on foot by name, in alphabetical order."""
+        return self._actors("pedestrian")
+
+    def _actors(self, kind: Literal["vehicle", "pedestrian"]) -> dict[str, ActorFacts]:
+        folder = self.folder(kind)
+        facts = {path.stem: read_actor_facts(path) for path in sorted(folder.glob("*.xml"))}
+        if not facts:
+            raise TownError(folder, f"holds no {kind}")
+        for fact in facts.values():
+            if (fact.kind == "person") != (kind == "pedestrian"):
+                raise TownError(fact.path, f"a {fact.kind} does not belong into {folder.name}")
+        return facts
+
+
+def _names(folder: Path) -> list[str]:
+    return [path.stem for path in folder.glob("*.xml")]

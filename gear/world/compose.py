@@ -1,0 +1,135 @@
+"""One MJCF out of many: a town, its boards, and a pool of actors.
+
+dm_control.mjcf keeps the names of different files apart. Every asset's file is attached once, for its meshes, textures
+and materials; each instance is a body whose geoms refer to those, so ten equal cars cost one mesh. Only faces that take
+a patch get a material and a texture of their own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gear.values.errors import TownError
+from gear.values.geometry import RigidTransform
+from gear.values.scene import Weather
+from gear.world.assets import ActorFacts, AssetLibrary
+from gear.world.instances import AssetParts, FaceName, load_mjcf
+from gear.world.scene_spec import BoardSpec
+from gear.world.weather import apply_weather
+
+PARKED_DEPTH_M = 60.0
+"""Actors of the pool that a sample does not use wait this far below the town, under its ground."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Slot:
+    """One place of the pool: an instance of an actor that samples may use.
+
+    Attributes:
+        body: its body in both models.
+        actor: what it is an instance of.
+        bears_surface: whether its face has a texture of its own.
+    """
+
+    body: str
+    actor: ActorFacts
+    bears_surface: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Composition:
+    """A composed world, not yet compiled.
+
+    Attributes:
+        xml: the whole of it as MJCF.
+        assets: files that it refers to, by name.
+        town: path of the town's MJCF.
+        slots: the pool.
+        faces: what takes patches, in patch order.
+    """
+
+    xml: str
+    assets: Mapping[str, bytes]
+    town: Path
+    slots: tuple[Slot, ...]
+    faces: tuple[FaceName, ...]
+
+
+def compose(
+    library: AssetLibrary,
+    boards: Sequence[BoardSpec],
+    pool: Sequence[tuple[ActorFacts, int]],
+    carrier: ActorFacts | None,
+    weather: Weather,
+) -> Composition:
+    """Puts a town, its boards and its actors into one tree.
+
+    Args:
+        library: of the town.
+        boards: in patch order.
+        pool: actors and how many instances of each; the first one is the ego car's.
+        carrier: an actor that bears a surface, besides the pool.
+        weather: light and air.
+
+    Raises:
+        TownError: a file cannot be composed.
+        UnknownNameError: a board's asset is not there.
+    """
+    root = load_mjcf(library.town)
+    parts = AssetParts(root)
+    faces: list[FaceName] = []
+    for index, board in enumerate(boards):
+        path = library.path("surface", board.asset)
+        body = root.worldbody.add("body", name=f"board_{index}", **_placed(board))
+        found = parts.add_bearer(path, body, is_carried=False)
+        if not found:
+            raise TownError(
+                path, "has no face: a geom of a class ending in `.face`, and a site `surface` in its middle"
+            )
+        faces += found
+    slots: list[Slot] = []
+    for actor, count in _merged(pool):
+        for index in range(count):
+            body = root.worldbody.add("body", name=f"{actor.name}_{index}", mocap=True)
+            parts.add_instance(actor.path, body)
+            slots.append(Slot(body=body.name, actor=actor))
+    if carrier is not None:
+        body = root.worldbody.add("body", name="carrier", mocap=True)
+        found = parts.add_bearer(carrier.path, body, is_carried=True)
+        if not found:
+            raise TownError(carrier.path, "cannot bear a patch: it has no geom of a class ending in `.face`")
+        faces += found
+        slots.append(Slot(body="carrier", actor=carrier, bears_surface=True))
+    parts.drop_templates()
+    apply_weather(root, weather)
+    return Composition(
+        xml=root.to_xml_string(),
+        assets=root.get_assets(),
+        town=library.town,
+        slots=tuple(slots),
+        faces=tuple(faces),
+    )
+
+
+def _merged(pool: Sequence[tuple[ActorFacts, int]]) -> list[tuple[ActorFacts, int]]:
+    counts: Counter[str] = Counter()
+    facts: dict[str, ActorFacts] = {}
+    for actor, count in pool:
+        facts[actor.name] = actor
+        counts[actor.name] += count
+    return [(facts[name], count) for name, count in counts.items()]
+
+
+def _placed(board: BoardSpec) -> dict[str, Any]:
+    half = math.radians(board.facing_deg) / 2
+    return {"pos": board.position_m, "quat": (math.cos(half), 0.0, 0.0, math.sin(half))}
+
+
+def world_from_board(board: BoardSpec) -> RigidTransform:
+    """A board's frame (x where its face looks, origin on the ground) in the world."""
+    return RigidTransform.from_yaw("world", "board", board.position_m, math.radians(board.facing_deg))

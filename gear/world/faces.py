@@ -1,0 +1,93 @@
+"""The face of a board: how a patch of any size becomes the one texture size that all faces have.
+
+Resampling averages areas in linear light. It is linear and separable, so it is two small matrices:
+`face = rows @ patch @ columns.T` for each channel, with `rows = box_matrix(h, 600)`, `columns = box_matrix(w, 1200)`. A
+differentiable twin uses the same two matrices. Where the face's size is a multiple of the patch's, every patch pixel
+becomes a block of equal texels, exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.values.frames import UInt8Image
+from gear.values.geometry import Array, frozen
+
+FACE_SIZE_PX = (1200, 600)
+"""Width and height of every face's texture."""
+
+SurfaceAlbedo = Literal["none", "white", "black"] | UInt8Image
+"""What a surface shows: its neutral face, albedo one, albedo zero, or a patch: (h, w, 3) uint8 in sRGB."""
+
+SurfaceAlbedos = Mapping[str, SurfaceAlbedo]
+"""By surface name; surfaces that are not named show their neutral face."""
+
+
+@lru_cache(maxsize=64)
+def box_matrix(source_px: int, target_px: int) -> Array:
+    """Box (area) resampling along one axis.
+
+    Target pixel i covers [i, i + 1) * source / target of the source axis and takes the mean of what it covers.
+
+    Returns:
+        (target_px, source_px) float64, rows sum to 1, read-only.
+    """
+    edges = np.arange(target_px + 1, dtype=np.float64) * source_px / target_px
+    source = np.arange(source_px, dtype=np.float64)
+    low = np.maximum(edges[:-1, None], source[None, :])
+    high = np.minimum(edges[1:, None], source[None, :] + 1)
+    weights = np.clip(high - low, 0.0, None)
+    return frozen(weights / weights.sum(axis=1, keepdims=True))
+
+
+def linear_from_srgb(srgb: npt.ArrayLike) -> Array:
+    """sRGB in 0..1 to linear light in 0..1, elementwise."""
+    values = np.asarray(srgb, dtype=np.float64)
+    return np.asarray(np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4))
+
+
+def srgb_from_linear(linear: npt.ArrayLike) -> Array:
+    """Linear light in 0..1 to sRGB in 0..1, elementwise."""
+    values = np.clip(np.asarray(linear, dtype=np.float64), 0.0, 1.0)
+    return np.asarray(np.where(values <= 0.0031308, values * 12.92, 1.055 * values ** (1 / 2.4) - 0.055))
+
+
+LINEAR_FROM_BYTE = linear_from_srgb(np.arange(256) / 255)
+"""(256,) linear light of each sRGB byte."""
+
+
+def resample_linear(linear: npt.ArrayLike, size_px: tuple[int, int] = FACE_SIZE_PX) -> Array:
+    """(h, w, 3) linear light to (size[1], size[0], 3) linear light; linear in its input."""
+    image = np.asarray(linear, dtype=np.float64)
+    rows, columns = box_matrix(image.shape[0], size_px[1]), box_matrix(image.shape[1], size_px[0])
+    return np.asarray(np.einsum("ih,hwc,jw->ijc", rows, image, columns, optimize=True))
+
+
+def face_from_patch(patch: UInt8Image, size_px: tuple[int, int] = FACE_SIZE_PX) -> UInt8Image:
+    """(h, w, 3) sRGB bytes of any size to the face's sRGB bytes, (size[1], size[0], 3), read-only.
+
+    Raises:
+        ValueError: the patch has another shape or dtype.
+    """
+    if patch.ndim != 3 or patch.shape[2] != 3 or patch.dtype != np.uint8 or 0 in patch.shape:
+        raise ValueError(f"a patch must be (h, w, 3) uint8, got {patch.shape} {patch.dtype}")
+    width, height = size_px
+    if width % patch.shape[1] == 0 and height % patch.shape[0] == 0:
+        face = patch.repeat(height // patch.shape[0], axis=0).repeat(width // patch.shape[1], axis=1)
+    else:
+        srgb = srgb_from_linear(resample_linear(LINEAR_FROM_BYTE[patch], size_px))
+        face = np.floor(srgb * 255 + 0.5).astype(np.uint8)
+    face.setflags(write=False)
+    return face
+
+
+def uniform_face(value: int, size_px: tuple[int, int] = FACE_SIZE_PX) -> UInt8Image:
+    """A face of one grey sRGB byte."""
+    face = np.full((size_px[1], size_px[0], 3), value, np.uint8)
+    face.setflags(write=False)
+    return face

@@ -1,0 +1,142 @@
+"""Instances of assets inside a dm_control tree: bodies that share the meshes and materials of one attached file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from dm_control import mjcf
+
+from gear.values.errors import TownError
+from gear.world.faces import FACE_SIZE_PX
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaceName:
+    """A face that takes a patch, by its names in the composed MJCF.
+
+    Attributes:
+        asset: MJCF that it comes from.
+        owner: body of the board or of the carrier.
+        is_carried: whether the owner is an actor.
+        geom, site: the face and its frame.
+        neutral_material: the asset's own material, which says what the face looks like without a patch.
+    """
+
+    asset: str
+    owner: str
+    is_carried: bool
+    geom: str
+    site: str
+    neutral_material: str
+
+
+def load_mjcf(path: Path) -> mjcf.RootElement:
+    """Reads one file; its model is named after the file and everything in it has a name.
+
+    Raises:
+        TownError: dm_control cannot read it.
+    """
+    try:
+        root = mjcf.from_path(str(path))
+    except (ValueError, OSError, AttributeError, KeyError) as error:
+        raise TownError(path, f"cannot be read as MJCF: {error}") from error
+    root.model = path.stem
+    # Writing an element without a name makes dm_control count all elements before it: quadratic in their number.
+    for tag in ("geom", "site", "body"):
+        for index, element in enumerate(root.find_all(tag)):
+            if getattr(element, "name", "") is None:
+                element.name = f"unnamed_{tag}_{index}"
+    return root
+
+
+class AssetParts:
+    """The assets that a composition has taken in, each file once."""
+
+    def __init__(self, root: mjcf.RootElement) -> None:
+        self._root = root
+        self._models: dict[Path, mjcf.RootElement] = {}
+
+    def add_instance(self, path: Path, body: Any) -> None:
+        """Fills `body` with an instance of the asset that shares everything."""
+        for child in self._model(path).worldbody.all_children():
+            _copy(child, body, body.name)
+
+    def add_bearer(self, path: Path, body: Any, *, is_carried: bool) -> list[FaceName]:
+        """Fills `body` with an instance whose faces have textures of their own.
+
+        Raises:
+            TownError: a face has no `surface` site or no material.
+        """
+        self.add_instance(path, body)
+        model = self._model(path)
+        faces = []
+        for geom in model.find_all("geom"):
+            if geom.dclass is None or not geom.dclass.dclass.endswith(".face"):
+                continue
+            site = "surface" + geom.name.removeprefix("face")
+            if model.find("site", site) is None or geom.material is None:
+                raise TownError(path, f"face {geom.name!r} needs a material and a site {site!r} in its middle")
+            name = f"{body.name}_{geom.name}"
+            self._root.find("geom", name).material = self._own_material(geom.material, name)
+            faces.append(
+                FaceName(
+                    asset=path.stem,
+                    owner=body.name,
+                    is_carried=is_carried,
+                    geom=name,
+                    site=f"{body.name}_{site}",
+                    neutral_material=geom.material.full_identifier,
+                )
+            )
+        return faces
+
+    def drop_templates(self) -> None:
+        """Removes the attached files' own bodies; only what the instances refer to stays."""
+        for model in self._models.values():
+            for child in list(model.worldbody.all_children()):
+                child.remove()
+
+    def _model(self, path: Path) -> mjcf.RootElement:
+        """The asset's file, attached when first asked for."""
+        if path not in self._models:
+            model = load_mjcf(path)
+            try:
+                self._root.attach(model)
+            except ValueError as error:
+                raise TownError(path, f"cannot be put into one world with the town: {error}") from error
+            self._models[path] = model
+        return self._models[path]
+
+    def _own_material(self, material: Any, name: str) -> Any:
+        width, height = FACE_SIZE_PX
+        texture = self._root.asset.add(
+            "texture",
+            name=name,
+            type="2d",
+            builtin="flat",
+            colorspace="sRGB",
+            width=width,
+            height=height,
+            rgb1=(1, 1, 1),
+        )
+        attributes = material.get_attributes()
+        attributes.update(name=name, texture=texture, rgba=(1.0, 1.0, 1.0, 1.0))
+        own = self._root.asset.add("material", **attributes)
+        for layer in material.all_children():
+            layer_attributes = layer.get_attributes()
+            if layer_attributes.get("role") == "rgb":
+                layer_attributes["texture"] = texture
+            own.add(layer.tag, **layer_attributes)
+        return own
+
+
+def _copy(element: Any, parent: Any, prefix: str) -> None:
+    attributes = element.get_attributes()
+    attributes["name"] = f"{prefix}_{element.name}"
+    copy = parent.add(element.tag, **attributes)
+    if element.tag == "body":
+        for child in element.all_children():
+            if child.tag in ("body", "geom", "site"):
+                _copy(child, copy, prefix)

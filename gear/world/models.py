@@ -1,0 +1,164 @@
+"""The two compiled models of a composition: what is seen, and what is felt."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+import mujoco
+
+from gear.values.errors import TownError
+from gear.world.classes import GeomClasses, classify, own_class
+from gear.world.compose import Composition
+
+COLLISION_CLASS = "collision"
+GROUND_PREFIX = "ground"
+
+GROUND_GROUP, OBSTACLE_GROUP, ACTOR_GROUP, FOOT_GROUP = 0, 1, 2, 3
+"""Geom groups of the placement model, so that rays can choose what to hit."""
+
+_BODIES, _FEET = "1", "2"
+"""Contact bits: bodies touch bodies and obstacles, feet touch ground."""
+
+FOOT_RADIUS_M = 0.05
+
+_ASSET_REFERENCES = ("material", "mesh", "hfield")
+_PLACEMENT_SECTIONS = ("compiler", "option", "size", "default", "worldbody", "custom")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stance:
+    """How an actor stands: what the placement model must know of it.
+
+    Attributes:
+        half_length_m, half_width_m: where its feet are.
+        height_m: of the whole.
+        mass_kg: of the whole.
+    """
+
+    half_length_m: float
+    half_width_m: float
+    height_m: float
+    mass_kg: float
+
+
+def render_model(composition: Composition) -> tuple[mujoco.MjModel, GeomClasses]:
+    """Compiles what is seen: no collision geoms, actors are mocap bodies.
+
+    Raises:
+        TownError: MuJoCo refuses it, or a visible geom has no label.
+    """
+    tree = ET.fromstring(composition.xml)
+    for parent, geom in _geoms(tree, _collides):
+        parent.remove(geom)
+    spec, model = _compile(composition, tree, composition.assets)
+    return model, classify(spec, composition.town)
+
+
+def placement_model(composition: Composition, stances: Mapping[str, Stance]) -> mujoco.MjModel:
+    """Compiles what is felt: collision geoms, every actor of the pool free to move and standing on four feet.
+
+    Args:
+        composition: the world.
+        stances: by name of the slot's body.
+
+    Raises:
+        TownError: MuJoCo refuses it, or a collision geom is no primitive.
+    """
+    tree = ET.fromstring(composition.xml)
+    for section in list(tree):
+        if section.tag not in _PLACEMENT_SECTIONS:
+            tree.remove(section)
+    for default in tree.iter("default"):
+        for geom in default.findall("geom"):
+            for reference in _ASSET_REFERENCES:
+                geom.attrib.pop(reference, None)
+    for parent, geom in _geoms(tree, lambda felt: not felt):
+        parent.remove(geom)
+    for _, geom in _geoms(tree, _collides):
+        if "mesh" in geom.attrib or "hfield" in geom.attrib:
+            raise TownError(composition.town, f"collision geom {geom.get('name')!r} must be a primitive")
+        geom.attrib.pop("material", None)
+    worldbody = tree.find("worldbody")
+    assert worldbody is not None  # dm_control always writes one
+    for light in list(worldbody.findall("light")):
+        worldbody.remove(light)
+    for element in worldbody:
+        if element.get("name") in stances and element.tag == "body":
+            _free(element, stances[element.get("name", "")])
+        else:
+            for geom in element.iter("geom"):
+                _fix(geom)
+    return _compile(composition, tree, {})[1]
+
+
+def _collides(felt: bool) -> bool:
+    return felt
+
+
+def _geoms(tree: ET.Element, wanted: Callable[[bool], bool]) -> list[tuple[ET.Element, ET.Element]]:
+    """(parent, geom) for the geoms of the world that are wanted, by whether they are collision geoms."""
+    found: list[tuple[ET.Element, ET.Element]] = []
+
+    def walk(parent: ET.Element, inherited: str) -> None:
+        inherited = parent.get("childclass", inherited)
+        for child in parent:
+            if child.tag == "geom":
+                name = own_class(child.get("class", inherited))
+                if wanted(name.partition(".")[0] == COLLISION_CLASS):
+                    found.append((parent, child))
+            elif child.tag in ("body", "frame"):
+                walk(child, inherited)
+
+    for worldbody in tree.iter("worldbody"):
+        walk(worldbody, "")
+    return found
+
+
+def _fix(geom: ET.Element) -> None:
+    """A collision geom of the town."""
+    is_ground = geom.get("name", "").rpartition("/")[2].startswith(GROUND_PREFIX)
+    geom.set("group", str(GROUND_GROUP if is_ground else OBSTACLE_GROUP))
+    geom.set("contype", "0" if is_ground else _BODIES)
+    geom.set("conaffinity", _FEET if is_ground else _BODIES)
+
+
+def _free(body: ET.Element, stance: Stance) -> None:
+    """Makes an actor of the pool free to move."""
+    body.attrib.pop("mocap")
+    name = body.get("name", "")
+    for geom in body.iter("geom"):
+        geom.attrib.update(group=str(ACTOR_GROUP), contype=_BODIES, conaffinity=_BODIES, mass="0")
+    x, y, z = 2 * stance.half_length_m, 2 * stance.half_width_m, stance.height_m
+    inertia = [stance.mass_kg / 12 * (a * a + b * b) for a, b in ((y, z), (x, z), (x, y))]
+    body.insert(0, ET.Element("freejoint", name=name))
+    ET.SubElement(body, "inertial", pos=f"0 0 {0.4 * z:.6g}", mass=f"{stance.mass_kg:.6g}", diaginertia=_words(inertia))
+    for number, (sx, sy) in enumerate(((1, 1), (1, -1), (-1, 1), (-1, -1))):
+        ET.SubElement(
+            body,
+            "geom",
+            name=f"{name}_foot_{number}",
+            type="sphere",
+            size=f"{FOOT_RADIUS_M}",
+            pos=_words((sx * stance.half_length_m, sy * stance.half_width_m, FOOT_RADIUS_M)),
+            mass="0",
+            group=str(FOOT_GROUP),
+            contype=_FEET,
+            conaffinity="0",
+            friction="1.5 0.01 0.001",
+        )
+
+
+def _words(numbers: Iterable[float]) -> str:
+    return " ".join(f"{number:.9g}" for number in numbers)
+
+
+def _compile(
+    composition: Composition, tree: ET.Element, assets: Mapping[str, bytes]
+) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
+    try:
+        spec = mujoco.MjSpec.from_string(ET.tostring(tree, encoding="unicode"), assets=dict(assets))
+        return spec, spec.compile()
+    except ValueError as error:
+        raise TownError(composition.town, f"MuJoCo cannot compile it: {error}") from error

@@ -1,0 +1,63 @@
+"""Lines through points, by arc length."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from gear.values.geometry import Array, frozen
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Polyline:
+    """A line through points, measured along the ground plan: arc length is that of its projection to the plane.
+
+    Attributes:
+        points_m: (N, 3), no two neighbours in one place.
+        s_m: (N,) arc length at each point, from 0.
+    """
+
+    points_m: Array
+    s_m: Array
+
+    @staticmethod
+    def through(points_m: Array) -> Polyline:
+        """Through (N, 3) points."""
+        steps_m = np.linalg.norm(np.diff(points_m[:, :2], axis=0), axis=1)
+        return Polyline(frozen(points_m), frozen(np.concatenate([[0.0], np.cumsum(steps_m)])))
+
+    @property
+    def length_m(self) -> float:
+        """Of the whole line."""
+        return float(self.s_m[-1])
+
+    def segment(self, s_m: float) -> int:
+        """Index of the segment that holds `s_m`; the ends hold all beyond them."""
+        return int(np.clip(np.searchsorted(self.s_m, s_m, side="right") - 1, 0, len(self.s_m) - 2))
+
+    def at(self, s_m: float, lateral_m: float = 0.0) -> tuple[Array, float]:
+        """The point at an arc length, moved to the left, and the heading there in radians counter-clockwise from east.
+
+        Beyond its ends the line goes straight on.
+        """
+        index = self.segment(s_m)
+        step = self.points_m[index + 1] - self.points_m[index]
+        length_m = math.hypot(step[0], step[1])
+        point = self.points_m[index] + step * ((s_m - self.s_m[index]) / length_m)
+        point[:2] += np.array([-step[1], step[0]]) * (lateral_m / length_m)
+        return point, math.atan2(step[1], step[0])
+
+    def project(self, position_m: Array) -> tuple[float, float, float]:
+        """Where the line is nearest to a point: arc length, how far to its left the point is, distance in space."""
+        starts, steps = self.points_m[:-1], np.diff(self.points_m, axis=0)
+        squared = np.einsum("ij,ij->i", steps[:, :2], steps[:, :2])
+        shares = np.clip(np.einsum("ij,ij->i", position_m[:2] - starts[:, :2], steps[:, :2]) / squared, 0.0, 1.0)
+        nearest = starts + shares[:, None] * steps
+        distances_m = np.linalg.norm(position_m - nearest, axis=1)
+        index = int(np.argmin(distances_m))
+        length_m = math.sqrt(squared[index])
+        offset = position_m[:2] - starts[index, :2]
+        lateral_m = (steps[index, 0] * offset[1] - steps[index, 1] * offset[0]) / length_m
+        return float(self.s_m[index] + shares[index] * length_m), float(lateral_m), float(distances_m[index])

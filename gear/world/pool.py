@@ -1,0 +1,43 @@
+"""Which actors a scene's world holds, and how many instances of each: enough for every sample, no more."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from gear.values.errors import UnknownNameError
+from gear.world.assets import ActorFacts, AssetLibrary
+from gear.world.scene_spec import SceneSpec
+
+EGO_ASSET = "car_saloon"
+
+POOL_SLACK = 2.0
+"""An asset has this many times the instances that its share of the largest crowd would be."""
+
+
+def plan_pool(scene: SceneSpec, library: AssetLibrary) -> list[tuple[ActorFacts, int]]:
+    """The ego car first, then vehicles and people with their counts.
+
+    Raises:
+        UnknownNameError: the town's vehicles hold no ego car.
+    """
+    if EGO_ASSET not in library.vehicles:
+        raise UnknownNameError("vehicle", EGO_ASSET, library.vehicles)
+    pool = [(library.vehicles[EGO_ASSET], 1)]
+    for actors, most in (
+        (library.vehicles, scene.npc_vehicles.count[1]),
+        (library.pedestrians, scene.pedestrians.count[1]),
+    ):
+        pool += _shares(actors, most)
+    return pool
+
+
+def _shares(actors: Mapping[str, ActorFacts], most: int) -> list[tuple[ActorFacts, int]]:
+    if most == 0:
+        return []
+    total = sum(actor.weight for actor in actors.values())
+    return [
+        (actor, min(most, max(1, math.ceil(POOL_SLACK * most * actor.weight / total))))
+        for actor in actors.values()
+        if actor.weight > 0
+    ]

@@ -1,0 +1,190 @@
+"""Scenes as their YAML says them: where boards stand, and what may stand around them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
+
+from gear.values.errors import FieldError
+from gear.values.scene import Vec3
+
+Range = tuple[float, float]
+CountRange = tuple[int, int]
+
+
+def _check_range(name: str, value: Range | None, *, least: float = -10_000.0) -> None:
+    if value is None:
+        return
+    low, high = value
+    if low > high:
+        raise FieldError(name, f"the first number must not exceed the second, got {low:g} and {high:g}")
+    if low < least or high > 10_000:
+        raise FieldError(name, f"must lie within {least:g} and 10000, got {low:g} to {high:g}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoardSpec:
+    """One billboard.
+
+    Attributes:
+        position_m: ground point under the middle of its face, in the world.
+        facing_deg: where its face looks, counter-clockwise from east.
+        asset: name of its MJCF in `mjcf/surfaces`.
+    """
+
+    position_m: Vec3
+    facing_deg: float
+    asset: str = "billboard"
+
+    def __post_init__(self) -> None:
+        if not -360 <= self.facing_deg <= 360:
+            raise FieldError("facing_deg", f"must be -360 to 360 degrees, got {self.facing_deg:g}")
+        if not self.asset:
+            raise FieldError("asset", "must be the name of a surface's MJCF")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EgoLimits:
+    """Where the ego car may stand, in the frame of the first board (ahead of its face, to the left of that direction).
+
+    Attributes:
+        ahead_m, lateral_m: from, to.
+        max_incidence_deg: how obliquely the reference camera may see the face, 0 is head-on.
+        min_free: share of the face that nothing of the town may hide.
+    """
+
+    ahead_m: Range
+    lateral_m: Range
+    max_incidence_deg: float = 75.0
+    min_free: float = 0.4
+
+    def __post_init__(self) -> None:
+        _check_range("ahead_m", self.ahead_m, least=0.0)
+        _check_range("lateral_m", self.lateral_m)
+        if not 0 < self.max_incidence_deg < 90:
+            raise FieldError("max_incidence_deg", f"must lie between 0 and 90 degrees, got {self.max_incidence_deg:g}")
+        if not 0 <= self.min_free <= 1:
+            raise FieldError("min_free", f"is a share, 0 to 1, got {self.min_free:g}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NpcLimits:
+    """Where other road users may be, and how many.
+
+    Attributes:
+        count: fewest, most; drawn evenly between.
+        ahead_m, lateral_m: from, to, in the frame of the first board.
+        radius_m: from, to, around the ego car; holds as well where both are given.
+    """
+
+    count: CountRange
+    ahead_m: Range | None = None
+    lateral_m: Range | None = None
+    radius_m: Range | None = None
+
+    def __post_init__(self) -> None:
+        low, high = self.count
+        if not 0 <= low <= high <= 1000:
+            raise FieldError("count", f"must be two numbers, 0 to 1000, the smaller first, got {low} and {high}")
+        _check_range("ahead_m", self.ahead_m)
+        _check_range("lateral_m", self.lateral_m)
+        _check_range("radius_m", self.radius_m, least=0.0)
+
+    @property
+    def needs_board(self) -> bool:
+        """Whether the limits speak of a board."""
+        return self.ahead_m is not None or self.lateral_m is not None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VehicleLimits(NpcLimits):
+    """As `NpcLimits`, for vehicles.
+
+    Attributes:
+        parked_share: share of them that stands in parking bays, as far as there are free ones.
+    """
+
+    parked_share: float = 0.3
+
+    def __post_init__(self) -> None:
+        NpcLimits.__post_init__(self)
+        if not 0 <= self.parked_share <= 1:
+            raise FieldError("parked_share", f"is a share, 0 to 1, got {self.parked_share:g}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TruckSpec:
+    """A vehicle that bears the patch on its rear, ahead of the ego car in its lane.
+
+    Attributes:
+        asset: name of its MJCF in `mjcf/vehicles`.
+        gap_m: from, to, between the ego's front and the face.
+    """
+
+    asset: str = "truck_box"
+    gap_m: Range = (3.0, 30.0)
+
+    def __post_init__(self) -> None:
+        _check_range("gap_m", self.gap_m, least=0.5)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SceneSpec:
+    """One scene: boards or a truck or neither, and limits for what is around them.
+
+    Attributes:
+        boards: take `patch_0`, `patch_1`, … in this order.
+        truck: instead of boards.
+        ego: limits of the ego car; needed with boards, anywhere on the road network without.
+        npc_vehicles, pedestrians: limits of the others.
+    """
+
+    boards: tuple[BoardSpec, ...] = ()
+    truck: TruckSpec | None = None
+    ego: EgoLimits | None = None
+    npc_vehicles: VehicleLimits = field(default_factory=lambda: VehicleLimits(count=(3, 7), radius_m=(0.0, 80.0)))
+    pedestrians: NpcLimits = field(default_factory=lambda: NpcLimits(count=(6, 20), radius_m=(0.0, 60.0)))
+
+    def __post_init__(self) -> None:
+        if self.boards and self.truck is not None:
+            raise FieldError("truck", "a scene has boards or a truck, not both")
+        if self.boards and self.ego is None:
+            raise FieldError("ego", "a scene with boards needs the limits of the ego car (ahead_m, lateral_m)")
+        if not self.boards and self.ego is not None:
+            raise FieldError("ego", "limits of the ego car are in the frame of the first board, and there is none")
+        for name in ("npc_vehicles", "pedestrians"):
+            if not self.boards and getattr(self, name).needs_board:
+                raise FieldError(name, "ahead_m and lateral_m are in the frame of the first board; use radius_m")
+
+    def capped(self, max_vehicles: int, max_pedestrians: int) -> SceneSpec:
+        """The same scene with at most so many others."""
+        return replace(
+            self,
+            npc_vehicles=_capped(self.npc_vehicles, max_vehicles),
+            pedestrians=_capped(self.pedestrians, max_pedestrians),
+        )
+
+
+LimitsT = TypeVar("LimitsT", bound=NpcLimits)
+
+
+def _capped(limits: LimitsT, most: int) -> LimitsT:
+    low, high = limits.count
+    return replace(limits, count=(min(low, most), min(high, most)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SceneLibrary:
+    """The scenes of one town.
+
+    Attributes:
+        town: name of the town that the poses belong to.
+        scenes: by name.
+    """
+
+    town: str
+    scenes: dict[str, SceneSpec]
+
+    def __post_init__(self) -> None:
+        if not self.scenes:
+            raise FieldError("scenes", "a scene library needs at least one scene")

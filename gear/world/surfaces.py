@@ -1,0 +1,120 @@
+"""Faces that take patches: where they are in the compiled model, how large, and what they show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from gear.values.errors import TownError
+from gear.values.frames import UInt8Image
+from gear.values.geometry import RigidTransform
+from gear.values.scene import Pose, SurfaceRecord
+from gear.world.faces import SurfaceAlbedo, face_from_patch, uniform_face
+from gear.world.instances import FaceName
+from gear.world.shapes import geom_triangles
+
+FLATNESS_M = 0.01
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Face:
+    """One face in the render model.
+
+    Attributes:
+        name: `surface_0`, ….
+        asset: MJCF that it comes from.
+        is_carried: whether an actor bears it.
+        geom_id: in the render model.
+        parent_from_surface: its frame in the world, or in its actor.
+        width_m, height_m: its size.
+        neutral: (H, W, 3) what it shows without a patch.
+    """
+
+    name: str
+    asset: str
+    is_carried: bool
+    geom_id: int
+    parent_from_surface: RigidTransform
+    width_m: float
+    height_m: float
+    neutral: UInt8Image
+
+    def record(self, carrier_id: int | None) -> SurfaceRecord:
+        """As data, on the actor of that id if it is carried."""
+        return SurfaceRecord(
+            name=self.name,
+            asset=self.asset,
+            actor_id=carrier_id if self.is_carried else None,
+            parent_from_surface=Pose.from_transform(self.parent_from_surface),
+            width_m=round(self.width_m, 6),
+            height_m=round(self.height_m, 6),
+        )
+
+    def show(self, albedo: SurfaceAlbedo) -> UInt8Image:
+        """The texture for what it is to show."""
+        if not isinstance(albedo, str):
+            return face_from_patch(albedo)
+        if albedo == "none":
+            return self.neutral
+        return uniform_face(255 if albedo == "white" else 0)
+
+
+def find_faces(model: mujoco.MjModel, data: mujoco.MjData, names: Sequence[FaceName], path: Path) -> tuple[Face, ...]:
+    """Measures the faces of a compiled model; actors stand at their own origins in `data`.
+
+    Raises:
+        TownError: a face is not flat in its `surface` frame.
+    """
+    return tuple(_face(model, data, number, name, path) for number, name in enumerate(names))
+
+
+def _face(model: mujoco.MjModel, data: mujoco.MjData, number: int, name: FaceName, path: Path) -> Face:
+    surface = f"surface_{number}"
+    geom_id, site_id = model.geom(name.geom).id, model.site(name.site).id
+    world_from_surface = RigidTransform.from_parts(
+        "world", surface, data.site_xmat[site_id].reshape(3, 3), data.site_xpos[site_id]
+    )
+    points, _ = geom_triangles(model, geom_id)
+    world_m = points @ data.geom_xmat[geom_id].reshape(3, 3).T + data.geom_xpos[geom_id]
+    local_m = world_from_surface.inverse().apply(world_m)
+    low, high = local_m.min(axis=0), local_m.max(axis=0)
+    if np.abs(low + high).max() > 2 * FLATNESS_M or high[2] - low[2] > FLATNESS_M:
+        raise TownError(
+            path, f"{name.asset}: the face must be flat, with the site {name.site!r} in its middle, z into the board"
+        )
+    parent_from_surface = world_from_surface
+    if name.is_carried:
+        body = model.body(name.owner).id
+        world_from_actor = RigidTransform.from_parts("world", "actor", data.xmat[body].reshape(3, 3), data.xpos[body])
+        parent_from_surface = world_from_actor.inverse() @ world_from_surface
+    return Face(
+        name=surface,
+        asset=name.asset,
+        is_carried=name.is_carried,
+        geom_id=geom_id,
+        parent_from_surface=parent_from_surface,
+        width_m=float(high[0] - low[0]),
+        height_m=float(high[1] - low[1]),
+        neutral=_neutral(model, name.neutral_material),
+    )
+
+
+def _neutral(model: mujoco.MjModel, material: str) -> UInt8Image:
+    """What the asset's own material looks like, as a face."""
+    material_id = model.material(material).id
+    roles = (mujoco.mjtTextureRole.mjTEXROLE_RGB, mujoco.mjtTextureRole.mjTEXROLE_RGBA)
+    textures = [int(model.mat_texid[material_id, role]) for role in roles]
+    texture = max(textures)
+    if texture < 0:
+        byte = np.floor(np.clip(model.mat_rgba[material_id, :3], 0, 1) * 255 + 0.5).astype(np.uint8)
+        return face_from_patch(byte[None, None, :])
+    height, width, channels = (
+        int(model.tex_height[texture]), int(model.tex_width[texture]), int(model.tex_nchannel[texture])
+    )  # fmt: skip
+    start = int(model.tex_adr[texture])
+    pixels = np.array(model.tex_data[start : start + height * width * channels]).reshape(height, width, channels)
+    return face_from_patch(np.ascontiguousarray(np.broadcast_to(pixels[..., :3], (height, width, 3))))

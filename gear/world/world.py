@@ -1,0 +1,250 @@
+"""A town with its scene, compiled once; every sample only moves what is there."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import OrderedDict
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from gear.contracts.rendering import Stage
+from gear.values.errors import PlacementError
+from gear.values.frames import GeomTable, SceneObject, UInt8Image
+from gear.values.scene import ActorRecord, SceneRecord, SurfaceRecord, Vec3, Weather
+from gear.world.assets import AssetLibrary
+from gear.world.catalogue import ActorType, StaticObjects, actor_types, static_objects, visible_geoms
+from gear.world.classes import GeomClasses
+from gear.world.compose import PARKED_DEPTH_M, Composition, Slot, compose
+from gear.world.faces import SurfaceAlbedo, SurfaceAlbedos
+from gear.world.lanes import LaneGraph
+from gear.world.models import placement_model, render_model
+from gear.world.pool import plan_pool
+from gear.world.scene_spec import SceneSpec
+from gear.world.surfaces import Face, find_faces
+
+FACES_KEPT = 8
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PlacedStage:
+    """One sample, ready to be rendered and to be measured.
+
+    Attributes:
+        stage: for the renderer. Its `data` is the world's own: it holds until the next `place`.
+        geoms: what each geom is.
+        objects: countable things by object id.
+    """
+
+    stage: Stage
+    geoms: GeomTable
+    objects: Mapping[int, SceneObject]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _SlotGeoms:
+    slot: Slot
+    mocap_id: int
+    geom_ids: tuple[int, ...]
+    paint_ids: tuple[int, ...]
+
+
+@dataclass(eq=False, kw_only=True)
+class World:
+    """A compiled town, scene, weather and pool of actors.
+
+    Attributes:
+        library: where its MJCF comes from.
+        scene_name, scene, weather: what it was built for.
+        model: what is seen.
+        placement_model: what is felt; its actors are free, by the same body names.
+        classes: label of each visible geom.
+        slots: the pool.
+        types: assets of the pool by name.
+        faces: what takes patches, in patch order.
+        statics: countable things of the town.
+        lanes: where road users may be.
+    """
+
+    library: AssetLibrary
+    scene_name: str
+    scene: SceneSpec
+    weather: Weather
+    model: mujoco.MjModel
+    placement_model: mujoco.MjModel
+    classes: GeomClasses
+    slots: tuple[Slot, ...]
+    types: Mapping[str, ActorType]
+    faces: tuple[Face, ...]
+    statics: StaticObjects
+    lanes: LaneGraph
+    _data: mujoco.MjData = field(init=False, repr=False)
+    _slot_geoms: tuple[_SlotGeoms, ...] = field(init=False, repr=False)
+    _shown: OrderedDict[tuple[str, str], UInt8Image] = field(init=False, repr=False, default_factory=OrderedDict)
+
+    def __post_init__(self) -> None:
+        self._data = mujoco.MjData(self.model)
+        self._slot_geoms = tuple(self._geoms_of(slot) for slot in self.slots)
+
+    @staticmethod
+    def build(*, town: str | Path, scene_name: str, scene: SceneSpec, weather: Weather) -> World:
+        """Composes and compiles.
+
+        Args:
+            town: a town's name, or the path of its MJCF.
+            scene_name: what records call the scene.
+            scene: boards, truck and limits.
+            weather: light and air.
+
+        Raises:
+            UnknownNameError: there is no such town, board or truck.
+            TownError: a file breaks the conventions.
+        """
+        library = AssetLibrary.for_town(town)
+        carrier = None
+        if scene.truck is not None:
+            library.path("vehicle", scene.truck.asset)
+            carrier = library.vehicles[scene.truck.asset]
+        composition = compose(library, scene.boards, plan_pool(scene, library), carrier, weather)
+        model, classes = render_model(composition)
+        return _assemble(library, scene_name, scene, weather, composition, model, classes)
+
+    @property
+    def town_name(self) -> str:
+        """Name of the town."""
+        return self.library.town_name
+
+    def surface_records(self, carrier_id: int | None = None) -> tuple[SurfaceRecord, ...]:
+        """What takes patches, as data; `carrier_id` is the actor that bears them in a truck's scene."""
+        return tuple(face.record(carrier_id) for face in self.faces)
+
+    def place(self, record: SceneRecord, surfaces: SurfaceAlbedos | None = None) -> PlacedStage:
+        """Moves everything to where the record says.
+
+        Args:
+            record: of this world's town and scene.
+            surfaces: what each surface shows, by name; the neutral face where nothing is said.
+
+        Raises:
+            PlacementError: the record needs actors that this world does not hold.
+            ValueError: a surface is named that is not there.
+        """
+        shown = dict(surfaces or {})
+        unknown = set(shown) - {face.name for face in self.faces}
+        if unknown:
+            raise ValueError(f"no surface named {', '.join(sorted(unknown))}; there are {len(self.faces)}")
+        taken = self._assign(record)
+        self._pose(record, taken)
+        object_id = self.statics.object_id.copy()
+        paint: dict[int, Vec3] = {}
+        objects: dict[int, SceneObject] = dict(self.statics.objects)
+        for actor, geoms in zip(record.actors, taken, strict=True):
+            object_id[list(geoms.geom_ids)] = actor.id
+            objects[actor.id] = self._object(actor)
+            if actor.paint_rgb is not None:
+                paint.update(dict.fromkeys(geoms.paint_ids, actor.paint_rgb))
+        surface_index = np.full(self.model.ngeom, -1, np.int16)
+        for index, face in enumerate(self.faces):
+            surface_index[face.geom_id] = index
+        for array in (object_id, surface_index):
+            array.setflags(write=False)
+        faces = {face.geom_id: self._show(face, shown.get(face.name, "none")) for face in self.faces}
+        return PlacedStage(
+            stage=Stage(model=self.model, data=self._data, paint_rgb=paint, faces=faces),
+            geoms=GeomTable(label_code=self.classes.label_code, object_id=object_id, surface_index=surface_index),
+            objects=objects,
+        )
+
+    def _geoms_of(self, slot: Slot) -> _SlotGeoms:
+        body = self.model.body(slot.body).id
+        geoms = visible_geoms(self.model, body, self.classes.label_code)
+        paint = tuple(geom for geom in geoms if self.classes.is_paint[geom])
+        return _SlotGeoms(slot, int(self.model.body_mocapid[body]), tuple(geoms), paint)
+
+    def _assign(self, record: SceneRecord) -> list[_SlotGeoms]:
+        """A slot for each actor: the first free one of its asset, so that a record always takes the same."""
+        free = list(self._slot_geoms)
+        taken = []
+        for actor in record.actors:
+            for candidate in free:
+                slot = candidate.slot
+                if slot.actor.name == actor.asset and slot.bears_surface == (actor.role == "carrier"):
+                    free.remove(candidate)
+                    taken.append(candidate)
+                    break
+            else:
+                raise PlacementError(
+                    record.scene, f"sample {record.index} needs one more {actor.asset} than this world was built with"
+                )
+        return taken
+
+    def _pose(self, record: SceneRecord, taken: list[_SlotGeoms]) -> None:
+        xmin, ymin, xmax, ymax = self.lanes.bounds_m
+        self._data.mocap_pos[:] = ((xmin + xmax) / 2, (ymin + ymax) / 2, -PARKED_DEPTH_M)
+        self._data.mocap_quat[:] = (1.0, 0.0, 0.0, 0.0)
+        for actor, geoms in zip(record.actors, taken, strict=True):
+            self._data.mocap_pos[geoms.mocap_id] = actor.world_from_actor.position_m
+            self._data.mocap_quat[geoms.mocap_id] = actor.world_from_actor.quat_wxyz
+        self._data.time = record.time_s
+        mujoco.mj_kinematics(self.model, self._data)
+        mujoco.mj_comPos(self.model, self._data)
+        mujoco.mj_camlight(self.model, self._data)
+
+    def _object(self, actor: ActorRecord) -> SceneObject:
+        kind = self.types[actor.asset]
+        return SceneObject(
+            id=actor.id,
+            asset=actor.asset,
+            label_code=kind.label.code,
+            kitti_type=kind.label.kitti_type,
+            is_ego=actor.role == "ego",
+            world_from_object=actor.world_from_actor.transform("world", "object"),
+            shape=kind.shape,
+        )
+
+    def _show(self, face: Face, albedo: SurfaceAlbedo) -> UInt8Image:
+        """Resampled faces are kept: a data set shows one patch thousands of times."""
+        key: str = (
+            albedo
+            if isinstance(albedo, str)
+            else f"{albedo.shape} {hashlib.blake2b(albedo.tobytes(), digest_size=16).hexdigest()}"
+        )
+        if (face.name, key) not in self._shown:
+            self._shown[face.name, key] = face.show(albedo)
+            if len(self._shown) > FACES_KEPT:
+                self._shown.popitem(last=False)
+        self._shown.move_to_end((face.name, key))
+        return self._shown[face.name, key]
+
+
+def _assemble(
+    library: AssetLibrary,
+    scene_name: str,
+    scene: SceneSpec,
+    weather: Weather,
+    composition: Composition,
+    model: mujoco.MjModel,
+    classes: GeomClasses,
+) -> World:
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    slots = composition.slots
+    types = actor_types(model, data, classes, slots)
+    felt = placement_model(composition, {slot.body: types[slot.actor.name].stance for slot in slots})
+    return World(
+        library=library,
+        scene_name=scene_name,
+        scene=scene,
+        weather=weather,
+        model=model,
+        placement_model=felt,
+        classes=classes,
+        slots=slots,
+        types=types,
+        faces=find_faces(model, data, composition.faces, library.town),
+        statics=static_objects(model, data, classes, slots, library.town),
+        lanes=LaneGraph.from_model(felt, library.town),
+    )
