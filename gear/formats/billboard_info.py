@@ -1,0 +1,114 @@
+"""`camera_billboard_info.json`: poses of cameras and boards as the original's public loaders want them.
+
+World: x forward, y left, z up, metres and radians. A board's origin lies on the face at half height, 0.1 m to the
+left of the middle, its x axis points into the board, y to the viewer's left, z up: the loaders' own offset of the
+patch starts from there. They ignore roll and pitch of everything, so records of tilted cameras or boards are marked
+by `level: false`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from gear.values.geometry import CAMERA_FROM_ACTOR_AXES, Array, RigidTransform
+from gear.values.scene import CameraRecord, SceneRecord
+from gear.values.serial import Json
+
+LEFT_OF_MIDDLE_M = 0.1
+FLU_FROM_SURFACE = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+"""From a surface's axes (x right, y down, z in) to the board's (x in, y left, z up)."""
+
+LEVEL_RAD = 1e-4
+
+
+def billboard_info(
+    records: Sequence[SceneRecord], *, task: str, patch_label: str, reference: str, second: str | None = None
+) -> Json:
+    """The content of the file for one split.
+
+    Args:
+        records: of the samples, in the loader's order.
+        task: the original's name of it: `ss`, `2dod`, `3dod`, `depth`.
+        patch_label: `none`, `random`, or the patch's name and hash.
+        reference: name of the camera whose pictures the loader reads.
+        second: name of the second camera; the first again if there is none.
+    """
+    second = second or reference
+    is_patched = patch_label != "none"
+    entries = [_entry(index, record, reference, second) for index, record in enumerate(records)]
+    boards = max((len(record.surfaces) for record in records), default=0)
+    info = {
+        "task": task,
+        "num_billboards": boards,
+        "is_patched": is_patched,
+        "patch_folder": patch_label if is_patched else None,
+        "patch_type": ("random" if patch_label == "random" else "adversarial") if is_patched else "none",
+        "net": None,
+        "creator": "gear",
+        "level": all(_is_level(record, (reference, second)) for record in records),
+    }
+    return {
+        "info": info,
+        "camera_billboard_positions": entries,
+        "patch_mask_corners": {},
+        "camera_params": _params(records, reference),
+        "camera_dx_params": _params(records, second),
+    }
+
+
+def xyzrpy(world_from_frame: RigidTransform) -> list[float]:
+    """x, y, z in metres and roll, pitch, yaw in radians, applied as Rz(yaw) Ry(pitch) Rx(roll)."""
+    r = world_from_frame.rotation
+    roll = math.atan2(r[2, 1], r[2, 2])
+    pitch = math.atan2(-r[2, 0], math.hypot(r[0, 0], r[1, 0]))
+    yaw = math.atan2(r[1, 0], r[0, 0])
+    numbers = (*world_from_frame.translation_m, roll, pitch, yaw)
+    return [round(float(v), 7) + 0.0 for v in numbers]
+
+
+def world_from_board(record: SceneRecord, index: int) -> RigidTransform:
+    """The board's frame of the module's text, for one surface of a record."""
+    world_from_surface = record.world_from_surface(record.surfaces[index])
+    rotation: Array = world_from_surface.rotation @ FLU_FROM_SURFACE.T
+    origin = world_from_surface.apply([-LEFT_OF_MIDDLE_M, 0.0, 0.0])
+    return RigidTransform.from_parts("world", "board", rotation, origin)
+
+
+def world_from_flu_camera(camera: CameraRecord) -> RigidTransform:
+    """The camera with x forward, y left, z up."""
+    placed = camera.world_from_camera_transform
+    rotation: Array = placed.rotation @ CAMERA_FROM_ACTOR_AXES
+    return RigidTransform.from_parts("world", "camera", rotation, placed.translation_m)
+
+
+def _entry(index: int, record: SceneRecord, reference: str, second: str) -> Json:
+    entry: dict[str, Json] = {"id": index}
+    # A loader reads the first board of every entry, boards or not, and stops at null; the second one may be null.
+    entry["billboard_xyzrpy"] = xyzrpy(world_from_board(record, 0)) if record.surfaces else [0.0] * 6
+    entry["billboard2_xyzrpy"] = xyzrpy(world_from_board(record, 1)) if len(record.surfaces) > 1 else [None] * 6
+    for number in range(2, len(record.surfaces)):
+        entry[f"billboard{number + 1}_xyzrpy"] = xyzrpy(world_from_board(record, number))
+    entry["camera_xyzrpy"] = xyzrpy(world_from_flu_camera(record.camera(reference)))
+    entry["camera_dx_xyzrpy"] = xyzrpy(world_from_flu_camera(record.camera(second)))
+    return entry
+
+
+def _params(records: Sequence[SceneRecord], name: str) -> Json:
+    if not records:
+        return {}
+    camera = records[0].camera(name)
+    return {
+        "height": camera.height_px,
+        "width": camera.width_px,
+        "fov": camera.intrinsics.hfov_rad,
+        "focal": camera.focal_px,
+    }
+
+
+def _is_level(record: SceneRecord, cameras: Sequence[str]) -> bool:
+    frames = [world_from_flu_camera(record.camera(name)) for name in cameras]
+    frames += [world_from_board(record, index) for index in range(len(record.surfaces))]
+    return all(float(frame.rotation[2, 2]) >= math.cos(LEVEL_RAD) for frame in frames)

@@ -1,0 +1,170 @@
+"""COCO: categories, annotations from masks, and the one file of a split."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from gear.values.serial import Json
+from gear.values.truth import BoxPx
+
+SUPERCATEGORIES: tuple[tuple[str, str], ...] = (
+    ("person", "1 person"),
+    (
+        "vehicle",
+        "2 bicycle, 3 car, 4 motorcycle, 5 airplane, 6 bus, 7 train, 8 truck, 9 boat",
+    ),
+    ("outdoor", "10 traffic light, 11 fire hydrant, 13 stop sign, 14 parking meter, 15 bench"),
+    (
+        "animal",
+        "16 bird, 17 cat, 18 dog, 19 horse, 20 sheep, 21 cow, 22 elephant, 23 bear, 24 zebra, 25 giraffe",
+    ),
+    ("accessory", "27 backpack, 28 umbrella, 31 handbag, 32 tie, 33 suitcase"),
+    (
+        "sports",
+        "34 frisbee, 35 skis, 36 snowboard, 37 sports ball, 38 kite, 39 baseball bat, 40 baseball glove, 41 skateboard,"
+        " 42 surfboard, 43 tennis racket",
+    ),
+    ("kitchen", "44 bottle, 46 wine glass, 47 cup, 48 fork, 49 knife, 50 spoon, 51 bowl"),
+    (
+        "food",
+        "52 banana, 53 apple, 54 sandwich, 55 orange, 56 broccoli, 57 carrot, 58 hot dog, 59 pizza, 60 donut, 61 cake",
+    ),
+    ("furniture", "62 chair, 63 couch, 64 potted plant, 65 bed, 67 dining table, 70 toilet"),
+    ("electronic", "72 tv, 73 laptop, 74 mouse, 75 remote, 76 keyboard, 77 cell phone"),
+    ("appliance", "78 microwave, 79 oven, 80 toaster, 81 sink, 82 refrigerator"),
+    ("indoor", "84 book, 85 clock, 86 vase, 87 scissors, 88 teddy bear, 89 hair drier, 90 toothbrush"),
+)
+
+
+def _categories() -> tuple[Json, ...]:
+    found = []
+    for supercategory, text in SUPERCATEGORIES:
+        for item in text.split(", "):
+            number, name = item.strip().split(" ", 1)
+            found.append({"id": int(number), "name": name, "supercategory": supercategory})
+    return tuple(found)
+
+
+CATEGORIES: tuple[Json, ...] = _categories()
+"""All 80 categories, so that what a COCO network finds has a place even where nothing of it occurs."""
+
+CATEGORY_NAMES: dict[int, str] = {category["id"]: category["name"] for category in CATEGORIES}
+"""Names by category id."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Annotation:
+    """One object in one picture.
+
+    Attributes:
+        category_id: of the 91-id space.
+        box_xywh: left, top, width, height in edge pixels.
+        area_px: pixels of the mask.
+        rle: compressed run lengths of the visible mask.
+        is_crowd: to be ignored: seen too little of to be looked for.
+        extras: what gear knows beyond COCO, under the key `gear`.
+    """
+
+    category_id: int
+    box_xywh: tuple[float, float, float, float]
+    area_px: int
+    rle: str
+    is_crowd: bool
+    extras: Json
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Picture:
+    """One picture of a split with its annotations."""
+
+    id: int
+    file_name: str
+    height_px: int
+    width_px: int
+    annotations: tuple[Annotation, ...]
+
+
+def dataset_json(pictures: Sequence[Picture], *, description: str, created: str) -> Json:
+    """The content of an annotation file.
+
+    Args:
+        pictures: in order of id. Annotations are numbered from 1 through all of them: pycocotools takes the id 0 for
+            "no match".
+        description: what the split is.
+        created: ISO date.
+    """
+    annotations: list[Json] = []
+    for picture in pictures:
+        for item in picture.annotations:
+            annotations.append(
+                {
+                    "id": len(annotations) + 1,
+                    "image_id": picture.id,
+                    "category_id": item.category_id,
+                    "bbox": list(item.box_xywh),
+                    "area": item.area_px,
+                    "segmentation": {"size": [picture.height_px, picture.width_px], "counts": item.rle},
+                    "iscrowd": int(item.is_crowd),
+                    "gear": item.extras,
+                }
+            )
+    return {
+        "info": {
+            "year": int(created[:4]),
+            "version": "1.0",
+            "description": description,
+            "contributor": "gear",
+            "url": "",
+            "date_created": created.replace("-", "/"),
+        },
+        "licenses": [{"id": 1, "name": "unspecified", "url": ""}],
+        "images": [
+            {
+                "id": picture.id,
+                "width": picture.width_px,
+                "height": picture.height_px,
+                "file_name": picture.file_name,
+                "license": 1,
+                "flickr_url": "",
+                "coco_url": "",
+                "date_captured": f"{created} 00:00:00",
+            }
+            for picture in pictures
+        ],
+        "annotations": annotations,
+        "categories": list(CATEGORIES),
+    }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Detection:
+    """One found object.
+
+    Attributes:
+        category_id: of the 91-id space.
+        box_px: left, top, right, bottom in edge pixels.
+        score: confidence; higher is surer.
+    """
+
+    category_id: int
+    box_px: BoxPx
+    score: float
+
+
+def results_json(image_id: int, detections: Sequence[Detection]) -> list[Json]:
+    """Detections of one picture as a results file lists them."""
+    return [
+        {
+            "image_id": image_id,
+            "category_id": found.category_id,
+            "bbox": [
+                found.box_px[0],
+                found.box_px[1],
+                found.box_px[2] - found.box_px[0],
+                found.box_px[3] - found.box_px[1],
+            ],
+            "score": found.score,
+        }
+        for found in detections
+    ]

@@ -1,0 +1,215 @@
+"""KITTI object detection: label lines and calibration, by the benchmark's own definitions.
+
+Boxes are in index pixels (the first pixel's centre is 0) and clipped to them; the location is the middle of the
+bottom face in the rectified frame of camera 0, which is the left camera; `rotation_y` is 0 for a front along +x.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gear.values.geometry import Array, Intrinsics
+from gear.values.truth import BoxPx
+
+TYPES = ("Car", "Van", "Truck", "Pedestrian", "Person_sitting", "Cyclist", "Tram", "Misc", "DontCare")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KittiLabel:
+    """One line of a label file.
+
+    Attributes:
+        type: one of `TYPES`.
+        truncated: share of the object outside the picture, 0..1.
+        occluded: 0 fully visible, 1 partly, 2 largely hidden, 3 unknown; -1 in DontCare lines.
+        alpha_rad: observation angle.
+        box_px: left, top, right, bottom in index pixels.
+        height_m, width_m, length_m: size.
+        location_m: middle of the bottom face in camera 0.
+        rotation_y_rad: turn about the camera's y.
+        score: confidence, in results only.
+    """
+
+    type: str
+    truncated: float
+    occluded: int
+    alpha_rad: float
+    box_px: BoxPx
+    height_m: float
+    width_m: float
+    length_m: float
+    location_m: tuple[float, float, float]
+    rotation_y_rad: float
+    score: float | None = None
+
+
+def dont_care(box_px: BoxPx) -> KittiLabel:
+    """A region where detections count for nothing."""
+    return KittiLabel(
+        type="DontCare",
+        truncated=-1,
+        occluded=-1,
+        alpha_rad=-10,
+        box_px=box_px,
+        height_m=-1,
+        width_m=-1,
+        length_m=-1,
+        location_m=(-1000, -1000, -1000),
+        rotation_y_rad=-10,
+    )
+
+
+def format_label(label: KittiLabel) -> str:
+    """15 fields (16 with a score), one space between, two decimals, no newline."""
+    if label.type == "DontCare":
+        box = " ".join(f"{v:.2f}" for v in label.box_px)
+        return f"DontCare -1 -1 -10 {box} -1 -1 -1 -1000 -1000 -1000 -10"
+    numbers = (
+        label.alpha_rad,
+        *label.box_px,
+        label.height_m,
+        label.width_m,
+        label.length_m,
+        *label.location_m,
+        label.rotation_y_rad,
+    )
+    text = f"{label.type} {label.truncated:.2f} {label.occluded:d} " + " ".join(_two(v) for v in numbers)
+    return text if label.score is None else f"{text} {label.score:.4f}"
+
+
+def _two(value: float) -> str:
+    """Two decimals, never a negative zero."""
+    text = f"{value:.2f}"
+    return "0.00" if text == "-0.00" else text
+
+
+def format_labels(labels: Iterable[KittiLabel]) -> bytes:
+    """A label file; empty for a picture without objects."""
+    return "".join(format_label(label) + "\n" for label in labels).encode()
+
+
+def parse_label(line: str) -> KittiLabel:
+    """One line of a label or result file.
+
+    Raises:
+        ValueError: it has not 15 or 16 fields, an unknown type, or a field that is no number.
+    """
+    fields = line.split()
+    if len(fields) not in (15, 16):
+        raise ValueError(f"a label line has 15 or 16 fields, got {len(fields)}: {line!r}")
+    if fields[0] not in TYPES:
+        raise ValueError(f"unknown type {fields[0]!r}")
+    numbers = [float(field) for field in fields[1:]]
+    return KittiLabel(
+        type=fields[0],
+        truncated=numbers[0],
+        occluded=int(numbers[1]),
+        alpha_rad=numbers[2],
+        box_px=(numbers[3], numbers[4], numbers[5], numbers[6]),
+        height_m=numbers[7],
+        width_m=numbers[8],
+        length_m=numbers[9],
+        location_m=(numbers[10], numbers[11], numbers[12]),
+        rotation_y_rad=numbers[13],
+        score=numbers[14] if len(numbers) == 15 else None,
+    )
+
+
+def parse_labels(text: str) -> tuple[KittiLabel, ...]:
+    """A label file."""
+    return tuple(parse_label(line) for line in text.splitlines() if line.strip())
+
+
+def clip_box(box_px: BoxPx, intrinsics: Intrinsics) -> BoxPx | None:
+    """The box inside the picture, in index pixels; None if nothing of it is."""
+    left, top = max(0.0, box_px[0]), max(0.0, box_px[1])
+    right, bottom = min(intrinsics.width_px - 1.0, box_px[2]), min(intrinsics.height_px - 1.0, box_px[3])
+    return (left, top, right, bottom) if right > left and bottom > top else None
+
+
+def truncation(box_px: BoxPx, clipped_px: BoxPx) -> float:
+    """Share of a projected box that lies outside the picture, 0..1."""
+    whole = (box_px[2] - box_px[0]) * (box_px[3] - box_px[1])
+    inside = (clipped_px[2] - clipped_px[0]) * (clipped_px[3] - clipped_px[1])
+    return min(1.0, max(0.0, 1.0 - inside / whole)) if whole > 0 else 0.0
+
+
+def occlusion_level(occluded_fraction: float) -> int:
+    """0 for at least 80 % visible of what lies in the picture, 1 for at least 50 %, 2 for less."""
+    visible = 1.0 - occluded_fraction
+    return 0 if visible >= 0.8 else 1 if visible >= 0.5 else 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Calibration:
+    """What a calibration file says of a rectified pair whose left camera is camera 0.
+
+    Attributes:
+        intrinsics: of both cameras.
+        baseline_m: left to right, > 0.
+    """
+
+    intrinsics: Intrinsics
+    baseline_m: float
+
+    def projection(self, camera: int) -> Array:
+        """(3, 4) `P<camera>`: 0 and 2 are the left camera, 1 and 3 the right one."""
+        matrix = np.zeros((3, 4))
+        matrix[:, :3] = self.intrinsics.matrix
+        if camera in (1, 3):
+            matrix[0, 3] = -self.intrinsics.focal_px * self.baseline_m
+        return matrix
+
+
+VELODYNE_TO_CAMERA = ((0.0, -1.0, 0.0, 0.0), (0.0, 0.0, -1.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+"""A laser scanner (x forward, y left, z up) in the place of camera 0."""
+
+
+def format_calibration(calibration: Calibration) -> bytes:
+    """The seven lines in their usual order, one space between numbers, none at a line's end."""
+    identity = np.eye(3, 4)
+    rows: list[tuple[str, Array]] = [(f"P{i}", calibration.projection(i)) for i in range(4)]
+    rows += [
+        ("R0_rect", np.eye(3)),
+        ("Tr_velo_to_cam", np.array(VELODYNE_TO_CAMERA)),
+        ("Tr_imu_to_velo", identity),
+    ]
+    lines = [f"{name}: " + " ".join(f"{v + 0.0:.12e}" for v in matrix.reshape(-1)) for name, matrix in rows]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def parse_calibration(text: str) -> dict[str, Array]:
+    """Matrices by name: `P0` to `P3` (3, 4), `R0_rect` (3, 3), `Tr_…` (3, 4)."""
+    found: dict[str, Array] = {}
+    for line in text.splitlines():
+        if ":" in line:
+            name, numbers = line.split(":", 1)
+            values = np.array([float(v) for v in numbers.split()])
+            found[name] = values.reshape(3, -1)
+    return found
+
+
+def read_baseline_m(matrices: dict[str, Array]) -> float:
+    """Left to right, from `P2` and `P3`."""
+    return float((matrices["P2"][0, 3] - matrices["P3"][0, 3]) / matrices["P2"][0, 0])
+
+
+def label_corners(label: KittiLabel) -> Array:
+    """(8, 3) corners in camera 0, the four of the bottom face first."""
+    c, s = math.cos(label.rotation_y_rad), math.sin(label.rotation_y_rad)
+    along = np.array([1, 1, -1, -1, 1, 1, -1, -1]) * label.length_m / 2
+    up = np.array([0, 0, 0, 0, -1, -1, -1, -1]) * label.height_m
+    across = np.array([1, -1, -1, 1, 1, -1, -1, 1]) * label.width_m / 2
+    return np.stack([c * along + s * across, up, -s * along + c * across], axis=1) + label.location_m
+
+
+def split_lists(split: str, ids: Sequence[str]) -> dict[str, bytes]:
+    """`ImageSets/<split>.txt` with a last newline, and `splits/<split>.txt` without: its reader takes one for an id."""
+    return {
+        f"ImageSets/{split}.txt": "".join(f"{name}\n" for name in ids).encode(),
+        f"splits/{split}.txt": "\n".join(ids).encode(),
+    }

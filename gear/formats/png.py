@@ -1,0 +1,77 @@
+"""Pictures as PNG and TIFF bytes, losslessly and the same bytes each time.
+
+Colour goes through fpng, which is eight times as quick as zlib on rendered pictures (5 ms for 2048x1024 on one core)
+for an eighth more bytes. Label maps go through OpenCV with the `up` filter and run lengths, which suit them best (3
+to 6 ms, some tens of kB).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import fpng
+import numpy as np
+import numpy.typing as npt
+
+from gear.values.frames import FloatImage, UInt8Image
+
+LABEL_PNG = [
+    cv2.IMWRITE_PNG_COMPRESSION, 1,
+    cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE,
+    cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_UP,
+]  # fmt: skip
+TIFF_UNCOMPRESSED = [cv2.IMWRITE_TIFF_COMPRESSION, 1]
+
+
+def encode_rgb(rgb: UInt8Image) -> bytes:
+    """(H, W, 3) uint8 RGB to an 8-bit RGB PNG."""
+    if rgb.ndim != 3 or rgb.shape[2] != 3 or rgb.dtype != np.uint8:
+        raise ValueError(f"rgb must have shape (H, W, 3) of uint8, got {rgb.shape} of {rgb.dtype}")
+    return bytes(fpng.from_ndarray(np.ascontiguousarray(rgb)))
+
+
+def encode_labels(labels: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]) -> bytes:
+    """(H, W) uint8 or uint16 to a grey PNG of 8 or 16 bits; (H, W, 4) uint8 RGBA to an RGBA one."""
+    if labels.dtype not in (np.uint8, np.uint16):
+        raise ValueError(f"labels must be uint8 or uint16, got {labels.dtype}")
+    stored = cv2.cvtColor(labels, cv2.COLOR_RGBA2BGRA) if labels.ndim == 3 else labels
+    return _encode(".png", stored, LABEL_PNG)
+
+
+def encode_tiff(values: FloatImage) -> bytes:
+    """(H, W) float32 to an uncompressed one-channel TIFF; every bit is kept."""
+    if values.ndim != 2 or values.dtype != np.float32:
+        raise ValueError(f"values must have shape (H, W) of float32, got {values.shape} of {values.dtype}")
+    return _encode(".tiff", values, TIFF_UNCOMPRESSED)
+
+
+def decode_rgb(data: bytes) -> UInt8Image:
+    """An 8-bit colour PNG to (H, W, 3) uint8 RGB.
+
+    Raises:
+        ValueError: the bytes are no picture.
+    """
+    picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    if picture is None:
+        raise ValueError("not a picture")
+    return np.ascontiguousarray(picture[..., ::-1])
+
+
+def decode_plain(data: bytes) -> npt.NDArray[Any]:
+    """A grey PNG or a float TIFF to (H, W) of its own dtype.
+
+    Raises:
+        ValueError: the bytes are no picture.
+    """
+    picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    if picture is None:
+        raise ValueError("not a picture")
+    return np.asarray(picture)
+
+
+def _encode(suffix: str, picture: npt.NDArray[Any], options: list[int]) -> bytes:
+    done, data = cv2.imencode(suffix, np.ascontiguousarray(picture), options)
+    if not done:
+        raise ValueError(f"cannot encode {picture.shape} of {picture.dtype} as {suffix}")
+    return bytes(data)

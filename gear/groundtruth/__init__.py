@@ -1,0 +1,1 @@
+"""Ground truth, measured on the id buffer and on the triangles themselves."""

@@ -1,0 +1,100 @@
+"""3D boxes of objects in a camera's frame, and where they fall in its picture."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from gear.groundtruth.raster import NEAR_M
+from gear.values.frames import SceneObject
+from gear.values.geometry import Array, Intrinsics, wrap_angle_rad
+from gear.values.scene import CameraRecord, Vec3
+
+EDGES = ((0, 1), (1, 3), (3, 2), (2, 0), (4, 5), (5, 7), (7, 6), (6, 4), (0, 4), (1, 5), (2, 6), (3, 7))
+"""Edges of a box whose corner i has the signs of i's bits: 4 is x, 2 is y, 1 is z."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Box3d:
+    """A box that stands upright in a camera's frame (x right, y down, z forward), as KITTI describes boxes.
+
+    Attributes:
+        height_m, width_m, length_m: along the camera's y, the object's left, the object's front.
+        bottom_m: middle of the bottom face.
+        rotation_y_rad: turn about the camera's y in [-pi, pi); 0 is a front along +x, -pi/2 one along +z (driving
+            away).
+    """
+
+    height_m: float
+    width_m: float
+    length_m: float
+    bottom_m: Vec3
+    rotation_y_rad: float
+
+    @property
+    def alpha_rad(self) -> float:
+        """Observation angle in [-pi, pi): the rotation as seen along the ray to the box."""
+        return wrap_angle_rad(self.rotation_y_rad - math.atan2(self.bottom_m[0], self.bottom_m[2]))
+
+    @property
+    def distance_m(self) -> float:
+        """From the camera to the middle of the box."""
+        x, y, z = self.bottom_m
+        return math.sqrt(x * x + (y - self.height_m / 2) ** 2 + z * z)
+
+    @property
+    def corners_m(self) -> Array:
+        """(8, 3) corners in the camera's frame, ordered as `EDGES` wants them."""
+        c, s = math.cos(self.rotation_y_rad), math.sin(self.rotation_y_rad)
+        front, left = np.array([c, 0.0, -s]), np.array([s, 0.0, c])
+        signs = np.array([[(i >> 2 & 1) - 0.5, (i >> 1 & 1) - 0.5, i & 1] for i in range(8)])
+        up = np.array([0.0, -self.height_m, 0.0])
+        middle = np.array(self.bottom_m)
+        return np.asarray(
+            middle + signs[:, 0:1] * self.length_m * front + signs[:, 1:2] * self.width_m * left + signs[:, 2:3] * up
+        )
+
+
+def box_in_camera(thing: SceneObject, camera: CameraRecord) -> Box3d:
+    """The object's tight box in the camera's frame.
+
+    The heading is the object's front projected on the camera's x-z plane: exact for level cameras and upright
+    objects, and what a format with one angle can say of all others.
+    """
+    camera_from_object = camera.world_from_camera_transform.inverse().matrix @ thing.world_from_object.matrix
+    centre, (length_m, width_m, height_m) = thing.shape.box_centre_m, (float(v) for v in thing.shape.box_size_m)
+    bottom = camera_from_object @ [centre[0], centre[1], centre[2] - height_m / 2, 1.0]
+    front = camera_from_object[:3, 0]
+    return Box3d(
+        height_m=height_m,
+        width_m=width_m,
+        length_m=length_m,
+        bottom_m=(float(bottom[0]), float(bottom[1]), float(bottom[2])),
+        rotation_y_rad=wrap_angle_rad(math.atan2(-front[2], front[0])),
+    )
+
+
+def project_box(corners_m: Array, intrinsics: Intrinsics) -> tuple[float, float, float, float] | None:
+    """Left, top, right, bottom of a projected box in index pixels, not clipped to the picture.
+
+    Args:
+        corners_m: (8, 3) camera-frame corners in the order of `EDGES`.
+        intrinsics: the pinhole.
+
+    Returns:
+        None if the whole box lies behind the near plane; edges that cross it are cut there.
+    """
+    points = [corner for corner in corners_m if corner[2] >= NEAR_M]
+    for i, j in EDGES:
+        a, b = corners_m[i], corners_m[j]
+        if (a[2] >= NEAR_M) != (b[2] >= NEAR_M):
+            cut = a + (NEAR_M - a[2]) / (b[2] - a[2]) * (b - a)
+            cut[2] = NEAR_M
+            points.append(cut)
+    if not points:
+        return None
+    pixels = intrinsics.project(np.array(points))
+    (left, top), (right, bottom) = pixels.min(axis=0), pixels.max(axis=0)
+    return (float(left), float(top), float(right), float(bottom))

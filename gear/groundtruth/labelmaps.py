@@ -1,0 +1,91 @@
+"""Label maps in Cityscapes ids, straight from the id buffer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from gear.formats.cityscapes import INSTANCE_FACTOR
+from gear.groundtruth.visible import gather
+from gear.values.frames import GeomTable, IdImage, SceneObject
+from gear.values.labels import LABELS
+
+EGO_VEHICLE_ID = 1
+InstanceImage = npt.NDArray[np.uint16]
+
+
+def instance_map(geom_id: IdImage, geoms: GeomTable, objects: Mapping[int, SceneObject]) -> InstanceImage:
+    """Cityscapes instance ids of an id buffer.
+
+    Args:
+        geom_id: (H, W) int32, -1 for the sky.
+        geoms: what each geom is.
+        objects: by object id; those that are not listed have no instances.
+
+    Returns:
+        (H, W) uint16. Instances are numbered from 0 for each class, in order of object id, among those that are seen.
+        The ego car is `ego vehicle`.
+    """
+    counts = np.bincount(geom_id.reshape(-1) + 1, minlength=len(geoms.object_id) + 1)[1:]
+    table = np.zeros(len(geoms.object_id) + 1, dtype=np.uint16)
+    table[-1] = LABELS[0].cityscapes_id
+    numbers: dict[tuple[int, int], int] = {}
+    used: dict[int, int] = {}
+    seen = np.flatnonzero(counts)
+    for geom in seen[np.argsort(geoms.object_id[seen], kind="stable")]:
+        label = LABELS[int(geoms.label_code[geom])]
+        thing = objects.get(int(geoms.object_id[geom]))
+        table[geom] = label.cityscapes_id
+        if thing is None:
+            continue
+        if thing.is_ego:
+            table[geom] = EGO_VEHICLE_ID
+        elif label.is_instance:
+            key = (label.cityscapes_id, thing.id)
+            if key not in numbers:
+                numbers[key] = used.get(label.cityscapes_id, 0)
+                used[label.cityscapes_id] = numbers[key] + 1
+            if numbers[key] < INSTANCE_FACTOR:
+                table[geom] = label.cityscapes_id * INSTANCE_FACTOR + numbers[key]
+    return gather(table, geom_id)  # type: ignore[return-value]
+
+
+def label_map(instances: InstanceImage) -> npt.NDArray[np.uint8]:
+    """(H, W) uint8 Cityscapes label ids of an instance map."""
+    table = np.arange(65536)
+    table = np.where(table >= INSTANCE_FACTOR, table // INSTANCE_FACTOR, table).astype(np.uint8)
+    return np.take(table, instances)
+
+
+def coarsen(instances: InstanceImage, window_px: int) -> InstanceImage:
+    """The labels that a person with a polygon tool would draw: each pixel takes what fills most of the square around
+    it.
+
+    Things thinner than about half the window (wires, thin poles, single leaves) and gaps as small (sky between twigs)
+    go to what surrounds them; straight borders stay where they are.
+
+    Args:
+        instances: (H, W) uint16 instance map.
+        window_px: side of the square, odd.
+    """
+    height, width = instances.shape
+    best_count = np.full((height, width), -1, dtype=np.int16)
+    best: InstanceImage = instances.copy()
+    reach = window_px // 2
+    for value in np.unique(instances):
+        inside = instances == value
+        rows, columns = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
+        y0, y1 = max(0, int(rows[0]) - reach), min(height, int(rows[-1]) + 1 + reach)
+        x0, x1 = max(0, int(columns[0]) - reach), min(width, int(columns[-1]) + 1 + reach)
+        crop = inside[y0:y1, x0:x1].astype(np.uint8)
+        border = cv2.BORDER_CONSTANT
+        count = cv2.boxFilter(crop, cv2.CV_16S, (window_px, window_px), normalize=False, borderType=border)
+        # A tie stays with the pixel's own label.
+        count = np.asarray(count * 2 + crop, dtype=np.int16)
+        wins = count > best_count[y0:y1, x0:x1]
+        best_count[y0:y1, x0:x1][wins] = count[wins]
+        best[y0:y1, x0:x1][wins] = value
+    return best

@@ -1,0 +1,152 @@
+"""Objects as one view shows them: visible pixels counted, whole silhouettes drawn from their triangles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.groundtruth.raster import Window, bounds, fill, project_mesh
+from gear.groundtruth.visible import PartKey, VisiblePart, visible_parts
+from gear.values.frames import GeomTable, SceneObject, View
+from gear.values.geometry import Array
+from gear.values.scene import CameraRecord
+from gear.values.truth import BoxPx, ObjectTruth
+
+MAX_CROP_PX = 512
+"""Silhouettes that leave the picture are sampled coarser outside it, so that no side takes more samples than this."""
+
+EMPTY = VisiblePart(left_px=0, top_px=0, mask=np.zeros((0, 0), dtype=np.bool_), count_px=0)
+
+
+def observe_objects(
+    view: View,
+    geoms: GeomTable,
+    objects: Mapping[int, SceneObject],
+    *,
+    by_label: bool = True,
+    include_hidden: bool = False,
+) -> tuple[ObjectTruth, ...]:
+    """Measures every object but the ego car in one view.
+
+    A silhouette inside the picture is exact to the pixel. Of one that leaves the picture, the part inside is exact
+    and the part outside is sampled at a step that grows with it; what lies less than 5 cm before the camera is left
+    out.
+
+    Args:
+        view: the id buffer and its camera.
+        geoms: what each geom is.
+        objects: by object id.
+        by_label: True measures each label of an object on its own, so that a cyclist gives a bicycle and a rider; False
+            measures the whole object under its own label.
+        include_hidden: also objects that have no visible pixel but would reach into the picture alone.
+
+    Returns:
+        In order of object id and label code.
+    """
+    seen = visible_parts(view.geom_id, geoms, objects, by_label=by_label)
+    wanted: dict[PartKey, VisiblePart] = dict(seen)
+    if include_hidden:
+        for thing in objects.values():
+            if not thing.is_ego:
+                codes = np.unique(thing.shape.face_label_code) if by_label else [thing.label_code]
+                for code in codes:
+                    wanted.setdefault((thing.id, int(code)), EMPTY)
+    vertices: dict[int, Array] = {}
+    truths = []
+    for (object_id, code), part in sorted(wanted.items(), key=lambda item: item[0]):
+        thing = objects[object_id]
+        if object_id not in vertices:
+            vertices[object_id] = in_camera(thing, view.camera)
+        faces = thing.shape.faces[thing.shape.face_label_code == code] if by_label else thing.shape.faces
+        truth = _measure(object_id, code, part, vertices[object_id], faces, view.camera)
+        if part.count_px or truth.amodal_in_image_px:
+            truths.append(truth)
+    return tuple(truths)
+
+
+def in_camera(thing: SceneObject, camera: CameraRecord) -> Array:
+    """(N, 3) vertices of an object in the camera's frame."""
+    camera_from_object = camera.world_from_camera_transform.inverse().matrix @ thing.world_from_object.matrix
+    return np.asarray(thing.shape.vertices_m @ camera_from_object[:3, :3].T + camera_from_object[:3, 3])
+
+
+def _measure(
+    object_id: int,
+    code: int,
+    part: VisiblePart,
+    vertices_camera_m: Array,
+    faces: npt.NDArray[np.int32],
+    camera: CameraRecord,
+) -> ObjectTruth:
+    triangles_px = project_mesh(vertices_camera_m, faces, camera.intrinsics)
+    whole = bounds(triangles_px)
+    rows, columns = part.mask.shape
+    visible_box: BoxPx | None = None
+    if part.count_px:
+        left, top = part.left_px, part.top_px
+        visible_box = (float(left), float(top), float(left + columns), float(top + rows))
+    picture: Window = (0, 0, camera.width_px, camera.height_px)
+    inside = _common(_cover(whole, visible_box), picture)
+    mask = fill(triangles_px, inside)
+    if part.count_px:
+        # The GPU's own rounding may show a pixel that the triangles just miss; what is seen is part of the whole.
+        y, x = part.top_px - inside[1], part.left_px - inside[0]
+        mask[y : y + rows, x : x + columns] |= part.mask
+    in_image_px = int(mask.sum())
+    box = _tight(mask, inside)
+    outside_px = 0
+    if whole[0] < 0 or whole[1] < 0 or whole[2] > camera.width_px or whole[3] > camera.height_px:
+        outside_px = _count_outside(triangles_px, whole, picture)
+        box = _cover(whole, visible_box)
+    return ObjectTruth(
+        object_id=object_id,
+        label_code=code,
+        visible_px=part.count_px,
+        visible_box=visible_box,
+        amodal_px=in_image_px + outside_px,
+        amodal_in_image_px=in_image_px,
+        amodal_box=(float(box[0]), float(box[1]), float(box[2]), float(box[3])),
+        mask=part.mask,
+    )
+
+
+def _count_outside(triangles_px: Array, whole: Window, picture: Window) -> int:
+    """Pixels of the silhouette that are not in the picture."""
+    step = max(1, -(-max(whole[2] - whole[0], whole[3] - whole[1]) // MAX_CROP_PX))
+    coarse = fill(triangles_px, whole, step)
+    x = whole[0] + (np.arange(coarse.shape[1]) + 0.5) * step - 0.5
+    y = whole[1] + (np.arange(coarse.shape[0]) + 0.5) * step - 0.5
+    inside_x, inside_y = (x >= 0) & (x <= picture[2] - 1), (y >= 0) & (y <= picture[3] - 1)
+    coarse &= ~(inside_y[:, None] & inside_x[None, :])
+    return int(coarse.sum()) * step * step
+
+
+def _tight(mask: npt.NDArray[np.bool_], window: Window) -> Window:
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    if not rows.size:
+        return (window[0], window[1], window[0], window[1])
+    x, y = window[0], window[1]
+    return (x + int(columns[0]), y + int(rows[0]), x + int(columns[-1]) + 1, y + int(rows[-1]) + 1)
+
+
+def _cover(window: Window, box: BoxPx | None) -> Window:
+    """The smallest window around both."""
+    if box is None:
+        return window
+    other = (int(box[0]), int(box[1]), int(box[2]), int(box[3]))
+    if window[2] <= window[0] or window[3] <= window[1]:
+        return other
+    return (
+        min(window[0], other[0]),
+        min(window[1], other[1]),
+        max(window[2], other[2]),
+        max(window[3], other[3]),
+    )
+
+
+def _common(window: Window, picture: Window) -> Window:
+    """What of the window lies in the picture; empty windows keep a place inside it."""
+    x0, y0 = min(max(window[0], 0), picture[2]), min(max(window[1], 0), picture[3])
+    return (x0, y0, max(x0, min(window[2], picture[2])), max(y0, min(window[3], picture[3])))

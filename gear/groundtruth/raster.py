@@ -1,0 +1,130 @@
+"""Silhouettes of triangles, by the rule that GPUs draw by: a pixel is covered if its centre is inside.
+
+Every triangle becomes one span a pixel row; spans are summed as differences along the rows, so a mesh of any size is
+filled by a handful of array operations.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.values.geometry import Array, Intrinsics
+
+Mask = npt.NDArray[np.bool_]
+Window = tuple[int, int, int, int]
+"""First column, first row, and one past the last column and row, in index pixels; may lie outside the picture."""
+
+NEAR_M = 0.05
+"""Nothing nearer than this along the optical axis is projected."""
+
+SPANS_AT_ONCE = 2_000_000
+
+
+def clip_near(triangles_m: Array, near_m: float = NEAR_M) -> Array:
+    """Cuts (T, 3, 3) camera-frame triangles at z = near; what lies before it is dropped, corners cut off leave two
+    triangles."""
+    front = triangles_m[..., 2] >= near_m
+    count = front.sum(axis=1)
+    parts = [triangles_m[count == 3]]
+    one = _odd_corner_first(triangles_m[count == 1], front[count == 1])
+    a, b, c = one[:, 0], one[:, 1], one[:, 2]
+    parts.append(np.stack([a, _cut(a, b, near_m), _cut(a, c, near_m)], axis=1))
+    two = _odd_corner_first(triangles_m[count == 2], ~front[count == 2])
+    a, b, c = two[:, 0], two[:, 1], two[:, 2]
+    ab, ac = _cut(a, b, near_m), _cut(a, c, near_m)
+    parts += [np.stack([ab, b, c], axis=1), np.stack([ab, c, ac], axis=1)]
+    return np.concatenate(parts)
+
+
+def project_mesh(vertices_camera_m: Array, faces: npt.NDArray[np.int32], intrinsics: Intrinsics) -> Array:
+    """(N, 3) camera-frame vertices and (M, 3) faces to (T, 3, 2) triangles in index pixels, cut at the near plane."""
+    used = vertices_camera_m[faces]
+    if used.size and used[..., 2].min() < NEAR_M:
+        used = clip_near(used)
+    return intrinsics.project(used)
+
+
+def bounds(triangles_px: Array) -> Window:
+    """The smallest window that can hold the silhouette; empty at the origin if there are no triangles."""
+    if not len(triangles_px):
+        return (0, 0, 0, 0)
+    low, high = np.ceil(triangles_px.min(axis=(0, 1))), np.ceil(triangles_px.max(axis=(0, 1)))
+    return (int(low[0]), int(low[1]), int(high[0]), int(high[1]))
+
+
+def fill(triangles_px: Array, window: Window, step_px: int = 1) -> Mask:
+    """The silhouette of (T, 3, 2) triangles inside a window.
+
+    Args:
+        triangles_px: corners in index pixels.
+        window: what to look at.
+        step_px: distance of samples; above 1, every sample stands for a square of `step_px` pixels a side.
+
+    Returns:
+        (rows, columns) bool; edges that pass through a sample count on the left and at the top.
+    """
+    x0, y0, x1, y1 = window
+    columns, rows = max(0, -(-(x1 - x0) // step_px)), max(0, -(-(y1 - y0) // step_px))
+    if not columns or not rows or not len(triangles_px):
+        return np.zeros((rows, columns), dtype=np.bool_)
+    centre = (step_px - 1) / 2
+    scaled = (triangles_px - (x0 + centre, y0 + centre)) / step_px
+    by_row = np.argsort(scaled[..., 1], axis=1)
+    scaled = np.take_along_axis(scaled, by_row[..., None], axis=1)
+    first = np.clip(np.ceil(scaled[:, 0, 1]), 0, rows).astype(np.int64)
+    last = np.clip(np.ceil(scaled[:, 2, 1]), 0, rows).astype(np.int64)
+    seen = (last > first) & (scaled[..., 0].max(axis=1) > 0) & (scaled[..., 0].min(axis=1) <= columns)
+    scaled, first, heights = scaled[seen], first[seen], (last - first)[seen]
+    depth = np.zeros(rows * (columns + 1), dtype=np.int64)
+    ends = np.cumsum(heights)
+    start = 0
+    while start < len(heights):
+        done = ends[start - 1] if start else 0
+        stop = max(start + 1, int(np.searchsorted(ends, done + SPANS_AT_ONCE, side="right")))
+        _add_spans(depth, scaled[start:stop], first[start:stop], heights[start:stop], columns)
+        start = stop
+    return np.cumsum(depth.reshape(rows, columns + 1)[:, :-1], axis=1) > 0
+
+
+def _add_spans(
+    depth: npt.NDArray[np.int64],
+    corners: Array,
+    first: npt.NDArray[np.int64],
+    heights: npt.NDArray[np.int64],
+    columns: int,
+) -> None:
+    """Adds one at each span's first column and takes one away behind its last; corners are sorted by row."""
+    x, y = corners[..., 0], corners[..., 1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        long_slope = (x[:, 2] - x[:, 0]) / (y[:, 2] - y[:, 0])
+        upper_slope = (x[:, 1] - x[:, 0]) / (y[:, 1] - y[:, 0])
+        lower_slope = (x[:, 2] - x[:, 1]) / (y[:, 2] - y[:, 1])
+    owner = np.repeat(np.arange(len(heights)), heights)
+    row = np.arange(len(owner)) + np.repeat(first - (np.cumsum(heights) - heights), heights)
+    along = row - y[owner, 0]
+    long_x = x[owner, 0] + along * long_slope[owner]
+    upper = row < y[owner, 1]
+    bend = np.where(upper, 0, 1)
+    slope = np.where(upper, upper_slope[owner], lower_slope[owner])
+    short_x = x[owner, bend] + (row - y[owner, bend]) * slope
+    left = np.clip(np.ceil(np.minimum(long_x, short_x)), 0, columns).astype(np.int64)
+    right = np.clip(np.ceil(np.maximum(long_x, short_x)), 0, columns).astype(np.int64)
+    base = row * (columns + 1)
+    depth += np.bincount(base + left, minlength=depth.size)
+    depth -= np.bincount(base + right, minlength=depth.size)
+
+
+def _odd_corner_first(triangles: Array, odd: Mask) -> Array:
+    """Turns each triangle so that its one odd corner comes first, keeping the winding."""
+    start = np.argmax(odd, axis=1)
+    order = (start[:, None] + np.arange(3)) % 3
+    return np.take_along_axis(triangles, order[..., None], axis=1)
+
+
+def _cut(a: Array, b: Array, near_m: float) -> Array:
+    """Where the edges from `a` to `b` meet z = near."""
+    share = (near_m - a[:, 2]) / (b[:, 2] - a[:, 2])
+    cut: Array = a + share[:, None] * (b - a)
+    cut[:, 2] = near_m
+    return cut

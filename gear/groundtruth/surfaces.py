@@ -1,0 +1,72 @@
+"""Patch surfaces as one view shows them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gear.formats import rle
+from gear.groundtruth.raster import NEAR_M
+from gear.values.frames import GeomTable, View
+from gear.values.geometry import Array
+from gear.values.scene import SceneRecord, SurfaceRecord
+from gear.values.truth import SurfaceTruth
+
+UNIT_CORNERS = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
+"""Patch coordinates of the corners: top left, top right, bottom right, bottom left."""
+
+
+def observe_surfaces(view: View, geoms: GeomTable, record: SceneRecord) -> tuple[SurfaceTruth, ...]:
+    """Measures each surface of the record, in its order, in one view."""
+    return tuple(_observe(view, geoms, record, index, surface) for index, surface in enumerate(record.surfaces))
+
+
+def _observe(view: View, geoms: GeomTable, record: SceneRecord, index: int, surface: SurfaceRecord) -> SurfaceTruth:
+    camera = view.camera
+    camera_from_world = camera.world_from_camera_transform.inverse()
+    camera_from_surface = camera_from_world @ record.world_from_surface(surface)
+    rotation, middle_m = camera_from_surface.rotation, camera_from_surface.translation_m
+    right_m, down_m = rotation[:, 0] * surface.width_m, rotation[:, 1] * surface.height_m
+    top_left_m = middle_m - (right_m + down_m) / 2
+    corners_m = np.array([top_left_m + u * right_m + v * down_m for u, v in UNIT_CORNERS])
+    corners_px = image_from_unit = None
+    if corners_m[:, 2].min() >= NEAR_M:
+        pixels = camera.intrinsics.project(corners_m)
+        corners_px = tuple((round(float(x), 6), round(float(y), 6)) for x, y in pixels)
+        homography = camera.intrinsics.matrix @ np.stack([right_m, down_m, top_left_m], axis=1)
+        image_from_unit = tuple(round(float(v), 9) for v in (homography / homography[2, 2]).reshape(-1))
+    mask = np.zeros(view.geom_id.shape, dtype=np.bool_)
+    for geom in np.flatnonzero(geoms.surface_index == index):
+        mask |= view.geom_id == geom
+    visible_px = int(mask.sum())
+    silhouette_px2 = _area_px2(corners_m, view)
+    distance_m = float(np.linalg.norm(middle_m))
+    # The face looks along -z of its own frame; the camera sits at the origin of the camera frame.
+    cosine = float(rotation[:, 2] @ middle_m) / distance_m if distance_m else 1.0
+    return SurfaceTruth(
+        name=surface.name,
+        camera=camera.name,
+        camera_from_surface=tuple(round(float(v), 9) for v in camera_from_surface.matrix.reshape(-1)),
+        corners_px=corners_px,
+        image_from_unit=image_from_unit,
+        visible_px=visible_px,
+        visible_fraction=round(min(1.0, visible_px / silhouette_px2), 6) if silhouette_px2 > 0 else 0.0,
+        distance_m=round(distance_m, 6),
+        incidence_deg=round(math.degrees(math.acos(max(-1.0, min(1.0, cosine)))), 6),
+        mask_rle=rle.encode(mask),
+    )
+
+
+def _area_px2(corners_m: Array, view: View) -> float:
+    """Area of the projected face, cut at the near plane, inside and outside the picture."""
+    polygon: list[Array] = []
+    for a, b in zip(corners_m, np.roll(corners_m, -1, axis=0), strict=True):
+        if a[2] >= NEAR_M:
+            polygon.append(a)
+        if (a[2] >= NEAR_M) != (b[2] >= NEAR_M):
+            polygon.append(a + (NEAR_M - a[2]) / (b[2] - a[2]) * (b - a))
+    if len(polygon) < 3:
+        return 0.0
+    x, y = view.camera.intrinsics.project(np.array(polygon)).T
+    return abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1))) / 2

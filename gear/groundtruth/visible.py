@@ -1,0 +1,70 @@
+"""What the id buffer holds of each part, found in one pass over the picture."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import ndimage
+
+from gear.values.frames import GeomTable, IdImage, SceneObject
+
+Mask = npt.NDArray[np.bool_]
+PartKey = tuple[int, int]
+"""Object id and label code."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class VisiblePart:
+    """The visible pixels of one part.
+
+    Attributes:
+        left_px, top_px: index pixel of the mask's first pixel.
+        mask: (h, w) bool, tight.
+        count_px: its pixels.
+    """
+
+    left_px: int
+    top_px: int
+    mask: Mask
+    count_px: int
+
+
+def gather(table: npt.NDArray[np.generic], geom_id: IdImage) -> npt.NDArray[np.generic]:
+    """`table[geom_id]` where the last entry of the table stands for -1, nothing."""
+    return np.take(table, geom_id, mode="wrap")
+
+
+def visible_parts(
+    geom_id: IdImage, geoms: GeomTable, objects: Mapping[int, SceneObject], *, by_label: bool
+) -> dict[PartKey, VisiblePart]:
+    """Each part that has at least one pixel.
+
+    Args:
+        geom_id: (H, W) int32, -1 for nothing.
+        geoms: tables by geom id.
+        objects: what counts; geoms of other objects and of the ego car count for nothing.
+        by_label: True tells the labels of an object apart (rider and bicycle); False takes it whole, under its own
+            label.
+    """
+    counts = np.bincount(geom_id.reshape(-1) + 1, minlength=len(geoms.object_id) + 1)[1:]
+    keys: dict[PartKey, int] = {}
+    table = np.zeros(len(geoms.object_id) + 1, dtype=np.uint16)
+    for geom in np.flatnonzero(counts):
+        thing = objects.get(int(geoms.object_id[geom]))
+        if thing is None or thing.is_ego:
+            continue
+        label = int(geoms.label_code[geom]) if by_label else thing.label_code
+        table[geom] = keys.setdefault((thing.id, label), len(keys) + 1)
+    if not keys:
+        return {}
+    parts = gather(table, geom_id)
+    slices = ndimage.find_objects(parts, max_label=len(keys))
+    found: dict[PartKey, VisiblePart] = {}
+    for key, number in sorted(keys.items()):
+        rows, columns = slices[number - 1]
+        mask = parts[rows, columns] == number
+        found[key] = VisiblePart(left_px=columns.start, top_px=rows.start, mask=mask, count_px=int(mask.sum()))
+    return found

@@ -1,0 +1,107 @@
+"""Overlaps of boxes: upright in the picture, turned on the ground, and in space. All pairs at once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gear.values.geometry import Array
+
+MAX_CORNERS = 8
+"""Two rectangles meet in a polygon of at most eight corners."""
+
+
+def intersections_px2(a: Array, b: Array) -> Array:
+    """(N, 4) and (M, 4) boxes (left, top, right, bottom) to (N, M) areas of what they share."""
+    low = np.maximum(a[:, None, :2], b[None, :, :2])
+    high = np.minimum(a[:, None, 2:], b[None, :, 2:])
+    return np.asarray(np.prod(np.clip(high - low, 0, None), axis=-1))
+
+
+def iou_2d(a: Array, b: Array) -> Array:
+    """(N, M) intersection over union of (N, 4) and (M, 4) boxes."""
+    shared = intersections_px2(a, b)
+    return _over(shared, _areas(a)[:, None] + _areas(b)[None] - shared)
+
+
+def share_of_first(a: Array, b: Array) -> Array:
+    """(N, M) intersection over the area of the first box."""
+    return _over(intersections_px2(a, b), np.broadcast_to(_areas(a)[:, None], (len(a), len(b))))
+
+
+def iou_ground_and_space(a: Array, b: Array) -> tuple[Array, Array]:
+    """Overlaps of KITTI's 3D boxes.
+
+    Args:
+        a, b: (N, 7) and (M, 7): height, width, length, then x, y, z of the bottom's middle and rotation_y; camera
+            frame, y down.
+
+    Returns:
+        (N, M) intersection over union seen from above, and in space.
+    """
+    shared_m2 = footprint_intersections_m2(a, b)
+    ground_a, ground_b = a[:, 1] * a[:, 2], b[:, 1] * b[:, 2]
+    ground = _over(shared_m2, ground_a[:, None] + ground_b[None] - shared_m2)
+    bottom = np.minimum(a[:, None, 4], b[None, :, 4])
+    top = np.maximum((a[:, 4] - a[:, 0])[:, None], (b[:, 4] - b[:, 0])[None])
+    shared_m3 = shared_m2 * np.clip(bottom - top, 0, None)
+    volume = (ground_a * a[:, 0])[:, None] + (ground_b * b[:, 0])[None] - shared_m3
+    return ground, _over(shared_m3, volume)
+
+
+def footprint_intersections_m2(a: Array, b: Array) -> Array:
+    """(N, 7) and (M, 7) boxes to (N, M) areas shared by their footprints."""
+    shared = np.zeros((len(a), len(b)))
+    reach = (np.hypot(a[:, 1], a[:, 2])[:, None] + np.hypot(b[:, 1], b[:, 2])[None]) / 2
+    near = np.hypot(a[:, None, 3] - b[None, :, 3], a[:, None, 5] - b[None, :, 5]) < reach
+    first, second = np.nonzero(near)
+    if first.size:
+        shared[first, second] = _convex_intersections(footprints(a)[first], footprints(b)[second])
+    return shared
+
+
+def footprints(boxes: Array) -> Array:
+    """(N, 7) boxes to (N, 4, 2) corners in x and z, counter-clockwise in (x, z)."""
+    c, s = np.cos(boxes[:, 6]), np.sin(boxes[:, 6])
+    along = np.array([0.5, -0.5, -0.5, 0.5]) * boxes[:, 2:3]
+    across = np.array([0.5, 0.5, -0.5, -0.5]) * boxes[:, 1:2]
+    x = c[:, None] * along + s[:, None] * across + boxes[:, 3:4]
+    z = -s[:, None] * along + c[:, None] * across + boxes[:, 5:6]
+    return np.stack([x, z], axis=-1)
+
+
+def _convex_intersections(polygons: Array, clips: Array) -> Array:
+    """Areas of (P, 4, 2) quadrangles cut by (P, 4, 2) ones, both counter-clockwise; Sutherland and Hodgman, all at
+    once.
+
+    A cut edge by edge: each corner is kept if it is inside, and a new one is made where an edge crosses. What is left
+    is packed to the front and the rest filled with the first corner, which adds no area.
+    """
+    corners = polygons
+    for edge in range(4):
+        start, end = clips[:, edge], clips[:, (edge + 1) % 4]
+        direction = (end - start)[:, None]
+        offset = corners - start[:, None]
+        side = direction[..., 0] * offset[..., 1] - direction[..., 1] * offset[..., 0]
+        following, side_following = np.roll(corners, -1, axis=1), np.roll(side, -1, axis=1)
+        inside = side >= 0
+        crosses = inside != (side_following >= 0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = np.where(crosses, side / (side - side_following), 0.0)
+        cut = corners + share[..., None] * (following - corners)
+        candidates = np.stack([corners, cut], axis=2).reshape(len(corners), -1, 2)
+        kept = np.stack([inside, crosses], axis=2).reshape(len(corners), -1)
+        order = np.argsort(~kept, axis=1, kind="stable")[:, :MAX_CORNERS]
+        packed = np.take_along_axis(candidates, order[..., None], axis=1)
+        valid = np.take_along_axis(kept, order, axis=1)
+        corners = np.where(valid[..., None], packed, np.where(valid[:, :1, None], packed[:, :1], 0.0))
+    x, z = corners[..., 0] - corners[:, :1, 0], corners[..., 1] - corners[:, :1, 1]
+    twice = x * np.roll(z, -1, axis=1) - z * np.roll(x, -1, axis=1)
+    return np.asarray(np.abs(twice.sum(axis=1)) / 2)
+
+
+def _areas(boxes: Array) -> Array:
+    return np.asarray((boxes[:, 2] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 1]))
+
+
+def _over(part: Array, whole: Array) -> Array:
+    return np.asarray(np.where(whole > 0, part / np.where(whole > 0, whole, 1.0), 0.0))

@@ -1,0 +1,90 @@
+"""Average precision by pycocotools itself."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Generic, TypeVar
+
+from gear.formats.coco import CATEGORY_NAMES, Annotation, Detection, Picture, dataset_json, results_json
+
+SampleT = TypeVar("SampleT", contravariant=True)
+
+STATS = ("ap", "ap50", "ap75", "ap_small", "ap_medium", "ap_large")
+RECALLS = ("ar1", "ar10", "ar100", "ar_small", "ar_medium", "ar_large")
+
+
+class CocoEvaluator(Generic[SampleT]):
+    """Gathers pictures and detections, and hands them to pycocotools at the end."""
+
+    def __init__(self, as_picture: Callable[[SampleT], Picture]) -> None:
+        """Args: as_picture: what COCO knows of a sample."""
+        self._as_picture = as_picture
+        self.pictures: list[Picture] = []
+        self.detections: list[tuple[Detection, ...]] = []
+
+    def update(self, sample: SampleT, prediction: Sequence[Detection]) -> Mapping[str, float]:
+        """Takes the detections of one sample; average precision has no meaning for a single picture.
+
+        Raises:
+            ValueError: a detection has an unknown category or a box turned inside out.
+        """
+        for found in prediction:
+            left, top, right, bottom = found.box_px
+            if found.category_id not in CATEGORY_NAMES:
+                raise ValueError(f"category_id must be one of COCO's, got {found.category_id}")
+            if not (right >= left and bottom >= top):
+                raise ValueError(f"box_px must be left, top, right, bottom, got {found.box_px}")
+        self.pictures.append(self._as_picture(sample))
+        self.detections.append(tuple(prediction))
+        return {}
+
+    def merge(self, other: Any) -> None:
+        """Takes in the pictures of another one."""
+        self.pictures += other.pictures
+        self.detections += other.detections
+
+    def result(self) -> Mapping[str, float]:
+        """COCO's twelve figures for boxes (`ap`, `ap50`, …, `ar100`, …) and `ap_<category>` for what occurs; 0..1 or
+        NaN."""
+        from pycocotools.coco import COCO
+        from pycocotools.cocoeval import COCOeval
+
+        names = (*STATS, *RECALLS)
+        # The same picture may come twice, so pictures are numbered here.
+        pictures = [replace(picture, id=number) for number, picture in enumerate(self.pictures)]
+        results = [item for number, found in enumerate(self.detections) for item in results_json(number, found)]
+        occurring = sorted({item.category_id for item in _labelled(pictures)})
+        if not occurring:
+            return {name: float("nan") for name in names}
+        with contextlib.redirect_stdout(io.StringIO()):
+            truth = COCO()
+            truth.dataset = dataset_json(pictures, description="", created="2022-01-01")
+            truth.createIndex()
+            found = truth.loadRes(results) if results else COCO()
+            evaluation = COCOeval(truth, found, "bbox")
+            evaluation.params.catIds = sorted(CATEGORY_NAMES)
+            evaluation.params.imgIds = [picture.id for picture in pictures]
+            evaluation.evaluate()
+            evaluation.accumulate()
+            evaluation.summarize()
+        figures = {name: _known(value) for name, value in zip(names, evaluation.stats, strict=True)}
+        precision = evaluation.eval["precision"]
+        for index, category_id in enumerate(evaluation.params.catIds):
+            if category_id in occurring:
+                # Axes: IoU, recall, category, area (all first), detections a picture (100 last).
+                figures[f"ap_{CATEGORY_NAMES[category_id].replace(' ', '_')}"] = float(
+                    precision[:, :, index, 0, -1].mean()
+                )
+        return figures
+
+
+def _labelled(pictures: Sequence[Picture]) -> list[Annotation]:
+    return [item for picture in pictures for item in picture.annotations if not item.is_crowd]
+
+
+def _known(value: float) -> float:
+    """pycocotools says -1 for "no such ground truth"."""
+    return float(value) if value >= 0 else float("nan")

@@ -1,0 +1,126 @@
+"""KITTI's object evaluation: average precision in the picture, from above and in space, and orientation similarity.
+
+By the rules of the devkit: 41 thresholds, neighbours and hard labels ignored, DontCare regions excuse. `r11` is the
+mean over 11 recalls, `r40` the mean over 40 that replaced it in 2019. With fewer than some 40 labels of a class a
+perfect detector stays well below 1 in both, because that many recall steps do not exist; that is the benchmark's own
+definition.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from gear.formats.kitti_object import KittiLabel
+from gear.metrics.kitti_match import (
+    DIFFICULTIES,
+    NEIGHBOURS,
+    OVERLAPS,
+    Chosen,
+    Counts,
+    Difficulty,
+    Overlap,
+    PictureBoxes,
+    choose,
+    count,
+    matched_scores,
+    picture_boxes,
+)
+from gear.values.geometry import Array
+
+SampleT = TypeVar("SampleT", contravariant=True)
+
+STEPS = 40
+"""Recall is looked at in steps of 1/40."""
+
+
+class KittiEvaluator(Generic[SampleT]):
+    """Gathers pictures; everything is computed at the end."""
+
+    def __init__(self, labels_of: Callable[[SampleT], Sequence[KittiLabel]]) -> None:
+        """Args: labels_of: the lines of a sample's label file, DontCare regions with them."""
+        self._labels_of = labels_of
+        self.pictures: list[PictureBoxes] = []
+
+    def update(self, sample: SampleT, prediction: Sequence[KittiLabel]) -> Mapping[str, float]:
+        """Takes the detections of one sample; average precision has no meaning for a single picture.
+
+        Raises:
+            ValueError: a detection has no score.
+        """
+        if any(found.score is None for found in prediction):
+            raise ValueError("every detection needs a score")
+        self.pictures.append(picture_boxes(self._labels_of(sample), prediction))
+        return {}
+
+    def merge(self, other: Any) -> None:
+        """Takes in the pictures of another one."""
+        self.pictures += other.pictures
+
+    def result(self) -> Mapping[str, float]:
+        """Shares, 0..1; NaN where no label is to be found.
+
+        `<class>_<2d|bev|3d>_<easy|moderate|hard>_<r11|r40>` and `<class>_aos_…`, and `ap_3d_moderate`, the mean of the
+        classes' `3d_moderate_r40`.
+        """
+        figures: dict[str, float] = {}
+        for kind in NEIGHBOURS:
+            for overlap in OVERLAPS:
+                for difficulty in DIFFICULTIES:
+                    self._add(figures, kind, difficulty, overlap)
+        known = [v for k in NEIGHBOURS if (v := figures[f"{k.lower()}_3d_moderate_r40"]) == v]
+        return {"ap_3d_moderate": float(np.mean(known)) if known else float("nan"), **figures}
+
+    def _add(self, figures: dict[str, float], kind: str, difficulty: Difficulty, overlap: Overlap) -> None:
+        chosen = [choose(picture, kind, difficulty, overlap) for picture in self.pictures]
+        precision, orientation = curves(chosen)
+        curve_by_name = {overlap: precision} | ({"aos": orientation} if overlap == "2d" else {})
+        for name, curve in curve_by_name.items():
+            stem = f"{kind.lower()}_{name}_{difficulty.name}"
+            figures[f"{stem}_r11"] = float(curve[:: STEPS // 10].mean())
+            figures[f"{stem}_r40"] = float(curve[1:].mean())
+
+
+def curves(chosen: Sequence[Chosen]) -> tuple[Array, Array]:
+    """(41,) precision and orientation similarity over recall 0, 1/40, …, 1; NaN if there is nothing to be found."""
+    wanted = sum(int((picture.label_state == 0).sum()) for picture in chosen)
+    if not wanted:
+        return np.full(STEPS + 1, np.nan), np.full(STEPS + 1, np.nan)
+    scores = sorted((score for picture in chosen for score in matched_scores(picture)), reverse=True)
+    thresholds = recall_thresholds(scores, wanted)
+    total = Counts(tp=np.zeros(1), fp=np.zeros(1), fn=np.zeros(1), similarity=np.zeros(1))
+    if len(thresholds):
+        parts = [count(picture, thresholds) for picture in chosen]
+        total = Counts(
+            tp=np.sum([part.tp for part in parts], axis=0),
+            fp=np.sum([part.fp for part in parts], axis=0),
+            fn=np.sum([part.fn for part in parts], axis=0),
+            similarity=np.sum([part.similarity for part in parts], axis=0),
+        )
+    found = np.maximum(total.tp + total.fp, 1.0)
+    return _monotone(total.tp / found), _monotone(total.similarity / found)
+
+
+def recall_thresholds(scores: Sequence[float], wanted: int) -> Array:
+    """Scores at which the recall passes each step of 1/40, highest first; at most 41."""
+    thresholds = []
+    recall = 0.0
+    for i, score in enumerate(scores):
+        is_last = i == len(scores) - 1
+        here = (i + 1) / wanted
+        following = here if is_last else (i + 2) / wanted
+        if following - recall < recall - here and not is_last:
+            continue
+        thresholds.append(score)
+        recall += 1.0 / STEPS
+    return np.array(thresholds)
+
+
+def _monotone(values: Array) -> Array:
+    """The best value at this recall or any higher one, filled with zeros to 41."""
+    curve = np.zeros(STEPS + 1)
+    kept = values[: STEPS + 1]
+    curve[: len(kept)] = np.maximum.accumulate(kept[::-1])[::-1]
+    return curve

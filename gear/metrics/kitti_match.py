@@ -1,0 +1,188 @@
+"""Matching labels and detections of one picture as KITTI's devkit does, for many score thresholds at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.formats.kitti_object import KittiLabel
+from gear.metrics.boxes import iou_2d, iou_ground_and_space, share_of_first
+from gear.values.geometry import Array
+
+Bools = npt.NDArray[np.bool_]
+Overlap = Literal["2d", "bev", "3d"]
+OVERLAPS: tuple[Overlap, ...] = ("2d", "bev", "3d")
+
+NEIGHBOURS = {"Car": "Van", "Pedestrian": "Person_sitting", "Cyclist": ""}
+"""Classes, and the types so like them that finding one counts neither for nor against."""
+
+MIN_OVERLAP = {"Car": 0.7, "Pedestrian": 0.5, "Cyclist": 0.5}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Difficulty:
+    """What a label may lack and still be looked for."""
+
+    name: str
+    min_height_px: float
+    max_occluded: int
+    max_truncated: float
+
+
+DIFFICULTIES = (
+    Difficulty(name="easy", min_height_px=40, max_occluded=0, max_truncated=0.15),
+    Difficulty(name="moderate", min_height_px=25, max_occluded=1, max_truncated=0.30),
+    Difficulty(name="hard", min_height_px=25, max_occluded=2, max_truncated=0.50),
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PictureBoxes:
+    """Labels and detections of one picture with their overlaps.
+
+    Attributes:
+        labels: without DontCare.
+        detections: every one with a score.
+        overlaps: (labels, detections) by kind.
+        in_dont_care: (detections,) largest share of a detection's own box that lies in one DontCare region.
+    """
+
+    labels: tuple[KittiLabel, ...]
+    detections: tuple[KittiLabel, ...]
+    overlaps: dict[Overlap, Array]
+    in_dont_care: Array
+
+
+def picture_boxes(labels: Sequence[KittiLabel], detections: Sequence[KittiLabel]) -> PictureBoxes:
+    """Computes all overlaps of a picture once."""
+    things = tuple(label for label in labels if label.type != "DontCare")
+    regions = _boxes_px([label for label in labels if label.type == "DontCare"])
+    found = tuple(detections)
+    ground, space = iou_ground_and_space(_boxes_m(things), _boxes_m(found))
+    shares = share_of_first(_boxes_px(found), regions)
+    return PictureBoxes(
+        labels=things,
+        detections=found,
+        overlaps={"2d": iou_2d(_boxes_px(things), _boxes_px(found)), "bev": ground, "3d": space},
+        in_dont_care=shares.max(axis=1) if regions.size else np.zeros(len(found)),
+    )
+
+
+def _boxes_px(labels: Sequence[KittiLabel]) -> Array:
+    return np.array([label.box_px for label in labels], dtype=np.float64).reshape(-1, 4)
+
+
+def _boxes_m(labels: Sequence[KittiLabel]) -> Array:
+    rows = [(t.height_m, t.width_m, t.length_m, *t.location_m, t.rotation_y_rad) for t in labels]
+    return np.array(rows, dtype=np.float64).reshape(-1, 7)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Chosen:
+    """What of a picture concerns one class at one difficulty.
+
+    Attributes:
+        label_state: (labels,) 0 to be found, 1 ignored, -1 of no concern.
+        detection_state: (detections,) likewise.
+        scores: (detections,).
+        overlaps: (labels, detections).
+        angle_gain: (labels, detections) (1 + cos of the difference of alpha) / 2.
+        excused: (detections,) lies in a DontCare region.
+        min_overlap: that a match needs.
+    """
+
+    label_state: npt.NDArray[np.int8]
+    detection_state: npt.NDArray[np.int8]
+    scores: Array
+    overlaps: Array
+    angle_gain: Array
+    excused: Bools
+    min_overlap: float
+
+
+def choose(picture: PictureBoxes, kind: str, difficulty: Difficulty, overlap: Overlap) -> Chosen:
+    """Sorts labels and detections into those that count, those that are ignored and those of no concern."""
+    label_state = np.full(len(picture.labels), -1, dtype=np.int8)
+    for i, label in enumerate(picture.labels):
+        hard = (
+            label.occluded > difficulty.max_occluded
+            or label.truncated > difficulty.max_truncated
+            or label.box_px[3] - label.box_px[1] <= difficulty.min_height_px
+        )
+        if label.type == kind:
+            label_state[i] = 1 if hard else 0
+        elif label.type == NEIGHBOURS[kind]:
+            label_state[i] = 1
+    detection_state = np.full(len(picture.detections), -1, dtype=np.int8)
+    for j, found in enumerate(picture.detections):
+        # The devkit holds the height in an integer, and looks at it before it looks at the type.
+        if int(abs(found.box_px[3] - found.box_px[1])) < difficulty.min_height_px:
+            detection_state[j] = 1
+        elif found.type == kind:
+            detection_state[j] = 0
+    label_alpha = np.array([label.alpha_rad for label in picture.labels])
+    found_alpha = np.array([found.alpha_rad for found in picture.detections])
+    return Chosen(
+        label_state=label_state,
+        detection_state=detection_state,
+        scores=np.array([found.score if found.score is not None else 1.0 for found in picture.detections]),
+        overlaps=picture.overlaps[overlap],
+        angle_gain=np.asarray((1 + np.cos(label_alpha[:, None] - found_alpha[None])) / 2),
+        # DontCare regions have no place in space, so they excuse in the picture alone.
+        excused=(picture.in_dont_care > MIN_OVERLAP[kind]) & (overlap == "2d"),
+        min_overlap=MIN_OVERLAP[kind],
+    )
+
+
+def matched_scores(chosen: Chosen) -> list[float]:
+    """Scores of the detections that would find each label if every one were kept; each label takes the surest."""
+    taken = np.zeros(len(chosen.scores), dtype=np.bool_)
+    scores = []
+    for i in np.flatnonzero(chosen.label_state >= 0):
+        candidates = (chosen.detection_state >= 0) & ~taken & (chosen.overlaps[i] > chosen.min_overlap)
+        if not candidates.any():
+            continue
+        j = int(np.argmax(np.where(candidates, chosen.scores, -np.inf)))
+        taken[j] = True
+        if chosen.label_state[i] == 0 and chosen.detection_state[j] == 0:
+            scores.append(float(chosen.scores[j]))
+    return scores
+
+
+@dataclass(slots=True, eq=False, kw_only=True)
+class Counts:
+    """What happens at each threshold: hits, false alarms, misses, and hits weighed by angle; (T,) each."""
+
+    tp: Array
+    fp: Array
+    fn: Array
+    similarity: Array
+
+
+def count(chosen: Chosen, thresholds: Array) -> Counts:
+    """Matches one picture at every threshold; each label takes the detection that overlaps it most."""
+    size = len(thresholds)
+    kept = (chosen.scores[None] >= thresholds[:, None]) & (chosen.detection_state >= 0)[None]
+    taken = np.zeros_like(kept)
+    counts = Counts(tp=np.zeros(size), fp=np.zeros(size), fn=np.zeros(size), similarity=np.zeros(size))
+    rows = np.arange(size)
+    for i in np.flatnonzero(chosen.label_state >= 0):
+        candidates = kept & ~taken & (chosen.overlaps[i] > chosen.min_overlap)[None]
+        proper = candidates & (chosen.detection_state == 0)[None]
+        # Too small a detection is taken only where no proper one is; the first one then.
+        best = np.argmax(np.where(proper, chosen.overlaps[i][None], -1.0), axis=1) if kept.shape[1] else rows * 0
+        has_proper, has_any = proper.any(axis=1), candidates.any(axis=1)
+        if kept.shape[1]:
+            best = np.where(has_proper, best, np.argmax(candidates, axis=1))
+            taken[rows[has_any], best[has_any]] = True
+        if chosen.label_state[i] == 0:
+            counts.tp += has_proper
+            counts.fn += ~has_any
+            counts.similarity[has_proper] += chosen.angle_gain[i, best[has_proper]]
+    wrong = kept & ~taken & (chosen.detection_state == 0)[None] & ~chosen.excused[None]
+    counts.fp += wrong.sum(axis=1)
+    return counts

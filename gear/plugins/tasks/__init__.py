@@ -1,0 +1,1 @@
+"""Tasks that gear brings, one file each."""

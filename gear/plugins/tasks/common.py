@@ -1,0 +1,137 @@
+"""What gear's own tasks share: camera options, checks and drawing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from gear.contracts.tasks import Sample
+from gear.groundtruth.surfaces import observe_surfaces
+from gear.values.errors import DatasetError, FieldError
+from gear.values.frames import Frame, UInt8Image
+from gear.values.rig import CameraMount
+from gear.values.scene import SceneRecord, Vec3
+from gear.values.truth import SurfaceTruth
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraOptions:
+    """The camera of a task, on the ego car.
+
+    Attributes:
+        width_px, height_px: picture size.
+        hfov_deg: horizontal field of view.
+        position_m: in the ego frame: x forward, y left, z up, the origin on the ground.
+        pitch_deg: turned downwards.
+        follows_road: False keeps the camera level, as the original's loaders demand; True takes the car's pitch and
+            roll.
+    """
+
+    width_px: int
+    height_px: int
+    hfov_deg: float = 90.0
+    position_m: Vec3 = (1.5, 0.0, 1.65)
+    pitch_deg: float = 0.0
+    follows_road: bool = False
+
+    def __post_init__(self) -> None:
+        self.mount("left")
+        if not all(math.isfinite(v) and abs(v) < 100 for v in self.position_m):
+            raise FieldError("position_m", f"must lie within 100 m of the car, got {self.position_m}")
+
+    def mount(self, name: str, right_m: float = 0.0) -> CameraMount:
+        """The camera under a name, moved to the right."""
+        x, y, z = self.position_m
+        return CameraMount(
+            name=name,
+            width_px=self.width_px,
+            height_px=self.height_px,
+            hfov_deg=self.hfov_deg,
+            position_m=(x, y - right_m, z),
+            pitch_deg=self.pitch_deg,
+        )
+
+
+def surfaces_of(frame: Frame, record: SceneRecord) -> tuple[SurfaceTruth, ...]:
+    """Every surface in every view, view by view in the record's order of cameras."""
+    return tuple(
+        truth for camera in record.cameras for truth in observe_surfaces(frame.views[camera.name], frame.geoms, record)
+    )
+
+
+def images_of(frame: Frame) -> dict[str, UInt8Image]:
+    """The pictures of every view."""
+    return {name: view.rgb for name, view in frame.views.items()}
+
+
+def read(root: Path, relative: str) -> bytes:
+    """A file of a dataset.
+
+    Raises:
+        DatasetError: it is not there or cannot be read.
+    """
+    try:
+        return (root / relative).read_bytes()
+    except OSError as error:
+        raise DatasetError(root / relative, error.strerror or str(error)) from error
+
+
+def draw_surfaces(picture: UInt8Image, sample: Sample, camera: str) -> None:
+    """Outlines every surface of a view in magenta, in place."""
+    for truth in sample.surfaces:
+        if truth.camera == camera and truth.corners_px is not None:
+            draw_polygon(picture, truth.corners_px, (255, 0, 255))
+
+
+def draw_polygon(picture: UInt8Image, points_px: Sequence[Sequence[float]], rgb: tuple[int, int, int]) -> None:
+    """A closed line through index pixels, in place."""
+    draw_segments(picture, list(zip(points_px, [*points_px[1:], points_px[0]], strict=True)), rgb)
+
+
+def draw_segments(
+    picture: UInt8Image, segments_px: Iterable[tuple[Sequence[float], Sequence[float]]], rgb: tuple[int, int, int]
+) -> None:
+    """Straight lines between index pixels, in place; ends far outside are fine."""
+    limit = 4 * 8192
+    for ends in segments_px:
+        (x0, y0), (x1, y1) = (np.round(np.clip(end, -limit, limit) * 16).astype(int).tolist() for end in ends)
+        cv2.line(picture, (x0, y0), (x1, y1), rgb, 1, cv2.LINE_AA, 4)
+
+
+def draw_box(
+    picture: UInt8Image, box: Sequence[float], rgb: tuple[int, int, int], text: str = "", *, dashed: bool = False
+) -> None:
+    """A box in index pixels with a word on it, in place; dashed for what is to be ignored."""
+    left, top, right, bottom = (round(float(v)) for v in box)
+    if dashed:
+        for x in range(left, right, 8):
+            for y in (top, bottom):
+                cv2.line(picture, (x, y), (min(x + 4, right), y), rgb, 1)
+        for y in range(top, bottom, 8):
+            for x in (left, right):
+                cv2.line(picture, (x, y), (x, min(y + 4, bottom)), rgb, 1)
+    else:
+        cv2.rectangle(picture, (left, top), (right, bottom), rgb, 1)
+    if text:
+        size, _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.4, 1)
+        base = max(top - 3, size[1] + 2)
+        cv2.rectangle(picture, (left, base - size[1] - 2), (left + size[0] + 2, base + 2), rgb, -1)
+        cv2.putText(picture, text, (left + 1, base), cv2.FONT_HERSHEY_SIMPLEX, 0.4, (0, 0, 0), 1, cv2.LINE_AA)
+
+
+def expect(facts: Any, *keys: str, place: Path) -> Mapping[str, Any]:
+    """The facts of a sidecar, checked for the keys that a task needs.
+
+    Raises:
+        DatasetError: something is missing: the sidecar is another task's, or damaged.
+    """
+    missing = [key for key in keys if not isinstance(facts, dict) or key not in facts]
+    if missing:
+        raise DatasetError(place, f"its sidecars do not say {', '.join(missing)}; was it collected for another task?")
+    return facts  # type: ignore[no-any-return]

@@ -1,0 +1,159 @@
+"""Monocular depth: KITTI's 16-bit pictures and exact metres, in the original's tree."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.specs import TaskSpec
+from gear.contracts.tasks import Encoded, Evaluator, Sample, Sidecar, SplitInfo
+from gear.formats import kitti_depth
+from gear.formats.billboard_info import billboard_info
+from gear.formats.jsontext import dump
+from gear.formats.png import decode_plain, decode_rgb, encode_labels, encode_rgb, encode_tiff
+from gear.metrics.depth import Crop, DepthEvaluator
+from gear.plugins.tasks.common import CameraOptions, draw_surfaces, images_of, read, surfaces_of
+from gear.values.errors import FieldError
+from gear.values.frames import FloatImage, Frame, UInt8Image
+from gear.values.rig import Rig
+from gear.values.scene import SceneRecord
+
+VIEW = "left"
+PREVIEW_MAX_DEPTH_M = 80.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DepthConfig(CameraOptions):
+    """Options of monocular depth.
+
+    Attributes:
+        max_depth_m: what lies farther has no ground truth.
+        eval_max_depth_m: what lies farther is not evaluated by the `eigen_` figures; 80 m is customary.
+        eval_crop: part of the picture that the `eigen_` figures look at.
+    """
+
+    width_px: int = 1224
+    height_px: int = 370
+    max_depth_m: float = 1000.0
+    eval_max_depth_m: float = 80.0
+    eval_crop: Crop = "none"
+
+    def __post_init__(self) -> None:
+        CameraOptions.__post_init__(self)
+        for name in ("max_depth_m", "eval_max_depth_m"):
+            if not getattr(self, name) > 0:
+                raise FieldError(name, f"must be above 0 m, got {getattr(self, name):g}")
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class DepthSample(Sample):
+    """A picture with its depth.
+
+    Attributes:
+        depth_m: (H, W) float32, planar z, NaN where there is no ground truth.
+    """
+
+    depth_m: FloatImage
+
+
+def _paths(split: str, index: int) -> tuple[str, str, str]:
+    """Picture, 16-bit depth, depth in metres."""
+    name = f"{split}/rgb_{index:04d}"
+    return f"leftImg8bit/{name}.png", f"gtFine/{name}.png", f"gtFine/{name}.tiff"
+
+
+class DepthTask:
+    """`leftImg8bit`, `gtFine`, `filenames`."""
+
+    def __init__(self, config: DepthConfig) -> None:
+        self.config = config
+
+    def rig(self) -> Rig:
+        """One camera."""
+        return Rig(cameras=(self.config.mount(VIEW),), follows_road=self.config.follows_road)
+
+    def ground_truth(self, frame: Frame, record: SceneRecord) -> DepthSample:
+        """The depth buffer, up to the range."""
+        depth_m = frame.views[VIEW].depth_m
+        known = (depth_m > 0) & (depth_m <= self.config.max_depth_m)
+        return DepthSample(
+            record=record,
+            images=images_of(frame),
+            surfaces=surfaces_of(frame, record),
+            depth_m=np.where(known, depth_m, np.float32(np.nan)),
+        )
+
+    def encode(self, sample: DepthSample, info: SplitInfo) -> Encoded:
+        """Picture and both depth files."""
+        image, units, metres = _paths(info.split, sample.record.index)
+        known = np.isfinite(sample.depth_m)
+        files = {
+            image: encode_rgb(sample.images[VIEW]),
+            units: encode_labels(kitti_depth.to_units(sample.depth_m)),
+            metres: encode_tiff(kitti_depth.to_metres_file(sample.depth_m)),
+        }
+        return Encoded(files=files, facts={"known_px": int(known.sum())})
+
+    def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
+        """Both lists and the original's poses."""
+        paths = [_paths(info.split, sidecar.record.index) for sidecar in sidecars]
+        records = [sidecar.record for sidecar in sidecars]
+        poses = billboard_info(records, task="depth", patch_label=info.patch_label, reference=VIEW)
+        return {
+            # The original's loader takes the file's numbers for metres, so its list names the float pictures.
+            f"filenames/{info.split}_list.txt": kitti_depth.file_list([(image, metres) for image, _, metres in paths]),
+            f"filenames/{info.split}_list_kitti.txt": kitti_depth.file_list(
+                [(image, units) for image, units, _ in paths]
+            ),
+            f"gtFine/{info.split}/camera_billboard_info.json": dump(poses),
+        }
+
+    def decode(self, root: Path, sidecar: Sidecar, info: SplitInfo) -> DepthSample:
+        """Reads the picture and the depth in metres."""
+        image, _, metres = _paths(info.split, sidecar.record.index)
+        return DepthSample(
+            record=sidecar.record,
+            images={VIEW: decode_rgb(read(root, image))},
+            surfaces=sidecar.surfaces,
+            depth_m=kitti_depth.from_metres_file(decode_plain(read(root, metres))),
+        )
+
+    def as_prediction(self, sample: DepthSample) -> FloatImage:
+        """(H, W) float32 metres; what is unknown is said to be at the range."""
+        return np.where(np.isfinite(sample.depth_m), sample.depth_m, np.float32(self.config.max_depth_m))
+
+    def evaluator(self) -> Evaluator[DepthSample, FloatImage]:
+        """The devkit's figures and Eigen's."""
+        return DepthEvaluator(max_depth_m=self.config.eval_max_depth_m, crop=self.config.eval_crop)
+
+    def preview(self, sample: DepthSample) -> Mapping[str, UInt8Image]:
+        """The picture, and inverse depth in colours, nearest red, nothing black."""
+        picture = sample.images[VIEW].copy()
+        draw_surfaces(picture, sample, VIEW)
+        known = np.isfinite(sample.depth_m)
+        nearness = np.sqrt(2.0 / np.clip(np.where(known, sample.depth_m, PREVIEW_MAX_DEPTH_M), 2.0, None))
+        colours = cv2.applyColorMap((nearness * 255).astype(np.uint8), cv2.COLORMAP_TURBO)[..., ::-1].copy()
+        colours[~known] = 0
+        return {"image": picture, "depth": colours}
+
+
+depth: TaskSpec[DepthConfig] = TaskSpec(
+    name="depth",
+    summary="Monocular depth: 16-bit KITTI pictures, float TIFF in metres, both lists.",
+    config=DepthConfig,
+    build=DepthTask,
+    views=(VIEW,),
+    layout="leftImg8bit/<split>/rgb_%04d.png, gtFine/<split>/rgb_%04d.{png,tiff}, filenames/<split>_list{,_kitti}.txt",
+    original_name="depth",
+)
+
+
+@hookimpl
+def gear_tasks() -> list[TaskSpec[DepthConfig]]:
+    """This task."""
+    return [depth]

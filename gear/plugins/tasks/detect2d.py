@@ -1,0 +1,251 @@
+"""2D object detection in the layout of COCO."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.specs import TaskSpec
+from gear.contracts.tasks import Encoded, Evaluator, Sample, Sidecar, SplitInfo
+from gear.formats import coco, rle
+from gear.formats.billboard_info import billboard_info
+from gear.formats.jsontext import dump
+from gear.formats.png import decode_rgb, encode_rgb
+from gear.groundtruth.boxes import box_in_camera
+from gear.groundtruth.objects import observe_objects
+from gear.groundtruth.visibility import VisibilityLimits
+from gear.metrics.coco_ap import CocoEvaluator
+from gear.plugins.tasks.common import CameraOptions, draw_box, draw_surfaces, expect, images_of, read, surfaces_of
+from gear.values.frames import Frame, UInt8Image
+from gear.values.labels import LABELS
+from gear.values.rig import Rig
+from gear.values.scene import CameraRecord, SceneRecord
+from gear.values.serial import from_json, to_json
+from gear.values.truth import BoxPx
+
+VIEW = "left"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Detect2dConfig(CameraOptions):
+    """Options of 2D detection.
+
+    Attributes:
+        visibility: what an object must show to be labelled; what shows less is annotated as a crowd, which
+            evaluations ignore.
+    """
+
+    width_px: int = 1333
+    height_px: int = 800
+    visibility: VisibilityLimits = field(default_factory=VisibilityLimits)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Object2d:
+    """One labelled part of one object; a cyclist is a bicycle and a person.
+
+    Attributes:
+        object_id: the same in every sample of a sequence.
+        label: gear's name of the part's label.
+        category_id: COCO's.
+        is_ignored: seen too little of to be looked for.
+        box_px: tight box of the visible pixels, edge pixels.
+        amodal_box_px: tight box of the whole silhouette; may exceed the picture.
+        area_px: visible pixels.
+        rle: their run lengths for the whole picture.
+        visible_fraction, occluded_fraction, truncated_fraction: of the silhouette: seen; covered, of what lies in the
+            picture; outside the picture.
+        distance_m: camera to the middle of the object's box.
+    """
+
+    object_id: int
+    label: str
+    category_id: int
+    is_ignored: bool
+    box_px: BoxPx
+    amodal_box_px: BoxPx
+    area_px: int
+    rle: str
+    visible_fraction: float
+    occluded_fraction: float
+    truncated_fraction: float
+    distance_m: float
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Detect2dSample(Sample):
+    """A picture with its objects.
+
+    Attributes:
+        objects: labelled and ignored ones.
+    """
+
+    objects: tuple[Object2d, ...]
+
+
+class Detect2dTask:
+    """`images/<split>`, `annotations`."""
+
+    def __init__(self, config: Detect2dConfig) -> None:
+        self.config = config
+
+    def rig(self) -> Rig:
+        """One camera."""
+        return Rig(cameras=(self.config.mount(VIEW),), follows_road=self.config.follows_road)
+
+    def ground_truth(self, frame: Frame, record: SceneRecord) -> Detect2dSample:
+        """Measures every object that COCO has a category for."""
+        view, limits = frame.views[VIEW], self.config.visibility
+        height, width = view.geom_id.shape
+        found = []
+        for truth in observe_objects(view, frame.geoms, frame.objects):
+            label = LABELS[truth.label_code]
+            if label.coco_id is None or truth.visible_box is None or not limits.mentions(truth):
+                continue
+            distance_m = box_in_camera(frame.objects[truth.object_id], view.camera).distance_m
+            left, top = int(truth.visible_box[0]), int(truth.visible_box[1])
+            found.append(
+                Object2d(
+                    object_id=truth.object_id,
+                    label=label.name,
+                    category_id=label.coco_id,
+                    is_ignored=not limits.labels(truth, distance_m),
+                    box_px=truth.visible_box,
+                    amodal_box_px=truth.amodal_box,
+                    area_px=truth.visible_px,
+                    rle=rle.encode_crop(truth.mask, left, top, height, width),
+                    visible_fraction=round(truth.visible_fraction, 6),
+                    occluded_fraction=round(truth.occluded_fraction, 6),
+                    truncated_fraction=round(truth.truncated_fraction, 6),
+                    distance_m=round(distance_m, 4),
+                )
+            )
+        return Detect2dSample(
+            record=record, images=images_of(frame), surfaces=surfaces_of(frame, record), objects=tuple(found)
+        )
+
+    def encode(self, sample: Detect2dSample, info: SplitInfo) -> Encoded:
+        """The picture; its annotations wait in the sidecar for the split's one file."""
+        files = {f"images/{info.split}/{_name(sample.record.index)}": encode_rgb(sample.images[VIEW])}
+        return Encoded(files=files, facts={"objects": to_json(sample.objects)})
+
+    def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
+        """The annotation file under both of its usual names, and the original's poses."""
+        pictures = [self._picture(sidecar) for sidecar in sidecars]
+        description = f"gear {info.town} {info.scene} {info.split}, patch: {info.patch_label}"
+        annotations = dump(coco.dataset_json(pictures, description=description, created=info.created))
+        records = [sidecar.record for sidecar in sidecars]
+        poses = billboard_info(records, task="2dod", patch_label=info.patch_label, reference=VIEW)
+        return {
+            f"annotations/{info.split}/coco_annotations.json": annotations,
+            f"annotations/instances_{info.split}.json": annotations,
+            f"annotations/{info.split}/camera_billboard_info.json": dump(poses),
+        }
+
+    def decode(self, root: Path, sidecar: Sidecar, info: SplitInfo) -> Detect2dSample:
+        """Reads the picture; the objects are in the sidecar."""
+        return Detect2dSample(
+            record=sidecar.record,
+            images={VIEW: decode_rgb(read(root, f"images/{info.split}/{_name(sidecar.record.index)}"))},
+            surfaces=sidecar.surfaces,
+            objects=_objects(sidecar, root),
+        )
+
+    def as_prediction(self, sample: Detect2dSample) -> tuple[coco.Detection, ...]:
+        """Every labelled box, quite sure."""
+        return tuple(
+            coco.Detection(category_id=thing.category_id, box_px=thing.box_px, score=1.0)
+            for thing in sample.objects
+            if not thing.is_ignored
+        )
+
+    def evaluator(self) -> Evaluator[Detect2dSample, tuple[coco.Detection, ...]]:
+        """COCO's average precision."""
+        return CocoEvaluator(lambda sample: self._as_picture(sample.record, sample.objects))
+
+    def preview(self, sample: Detect2dSample) -> Mapping[str, UInt8Image]:
+        """Masks and boxes over the picture; ignored objects dashed in grey."""
+        picture = sample.images[VIEW].copy()
+        height, width = picture.shape[:2]
+        for thing in sample.objects:
+            colour = _colour(thing)
+            inside = rle.decode(thing.rle, height, width)
+            picture[inside] = (picture[inside] * 0.6 + np.array(colour) * 0.4).astype(np.uint8)
+            left, top, right, bottom = thing.box_px
+            text = f"{coco.CATEGORY_NAMES[thing.category_id]} {thing.visible_fraction:.0%}"
+            draw_box(picture, (left, top, right - 1, bottom - 1), colour, text, dashed=thing.is_ignored)
+        draw_surfaces(picture, sample, VIEW)
+        return {"boxes": picture}
+
+    def _picture(self, sidecar: Sidecar) -> coco.Picture:
+        return self._as_picture(sidecar.record, _objects(sidecar, Path()))
+
+    def _as_picture(self, record: SceneRecord, objects: tuple[Object2d, ...]) -> coco.Picture:
+        camera = record.camera(VIEW)
+        return coco.Picture(
+            id=record.index,
+            file_name=_name(record.index),
+            height_px=camera.height_px,
+            width_px=camera.width_px,
+            annotations=tuple(_annotation(thing, camera) for thing in objects),
+        )
+
+
+def _name(index: int) -> str:
+    return f"rgb_{index:04d}.png"
+
+
+def _objects(sidecar: Sidecar, root: Path) -> tuple[Object2d, ...]:
+    facts = expect(sidecar.facts, "objects", place=root)
+    return tuple(from_json(Object2d, item, "objects") for item in facts["objects"])
+
+
+def _annotation(thing: Object2d, camera: CameraRecord) -> coco.Annotation:
+    left, top, right, bottom = thing.box_px
+    x0, y0, x1, y1 = thing.amodal_box_px
+    return coco.Annotation(
+        category_id=thing.category_id,
+        box_xywh=(left, top, right - left, bottom - top),
+        area_px=thing.area_px,
+        rle=thing.rle,
+        is_crowd=thing.is_ignored,
+        extras={
+            "object_id": thing.object_id,
+            "label": thing.label,
+            "amodal_bbox": [x0, y0, x1 - x0, y1 - y0],
+            "visible_fraction": thing.visible_fraction,
+            "occluded_fraction": thing.occluded_fraction,
+            "truncated_fraction": thing.truncated_fraction,
+            "distance_m": thing.distance_m,
+        },
+    )
+
+
+def _colour(thing: Object2d) -> tuple[int, int, int]:
+    if thing.is_ignored:
+        return (170, 170, 170)
+    hue = np.array([[[thing.category_id * 47 % 180, 200, 255]]], dtype=np.uint8)
+    red, green, blue = (int(v) for v in cv2.cvtColor(hue, cv2.COLOR_HSV2RGB)[0, 0])
+    return (red, green, blue)
+
+
+detect2d: TaskSpec[Detect2dConfig] = TaskSpec(
+    name="detect2d",
+    summary="2D object detection: COCO boxes and masks with how much of each object is seen.",
+    config=Detect2dConfig,
+    build=Detect2dTask,
+    views=(VIEW,),
+    layout="images/<split>/rgb_%04d.png, annotations/<split>/coco_annotations.json, annotations/instances_<split>.json",
+    original_name="2dod",
+)
+
+
+@hookimpl
+def gear_tasks() -> list[TaskSpec[Detect2dConfig]]:
+    """This task."""
+    return [detect2d]

@@ -1,0 +1,175 @@
+"""Semantic segmentation in the layout of Cityscapes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.specs import TaskSpec
+from gear.contracts.tasks import Encoded, Evaluator, Sample, Sidecar, SplitInfo
+from gear.formats import cityscapes
+from gear.formats.billboard_info import billboard_info
+from gear.formats.cityscapes_polygons import polygons_json
+from gear.formats.jsontext import dump
+from gear.formats.png import decode_plain, decode_rgb, encode_labels, encode_rgb
+from gear.groundtruth.labelmaps import coarsen, instance_map, label_map
+from gear.metrics.semantic import SemanticEvaluator
+from gear.plugins.tasks.common import CameraOptions, draw_surfaces, images_of, read, surfaces_of
+from gear.values.errors import FieldError
+from gear.values.frames import Frame, UInt8Image
+from gear.values.rig import Rig
+from gear.values.scene import SceneRecord
+
+VIEW = "left"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LabelOptions:
+    """How fine the labels are.
+
+    Attributes:
+        granularity: `fine` is what each pixel shows. `coarse` is what a person with a polygon tool would draw: each
+            pixel takes the label that fills most of a square around it, so that thin poles, wires, single leaves and
+            the sky between twigs go to what surrounds them.
+        coarse_window_px: side of that square, odd; things thinner than about half of it vanish.
+    """
+
+    granularity: Literal["fine", "coarse"] = "fine"
+    coarse_window_px: int = 9
+
+    def __post_init__(self) -> None:
+        if not 3 <= self.coarse_window_px <= 101 or self.coarse_window_px % 2 == 0:
+            raise FieldError("coarse_window_px", f"must be odd and 3 to 101, got {self.coarse_window_px}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SemsegConfig(CameraOptions):
+    """Options of semantic segmentation.
+
+    Attributes:
+        labels: how fine the labels are.
+        polygons: whether to write polygon files too (about a third of the task's own time).
+    """
+
+    width_px: int = 2048
+    height_px: int = 1024
+    labels: LabelOptions = field(default_factory=LabelOptions)
+    polygons: bool = True
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class SemsegSample(Sample):
+    """A picture with its labels.
+
+    Attributes:
+        label_ids: (H, W) uint8, Cityscapes ids 0..33.
+        instance_ids: (H, W) uint16, id * 1000 + number for single instances, the id for everything else.
+    """
+
+    label_ids: npt.NDArray[np.uint8]
+    instance_ids: npt.NDArray[np.uint16]
+
+
+class SemsegTask:
+    """Cityscapes: `leftImg8bit`, `gtFine`, `camera`."""
+
+    def __init__(self, config: SemsegConfig) -> None:
+        self.config = config
+
+    def rig(self) -> Rig:
+        """One camera."""
+        return Rig(cameras=(self.config.mount(VIEW),), follows_road=self.config.follows_road)
+
+    def ground_truth(self, frame: Frame, record: SceneRecord) -> SemsegSample:
+        """Reads labels off the id buffer."""
+        instances = instance_map(frame.views[VIEW].geom_id, frame.geoms, frame.objects)
+        if self.config.labels.granularity == "coarse":
+            instances = coarsen(instances, self.config.labels.coarse_window_px)
+        return SemsegSample(
+            record=record,
+            images=images_of(frame),
+            surfaces=surfaces_of(frame, record),
+            label_ids=label_map(instances),
+            instance_ids=instances,
+        )
+
+    def encode(self, sample: SemsegSample, info: SplitInfo) -> Encoded:
+        """Picture, labels, instances, colours, polygons, camera."""
+        record = sample.record
+        paths = cityscapes.paths(info.town, info.split, record.sequence, record.frame)
+        world_from_vehicle = record.ego.world_from_actor.transform("world", "ego")
+        camera = cityscapes.camera_json(record.camera(VIEW), world_from_vehicle, baseline_m=0.0)
+        files = {
+            paths.image: encode_rgb(sample.images[VIEW]),
+            paths.label_ids: encode_labels(sample.label_ids),
+            paths.instance_ids: encode_labels(sample.instance_ids),
+            paths.colour: encode_labels(cityscapes.colour_map(sample.label_ids)),
+            paths.camera: dump(camera),
+        }
+        if self.config.polygons:
+            files[paths.polygons] = dump(polygons_json(sample.instance_ids))
+        counts = np.bincount(sample.label_ids.reshape(-1), minlength=len(cityscapes.LABELS))
+        present = {cityscapes.LABELS[i].name: int(counts[i]) for i in np.flatnonzero(counts)}
+        return Encoded(files=files, facts={"label_px": present})
+
+    def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
+        """The original's list of poses."""
+        records = [sidecar.record for sidecar in sidecars]
+        poses = billboard_info(records, task="ss", patch_label=info.patch_label, reference=VIEW)
+        return {f"gtFine/{info.split}/camera_billboard_info.json": dump(poses)}
+
+    def decode(self, root: Path, sidecar: Sidecar, info: SplitInfo) -> SemsegSample:
+        """Reads the picture and both label maps."""
+        record = sidecar.record
+        paths = cityscapes.paths(info.town, info.split, record.sequence, record.frame)
+        return SemsegSample(
+            record=record,
+            images={VIEW: decode_rgb(read(root, paths.image))},
+            surfaces=sidecar.surfaces,
+            label_ids=decode_plain(read(root, paths.label_ids)),
+            instance_ids=decode_plain(read(root, paths.instance_ids)),
+        )
+
+    def as_prediction(self, sample: SemsegSample) -> npt.NDArray[np.uint8]:
+        """(H, W) uint8 label ids."""
+        return sample.label_ids
+
+    def evaluator(self) -> Evaluator[SemsegSample, npt.NDArray[np.uint8]]:
+        """mIoU and iIoU."""
+        return SemanticEvaluator()
+
+    def preview(self, sample: SemsegSample) -> Mapping[str, UInt8Image]:
+        """The labels' colours over the picture, borders between instances in white."""
+        colours = cityscapes.colour_map(sample.label_ids)[..., :3]
+        picture = cv2.addWeighted(sample.images[VIEW], 0.45, np.ascontiguousarray(colours), 0.55, 0.0)
+        instances = sample.instance_ids
+        edge = np.zeros(instances.shape, dtype=np.bool_)
+        edge[:, 1:] |= instances[:, 1:] != instances[:, :-1]
+        edge[1:] |= instances[1:] != instances[:-1]
+        picture[edge & (instances >= cityscapes.INSTANCE_FACTOR)] = 255
+        draw_surfaces(picture, sample, VIEW)
+        return {"labels": picture}
+
+
+semseg: TaskSpec[SemsegConfig] = TaskSpec(
+    name="semseg",
+    summary="Semantic segmentation: Cityscapes labels, instances, polygons and cameras.",
+    config=SemsegConfig,
+    build=SemsegTask,
+    views=(VIEW,),
+    layout="{leftImg8bit,gtFine,camera}/<split>/<city>/<city>_<sequence>_<frame>_*.{png,json}",
+    original_name="ss",
+)
+
+
+@hookimpl
+def gear_tasks() -> list[TaskSpec[SemsegConfig]]:
+    """This task."""
+    return [semseg]
