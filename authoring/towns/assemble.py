@@ -1,0 +1,72 @@
+"""Puts a town together and writes it."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+from shapely.geometry import Polygon  # type: ignore[import-untyped]
+from shapely.ops import unary_union  # type: ignore[import-untyped]
+
+from authoring.kit.parts import Sink
+from authoring.mesh import write_obj
+from authoring.towns import town10
+from authoring.towns.bridges import build_bridge
+from authoring.towns.chunks import chunked
+from authoring.towns.collision import town_solids
+from authoring.towns.document import Document, Geom, bay_rows
+from authoring.towns.ground import lay_ground
+from authoring.towns.lanes import Lane, lane_graph, turns_of
+from authoring.towns.lots import build_lots, plan_lots
+from authoring.towns.markings import paint_streets
+from authoring.towns.regions import Regions, canal_polygon
+from authoring.towns.skyline import build_skyline
+from authoring.towns.walks import crosswalks, sidewalks
+
+CELL_M = 110.0
+SEED = 10
+
+
+def town10_regions() -> Regions:
+    """The plan of town10 as polygons."""
+    return Regions(town10.NETWORK, canal_polygon(town10.CANAL_LINE, town10.CANAL_HALF_WIDTH_M))
+
+
+def town10_lanes() -> dict[str, Lane]:
+    """The lanes of town10 by name."""
+    return lane_graph(town10.NETWORK)
+
+
+def write_town10(folder: Path) -> None:
+    """Write town10.xml and its meshes into a folder, replacing what is there.
+
+    Args:
+        folder: where the file goes; meshes go to `town10/` in it.
+    """
+    regions, lanes = town10_regions(), town10_lanes()
+    sites = unary_union([Polygon()])
+    sink = Sink("static")
+    lay_ground(sink, regions, sites)
+    paint_streets(sink, regions, lambda lane: turns_of(lanes, lane))
+    for street in regions.network.streets.values():
+        if street.hump_m:
+            build_bridge(sink, regions.network, street)
+    lots = plan_lots(regions, sites, rng=np.random.default_rng([SEED, 1]))
+    build_lots(sink, lots, seed=SEED)
+    build_skyline(sink, regions, lots, rng=np.random.default_rng([SEED, 2]))
+
+    document = Document("town10", town10.BOUNDS)
+    meshes = folder / "town10"
+    shutil.rmtree(meshes, ignore_errors=True)
+    meshes.mkdir(parents=True)
+    for chunk in chunked(sink.parts(), cell_m=CELL_M):
+        write_obj(meshes / f"{chunk.name}.obj", chunk.mesh)
+        document.meshes.append(chunk.name)
+        document.geoms.append(Geom(mesh=chunk.name, material=chunk.material, label=chunk.label))
+    document.solids.extend(town_solids(regions, lots))
+    document.lanes.extend(lanes.values())
+    document.sidewalks.extend(sidewalks(regions, town10.BOUNDS))
+    document.crosswalks.extend(crosswalks(regions))
+    document.bays.extend(bay_rows(regions.bay_groups))
+    (folder / "town10.xml").write_text(document.text(), encoding="utf-8", newline="\n")

@@ -1,0 +1,89 @@
+"""The level ground: asphalt, kerbs, sidewalks, medians, tactile paving, the canal and its quays."""
+
+from __future__ import annotations
+
+import numpy as np
+from shapely.geometry import LineString, Polygon, box  # type: ignore[import-untyped]
+from shapely.geometry.base import BaseGeometry  # type: ignore[import-untyped]
+from shapely.ops import unary_union  # type: ignore[import-untyped]
+
+from authoring.kit.parts import Sink
+from authoring.towns import paths, solids
+from authoring.towns.network import CROSSING_M, STOP_LINE_GAP_M
+from authoring.towns.regions import KERB_M, Regions
+
+WATER_M = -1.7
+COPING_M = 0.6
+TACTILE_DEPTH_M = 0.8
+
+
+def lay_ground(sink: Sink, regions: Regions, sites: BaseGeometry) -> None:
+    """Lay everything level but the sites, which are somebody else's."""
+    worn = unary_union([regions.band(s.name, -s.profile.half_width_m, s.profile.half_width_m)
+                        for s in regions.network.streets.values() if s.bays_left and s.bays_right])
+    roads = regions.level_roads
+    solids.flat(sink, roads.difference(worn), 0.0, "asphalt", "road")
+    solids.flat(sink, roads.intersection(worn), 0.0, "asphalt_worn", "road")
+    tactile = tactile_paving(regions)
+    stones = regions.kerb_stones
+    solids.flat(sink, regions.sidewalks.difference(stones).difference(tactile), KERB_M, "pavement", "sidewalk")
+    solids.flat(sink, stones, KERB_M, "kerb", "sidewalk")
+    solids.flat(sink, tactile.difference(stones), KERB_M, "tactile", "sidewalk")
+    for land in regions.blocks:
+        for rim in solids.boundary_towards(land, regions.level_roads):
+            solids.wall(sink, rim, 0.0, KERB_M, "kerb", "sidewalk")
+    quay = regions.canal.buffer(COPING_M, join_style="mitre").difference(regions.canal)
+    taken = unary_union([sites, quay])
+    for interior in regions.interiors:
+        solids.flat(sink, interior.difference(taken), KERB_M, "cobbles" if interior.area < 12000 else "concrete", "ground")
+    for median in regions.medians.values():
+        _median(sink, median)
+    _canal(sink, regions)
+
+
+def tactile_paving(regions: Regions) -> BaseGeometry:
+    """The studded paving on the sidewalk at both ends of every crossing."""
+    network, strips = regions.network, []
+    for street in network.streets.values():
+        line = network.lines[street.name]
+        for at_start in (True, False) if street.end else (True,):
+            mouth = network.mouths[street.name, at_start] - STOP_LINE_GAP_M
+            low, high = sorted(s if at_start else paths.length(line) - s for s in (mouth, mouth - CROSSING_M))
+            half = street.profile.half_width_m
+            for left in (half, -half - TACTILE_DEPTH_M - 0.35):
+                strips.append(regions.band(street.name, left, left + TACTILE_DEPTH_M + 0.35, (low, high)))
+    return unary_union(strips).intersection(regions.sidewalks)
+
+
+def _median(sink: Sink, median: Polygon) -> None:
+    rim = np.asarray(median.exterior.coords)[:, :2]
+    if median.exterior.is_ccw:
+        rim = rim[::-1]
+    solids.wall(sink, rim[::-1], 0.0, KERB_M, "kerb", "sidewalk")
+    inner = median.buffer(-0.3)
+    solids.flat(sink, median.difference(inner), KERB_M, "kerb", "sidewalk")
+    solids.flat(sink, inner, KERB_M, "grass", "terrain")
+
+
+def _canal(sink: Sink, regions: Regions) -> None:
+    canal = regions.canal
+    solids.flat(sink, canal, WATER_M, "water", "ground", cell_m=220.0)
+    coping = canal.buffer(COPING_M, join_style="mitre").difference(canal).difference(regions.corridors)
+    solids.flat(sink, coping, KERB_M, "concrete", "ground")
+    rim = np.asarray(canal.exterior.coords)[:, :2]
+    if canal.exterior.is_ccw:
+        rim = rim[::-1]
+    for start, end in zip(rim[:-1], rim[1:], strict=True):
+        if abs(end[0] - start[0]) > 20:
+            edge = paths.densified(np.array([start, end]), 60.0)
+            solids.wall(sink, edge, WATER_M - 0.5, KERB_M, "ashlar", "wall")
+    clear = regions.corridors
+    rail = canal.buffer(COPING_M * 0.6, join_style="mitre").exterior.difference(clear.buffer(0.05))
+    for piece in getattr(rail, "geoms", [rail]):
+        points = np.asarray(piece.coords)[:, :2]
+        if abs(points[:, 0]).min() < 240 and np.ptp(points[:, 0]) > 5:
+            near = LineString(points).intersection(box(-240, -240, 240, 240))
+            for part in getattr(near, "geoms", [near]):
+                if part.length > 2:
+                    solids.railing(sink, np.asarray(part.coords)[:, :2], KERB_M, "anthracite", "fence")
+
