@@ -1,1 +1,42 @@
-"""gear: driving datasets with physical adversarial patches in them, rendered by MuJoCo."""
+"""gear: driving datasets with physical adversarial patches in them, rendered by MuJoCo.
+
+    import gear
+
+    report = gear.collect("stereo3d", scene="billboard01", patch="random", out="data/random")
+    dataset = gear.open_dataset("data/random", split="test")
+    sample = dataset[0]  # typed: images, objects, surfaces, the scene record
+
+Names are looked up when they are first used, so `import gear` costs nothing.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from gear.verbs.collect.run import CollectReport, collect
+    from gear.verbs.opening import Dataset, Twins, open_dataset, open_twins
+    from gear.values.errors import GearError
+
+__all__ = ["CollectReport", "Dataset", "GearError", "Twins", "collect", "open_dataset", "open_twins"]
+
+_HOME = {
+    "CollectReport": "gear.verbs.collect.run",
+    "Dataset": "gear.verbs.opening",
+    "GearError": "gear.values.errors",
+    "Twins": "gear.verbs.opening",
+    "collect": "gear.verbs.collect.run",
+    "open_dataset": "gear.verbs.opening",
+    "open_twins": "gear.verbs.opening",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'gear' has no attribute {name!r}")
+    return getattr(importlib.import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

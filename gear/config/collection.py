@@ -134,6 +134,7 @@ class CollectionConfig:
         renderer: `filament` (physically based) or `classic`.
         quality: `film` (2x2 supersampled) or `fast`.
         seed, samples: instead of the simulation config's.
+        patch_seed: of random patches; not the split's, so that all splits show the same one.
         simulation: name or path of the simulation config.
         options: the task's own options (`gear plugins show TASK`).
     """
@@ -150,6 +151,7 @@ class CollectionConfig:
     quality: Quality = "film"
     seed: int | None = None
     samples: int | None = None
+    patch_seed: int = 0
     simulation: str = "default"
     options: Node = field(default_factory=lambda: Mapping({}, Place("defaults")))
 

@@ -9,12 +9,12 @@ from typing import Any
 import yaml
 
 from gear.config.nodes import Items, Mapping, Node, Scalar
-from gear.values.serial import Json, to_json
+from gear.values.serial import Json
 
 
 def to_yaml(config: Any) -> str:
     """YAML text that reads back as the same config."""
-    return str(yaml.safe_dump(to_json(_plain(config)), sort_keys=False, allow_unicode=True, default_flow_style=None))
+    return str(yaml.safe_dump(to_plain(config), sort_keys=False, allow_unicode=True, default_flow_style=None))
 
 
 def node_to_json(node: Node) -> Json:
@@ -26,15 +26,16 @@ def node_to_json(node: Node) -> Json:
     return {key: node_to_json(item) for key, (_, item) in node.entries.items()}
 
 
-def _plain(value: Any) -> Any:
+def to_plain(value: Any) -> Json:
+    """A config as JSON values: paths become texts, unread nodes stay texts."""
     if isinstance(value, (Scalar, Items, Mapping)):
         return node_to_json(value)
     if isinstance(value, Path):
         return str(value)
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {field.name: _plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+        return {field.name: to_plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
     if isinstance(value, (tuple, list)):
-        return [_plain(item) for item in value]
+        return [to_plain(item) for item in value]
     if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
+        return {key: to_plain(item) for key, item in value.items()}
     return value

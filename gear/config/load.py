@@ -51,7 +51,7 @@ def load_collection(
         node = parse_file(find_config("collections", source))
         if isinstance(node, MappingNode) and is_original(node):
             node = from_original(node)
-    given = {
+    given: dict[str, tuple[Place, Node]] = {
         key: (Place(f"--{key}"), Scalar(text, False, Place(f"--{key}")))
         for key, text in flags.items()
         if text is not None

@@ -16,7 +16,7 @@ from typing import Any
 import pluggy
 
 from gear.contracts import hookspecs
-from gear.contracts.specs import PROTOCOL_VERSION, SPEC_TYPES, AnySpec, Kind
+from gear.contracts.specs import PROTOCOL_VERSION, SPEC_TYPES, Kind
 from gear.plugins.builtins import BUILTINS
 from gear.plugins.catalogue import Broken, Catalogue, Found, Owner, as_iterable, one_line
 
@@ -110,7 +110,7 @@ def _call_hooks(manager: pluggy.PluginManager, owners: dict[str, Owner]) -> tupl
     return found, broken
 
 
-def spec_problem(kind: Kind, spec: AnySpec | Any) -> str | None:
+def spec_problem(kind: Kind, spec: Any) -> str | None:
     """Why a spec cannot be used, or None."""
     expected = SPEC_TYPES[kind]
     if not isinstance(spec, expected):
@@ -126,9 +126,8 @@ def spec_problem(kind: Kind, spec: AnySpec | Any) -> str | None:
         for f in dataclasses.fields(spec.config)
     ):
         return f"{spec.name!r}: every option needs a default"
-    if not callable(spec.build):
-        return f"{spec.name!r}: its build cannot be called"
-    return None
+    build: object = spec.build
+    return None if callable(build) else f"{spec.name!r}: its build cannot be called"
 
 
 def _quietly(call: Callable[[], Any]) -> Any:

@@ -93,3 +93,17 @@ _CAMERA = CameraRecord(
         RigidTransform.from_parts("world", "camera", CAMERA_FROM_ACTOR_AXES.T, (0.0, 0.1, 1.2))
     ),
 )
+
+
+def renderer_info(name: str) -> RendererInfo:
+    """Who would render, without a frame.
+
+    Raises:
+        UnknownNameError: there is no such renderer.
+        BackendError: it does not start here; says what to install.
+    """
+    renderer = open_renderer(name, mujoco.MjModel.from_xml_string(_REFERENCE_MJCF))
+    try:
+        return renderer.info
+    finally:
+        renderer.close()

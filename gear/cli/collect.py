@@ -1,0 +1,85 @@
+"""`gear collect`."""
+
+from __future__ import annotations
+
+import argparse
+
+EXAMPLE = """examples:
+  gear collect --task stereo3d
+  gear collect --task semseg --scene billboard04 --patch patches/ --out data/twin
+  gear collect --config my.yml --set weather.cloudiness=30 --set options.camera.width_px=1024
+"""
+
+
+def positive(text: str) -> int:
+    """A number of at least 1, for argparse."""
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError("must be at least 1")
+    return number
+
+
+def add_collection_arguments(parser: argparse.ArgumentParser) -> None:
+    """Flags that describe a collection; shared with `gear show-config`."""
+    parser.add_argument("--task", help="task plugin: semseg, detect2d, stereo3d, depth, or an installed one")
+    parser.add_argument("--scene", help="scene of the town's library (billboard01 … billboard09, truck, no_billboard)")
+    parser.add_argument("--town", help="name of a town, or path of its MJCF (town10)")
+    parser.add_argument("--split", help="train, val, test, debug, finetuning, video (test)")
+    parser.add_argument("--samples", metavar="N", help="samples of the split, instead of the simulation config's")
+    parser.add_argument("--seed", metavar="N", help="seed of the split, instead of the simulation config's")
+    parser.add_argument("--weather", help="weather preset (ClearNoon)")
+    parser.add_argument("--patch", help="none, random, a picture, or a patch folder (none)")
+    parser.add_argument("--renderer", help="filament or classic (filament)")
+    parser.add_argument("--quality", help="film or fast (film)")
+    parser.add_argument(
+        "--out", metavar="DIR", help="root of the dataset (data/<task>/<town>-<scene>-<weather>/<patch>)"
+    )
+    parser.add_argument(
+        "--config", metavar="FILE", help="collection config, gear's or CARLA-GeAR's; flags go before it"
+    )
+    parser.add_argument(
+        "--set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        dest="settings",
+        help="any key of the config; repeatable",
+    )
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the command's flags."""
+    parser.epilog = EXAMPLE
+    add_collection_arguments(parser)
+    parser.add_argument(
+        "--workers", type=positive, default=1, metavar="N", help="processes; change nothing but time (1)"
+    )
+    parser.add_argument("--force", action="store_true", help="replace a split that was made with another configuration")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Collects and says where."""
+    from gear.cli.progress import ProgressBar
+    from gear.verbs.collect.run import collect
+
+    with ProgressBar() as progress:
+        report = collect(
+            args.task,
+            config=args.config,
+            town=args.town,
+            scene=args.scene,
+            split=args.split,
+            samples=args.samples,
+            seed=args.seed,
+            weather=args.weather,
+            patch=args.patch,
+            renderer=args.renderer,
+            quality=args.quality,
+            out=args.out,
+            settings=args.settings,
+            workers=args.workers,
+            force=args.force,
+            progress=progress,
+        )
+    print(report.summary())
+    return 0

@@ -1,0 +1,31 @@
+"""`gear export`."""
+
+from __future__ import annotations
+
+import argparse
+
+EXAMPLE = """examples:
+  gear export data/stereo3d/town10-billboard01-ClearNoon/none --layout kitti --out kitti/
+  gear export data/depth/town10-billboard01-ClearNoon/none --layout kitti-depth --out depth/
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the command's flags."""
+    parser.epilog = EXAMPLE
+    parser.add_argument("dataset", help="root of a dataset")
+    parser.add_argument(
+        "--layout", required=True, help="kitti (object, one training/ pool) or kitti-depth (the devkit's)"
+    )
+    parser.add_argument("--out", required=True, metavar="DIR", help="folder of the new tree; must be empty or new")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Exports and says where."""
+    from gear.cli.progress import ProgressBar
+    from gear.verbs.export import export
+
+    with ProgressBar() as progress:
+        count = export(args.dataset, layout=args.layout, out=args.out, progress=progress)
+    print(f"{args.out}: {count} samples in the layout {args.layout}")
+    return 0

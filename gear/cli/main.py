@@ -1,0 +1,78 @@
+"""`gear`: finds the command, runs it, and is the only place that catches."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import os
+import sys
+from collections.abc import Sequence
+
+from gear.values.errors import GearError
+
+COMMANDS: dict[str, str] = {
+    "collect": "collect a dataset split: pictures with exact ground truth",
+    "export": "write a dataset in another layout",
+    "plugins": "list the installed tasks, models, attacks and defenses",
+    "doctor": "render a reference frame with each renderer and say who renders",
+    "show-config": "print a config with every default filled in",
+}
+"""Command names with one line each; `gear.cli.<name>` holds the command."""
+
+EXAMPLES = """examples:
+  gear collect --task stereo3d                      a KITTI stereo dataset around billboard01
+  gear collect --task semseg --scene billboard04 --patch random
+  gear collect --task depth --split train --weather CloudySunset --out data/depth
+  gear plugins --kind task
+  gear doctor
+"""
+
+
+def entry() -> None:
+    """Console entry point."""
+    sys.exit(main(sys.argv[1:]))
+
+
+def main(argv: Sequence[str]) -> int:
+    """Runs one command.
+
+    Returns:
+        0, 2 for what the user can put right (one line on stderr), 130 when interrupted. Bugs keep their traceback.
+    """
+    parser = argparse.ArgumentParser(
+        prog="gear",
+        description="Driving datasets with physical adversarial patches in them, rendered by MuJoCo.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="store_true", help="print the version and leave")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", dest="command")
+    wanted = next((word for word in argv if not word.startswith("-")), None)
+    for name, summary in COMMANDS.items():
+        command = commands.add_parser(
+            name, help=summary, description=summary, formatter_class=argparse.RawDescriptionHelpFormatter
+        )
+        if name == wanted:  # only the command that was asked for pays for its imports
+            module = importlib.import_module(f"gear.cli.{name.replace('-', '_')}")
+            module.add_arguments(command)
+            command.set_defaults(run=module.run)
+    args = parser.parse_args(argv)
+    if args.version:
+        from importlib.metadata import version
+
+        print(f"gear {version('mujoco-gear')}")
+        return 0
+    if args.command is None:
+        parser.print_help()
+        return 0
+    try:
+        return int(args.run(args))
+    except GearError as error:
+        print(f"gear: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("gear: stopped; run the same command again to go on", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0

@@ -1,0 +1,29 @@
+"""`gear show-config`."""
+
+from __future__ import annotations
+
+import argparse
+
+from gear.cli.collect import add_collection_arguments
+
+EXAMPLE = """examples:
+  gear show-config --task semseg
+  gear show-config --config old_collection_config.yml     # a CARLA-GeAR config, in gear's words
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the command's flags."""
+    parser.epilog = EXAMPLE
+    add_collection_arguments(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Prints the collection config that these flags and files make."""
+    from gear.config.dump import to_yaml
+    from gear.config.load import load_collection
+
+    names = ("task", "town", "scene", "split", "samples", "seed", "weather", "patch", "renderer", "quality")
+    flags = {name: getattr(args, name) for name in names} | {"root": args.out}
+    print(to_yaml(load_collection(args.config, flags, args.settings)), end="")
+    return 0

@@ -1,0 +1,1 @@
+"""Datasets on disk: whole files or none, sidecars, manifests, resuming, twins, readers."""

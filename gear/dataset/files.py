@@ -1,0 +1,114 @@
+"""Files appear whole or not at all, and never outside the dataset's root."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import hashlib
+import os
+import threading
+from collections.abc import Iterator
+from pathlib import Path, PurePosixPath
+
+from gear.values.errors import DatasetError
+
+SCRATCH = "gear/scratch"
+"""Half-written files live here, away from the folders that foreign loaders list."""
+
+
+def sha256(data: bytes) -> str:
+    """Hex digest."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def inside(root: Path, relative: str) -> Path:
+    """`root/relative`, which must not leave the root, not even through a link.
+
+    Raises:
+        DatasetError: it would.
+    """
+    pure = PurePosixPath(relative)
+    if pure.is_absolute() or ".." in pure.parts or not pure.parts or "\\" in relative or "\0" in relative:
+        raise DatasetError(root, f"{relative!r} is not a path inside a dataset")
+    path = root.joinpath(*pure.parts)
+    if not path.resolve().is_relative_to(root.resolve()):
+        raise DatasetError(root, f"{relative!r} leads outside the dataset through a link")
+    return path
+
+
+@contextlib.contextmanager
+def explained(path: Path) -> Iterator[None]:
+    """Turns a full disk, a read-only folder and the like into one line.
+
+    Raises:
+        DatasetError: an `OSError` came up inside.
+    """
+    try:
+        yield
+    except OSError as error:
+        hints = {
+            errno.ENOSPC: "the disk is full; free some space and run the same command again, finished samples are kept",
+            errno.EDQUOT: "the quota is used up; finished samples are kept",
+            errno.EROFS: "the file system is read-only; choose another --out",
+            errno.EACCES: "no permission to write there; choose another --out",
+            errno.EPERM: "no permission to write there; choose another --out",
+            errno.ENOTDIR: "a file is where a folder should be; choose another --out",
+            errno.EISDIR: "a folder is where a file should be; choose another --out",
+            errno.EEXIST: "a file is where a folder should be; choose another --out",
+        }
+        raise DatasetError(path, hints.get(error.errno or 0, error.strerror or str(error))) from error
+
+
+def write_whole(root: Path, relative: str, data: bytes) -> None:
+    """Writes, syncs and renames into place.
+
+    Raises:
+        DatasetError: the disk refuses, or the path leaves the root.
+    """
+    target = inside(root, relative)
+    with explained(target):
+        scratch = root / SCRATCH
+        scratch.mkdir(parents=True, exist_ok=True)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        temporary = scratch / f"{os.getpid()}-{threading.get_ident()}"
+        try:
+            with temporary.open("wb") as stream:
+                stream.write(data)
+                stream.flush()
+                os.fsync(stream.fileno())
+            temporary.replace(target)
+        except OSError:
+            temporary.unlink(missing_ok=True)
+            raise
+
+
+def clear_scratch(root: Path) -> None:
+    """Removes what a killed run left half-written. Call it when nobody writes."""
+    scratch = root / SCRATCH
+    if scratch.is_dir():
+        with explained(scratch):
+            for leftover in scratch.iterdir():
+                leftover.unlink()
+            scratch.rmdir()
+
+
+def sync_folder(path: Path) -> None:
+    """Makes renames inside a folder last through a power cut, where the system can."""
+    with contextlib.suppress(OSError):
+        descriptor = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def read_bytes(path: Path) -> bytes:
+    """The file's bytes.
+
+    Raises:
+        DatasetError: it is missing or cannot be read.
+    """
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise DatasetError(path, f"cannot read it: {error.strerror}") from error

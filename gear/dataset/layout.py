@@ -1,0 +1,30 @@
+"""Where gear keeps its own files inside a dataset: everything under `gear/`, one folder a split."""
+
+from __future__ import annotations
+
+GEAR = "gear"
+
+
+def split_folder(split: str) -> str:
+    """Folder of one split's sidecars and manifest."""
+    return f"{GEAR}/{split}"
+
+
+def sidecar_path(split: str, index: int) -> str:
+    """The sidecar of one sample; it is written last, so a sample that has one is whole."""
+    return f"{split_folder(split)}/samples/{index:06d}.json"
+
+
+def plan_path(split: str) -> str:
+    """What the split was begun with; written first."""
+    return f"{split_folder(split)}/plan.json"
+
+
+def manifest_path(split: str) -> str:
+    """What the finished split holds; written last."""
+    return f"{split_folder(split)}/manifest.json"
+
+
+def patch_path(label: str, name: str) -> str:
+    """A copy of the patch that was used."""
+    return f"{GEAR}/patches/{label}/{name}"

@@ -1,0 +1,112 @@
+"""What a split was begun with. A run with another configuration must not mix its samples in."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from gear.contracts.tasks import SplitInfo
+from gear.dataset.files import inside, write_whole
+from gear.dataset.layout import GEAR, plan_path
+from gear.dataset.sidecar import dump_json, load_json
+from gear.values.errors import DatasetError, FieldError
+from gear.values.serial import Json, from_json, to_json
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """Everything that decides the bytes of a split, as JSON.
+
+    Attributes:
+        task: name and package of the task plugin, its version and options.
+        content: town, scene, weather, renderer and the rest that decides what is seen; no paths, no patch.
+        patch: label and sha256 of the patch's pictures.
+        info: names for the format's index files.
+        samples: how many frames the split has.
+    """
+
+    task: dict[str, str]
+    options: Json
+    content: Json
+    patch: dict[str, str]
+    info: SplitInfo
+    samples: int
+
+    @property
+    def twin_key(self) -> str:
+        """Equal for two splits that differ in nothing but the patch (and in how many samples they have)."""
+        return _digest({"task": self.task, "options": self.options, "content": self.content})
+
+    @property
+    def content_key(self) -> str:
+        """Equal for two splits whose common samples are equal byte for byte."""
+        return _digest({"twin": self.twin_key, "patch": self.patch})
+
+
+def _digest(value: Json) -> str:
+    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
+
+
+def read_plan(root: Path, split: str) -> Plan | None:
+    """The plan of a split that was begun, or None.
+
+    Raises:
+        DatasetError: it cannot be read.
+    """
+    path = inside(root, plan_path(split))
+    if not path.exists():
+        return None
+    try:
+        return from_json(Plan, load_json(path), "plan")
+    except FieldError as error:
+        raise DatasetError(path, f"is not of this version of gear ({error}); use another --out, or --force") from error
+
+
+def begin(root: Path, plan: Plan) -> None:
+    """Writes the plan, or checks that the one there is the same; more samples than before are welcome.
+
+    Raises:
+        DatasetError: the split was begun with another configuration, or with more samples.
+    """
+    split = plan.info.split
+    for path in sorted((root / GEAR).glob("*/plan.json")):
+        other = read_plan(root, path.parent.name)
+        if other is not None and other.task["name"] != plan.task["name"]:
+            raise DatasetError(
+                root, f"holds a {other.task['name']} dataset, {plan.task['name']} was asked for; use another --out"
+            )
+    there = read_plan(root, split)
+    if there is not None and there.content_key != plan.content_key:
+        what = ", ".join(differences(to_json(there), to_json(plan))[:4])
+        raise DatasetError(
+            root,
+            f"split {split!r} was made with another configuration ({what});"
+            " use another --out, or --force to replace it",
+        )
+    if there is not None and there.samples > plan.samples:
+        raise DatasetError(
+            root,
+            f"split {split!r} has {there.samples} samples already, {plan.samples} were asked for;"
+            " use --force to replace it",
+        )
+    if there is None or there.samples != plan.samples:
+        write_whole(root, plan_path(split), dump_json(to_json(plan)))
+
+
+def differences(old: Json, new: Json, key: str = "") -> list[str]:
+    """Keys in which two JSON values differ, with both values."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        found: list[str] = []
+        for name in sorted(old.keys() | new.keys()):
+            if name in ("samples", "info") and not key:
+                continue
+            found += differences(old.get(name), new.get(name), f"{key}.{name}" if key else name)
+        return found
+    return [] if old == new else [f"{key}: {_short(old)} there, {_short(new)} now"]
+
+
+def _short(value: Json) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 40 else text[:37] + "..."

@@ -1,0 +1,117 @@
+"""Datasets read back: samples with typed fields, and twins."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, overload
+
+from gear.contracts.tasks import Sample, SampleT, Sidecar, Task
+from gear.dataset.files import inside, read_bytes, sha256
+from gear.dataset.layout import manifest_path, sidecar_path
+from gear.dataset.plan import Plan
+from gear.dataset.sidecar import load_json, read_sidecar
+from gear.values.errors import DatasetError
+from gear.values.serial import Json
+
+
+@dataclass(frozen=True, slots=True)
+class Dataset(Sequence[SampleT], Generic[SampleT]):
+    """One finished split: a sequence of samples, each decoded when it is asked for.
+
+    Attributes:
+        root: its folder.
+        plan: what it was made with.
+        task: the task that wrote it.
+        manifest: versions, renderer, configuration and file hashes.
+    """
+
+    root: Path
+    plan: Plan
+    task: Task[SampleT, Any]
+    manifest: Json
+
+    def __len__(self) -> int:
+        return len(self.manifest["samples"])
+
+    @overload
+    def __getitem__(self, index: int) -> SampleT: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[SampleT]: ...
+    def __getitem__(self, index: int | slice) -> SampleT | Sequence[SampleT]:
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        return self.task.decode(self.root, self.sidecar(index), self.plan.info)
+
+    def __iter__(self) -> Iterator[SampleT]:
+        return (self[i] for i in range(len(self)))
+
+    def sidecar(self, index: int) -> Sidecar:
+        """The scene record, surfaces and facts of one sample, without its pictures.
+
+        Raises:
+            IndexError: there is no such sample.
+        """
+        if not -len(self) <= index < len(self):
+            raise IndexError(f"sample {index} of {len(self)}")
+        return read_sidecar(inside(self.root, sidecar_path(self.plan.info.split, index % len(self))))
+
+    def verify(self) -> list[str]:
+        """Files that are missing or differ from the manifest's hashes, by relative path."""
+        wanted: dict[str, str] = dict(self.manifest["indexes"])
+        for sample in self.manifest["samples"]:
+            wanted.update(sample["files"])
+        return [relative for relative, digest in wanted.items() if not self._is_whole(relative, digest)]
+
+    def _is_whole(self, relative: str, digest: str) -> bool:
+        path = inside(self.root, relative)
+        return path.is_file() and sha256(read_bytes(path)) == digest
+
+
+def read_manifest(root: Path, split: str) -> Json:
+    """The manifest of a finished split.
+
+    Raises:
+        DatasetError: it is not there: the split is not finished.
+    """
+    path = inside(root, manifest_path(split))
+    if not path.exists():
+        raise DatasetError(root, f"split {split!r} is not finished; run its `gear collect` again to complete it")
+    return load_json(path)
+
+
+@dataclass(frozen=True, slots=True)
+class Twins(Sequence[tuple[SampleT, SampleT]], Generic[SampleT]):
+    """Two splits that differ in nothing but their patch, sample by sample."""
+
+    first: Dataset[SampleT]
+    second: Dataset[SampleT]
+
+    def __len__(self) -> int:
+        return min(len(self.first), len(self.second))
+
+    @overload
+    def __getitem__(self, index: int) -> tuple[SampleT, SampleT]: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[tuple[SampleT, SampleT]]: ...
+    def __getitem__(self, index: int | slice) -> tuple[SampleT, SampleT] | Sequence[tuple[SampleT, SampleT]]:
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        if not -len(self) <= index < len(self):
+            raise IndexError(f"pair {index} of {len(self)}")
+        return self.first[index % len(self)], self.second[index % len(self)]
+
+
+def pair_twins(first: Dataset[Sample], second: Dataset[Sample]) -> Twins[Sample]:
+    """Pairs two splits by index.
+
+    Raises:
+        DatasetError: they differ in more than their patch.
+    """
+    if first.plan.twin_key != second.plan.twin_key:
+        raise DatasetError(
+            second.root,
+            f"is no twin of {first.root}: they differ in more than the patch (compare their gear/*/plan.json)",
+        )
+    return Twins(first, second)

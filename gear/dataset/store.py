@@ -1,0 +1,158 @@
+"""One split being written: which samples are whole, how a sample becomes files, how the split is closed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gear.contracts.tasks import Encoded, Sample, Sidecar, Task
+from gear.dataset.files import clear_scratch, explained, inside, sha256, sync_folder, write_whole
+from gear.dataset.layout import manifest_path, patch_path, plan_path, sidecar_path, split_folder
+from gear.dataset.plan import Plan, begin, read_plan
+from gear.dataset.sidecar import dump_json, load_json, read_sidecar, sidecar_bytes
+from gear.values.errors import DatasetError
+from gear.values.serial import Json
+
+
+@dataclass(frozen=True, slots=True)
+class Store:
+    """A split on disk that is being collected."""
+
+    root: Path
+    plan: Plan
+
+    @property
+    def split(self) -> str:
+        """Its name."""
+        return self.plan.info.split
+
+    def open(self, patch_files: Mapping[str, bytes]) -> None:
+        """Begins the split or takes it up again.
+
+        Raises:
+            DatasetError: it cannot be written, or was made with another configuration.
+        """
+        clear_scratch(self.root)
+        begin(self.root, self.plan)
+        for name, data in patch_files.items():
+            target = inside(self.root, patch_path(self.plan.info.patch_label, name))
+            if not target.exists():
+                write_whole(self.root, patch_path(self.plan.info.patch_label, name), data)
+
+    def missing(self, progress: Callable[[int], None] = lambda _: None) -> list[int]:
+        """Indices of samples that have no sidecar yet; a sample with one is whole and is never made again."""
+        folder = inside(self.root, split_folder(self.split)) / "samples"
+        there = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
+        return [i for i in range(self.plan.samples) if f"{i:06d}.json" not in there]
+
+    def write(self, sample: Sample, encoded: Encoded) -> None:
+        """Writes one sample's files, then its sidecar.
+
+        Raises:
+            DatasetError: the disk refuses.
+        """
+        hashes: dict[str, str] = {}
+        for relative, data in sorted(encoded.files.items()):
+            write_whole(self.root, relative, data)
+            hashes[relative] = sha256(data)
+        sidecar = Sidecar(record=sample.record, surfaces=sample.surfaces, facts=encoded.facts, files=hashes)
+        write_whole(self.root, sidecar_path(self.split, sample.record.index), sidecar_bytes(sidecar))
+
+    def sidecars(self) -> list[Sidecar]:
+        """All of them, in order of index.
+
+        Raises:
+            DatasetError: one is missing or broken.
+        """
+        return [read_sidecar(inside(self.root, sidecar_path(self.split, i))) for i in range(self.plan.samples)]
+
+    def close(self, task: Task[Any, Any], facts: Mapping[str, Json]) -> None:
+        """Writes the format's index files and then the manifest.
+
+        `facts` are what the manifest says of versions, renderer and configuration.
+
+        Raises:
+            DatasetError: the disk refuses, or a sample is missing.
+        """
+        sidecars = self.sidecars()
+        indexes: dict[str, str] = {}
+        for relative, data in sorted(task.finalise(sidecars, self.plan.info).items()):
+            target = inside(self.root, relative)
+            if not (target.exists() and target.read_bytes() == data):
+                write_whole(self.root, relative, data)
+            indexes[relative] = sha256(data)
+        manifest = {
+            "format": "gear-dataset",
+            "version": 1,
+            "twin_key": self.plan.twin_key,
+            "content_key": self.plan.content_key,
+            **facts,
+            "samples": [
+                {
+                    "index": s.record.index,
+                    "sequence": s.record.sequence,
+                    "frame": s.record.frame,
+                    "files": dict(s.files),
+                }
+                for s in sidecars
+            ],
+            "indexes": indexes,
+        }
+        data = dump_json(manifest)
+        target = inside(self.root, manifest_path(self.split))
+        if not (target.exists() and target.read_bytes() == data):
+            write_whole(self.root, manifest_path(self.split), data)
+        clear_scratch(self.root)
+        sync_folder(target.parent)
+
+
+def remove_split(root: Path, split: str) -> None:
+    """Deletes what gear wrote for a split, and nothing else: the files its sidecars and manifest name.
+
+    Raises:
+        DatasetError: a file cannot be deleted, or names a path outside the root.
+    """
+    folder = inside(root, split_folder(split))
+    if not folder.is_dir():
+        return
+    doomed: list[str] = []
+    manifest = inside(root, manifest_path(split))
+    if manifest.exists():
+        doomed += load_json(manifest).get("indexes", {})
+    sidecars = sorted((folder / "samples").glob("*.json")) if (folder / "samples").is_dir() else []
+    for path in sidecars:
+        doomed += load_json(path).get("files", {})
+    own = [manifest, *sidecars, inside(root, plan_path(split))]
+    with explained(root):
+        for path in [manifest, *(inside(root, relative) for relative in doomed), *own]:
+            path.unlink(missing_ok=True)
+        for path in sorted((p for p in folder.rglob("*") if p.is_dir()), reverse=True):
+            path.rmdir()
+        folder.rmdir()
+
+
+def splits_of(root: Path) -> Sequence[str]:
+    """Names of the splits that a root holds, finished or not.
+
+    Raises:
+        DatasetError: it is not a dataset of gear's.
+    """
+    folder = root / "gear"
+    names = sorted(p.parent.name for p in folder.glob("*/plan.json")) if folder.is_dir() else []
+    if not names:
+        raise DatasetError(root, "is not a dataset of gear's (it has no gear/<split>/plan.json)")
+    return names
+
+
+def plan_of(root: Path, split: str) -> Plan:
+    """The plan of one split.
+
+    Raises:
+        DatasetError: there is no such split.
+    """
+    plan = read_plan(root, split)
+    if plan is None:
+        raise DatasetError(root, f"has no split {split!r}; there are: {', '.join(splits_of(root))}")
+    return plan

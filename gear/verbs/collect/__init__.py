@@ -1,0 +1,1 @@
+"""The verb `collect`: a config becomes a dataset split on disk."""

@@ -1,0 +1,218 @@
+"""One run of `collect`, resolved: everything a worker needs, as data."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import importlib.metadata
+import platform
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import mujoco
+import numpy as np
+
+from gear.verbs.collect.patches import PatchSet, resolve_patch
+from gear.config.collection import CollectionConfig, SplitConfig, WeatherConfig
+from gear.config.dump import to_plain
+from gear.config.load import load_simulation, split_of
+from gear.config.nodes import parse_file
+from gear.config.reader import read_node
+from gear.contracts.rendering import RendererInfo
+from gear.contracts.tasks import SplitInfo
+from gear.dataset.plan import Plan
+from gear.plugins.build import find
+from gear.render.probing import renderer_info
+from gear.values.errors import ConfigError, UnknownNameError
+from gear.values.resources import data_dir
+from gear.values.scene import Weather
+from gear.values.serial import Json, to_json
+from gear.world.assets import AssetLibrary
+from gear.world.scene_spec import SceneLibrary, SceneSpec
+from gear.world.weather import PRESETS
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Job:
+    """A resolved collection.
+
+    Attributes:
+        config: as the user wrote it, defaults filled in.
+        split: seeds and counts.
+        scene: boards, truck and limits, capped by the simulation config.
+        weather: every parameter.
+        patch: pictures of this run.
+        root: folder of the dataset.
+        plan: what decides the bytes.
+        renderer: who renders.
+    """
+
+    config: CollectionConfig
+    split: SplitConfig
+    scene: SceneSpec
+    weather: Weather
+    patch: PatchSet
+    root: Path
+    plan: Plan
+    renderer: RendererInfo
+
+    @property
+    def frames(self) -> int:
+        """Samples of the whole split."""
+        return self.split.samples * self.split.frames
+
+
+def resolve(config: CollectionConfig) -> Job:
+    """Looks up every name in a config, before anything is rendered.
+
+    Raises:
+        UnknownNameError: a task, town, scene, split or weather is not known; says what may have been meant.
+        ConfigError: a scene library or the task's options cannot be read.
+        PatchError: the patch cannot be used.
+        BackendError: the renderer cannot start here.
+    """
+    found = find("task", config.task)
+    options = read_node(found.spec.config, config.options, "options")
+    library = AssetLibrary.for_town(config.town)
+    simulation = load_simulation(config.simulation)
+    scene = find_scene(config, library.town_name).capped(simulation.max_vehicles, simulation.max_pedestrians)
+    split = split_of(simulation, config.split)
+    split = dataclasses.replace(
+        split,
+        seed=split.seed if config.seed is None else config.seed,
+        samples=split.samples if config.samples is None else config.samples,
+    )
+    weather = find_weather(config.weather)
+    surfaces = len(scene.boards) if scene.truck is None else 1
+    patch = resolve_patch(config.patch, surfaces=surfaces, seed=config.patch_seed)
+    info = SplitInfo(
+        town=library.town_name, scene=config.scene, split=config.split, seed=split.seed, patch_label=patch.label
+    )
+    renderer = renderer_info(config.renderer)
+    content: Json = {
+        "town": library.town_name,
+        "scene_name": config.scene,
+        "split": config.split,
+        "seed": split.seed,
+        "frames": split.frames,
+        "interval_s": split.interval_s,
+        "scene": to_json(scene),
+        "weather": to_json(weather),
+        "renderer": to_json(renderer),
+        "quality": config.quality,
+        "assets": assets_digest(library.town),
+        "versions": versions(),
+    }
+    plan = Plan(
+        task={"name": found.spec.name, "package": found.owner.package, "version": found.owner.version},
+        options=to_plain(options),
+        content=content,
+        patch={"label": patch.label, "sha256": patch.digest},
+        info=info,
+        samples=split.samples * split.frames,
+    )
+    return Job(
+        config=config,
+        split=split,
+        scene=scene,
+        weather=weather,
+        patch=patch,
+        root=dataset_root(config, info, weather),
+        plan=plan,
+        renderer=renderer,
+    )
+
+
+def find_scene(config: CollectionConfig, town: str) -> SceneSpec:
+    """The scene by name, in the library that the config names or in the town's own."""
+    library = scene_library(config.scenes or town)
+    if config.scenes and library.town != town:
+        raise ConfigError(
+            config.scenes, 0, 0, "town", f"its boards stand in {library.town}, not in {town}; use --town {library.town}"
+        )
+    if config.scene not in library.scenes:
+        raise UnknownNameError(f"scene of {library.town}", config.scene, library.scenes)
+    return library.scenes[config.scene]
+
+
+def scene_library(name: str) -> SceneLibrary:
+    """A scene library by the name of its town, or by path.
+
+    Raises:
+        UnknownNameError: there is none.
+        ConfigError: it cannot be read.
+    """
+    path = Path(name)
+    if path.suffix not in (".yml", ".yaml"):
+        folder = data_dir("configs") / "scenes"
+        path = folder / f"{name}.yml"
+        if not path.is_file():
+            hint = "(write one and give it with --set scenes=FILE.yml)"
+            raise UnknownNameError("scene library for town", name, (p.stem for p in folder.glob("*.yml")), hint)
+    return read_node(SceneLibrary, parse_file(path))
+
+
+def find_weather(config: WeatherConfig) -> Weather:
+    """The preset with what the config changes in it.
+
+    Raises:
+        UnknownNameError: there is no such preset.
+    """
+    if config.preset not in PRESETS:
+        raise UnknownNameError("weather", config.preset, PRESETS)
+    changes: dict[str, Any] = {
+        field.name: getattr(config, field.name)
+        for field in dataclasses.fields(config)
+        if field.name != "preset" and getattr(config, field.name) is not None
+    }
+    preset = PRESETS[config.preset]
+    if all(getattr(preset, name) == value for name, value in changes.items()):
+        return preset
+    return dataclasses.replace(preset, name=f"{preset.name}*", **changes)
+
+
+def dataset_root(config: CollectionConfig, info: SplitInfo, weather: Weather) -> Path:
+    """Where the dataset goes: what the user said, or `data/<task>/<town>-<scene>-<weather>/<patch>`."""
+    if config.root:
+        return Path(config.root)
+    name = weather.name
+    if name.endswith("*"):
+        name = f"{name[:-1]}-{hashlib.sha256(repr(weather).encode()).hexdigest()[:6]}"
+    return Path("data") / config.task.replace("/", "-") / f"{info.town}-{info.scene}-{name}" / info.patch_label
+
+
+def versions() -> dict[str, str]:
+    """Of what decides the bytes of pictures and labels."""
+    return {
+        "gear": _version("mujoco-gear"),
+        "mujoco": mujoco.__version__,
+        "dm_control": _version("dm-control"),
+        "numpy": np.__version__,
+        "opencv": cv2.__version__,
+        "machine": platform.machine(),
+    }
+
+
+def _version(distribution: str) -> str:
+    try:
+        return importlib.metadata.version(distribution)
+    except importlib.metadata.PackageNotFoundError:
+        return "source"
+
+
+def assets_digest(town: Path) -> str:
+    """sha256 over every MJCF file, mesh and texture that a town's pictures can show."""
+    own = data_dir("mjcf")
+    files = {path.relative_to(own).as_posix(): path for path in own.rglob("*") if path.is_file()}
+    town = town.resolve()
+    if not town.is_relative_to(own):
+        files = {**files, f"town/{town.name}": town}
+        folder = town.with_suffix("")
+        if folder.is_dir():
+            files.update({f"town/{p.relative_to(folder).as_posix()}": p for p in folder.rglob("*") if p.is_file()})
+    digest = hashlib.sha256()
+    for name in sorted(files):
+        digest.update(f"{name}\0{hashlib.sha256(files[name].read_bytes()).hexdigest()}\n".encode())
+    return digest.hexdigest()

@@ -1,0 +1,47 @@
+"""One worker's loop: the next scene is rendered while the last one is measured, encoded and written."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future, ThreadPoolExecutor
+
+from gear.verbs.collect.session import Session
+from gear.dataset.store import Store
+from gear.values.frames import Frame
+from gear.values.scene import SceneRecord
+
+IN_FLIGHT = 2
+"""Frames that may wait for the writer; more would only cost memory."""
+
+
+def collect_samples(session: Session, store: Store, indices: Iterable[int], done: Callable[[int], None]) -> None:
+    """Makes and writes the samples; `done` hears of each one when its last file is in place.
+
+    Raises:
+        GearError: the first one that comes up; what was finished before it stays.
+    """
+    waiting: deque[tuple[int, Future[None]]] = deque()
+
+    def settle(most: int) -> None:
+        while len(waiting) > most:
+            index, future = waiting.popleft()
+            future.result()
+            done(index)
+
+    with ThreadPoolExecutor(max_workers=1, thread_name_prefix="gear-writer") as writer:
+        try:
+            for index in indices:
+                record = session.record(index)
+                frame = session.frame(record)
+                settle(IN_FLIGHT - 1)
+                waiting.append((index, writer.submit(_write, session, store, frame, record)))
+            settle(0)
+        except BaseException:
+            writer.shutdown(wait=True, cancel_futures=True)
+            raise
+
+
+def _write(session: Session, store: Store, frame: Frame, record: SceneRecord) -> None:
+    sample, encoded = session.finish(frame, record)
+    store.write(sample, encoded)

@@ -1,0 +1,75 @@
+"""One worker's world: compiled once, then one sample after another."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from gear.camera.response import Response, response_for
+from gear.verbs.collect.job import Job
+from gear.contracts.rendering import RawView, Renderer
+from gear.contracts.tasks import Encoded, Sample, Task
+from gear.plugins.build import build_task
+from gear.render.opening import open_renderer
+from gear.values.frames import Frame, View
+from gear.values.scene import CameraRecord, SceneRecord
+from gear.world.planner import ScenePlanner
+from gear.world.world import World
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Session:
+    """Everything that makes samples of one job."""
+
+    job: Job
+    task: Task[Any, Any]
+    world: World
+    planner: ScenePlanner
+    renderer: Renderer
+    response: Response
+
+    def record(self, index: int) -> SceneRecord:
+        """The scene of one sample: a pure function of the job and the index."""
+        return self.planner.plan(index)
+
+    def frame(self, record: SceneRecord) -> Frame:
+        """Places the scene with the run's patch in it and takes its pictures."""
+        names = tuple(surface.name for surface in record.surfaces)
+        placed = self.world.place(record, self.job.patch.by_surface(names))
+        raw = self.renderer.render(placed.stage, record.cameras)
+        views = {
+            camera.name: _view(camera, view, self.response) for camera, view in zip(record.cameras, raw, strict=True)
+        }
+        return Frame(views=views, geoms=placed.geoms, objects=placed.objects)
+
+    def finish(self, frame: Frame, record: SceneRecord) -> tuple[Sample, Encoded]:
+        """Measures the frame and turns it into files; needs neither world nor renderer, so it can run beside them."""
+        sample = self.task.ground_truth(frame, record)
+        return sample, self.task.encode(sample, self.job.plan.info)
+
+
+def _view(camera: CameraRecord, raw: RawView, response: Response) -> View:
+    assert raw.linear_rgb is not None and raw.depth_m is not None and raw.geom_id is not None
+    return View(
+        camera=camera,
+        linear_rgb=raw.linear_rgb,
+        rgb=response.apply(raw.linear_rgb),
+        depth_m=raw.depth_m,
+        geom_id=raw.geom_id,
+    )
+
+
+@contextlib.contextmanager
+def open_session(job: Job) -> Iterator[Session]:
+    """Builds a worker's world and renderer, and closes the renderer at the end."""
+    _, task = build_task(job.config.task, job.config.options)
+    world = World.build(town=job.config.town, scene_name=job.config.scene, scene=job.scene, weather=job.weather)
+    renderer = open_renderer(job.config.renderer, world.model, quality=job.config.quality)
+    try:
+        planner = ScenePlanner(world, task.rig(), job.split, split_name=job.config.split)
+        response = response_for(job.config.renderer, job.weather)
+        yield Session(job=job, task=task, world=world, planner=planner, renderer=renderer, response=response)
+    finally:
+        renderer.close()

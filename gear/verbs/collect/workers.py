@@ -1,0 +1,105 @@
+"""Several workers: spawned processes that take the next index from a shared counter."""
+
+from __future__ import annotations
+
+import multiprocessing
+import pickle
+import queue
+from collections.abc import Callable, Iterator, Sequence
+from multiprocessing.context import SpawnProcess
+from multiprocessing.queues import Queue
+from typing import Any
+
+from gear.verbs.collect.job import Job
+from gear.verbs.collect.pipeline import collect_samples
+from gear.verbs.collect.session import open_session
+from gear.dataset.store import Store
+from gear.values.errors import BackendError, GearError
+
+SILENCE_S = 600.0
+"""A pool that finishes nothing for so long is taken for hung (drivers do hang); slow machines need seconds a sample."""
+
+
+def collect_in_processes(job: Job, indices: Sequence[int], workers: int, done: Callable[[int], None]) -> None:
+    """As `collect_samples`, shared out among processes. Who makes which sample changes nothing in its bytes.
+
+    Raises:
+        GearError: the first one that a worker reports, or that a worker died or hung.
+    """
+    context = multiprocessing.get_context("spawn")
+    reports: Queue[tuple[str, Any]] = context.Queue()
+    position = context.Value("q", 0)
+    processes = [
+        context.Process(target=_work, args=(job, list(indices), position, reports), daemon=True, name=f"gear-{i}")
+        for i in range(min(workers, len(indices)))
+    ]
+    for process in processes:
+        process.start()
+    try:
+        _listen(job, processes, reports, len(indices), done)
+    finally:
+        for process in processes:
+            if process.is_alive():
+                process.terminate()
+        for process in processes:
+            process.join(timeout=10)
+
+
+def _listen(
+    job: Job, processes: list[SpawnProcess], reports: Queue[tuple[str, Any]], total: int, done: Callable[[int], None]
+) -> None:
+    finished, silent_s = 0, 0.0
+    while finished < total:
+        try:
+            kind, content = reports.get(timeout=1.0)
+        except queue.Empty:
+            silent_s += 1.0
+            dead = [p for p in processes if p.exitcode not in (None, 0)]
+            if dead:
+                raise BackendError(
+                    job.config.renderer,
+                    f"a worker died (exit code {dead[0].exitcode})",
+                    "run the same command again: finished samples are kept; fewer --workers need less memory",
+                ) from None
+            if silent_s >= SILENCE_S:
+                raise BackendError(
+                    job.config.renderer,
+                    f"no sample for {SILENCE_S:g} s, the driver seems to hang",
+                    "run the same command again with --workers 1",
+                ) from None
+            continue
+        silent_s = 0.0
+        if kind == "error":
+            raise content
+        finished += 1
+        done(content)
+
+
+def _work(job: Job, indices: list[int], position: Any, reports: Queue[tuple[str, Any]]) -> None:
+    """Runs in the worker process."""
+
+    def remaining() -> Iterator[int]:
+        while True:
+            with position.get_lock():
+                taken = position.value
+                position.value = taken + 1
+            if taken >= len(indices):
+                return
+            yield indices[taken]
+
+    try:
+        with open_session(job) as session:
+            collect_samples(session, Store(job.root, job.plan), remaining(), lambda i: reports.put(("done", i)))
+    except KeyboardInterrupt:
+        return
+    except GearError as error:
+        reports.put(("error", _portable(error)))
+
+
+def _portable(error: GearError) -> GearError:
+    """The error itself where it survives the way to the parent, else its text."""
+    try:
+        pickle.loads(pickle.dumps(error))
+    except Exception:
+        return GearError(str(error))
+    return error

@@ -1,0 +1,57 @@
+"""Opening datasets: the task that wrote one is found among the plugins, and reads it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from gear.config.nodes import parse_text
+from gear.contracts.tasks import Sample
+from gear.dataset.reading import Dataset, Twins, pair_twins, read_manifest
+from gear.dataset.store import plan_of, splits_of
+from gear.plugins.build import build_task
+from gear.values.errors import DatasetError
+
+__all__ = ["Dataset", "Twins", "open_dataset", "open_twins"]
+
+
+def open_dataset(path: str | Path, split: str | None = None) -> Dataset[Any]:
+    """Opens one finished split of a dataset.
+
+    Args:
+        path: root of the dataset.
+        split: its name; may be left out where there is only one.
+
+    Returns:
+        A sequence of the task's samples, decoded one by one: `dataset[0].images["left"]`, `.record`, `.surfaces` and the
+        task's own fields.
+
+    Raises:
+        DatasetError: there is no dataset, no such split, or it is not finished.
+        UnknownNameError: its task's plugin is not installed.
+    """
+    root = Path(path)
+    if split is None:
+        names = splits_of(root)
+        if len(names) > 1:
+            raise DatasetError(root, f"holds several splits ({', '.join(names)}); say which")
+        split = names[0]
+    plan = plan_of(root, split)
+    manifest = read_manifest(root, split)
+    _, task = build_task(plan.task["name"], parse_text(_as_yaml(plan.options), f"{root} options"))
+    return Dataset(root=root, plan=plan, task=task, manifest=manifest)
+
+
+def open_twins(first: str | Path, second: str | Path, split: str | None = None) -> Twins[Sample]:
+    """Opens two datasets that differ in nothing but their patch, and pairs their samples by index.
+
+    Raises:
+        DatasetError: they differ in more than the patch, or one of them cannot be opened.
+    """
+    return pair_twins(open_dataset(first, split), open_dataset(second, split))
+
+
+def _as_yaml(options: Any) -> str:
+    import yaml
+
+    return str(yaml.safe_dump(options, sort_keys=False))
