@@ -1,0 +1,74 @@
+"""Draws every texture of the registry into mjcf/textures: `python -m authoring.materials.build [FOLDER]`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from authoring.materials import far, glazing, graphics, ground, masonry
+from authoring.materials.image import Image, write_png
+from authoring.materials.palette import palette_images
+from authoring.materials.registry import MATERIALS
+from gear.values.rng import derive_rng
+
+Painter = Callable[..., dict[str, Image]]
+TEXTURES = Path(__file__).resolve().parents[2] / "mjcf" / "textures"
+PAINTERS: tuple[Painter, ...] = (
+    masonry.brick,
+    masonry.ashlar,
+    masonry.slates,
+    masonry.roof_tiles,
+    masonry.pavement,
+    masonry.cobbles,
+    masonry.tactile,
+    masonry.gravel,
+    ground.asphalt,
+    ground.concrete,
+    ground.plaster,
+    ground.metal_panel,
+    ground.boards,
+    ground.road_paint,
+    ground.grass,
+    ground.soil,
+    ground.bark,
+    ground.foliage,
+    glazing.windows,
+    glazing.shop_fronts,
+    glazing.curtain_wall,
+    graphics.signs,
+    graphics.awnings,
+    graphics.traffic_signs,
+    graphics.lenses,
+    graphics.ironwork,
+    far.far_facades,
+)
+# Noise has few shades: as a palette image it takes a third of the bytes.
+FEW_COLOURS = 256
+
+
+def paint() -> dict[str, Image]:
+    """Every texture by its stem, (H, W, 3) uint8."""
+    colour, surface = palette_images(rng=derive_rng(0, "textures", "palette"))
+    textures = {"palette": colour, "palette_orm": surface}
+    for painter in PAINTERS:
+        textures |= painter(rng=derive_rng(0, "textures", painter.__name__))
+    return textures
+
+
+def registered_stems() -> set[str]:
+    """The stems that the registry's materials use."""
+    return {stem for m in MATERIALS.values() for stem in (m.rgb, m.normal, m.orm) if stem}
+
+
+def build(folder: Path) -> None:
+    """Write every registered texture into `folder`."""
+    textures = paint()
+    if missing := registered_stems() - set(textures):
+        raise ValueError(f"nobody paints {', '.join(sorted(missing))}")
+    for stem in sorted(registered_stems()):
+        write_png(folder / f"{stem}.png", textures[stem], colours=FEW_COLOURS)
+
+
+if __name__ == "__main__":
+    build(Path(sys.argv[1]) if len(sys.argv) > 1 else TEXTURES)
