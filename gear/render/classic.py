@@ -152,7 +152,7 @@ class ClassicRenderer:
 
     def _colour(self, camera: CameraRecord) -> UInt8Image:
         pixels = np.empty((camera.height_px, camera.width_px, 3), np.uint8)
-        self._render_and_read(camera, pixels, None, seen=(_FLAGS.mjRND_SHADOW, _FLAGS.mjRND_SKYBOX, _FLAGS.mjRND_FOG))
+        self._render_and_read(camera, pixels, None, seen=(_FLAGS.mjRND_SHADOW, _FLAGS.mjRND_SKYBOX))
         return pixels[::-1]
 
     def _truth(self, camera: CameraRecord) -> tuple[IdImage, FloatImage]:

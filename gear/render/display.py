@@ -15,17 +15,27 @@ def encode_srgb(linear: npt.ArrayLike) -> npt.NDArray[np.float64]:
     return np.where(light <= 0.0031308, light * 12.92, 1.055 * np.maximum(light, 0.0031308) ** (1 / 2.4) - 0.055)
 
 
+def has_linear_colours(model: mujoco.MjModel) -> bool:
+    """Whether the model says that its colours (`rgba`) are linear albedo; MuJoCo's habit is sRGB."""
+    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, "filament.material.base_color_type")
+    if index < 0:
+        return False
+    begin, size = int(model.text_adr[index]), int(model.text_size[index])
+    return bytes(model.text_data[begin : begin + size]).rstrip(b"\0") == b"linear"
+
+
 def displayed_model(model: mujoco.MjModel) -> mujoco.MjModel:
     """A copy whose colours are display values.
 
     OpenGL would decode a texture that is marked sRGB, light it, and show the linear result as it is: far too dark. In
-    the copy such textures are not marked, and the linear colours of geoms and materials are encoded. Lights of the
+    the copy such textures are not marked, and linear colours of geoms and materials are encoded. Lights of the
     kind `image`, which OpenGL does not have, are off, and so is the headlight.
     """
     shown = copy.copy(model)
     shown.tex_colorspace[:] = mujoco.mjtColorSpace.mjCOLORSPACE_LINEAR
-    for rgba in (shown.mat_rgba, shown.geom_rgba):
-        rgba[:, :3] = encode_srgb(rgba[:, :3])
+    if has_linear_colours(model):
+        for rgba in (shown.mat_rgba, shown.geom_rgba):
+            rgba[:, :3] = encode_srgb(rgba[:, :3])
     shown.light_active[shown.light_type == mujoco.mjtLightType.mjLIGHT_IMAGE] = 0
     shown.vis.headlight.active = 0
     return shown

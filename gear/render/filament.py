@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.contracts.rendering import Quality, RawView, RendererInfo, Stage
+from gear.render.display import encode_srgb, has_linear_colours
 from gear.render.faces import checked_faces
 from gear.render.pinhole import FAR_M, NEAR_M, Frustum, depth_from_reversed
 from gear.render.quiet import native_output
@@ -55,6 +56,7 @@ class FilamentRenderer:
         self._closed = True
         self._model = model
         self._quality = quality
+        self._linear_colours = has_linear_colours(model)
         self._mjrf, chatter, software_by_device = _start()
         with native_output() as lines:
             mjrf = self._mjrf
@@ -108,7 +110,8 @@ class FilamentRenderer:
         for geom_id, rgb in stage.paint_rgb.items():
             renderable = self._renderable(geom_id)
             material = renderable.get_material()
-            material.color = np.array([*rgb, 1.0], np.float32)
+            colour = rgb if self._linear_colours else encode_srgb(rgb)
+            material.color = np.array([*colour, 1.0], np.float32)
             renderable.set_material(material)
         for geom_id, (_, srgb) in checked_faces(self._model, stage.faces).items():
             renderable = self._renderable(geom_id)

@@ -1,0 +1,119 @@
+"""What a weather's sun and sky are worth in the renderers' units, at an exposure fixed per weather.
+
+The exposure puts a white wall (albedo 0.7) that faces the brightest direction at `WHITE_LEVEL` of the frame's full
+scale.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.values.frames import UInt8Image
+from gear.values.scene import Weather
+from gear.world.sky import Sky
+
+Floats = npt.NDArray[np.float64]
+
+WHITE_ALBEDO = 0.7
+WHITE_LEVEL = 0.85
+FILAMENT_LUX = 38400.0
+"""Filament's fixed exposure (f/16, 1/125 s, ISO 100) shows a radiance of so many cd/m² as 1.0."""
+
+SKY_FACE_PX = 512
+FACE_ORDER = "RLUDFB"
+_INTEGRATION_PX = 16
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Lighting:
+    """Sun, sky and haze in units of the frame: radiance 1.0 is full scale.
+
+    Attributes:
+        towards_sun: (3,) unit vector.
+        sun: (3,) what a surface of albedo pi that faces the sun would radiate.
+        ambient: (3,) radiance of the sky, averaged over what a roof sees.
+        haze: (3,) radiance of distant air.
+        sky_faces: (6 * size, size, 3) uint8 sRGB, a strip of the faces in `FACE_ORDER`.
+    """
+
+    towards_sun: Floats
+    sun: Floats
+    ambient: Floats
+    haze: Floats
+    sky_faces: UInt8Image
+
+
+def lighting_of(weather: Weather, *, sky_face_px: int = SKY_FACE_PX) -> Lighting:
+    """Light of a weather."""
+    sky = Sky.of(weather)
+    coarse = face_directions(_INTEGRATION_PX)
+    radiance, solid_angle = sky.radiance(coarse), _solid_angles(_INTEGRATION_PX)
+    flat_sun = np.array([*sky.towards_sun[:2], 0.0])
+    walls = [sky.towards_sun, np.array([0.0, 0.0, 1.0]), flat_sun / np.linalg.norm(flat_sun)]
+    from_sky = [_irradiance(radiance, coarse, solid_angle, normal) for normal in walls]
+    brightest = max(
+        float((klx + sky.sun_klx * max(float(normal @ sky.towards_sun), 0.0)).max())
+        for klx, normal in zip(from_sky, walls, strict=True)
+    )
+    exposure = WHITE_LEVEL / (WHITE_ALBEDO / math.pi * brightest)
+    faces = encode_srgb(exposure * sky.radiance(face_directions(sky_face_px)))
+    return Lighting(
+        towards_sun=sky.towards_sun,
+        sun=exposure * sky.sun_klx,
+        ambient=exposure * from_sky[1] / math.pi,
+        haze=np.minimum(exposure * sky.horizon_radiance(), 1.0),
+        sky_faces=faces.reshape(6 * sky_face_px, sky_face_px, 3),
+    )
+
+
+def face_directions(size: int) -> Floats:
+    """(6, size, size, 3) unit vectors into the world through the texels of MuJoCo's skybox, faces in `FACE_ORDER`.
+
+    The cube is OpenGL's, turned so that its y points up in the world: the picture `right` is east, `back` is north.
+    """
+    ticks = (np.arange(size) + 0.5) / size * 2 - 1
+    column, row = np.meshgrid(ticks, ticks)
+    one = np.ones_like(column)
+    world = [
+        (one, column, -row),
+        (-one, -column, -row),
+        (column, -row, one),
+        (column, row, -one),
+        (column, -one, -row),
+        (-column, one, -row),
+    ]
+    directions = np.stack([np.stack(axes, axis=-1) for axes in world])
+    return np.asarray(directions / np.linalg.norm(directions, axis=-1, keepdims=True))
+
+
+def _solid_angles(size: int) -> Floats:
+    """(1, size, size) steradians of a face's texels."""
+    ticks = (np.arange(size) + 0.5) / size * 2 - 1
+    column, row = np.meshgrid(ticks, ticks)
+    return np.asarray((2 / size) ** 2 / (1 + column**2 + row**2) ** 1.5)[None]
+
+
+def _irradiance(radiance: Floats, directions: Floats, solid_angle: Floats, normal: Floats) -> Floats:
+    """(3,) of a surface with that normal."""
+    weight = np.maximum(directions @ normal, 0.0) * solid_angle
+    return np.asarray(np.tensordot(weight, radiance, axes=3))
+
+
+def encode_srgb(light: Floats) -> UInt8Image:
+    """Linear light, 1.0 is full scale, to sRGB bytes."""
+    steps = (np.clip(light, 0.0, 1.0) * (len(_SRGB_BYTES) - 1) + 0.5).astype(np.uint16)
+    return _SRGB_BYTES[steps]
+
+
+def _srgb_bytes() -> UInt8Image:
+    linear = np.linspace(0, 1, 1 << 16)
+    encoded = np.where(linear <= 0.0031308, linear * 12.92, 1.055 * np.maximum(linear, 1e-9) ** (1 / 2.4) - 0.055)
+    return np.asarray(np.floor(encoded * 255 + 0.5), dtype=np.uint8)
+
+
+_SRGB_BYTES = _srgb_bytes()
+"""(65536,) sRGB bytes of evenly spaced light."""

@@ -1,0 +1,245 @@
+"""The sky as radiance by direction: the analytic daylight of Preetham, Shirley and Smits (1999), with clouds before it.
+
+Directions are unit vectors in the world (x east, y north, z up). Radiance is in kcd/m² per linear sRGB channel, so
+that a white surface under it and a sun in klx can be compared.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from gear.values.rng import derive_rng
+from gear.values.scene import Weather
+
+Floats = npt.NDArray[np.float64]
+
+_MIN_ALTITUDE_RAD = math.radians(1.5)
+"""The formulas hold for a sun above the horizon; a lower one lights the sky as if it stood here, only more weakly."""
+
+_GROUND_ALBEDO = np.array([0.16, 0.15, 0.13])
+_SUN_KLX = 128.0 * np.array([1.03, 1.0, 0.96])
+_WAVELENGTHS_UM = np.array([0.610, 0.550, 0.465])
+_RGB_FROM_XYZ = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
+_D65 = (0.3127, 0.3290)
+_HORIZON_BLUR = 0.035
+_DISC_COSINE = math.cos(math.radians(0.5))
+_DISC_SR = 2 * math.pi * (1 - _DISC_COSINE)
+
+# Distribution coefficients (A to E, each slope and offset in turbidity) of luminance and chromaticities, from the
+# paper.
+_PEREZ = {
+    "Y": ((0.1787, -1.4630), (-0.3554, 0.4275), (-0.0227, 5.3251), (0.1206, -2.5771), (-0.0670, 0.3703)),
+    "x": ((-0.0193, -0.2592), (-0.0665, 0.0008), (-0.0004, 0.2125), (-0.0641, -0.8989), (-0.0033, 0.0452)),
+    "y": ((-0.0167, -0.2608), (-0.0950, 0.0092), (-0.0079, 0.2102), (-0.0441, -1.6537), (-0.0109, 0.0529)),
+}
+_ZENITH_X = (
+    (0.00166, -0.00375, 0.00209, 0.0),
+    (-0.02903, 0.06377, -0.03202, 0.00394),
+    (0.11693, -0.21196, 0.06052, 0.25886),
+)
+_ZENITH_Y = (
+    (0.00275, -0.00610, 0.00317, 0.0),
+    (-0.04214, 0.08970, -0.04153, 0.00516),
+    (0.15346, -0.26756, 0.06670, 0.26688),
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Sky:
+    """Sun and sky of one weather.
+
+    Attributes:
+        towards_sun: (3,) unit vector.
+        sun_klx: (3,) illuminance of a surface that faces the sun, behind its clouds.
+        cloud_cover: 0..1, what clouds and rain together cover.
+        turbidity: haziness of the clear air; 2 is very clear.
+        blueness: how saturated the clear sky is; 1 is the model's own.
+    """
+
+    towards_sun: Floats
+    sun_klx: Floats
+    cloud_cover: float
+    turbidity: float
+    blueness: float
+
+    @staticmethod
+    def of(weather: Weather) -> Sky:
+        """The sky that CARLA's parameters mean."""
+        altitude = math.radians(weather.sun_altitude_deg)
+        azimuth = math.radians(weather.sun_azimuth_deg)
+        shown_altitude = max(altitude, _MIN_ALTITUDE_RAD)
+        towards_sun = np.array(
+            [
+                math.cos(azimuth) * math.cos(shown_altitude),
+                math.sin(azimuth) * math.cos(shown_altitude),
+                math.sin(shown_altitude),
+            ]
+        )
+        cover = _fraction(weather.cloudiness)
+        if weather.precipitation > 0:
+            # Rain falls from clouds, whatever the cloudiness says.
+            cover = max(cover, 0.72 + 0.28 * _fraction(weather.precipitation))
+        turbidity = float(np.clip(2.5 + 40 * (weather.mie_scattering_scale - 0.03), 2.0, 9.0))
+        # Twilight: the sun's last light goes within a few degrees.
+        daylight = float(_smooth_step(math.radians(-8), math.radians(3), np.array(altitude)))
+        through_clouds = 1 - 0.97 * float(_smooth_step(0.15, 0.95, np.array(cover)))
+        return Sky(
+            towards_sun=towards_sun,
+            sun_klx=_beam_klx(shown_altitude, turbidity) * through_clouds * max(daylight, 0.01),
+            cloud_cover=cover,
+            turbidity=turbidity,
+            blueness=float(np.clip(0.85 * weather.rayleigh_scattering_scale / 0.0331, 0.0, 1.5)),
+        )
+
+    def radiance(self, directions: Floats) -> Floats:
+        """(..., 3) unit vectors to (..., 3) kcd/m²: sky and clouds above the horizon, sunlit ground below it."""
+        flat = directions.reshape(-1, 3)
+        ground = self._ground()
+        result = np.broadcast_to(ground, flat.shape).copy()
+        seen = flat[:, 2] > -_HORIZON_BLUR
+        rays = flat[seen]
+        share = _smooth_step(-_HORIZON_BLUR, 0.0, rays[:, 2])[:, None]
+        result[seen] = share * self._above(rays) + (1 - share) * ground
+        return result.reshape(directions.shape)
+
+    def horizon_radiance(self) -> Floats:
+        """(3,) kcd/m², averaged around the horizon: the colour of distant haze."""
+        angles = np.linspace(0, 2 * math.pi, 72, endpoint=False)
+        ring = np.column_stack([np.cos(angles), np.sin(angles), np.full_like(angles, 0.03)])
+        clear = self._clear(ring / np.linalg.norm(ring, axis=1, keepdims=True))
+        haze = np.minimum(clear, 4 * np.median(clear, axis=0)).mean(axis=0)
+        return np.asarray((1 - self.cloud_cover) * haze + self.cloud_cover * self._cloud_base())
+
+    def _ground(self) -> Floats:
+        zenith = self._above(np.array([[0.0, 0.0, 1.0]]))[0]
+        return np.asarray(_GROUND_ALBEDO * (self.sun_klx * self.towards_sun[2] / math.pi + zenith))
+
+    def _above(self, directions: Floats) -> Floats:
+        """(N, 3) radiance where there is no ground."""
+        clear = self._clear(directions)
+        towards_sun = directions @ self.towards_sun
+        clear[towards_sun > _DISC_COSINE] += self.sun_klx / _DISC_SR
+        noise = _cloud_noise(directions)
+        clouds = self._clouds(noise, directions[:, 2], towards_sun)
+        opacity = self._opacity(noise, directions[:, 2])[:, None]
+        return np.asarray(clear + opacity * (clouds - clear))
+
+    def _clear(self, directions: Floats) -> Floats:
+        """Clear air, (N, 3)."""
+        zenith_angle = math.acos(float(np.clip(self.towards_sun[2], -1, 1)))
+        cos_view = np.maximum(directions[:, 2], 0.01)
+        cos_sun = np.clip(directions @ self.towards_sun, -1, 1)
+        values = {
+            name: zenith
+            * _perez(name, self.turbidity, cos_view, cos_sun)
+            / _perez_zenith(name, self.turbidity, zenith_angle)
+            for name, zenith in _zenith(self.turbidity, zenith_angle).items()
+        }
+        luminance, x, y = values["Y"], values["x"], values["y"]
+        # The model's horizon is too red under a high sun: what the eye sees there is whitish.
+        whitish = self.towards_sun[2] * np.exp(-directions[:, 2].clip(0) / 0.12)
+        tint = self.blueness * (1 - 0.8 * whitish)
+        x, y = _D65[0] + tint * (x - _D65[0]), _D65[1] + tint * (y - _D65[1])
+        xyz = np.column_stack([luminance * x / y, luminance, luminance * (1 - x - y) / y])
+        return np.asarray(np.maximum(xyz @ _RGB_FROM_XYZ.T, 0.0))
+
+    def _cloud_base(self) -> Floats:
+        """(3,) mean radiance of clouds: bright when they are few, a third as bright when they cover everything."""
+        beam = _beam_klx(math.asin(self.towards_sun[2]), self.turbidity)
+        global_klx = beam * self.towards_sun[2] + 0.18 * beam.mean()
+        grey = 0.6 * global_klx.mean() + 0.4 * global_klx
+        return np.asarray((0.72 - 0.36 * self.cloud_cover) * grey / math.pi)
+
+    def _clouds(self, noise: Floats, height: Floats, towards_sun: Floats) -> Floats:
+        """(N, 3): bright where thin and near the sun; where overcast, brighter overhead, as the CIE's overcast sky."""
+        overcast = (1 + 2 * np.maximum(height, 0)) * (3 / 7)
+        shade = (1.2 - 0.45 * noise) * (1 + self.cloud_cover**2 * (overcast - 1))
+        glow = 0.8 * (1 - self.cloud_cover) * np.exp((towards_sun - 1) / 0.08)
+        return np.asarray((shade + glow)[:, None] * self._cloud_base())
+
+    def _opacity(self, noise: Floats, height: Floats) -> Floats:
+        """(N,) 0..1: the noise is spread evenly, so the share of sky above the threshold is the cover."""
+        edge = 1 - 1.15 * self.cloud_cover
+        opacity = _smooth_step(edge - 0.05, edge + 0.18, noise)
+        # Distant clouds melt into the haze of the horizon.
+        return np.asarray(opacity * (1 - (1 - self.cloud_cover) * (1 - _smooth_step(0.02, 0.2, height))))
+
+
+def _fraction(percent: float) -> float:
+    return min(max(percent, 0.0), 100.0) / 100.0
+
+
+def _smooth_step(low: float, high: float, value: Floats) -> Floats:
+    t = np.clip((value - low) / (high - low), 0.0, 1.0)
+    return np.asarray(t * t * (3 - 2 * t))
+
+
+def _beam_klx(altitude_rad: float, turbidity: float) -> Floats:
+    """(3,) direct normal illuminance under a clear sky: Rayleigh and Ångström extinction along Kasten's air mass."""
+    altitude_deg = math.degrees(altitude_rad)
+    air_mass = 1 / (math.sin(altitude_rad) + 0.15 * (altitude_deg + 3.885) ** -1.253)
+    rayleigh = 0.008735 * _WAVELENGTHS_UM**-4.08
+    aerosol = (0.04608 * turbidity - 0.04586) * _WAVELENGTHS_UM**-1.3
+    return np.asarray(_SUN_KLX * np.exp(-(rayleigh + aerosol) * air_mass))
+
+
+def _zenith(turbidity: float, sun_zenith_rad: float) -> dict[str, float]:
+    """Luminance (kcd/m²) and chromaticities at the zenith."""
+    chi = (4 / 9 - turbidity / 120) * (math.pi - 2 * sun_zenith_rad)
+    powers = np.array([sun_zenith_rad**3, sun_zenith_rad**2, sun_zenith_rad, 1.0])
+    rows = np.array([turbidity**2, turbidity, 1.0])
+    return {
+        "Y": (4.0453 * turbidity - 4.9710) * math.tan(chi) - 0.2155 * turbidity + 2.4192,
+        "x": float(rows @ np.array(_ZENITH_X) @ powers),
+        "y": float(rows @ np.array(_ZENITH_Y) @ powers),
+    }
+
+
+def _perez(name: str, turbidity: float, cos_view: Floats, cos_sun: Floats) -> Floats:
+    a, b, c, d, e = (slope * turbidity + offset for slope, offset in _PEREZ[name])
+    angle = np.arccos(cos_sun)
+    return np.asarray((1 + a * np.exp(b / cos_view)) * (1 + c * np.exp(d * angle) + e * cos_sun**2))
+
+
+def _perez_zenith(name: str, turbidity: float, sun_zenith_rad: float) -> float:
+    return float(_perez(name, turbidity, np.array(1.0), np.array(math.cos(sun_zenith_rad))))
+
+
+_TILE = 1024
+_OCTAVES = (4, 8, 16, 32, 64, 128, 256)
+_tile_cache: list[npt.NDArray[np.float32]] = []
+
+
+def _cloud_tile() -> npt.NDArray[np.float32]:
+    """(1024, 1024) periodic fractal noise whose values are spread evenly over 0..1; the same in every process."""
+    if not _tile_cache:
+        rng = derive_rng(0, "sky", "clouds")
+        total = np.zeros((_TILE, _TILE), np.float32)
+        for octave in _OCTAVES:
+            grid = rng.random((octave, octave)).astype(np.float32)
+            # Two cells more on each side make the interpolation meet itself at the borders.
+            cell = _TILE // octave
+            padded = np.pad(grid, 2, mode="wrap")
+            fine = cv2.resize(padded, None, fx=cell, fy=cell, interpolation=cv2.INTER_CUBIC)
+            total += fine[2 * cell : 2 * cell + _TILE, 2 * cell : 2 * cell + _TILE] * np.float32(octave**-0.85)
+        ranks = np.empty(total.size, np.float32)
+        ranks[np.argsort(total, axis=None, kind="stable")] = np.linspace(0, 1, total.size, dtype=np.float32)
+        _tile_cache.append(ranks.reshape(total.shape))
+    return _tile_cache[0]
+
+
+def _cloud_noise(directions: Floats) -> Floats:
+    """(N, 3) directions to (N,) noise on a layer of clouds that the Earth's curve brings down at the horizon."""
+    reach = 0.16 * _TILE / (np.maximum(directions[:, 2], 0.0) + 0.1)
+    x, y = ((directions[:, axis] * reach % _TILE).astype(np.float32) for axis in (0, 1))
+    # OpenCV's remap takes at most 32767 columns: the list is folded into rows.
+    width = 4096
+    rows = -(-len(directions) // width)
+    folded = [np.resize(values, (rows, width)) for values in (x, y)]
+    sampled = cv2.remap(_cloud_tile(), folded[0], folded[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
+    return np.asarray(sampled.reshape(-1)[: len(directions)], dtype=np.float64)

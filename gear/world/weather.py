@@ -1,0 +1,179 @@
+"""Weather: the presets, and what a weather does to a world's MJCF."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+from dm_control import mjcf
+
+from gear.config.nodes import Mapping, Scalar, parse_file
+from gear.config.reader import read_node
+from gear.values.resources import data_dir
+from gear.values.scene import Weather
+from gear.world.light import FACE_ORDER, FILAMENT_LUX, Lighting, encode_srgb, lighting_of
+
+WET_LABELS = frozenset({"road", "road_marking", "sidewalk", "parking", "ground"})
+"""What lies open to the rain and holds its water."""
+
+_WET_DARKENING = 0.45
+_WET_SMOOTHING = 0.7
+_DENSEST_FOG_PER_M = 0.05
+_CLASSIC_SUN_SHARE = 0.75
+
+
+def _read_presets() -> dict[str, Weather]:
+    path = data_dir("configs") / "weather" / "presets.yml"
+    root = parse_file(path)
+    if not isinstance(root, Mapping):
+        raise TypeError(f"{path} holds no presets")
+    presets = {}
+    for name, (place, node) in root.entries.items():
+        entries = node.entries if isinstance(node, Mapping) else {}
+        named = Mapping({"name": (place, Scalar(name, False, place)), **entries}, node.place)
+        presets[name] = read_node(Weather, named, name)
+    return presets
+
+
+PRESETS: dict[str, Weather] = _read_presets()
+"""Weather presets by name, from `configs/weather/presets.yml`."""
+
+
+def apply_weather(root: mjcf.RootElement, weather: Weather) -> None:
+    """Puts a weather into a composed world, in place of the light that its town came with.
+
+    - a light `sun`, a texture `sky` as the sky's picture, and the same picture as a light for Filament;
+    - haze, for Filament;
+    - wet materials: what lies open to the rain is darker and smoother;
+    - colours of materials and geoms are read as linear albedo by both renderers.
+
+    """
+    lighting = lighting_of(weather)
+    _remove_old_light(root)
+    _add_sky(root, lighting)
+    _add_sun(root, lighting)
+    _add_haze(root, weather, lighting)
+    _wet(root, wetness(weather))
+    root.custom.add("text", name="filament.material.base_color_type", data="linear")
+
+
+def wetness(weather: Weather) -> float:
+    """How wet open ground is, 0..1: by itself, by its puddles or by the rain that falls."""
+    return float(min(1.0, max(weather.wetness, 1.4 * weather.precipitation_deposits, weather.precipitation) / 100))
+
+
+def fog_per_m(weather: Weather) -> float:
+    """Extinction of the air. CARLA's percent run from clear air to a thick fog; rain adds its own veil."""
+    fog = _DENSEST_FOG_PER_M * (weather.fog_density / 100) ** 1.5
+    return float(weather.scattering_intensity * (fog + 0.0008 * (weather.precipitation / 100) ** 2))
+
+
+def _remove_old_light(root: mjcf.RootElement) -> None:
+    for light in root.find_all("light"):
+        light.remove()
+    for texture in root.find_all("texture"):
+        if texture.type == "skybox":
+            texture.remove()
+    for element in [*root.find_all("text"), *root.find_all("numeric")]:
+        if element.name.rsplit("/", 1)[-1].startswith("filament."):
+            element.remove()
+    root.visual.headlight.active = 0
+
+
+def _add_sky(root: mjcf.RootElement, lighting: Lighting) -> None:
+    strip = cv2.imencode(".png", lighting.sky_faces[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 1])[1].tobytes()
+    sky = root.asset.add(
+        "texture",
+        name="sky",
+        type="skybox",
+        file=mjcf.Asset(strip, ".png"),
+        gridsize=(6, 1),
+        gridlayout=FACE_ORDER,
+        colorspace="sRGB",
+    )
+    root.worldbody.add("light", name="sky", type="image", texture=sky, intensity=FILAMENT_LUX, diffuse=(0, 0, 0))
+
+
+def _add_sun(root: mjcf.RootElement, lighting: Lighting) -> None:
+    """One light for both: Filament multiplies `intensity` and `diffuse`, OpenGL knows `diffuse` and `ambient`.
+
+    OpenGL shows light as it is added up, without a tone curve: its shares of sun and sky are those of display values.
+    """
+    sky_share = _display(lighting.ambient) / _display(lighting.ambient + lighting.sun * lighting.towards_sun[2])
+    ambient = np.clip(sky_share, 0.35, 1.0) * _balanced(lighting.ambient)
+    strength = _CLASSIC_SUN_SHARE * float(1.15 - np.clip(sky_share, 0.35, 1.0).mean())
+    colour = lighting.sun / lighting.sun.max()
+    root.worldbody.add(
+        "light",
+        name="sun",
+        type="directional",
+        dir=tuple(-lighting.towards_sun),
+        pos=tuple(200 * lighting.towards_sun),
+        diffuse=tuple(strength * colour),
+        ambient=tuple(ambient),
+        specular=(0.1, 0.1, 0.1),
+        intensity=float(lighting.sun.max() * FILAMENT_LUX / strength),
+        castshadow=True,
+    )
+
+
+def _display(light: Any) -> Any:
+    return encode_srgb(np.asarray(light)).astype(np.float64) / 255
+
+
+def _balanced(light: Any) -> Any:
+    """Half the tint of a light, none of its strength."""
+    tint = np.asarray(light) / max(float(np.mean(light)), 1e-9)
+    return np.sqrt(tint)
+
+
+def _add_haze(root: mjcf.RootElement, weather: Weather, lighting: Lighting) -> None:
+    density = fog_per_m(weather)
+    if density <= 0:
+        return
+    for key, value in (
+        ("enabled", [1]),
+        ("color", list(lighting.haze)),
+        ("density", [density]),
+        ("distance", [weather.fog_distance_m]),
+        ("height_falloff", [0]),
+        ("maximum_opacity", [1]),
+        ("cut_off_distance", [1900]),
+    ):
+        root.custom.add("numeric", name=f"filament.fog.{key}", data=value)
+
+
+def _wet(root: mjcf.RootElement, amount: float) -> None:
+    """Water fills the pores: less light comes back from inside, and the surface mirrors more sharply."""
+    if amount <= 0:
+        return
+    for material in _open_materials(root):
+        rgba = np.array(material.rgba if material.rgba is not None else (1.0, 1.0, 1.0, 1.0))
+        rgba[:3] *= 1 - _WET_DARKENING * amount
+        material.rgba = rgba
+        if material.roughness is not None and material.roughness >= 0:
+            material.roughness = float(material.roughness * (1 - _WET_SMOOTHING * amount))
+
+
+def _open_materials(root: mjcf.RootElement) -> list[Any]:
+    """Materials of geoms whose label is in `WET_LABELS`, each once, in the order of the file."""
+    found: dict[str, Any] = {}
+    for geom in root.find_all("geom"):
+        default = geom.dclass
+        name = default.dclass if default is not None else ""
+        if name.rsplit("/", 1)[-1].partition(".")[0] not in WET_LABELS:
+            continue
+        material = geom.material if geom.material is not None else _inherited_material(default)
+        if material is not None:
+            found.setdefault(material.full_identifier, material)
+    return list(found.values())
+
+
+def _inherited_material(default: Any) -> Any:
+    """The material that a default class, or one that it stands in, gives its geoms."""
+    while default is not None and default.tag == "default":
+        if default.geom is not None and default.geom.material is not None:
+            return default.geom.material
+        default = default.parent
+    return None
