@@ -14,8 +14,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gear.values.errors import TownError
-from gear.values.geometry import RigidTransform
 from gear.values.scene import Weather
 from gear.world.assets import ActorFacts, AssetLibrary
 from gear.world.instances import AssetParts, FaceName, load_mjcf
@@ -86,12 +84,7 @@ def compose(
     for index, board in enumerate(boards):
         path = library.path("surface", board.asset)
         body = root.worldbody.add("body", name=f"board_{index}", **_placed(board))
-        found = parts.add_bearer(path, body, is_carried=False)
-        if not found:
-            raise TownError(
-                path, "has no face: a geom of a class ending in `.face`, and a site `surface` in its middle"
-            )
-        faces += found
+        faces.append(parts.add_bearer(path, body, is_carried=False))
     slots: list[Slot] = []
     for actor, count in _merged(pool):
         for index in range(count):
@@ -100,10 +93,7 @@ def compose(
             slots.append(Slot(body=body.name, actor=actor))
     if carrier is not None:
         body = root.worldbody.add("body", name="carrier", mocap=True)
-        found = parts.add_bearer(carrier.path, body, is_carried=True)
-        if not found:
-            raise TownError(carrier.path, "cannot bear a patch: it has no geom of a class ending in `.face`")
-        faces += found
+        faces.append(parts.add_bearer(carrier.path, body, is_carried=True))
         slots.append(Slot(body="carrier", actor=carrier, bears_surface=True))
     parts.drop_templates()
     apply_weather(root, weather)
@@ -128,8 +118,3 @@ def _merged(pool: Sequence[tuple[ActorFacts, int]]) -> list[tuple[ActorFacts, in
 def _placed(board: BoardSpec) -> dict[str, Any]:
     half = math.radians(board.facing_deg) / 2
     return {"pos": board.position_m, "quat": (math.cos(half), 0.0, 0.0, math.sin(half))}
-
-
-def world_from_board(board: BoardSpec) -> RigidTransform:
-    """A board's frame (x where its face looks, origin on the ground) in the world."""
-    return RigidTransform.from_yaw("world", "board", board.position_m, math.radians(board.facing_deg))

@@ -63,34 +63,30 @@ class AssetParts:
         for child in self._model(path).worldbody.all_children():
             _copy(child, body, body.name)
 
-    def add_bearer(self, path: Path, body: Any, *, is_carried: bool) -> list[FaceName]:
-        """Fills `body` with an instance whose faces have textures of their own.
+    def add_bearer(self, path: Path, body: Any, *, is_carried: bool) -> FaceName:
+        """Fills `body` with an instance whose face has a texture of its own.
 
         Raises:
-            TownError: a face has no `surface` site or no material.
+            TownError: the asset has not exactly one face, or the face has no material or no `surface` site.
         """
         self.add_instance(path, body)
         model = self._model(path)
-        faces = []
-        for geom in model.find_all("geom"):
-            if geom.dclass is None or not geom.dclass.dclass.endswith(".face"):
-                continue
-            site = "surface" + geom.name.removeprefix("face")
-            if model.find("site", site) is None or geom.material is None:
-                raise TownError(path, f"face {geom.name!r} needs a material and a site {site!r} in its middle")
-            name = f"{body.name}_{geom.name}"
-            self._root.find("geom", name).material = self._own_material(geom.material, name)
-            faces.append(
-                FaceName(
-                    asset=path.stem,
-                    owner=body.name,
-                    is_carried=is_carried,
-                    geom=name,
-                    site=f"{body.name}_{site}",
-                    neutral_material=geom.material.full_identifier,
-                )
-            )
-        return faces
+        faces = [g for g in model.find_all("geom") if g.dclass is not None and g.dclass.dclass.endswith(".face")]
+        if len(faces) != 1:
+            raise TownError(path, f"must have one geom of a class ending in `.face` to bear a patch, has {len(faces)}")
+        face = faces[0]
+        if model.find("site", "surface") is None or face.material is None:
+            raise TownError(path, f"face {face.name!r} needs a material, and a site `surface` in its middle")
+        geom = self._root.find("geom", f"{body.name}_{face.name}")
+        geom.material = self._own_material(face.material, geom.name)
+        return FaceName(
+            asset=path.stem,
+            owner=body.name,
+            is_carried=is_carried,
+            geom=geom.name,
+            site=f"{body.name}_surface",
+            neutral_material=face.material.full_identifier,
+        )
 
     def drop_templates(self) -> None:
         """Removes the attached files' own bodies; only what the instances refer to stays."""

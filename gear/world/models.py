@@ -23,6 +23,9 @@ _BODIES, _FEET = "1", "2"
 
 FOOT_RADIUS_M = 0.05
 
+_OPAQUE = "1 1 1 1"
+"""Rays pass through what has no colour."""
+
 _ASSET_REFERENCES = ("material", "mesh", "hfield")
 _PLACEMENT_SECTIONS = ("compiler", "option", "size", "default", "worldbody", "custom")
 
@@ -122,6 +125,7 @@ def _fix(geom: ET.Element) -> None:
     geom.set("group", str(GROUND_GROUP if is_ground else OBSTACLE_GROUP))
     geom.set("contype", "0" if is_ground else _BODIES)
     geom.set("conaffinity", _FEET if is_ground else _BODIES)
+    geom.set("rgba", _OPAQUE)
 
 
 def _free(body: ET.Element, stance: Stance) -> None:
@@ -129,7 +133,7 @@ def _free(body: ET.Element, stance: Stance) -> None:
     body.attrib.pop("mocap")
     name = body.get("name", "")
     for geom in body.iter("geom"):
-        geom.attrib.update(group=str(ACTOR_GROUP), contype=_BODIES, conaffinity=_BODIES, mass="0")
+        geom.attrib.update(group=str(ACTOR_GROUP), contype=_BODIES, conaffinity=_BODIES, mass="0", rgba=_OPAQUE)
     x, y, z = 2 * stance.half_length_m, 2 * stance.half_width_m, stance.height_m
     inertia = [stance.mass_kg / 12 * (a * a + b * b) for a, b in ((y, z), (x, z), (x, y))]
     body.insert(0, ET.Element("freejoint", name=name))

@@ -1,0 +1,63 @@
+"""Rectangles on the ground plan, for gaps between road users."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+LEVEL_M = 3.0
+"""Things this far apart in height are on different levels of the town."""
+
+
+@dataclass(frozen=True, slots=True)
+class Footprint:
+    """An oriented rectangle.
+
+    Attributes:
+        x_m, y_m, z_m: its middle, on the ground.
+        yaw_rad: heading of its length.
+        half_length_m, half_width_m: half of its sides.
+    """
+
+    x_m: float
+    y_m: float
+    z_m: float
+    yaw_rad: float
+    half_length_m: float
+    half_width_m: float
+
+    def grown(self, length_m: float, width_m: float) -> Footprint:
+        """With so much more at each end and at each side."""
+        return Footprint(
+            self.x_m, self.y_m, self.z_m, self.yaw_rad, self.half_length_m + length_m, self.half_width_m + width_m
+        )
+
+    @property
+    def radius_m(self) -> float:
+        """Of the circle that holds it."""
+        return math.hypot(self.half_length_m, self.half_width_m)
+
+    def overlaps(self, other: Footprint) -> bool:
+        """Whether two rectangles share a point (by separating axes)."""
+        dx, dy = other.x_m - self.x_m, other.y_m - self.y_m
+        if math.hypot(dx, dy) > self.radius_m + other.radius_m or abs(other.z_m - self.z_m) > LEVEL_M:
+            return False
+        turn = other.yaw_rad - self.yaw_rad
+        c, s = abs(math.cos(turn)), abs(math.sin(turn))
+        for first, second, sign in ((self, other, 1.0), (other, self, -1.0)):
+            cy, sy = math.cos(first.yaw_rad), math.sin(first.yaw_rad)
+            along, across = sign * (dx * cy + dy * sy), sign * (-dx * sy + dy * cy)
+            if abs(along) > first.half_length_m + second.half_length_m * c + second.half_width_m * s:
+                return False
+            if abs(across) > first.half_width_m + second.half_length_m * s + second.half_width_m * c:
+                return False
+        return True
+
+    def holds(self, x_m: float, y_m: float) -> bool:
+        """Whether a point lies inside."""
+        dx, dy = x_m - self.x_m, y_m - self.y_m
+        cy, sy = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
+        along, across = abs(dx * cy + dy * sy), abs(-dx * sy + dy * cy)
+        return bool(along <= self.half_length_m and across <= self.half_width_m)

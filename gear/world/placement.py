@@ -1,0 +1,195 @@
+"""What is felt: where the ground is, what overlaps, what hides the board, how things come to rest.
+
+MuJoCo answers all of it, on the placement model: rays for the ground and for lines of sight, its collision detection
+for overlaps, and a short simulation from a reset state for what does not stand evenly.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from gear.values.geometry import Array, RigidTransform
+from gear.values.scene import Pose
+from gear.world.catalogue import ActorType
+from gear.world.compose import PARKED_DEPTH_M
+from gear.world.models import ACTOR_GROUP, GROUND_GROUP, OBSTACLE_GROUP
+
+EVEN_M = 0.005
+"""Four feet within this of one plane stand evenly; no simulation is needed."""
+
+STEP_UP_M = 1.2
+"""The ground is looked for from this far above where the lane says it is, so bridges do not count for what is below."""
+
+SETTLE_DROP_M = 0.01
+SETTLE_STEP_S = 0.005
+SETTLE_STEPS = 120
+OVERLAP_M = 1e-4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Standing:
+    """How an actor stands.
+
+    Attributes:
+        world_from_actor: pose.
+        is_even: whether all four feet are on the ground there.
+    """
+
+    world_from_actor: RigidTransform
+    is_even: bool
+
+
+def _groups(*wanted: int) -> npt.NDArray[np.uint8]:
+    groups = np.zeros(6, np.uint8)
+    groups[list(wanted)] = 1
+    return groups
+
+
+_GROUND = _groups(GROUND_GROUP)
+_STATIC = _groups(GROUND_GROUP, OBSTACLE_GROUP)
+_ACTORS = _groups(ACTOR_GROUP)
+
+
+class PlacementSpace:
+    """The placement model with nothing in it until asked; every answer starts from the reset state."""
+
+    def __init__(self, model: mujoco.MjModel, bodies: Mapping[str, ActorType]) -> None:
+        """Takes the placement model and its actors by body name."""
+        self._model = model
+        self._types = dict(bodies)
+        self._qpos = {name: int(model.joint(name).qposadr[0]) for name in bodies}
+        self._dof = {name: int(model.joint(name).dofadr[0]) for name in bodies}
+        self._body_of_id = {int(model.body(name).id): name for name in bodies}
+        self._data = mujoco.MjData(model)
+        model.opt.timestep = SETTLE_STEP_S
+        model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        self._pose({})
+
+    def ground_m(self, x_m: float, y_m: float, near_z_m: float) -> float | None:
+        """Height of the ground at a place, near a height; None where there is none within reach below."""
+        start_m = np.array([x_m, y_m, near_z_m + STEP_UP_M])
+        geom = np.zeros(1, np.int32)
+        down = np.array([0.0, 0.0, -1.0])
+        distance_m = mujoco.mj_ray(self._model, self._data, start_m, down, _GROUND, 1, -1, geom)
+        if distance_m < 0 or distance_m > 3 * STEP_UP_M:
+            return None
+        return float(start_m[2] - distance_m)
+
+    def stand(self, kind: ActorType, x_m: float, y_m: float, near_z_m: float, yaw_rad: float) -> Standing | None:
+        """An actor on the ground; None where there is none.
+
+        People stand upright at their middle. A vehicle's four feet are fitted to what is below them.
+        """
+        if kind.facts.kind == "person":
+            z_m = self.ground_m(x_m, y_m, near_z_m)
+            if z_m is None:
+                return None
+            return Standing(RigidTransform.from_yaw("world", "actor", (x_m, y_m, z_m), yaw_rad), True)
+        stance = kind.stance
+        c, s = math.cos(yaw_rad), math.sin(yaw_rad)
+        feet: list[tuple[float, float, float]] = []
+        for sx, sy in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+            ahead_m, left_m = sx * stance.half_length_m, sy * stance.half_width_m
+            height_m = self.ground_m(x_m + c * ahead_m - s * left_m, y_m + s * ahead_m + c * left_m, near_z_m)
+            if height_m is None:
+                return None
+            feet.append((ahead_m, left_m, height_m))
+        points = np.array(feet)
+        # The feet are symmetric about the origin, so the least-squares plane is three means.
+        z_m = float(points[:, 2].mean())
+        climb = float((points[:, 0] * points[:, 2]).sum() / (points[:, 0] ** 2).sum())
+        bank = float((points[:, 1] * points[:, 2]).sum() / (points[:, 1] ** 2).sum())
+        uneven_m = np.abs(z_m + climb * points[:, 0] + bank * points[:, 1] - points[:, 2]).max()
+        forward = np.array([c, s, climb])
+        forward /= np.linalg.norm(forward)
+        left = np.array([-s, c, bank])
+        left -= forward * (left @ forward)
+        left /= np.linalg.norm(left)
+        rotation = np.stack([forward, left, np.cross(forward, left)], axis=1)
+        pose = RigidTransform.from_parts("world", "actor", rotation, (x_m, y_m, z_m))
+        return Standing(pose, bool(uneven_m <= EVEN_M))
+
+    def overlaps(self, poses: Mapping[str, RigidTransform]) -> list[tuple[str, str]]:
+        """Pairs of bodies that overlap; the second is "" where an actor overlaps the town or a board."""
+        self._pose(poses)
+        mujoco.mj_collision(self._model, self._data)
+        pairs: set[tuple[str, str]] = set()
+        for contact in self._data.contact[: self._data.ncon]:
+            if contact.dist > -OVERLAP_M:
+                continue
+            names = [self._body_of_id.get(int(self._model.body_rootid[self._model.geom_bodyid[g]]), "")
+                     for g in contact.geom]  # fmt: skip
+            if any(name in poses for name in names) and self._is_body_contact(contact.geom):
+                first, second = sorted(names, reverse=True)
+                pairs.add((first, second))
+        return sorted(pairs)
+
+    def _is_body_contact(self, geoms: npt.NDArray[np.int32]) -> bool:
+        groups = [int(self._model.geom_group[g]) for g in geoms]
+        return ACTOR_GROUP in groups and all(group in (ACTOR_GROUP, OBSTACLE_GROUP) for group in groups)
+
+    def settle(self, poses: Mapping[str, RigidTransform]) -> dict[str, RigidTransform]:
+        """Lets actors come to rest from just above where they are."""
+        lifted = {
+            name: RigidTransform.from_parts(
+                "world", "actor", pose.rotation, pose.translation_m + pose.rotation[:, 2] * SETTLE_DROP_M
+            )
+            for name, pose in poses.items()
+        }
+        self._pose(lifted)
+        for _ in range(SETTLE_STEPS):
+            mujoco.mj_step(self._model, self._data)
+        settled = {}
+        for name in poses:
+            body = self._model.body(name).id
+            settled[name] = RigidTransform.from_parts(
+                "world", "actor", self._data.xmat[body].reshape(3, 3), self._data.xpos[body]
+            )
+        self._pose({})
+        return settled
+
+    def sees(self, eye_m: Array, targets_m: Array) -> npt.NDArray[np.bool_]:
+        """Which of (N, 3) points can be seen from a point past the town, its boards and its ground."""
+        return self._rays(eye_m, targets_m, _STATIC)[0] < 0
+
+    def blockers(self, eye_m: Array, targets_m: Array, poses: Mapping[str, RigidTransform]) -> list[str | None]:
+        """For each of (N, 3) points the actor that hides it from a point, if any."""
+        self._pose(poses)
+        geoms = self._rays(eye_m, targets_m, _ACTORS)[0]
+        roots = [int(self._model.body_rootid[self._model.geom_bodyid[g]]) if g >= 0 else -1 for g in geoms]
+        return [self._body_of_id.get(root) for root in roots]
+
+    def _rays(
+        self, eye_m: Array, targets_m: Array, groups: npt.NDArray[np.uint8]
+    ) -> tuple[npt.NDArray[np.int32], Array]:
+        """Geom hit before each target, else -1, and distances."""
+        rays = np.ascontiguousarray(targets_m - eye_m, dtype=np.float64)
+        reach_m = np.linalg.norm(rays, axis=1)
+        count = len(rays)
+        geoms, distances_m = np.full(count, -1, np.int32), np.full(count, -1.0)
+        unit = np.ascontiguousarray(rays / reach_m[:, None])
+        start_m = np.ascontiguousarray(eye_m, dtype=np.float64)
+        mujoco.mj_multiRay(
+            self._model, self._data, start_m, unit.reshape(-1), groups, 1, -1, geoms, distances_m, None, count,
+            float(reach_m.max()),
+        )  # fmt: skip
+        geoms[(distances_m < 0) | (distances_m >= reach_m)] = -1
+        return geoms, distances_m
+
+    def _pose(self, poses: Mapping[str, RigidTransform]) -> None:
+        """Resets, then puts the named actors into place and all others far below, apart from one another."""
+        mujoco.mj_resetData(self._model, self._data)
+        for number, (name, address) in enumerate(self._qpos.items()):
+            if name in poses:
+                pose = Pose.from_transform(poses[name])
+                self._data.qpos[address : address + 7] = (*pose.position_m, *pose.quat_wxyz)
+            else:
+                self._data.qpos[address : address + 7] = (30.0 * number, 0.0, -PARKED_DEPTH_M, 1.0, 0.0, 0.0, 0.0)
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_comPos(self._model, self._data)

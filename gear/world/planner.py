@@ -1,0 +1,108 @@
+"""Plans samples: `plan(index)` is a pure function of the world, the split's seed and the index."""
+
+from __future__ import annotations
+
+from gear.config.collection import SplitConfig
+from gear.values.geometry import RigidTransform
+from gear.values.rig import Rig
+from gear.values.scene import ActorRecord, Pose, SceneRecord, Vec3
+from gear.world.cast import Cast, Crowd, HidingTest
+from gear.world.leads import Leads
+from gear.world.placement import PlacementSpace
+from gear.world.spawn import Draft, Spawner
+from gear.world.view_limits import reference_camera
+from gear.world.world import World
+
+POSE_TO_RECORD_DIGITS = 6
+
+
+class ScenePlanner:
+    """Makes the records of one split."""
+
+    def __init__(self, world: World, rig: Rig, split: SplitConfig, *, split_name: str) -> None:
+        """Prepares what all samples share.
+
+        Args:
+            world: compiled; the planner uses its placement model.
+            rig: cameras on the ego car; the first one must have the boards in view.
+            split: seed, and length of its sequences.
+            split_name: what records call it. Draws do not depend on it, so `test_night` shows the scenes of `test`.
+        """
+        self._world = world
+        self._rig = rig
+        self._split = split
+        self._split_name = split_name
+        bodies = {slot.body: world.types[slot.actor.name] for slot in world.slots}
+        space = PlacementSpace(world.placement_model, bodies)
+        spawner = Spawner(world.lanes)
+        self._leads = Leads(
+            scene_name=world.scene_name,
+            scene=world.scene,
+            rig=rig,
+            types=world.types,
+            slots=world.slots,
+            faces=world.faces,
+            spawner=spawner,
+            space=space,
+        )
+        self._crowd = Crowd(
+            scene_name=world.scene_name, scene=world.scene, types=world.types, spawner=spawner, space=space
+        )
+
+    def plan(self, index: int) -> SceneRecord:
+        """The record of one sample; `index` counts all frames of the split.
+
+        Raises:
+            PlacementError: the scene's limits are too tight; says which.
+        """
+        sequence, frame = divmod(index, self._split.frames)
+        cast = self._still(sequence)
+        return self._record(cast, index, sequence, frame)
+
+    def _still(self, sequence: int) -> Cast:
+        cast = self._leads.draw(self._split.seed, sequence)
+        self._crowd.fill(cast, self._split.seed, sequence, self._hiding(cast))
+        return cast
+
+    def _hiding(self, cast: Cast) -> HidingTest | None:
+        if not self._leads.faces:
+            return None
+        ego = next(iter(cast.poses.values()))
+        _, camera = reference_camera(self._rig, ego)
+        grids_m = tuple(face.grid_m for face in self._leads.faces_in_world(cast))
+        return HidingTest(camera.world_from_camera_transform.translation_m, grids_m, self._leads.limits.min_free)
+
+    def _record(self, cast: Cast, index: int, sequence: int, frame: int) -> SceneRecord:
+        world = self._world
+        actors = tuple(
+            _actor(number, draft, cast.poses[body]) for number, (body, draft) in enumerate(cast.drafts.items(), start=1)
+        )
+        carrier = next((actor.id for actor in actors if actor.role == "carrier"), None)
+        return SceneRecord(
+            town=world.town_name,
+            scene=world.scene_name,
+            split=self._split_name,
+            seed=self._split.seed,
+            index=index,
+            sequence=sequence,
+            frame=frame,
+            time_s=round(frame * self._split.interval_s, 9),
+            weather=world.weather,
+            actors=actors,
+            surfaces=world.surface_records(carrier),
+            cameras=self._rig.place(actors[0].world_from_actor.transform("world", "ego")),
+        )
+
+
+def _actor(number: int, draft: Draft, world_from_actor: RigidTransform) -> ActorRecord:
+    velocity = world_from_actor.rotation[:, 0] * draft.speed_mps
+    rounded = [round(float(v), POSE_TO_RECORD_DIGITS) + 0.0 for v in velocity]
+    velocity_mps: Vec3 = (rounded[0], rounded[1], rounded[2])
+    return ActorRecord(
+        id=number,
+        asset=draft.kind.facts.name,
+        role=draft.role,
+        world_from_actor=Pose.from_transform(world_from_actor),
+        velocity_world_mps=velocity_mps,
+        paint_rgb=draft.paint_rgb,
+    )

@@ -1,0 +1,83 @@
+"""Ways through the lane graph, as one line each."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from gear.values.geometry import Array
+from gear.world.lanes import LaneGraph
+from gear.world.polyline import Polyline
+
+HALF_WHEELBASE_SHARE = 0.6
+"""Axles stand this share of half a vehicle's length from its middle; its heading is from axle to axle."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Route:
+    """Lanes in a row.
+
+    Attributes:
+        lanes: their names.
+        starts_m: arc length at which each begins.
+        line: all of them.
+        is_dead_end: whether nothing continues the last one.
+    """
+
+    lanes: tuple[str, ...]
+    starts_m: tuple[float, ...]
+    line: Polyline
+    is_dead_end: bool
+
+    @staticmethod
+    def along(graph: LaneGraph, lanes: tuple[str, ...]) -> Route:
+        """Through the lanes given, each a follower of the one before."""
+        points: list[Array] = []
+        firsts: list[int] = []
+        for name in lanes:
+            firsts.append(max(0, len(points) - 1))
+            for point in graph.lanes[name].line.points_m:
+                if not points or float(np.linalg.norm((point - points[-1])[:2])) > 1e-3:
+                    points.append(point)
+        line = Polyline.through(np.array(points))
+        return Route(lanes, tuple(float(line.s_m[i]) for i in firsts), line, not graph.lanes[lanes[-1]].next)
+
+    def lane_at(self, s_m: float) -> str:
+        """Name of the lane at an arc length."""
+        return self.lanes[max(0, int(np.searchsorted(self.starts_m, s_m, side="right")) - 1)]
+
+
+def drive_on(graph: LaneGraph, lane: str, length_m: float, rng: np.random.Generator) -> tuple[str, ...]:
+    """Lanes from the start of `lane` that together have a length, or end where the road does."""
+    names = [lane]
+    total_m = graph.lanes[lane].line.length_m
+    while total_m < length_m and graph.lanes[names[-1]].next:
+        followers = graph.lanes[names[-1]].next
+        names.append(followers[int(rng.integers(len(followers)))])
+        total_m += graph.lanes[names[-1]].line.length_m
+    return tuple(names)
+
+
+def back_up(
+    graph: LaneGraph, lane: str, s_m: float, distance_m: float, rng: np.random.Generator
+) -> tuple[tuple[str, ...], float] | None:
+    """The place so far before another one: the lanes from it to there, and its arc length on the first of them."""
+    names = [lane]
+    s_m -= distance_m
+    while s_m < 0:
+        leaders = graph.previous[names[0]]
+        if not leaders:
+            return None
+        names.insert(0, leaders[int(rng.integers(len(leaders)))])
+        s_m += graph.lanes[names[0]].line.length_m
+    return tuple(names), s_m
+
+
+def vehicle_pose(line: Polyline, s_m: float, half_length_m: float, lateral_m: float = 0.0) -> tuple[Array, float]:
+    """Where a vehicle stands on a line: the point under its middle, and its heading from axle to axle."""
+    reach_m = HALF_WHEELBASE_SHARE * half_length_m
+    point, _ = line.at(s_m, lateral_m)
+    rear, front = line.at(s_m - reach_m)[0], line.at(s_m + reach_m)[0]
+    return point, math.atan2(front[1] - rear[1], front[0] - rear[0])
