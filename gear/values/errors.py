@@ -58,8 +58,9 @@ class DuplicateNameError(GearError):
     """Two plugins claim one name and the name was asked for without its package."""
 
     def __init__(self, kind: str, name: str, choices: Iterable[str]) -> None:
-        super().__init__(kind, name, tuple(choices))
-        self.kind, self.name, self.choices = kind, name, tuple(choices)
+        listed = tuple(choices)
+        super().__init__(kind, name, listed)
+        self.kind, self.name, self.choices = kind, name, listed
 
     def __str__(self) -> str:
         return f"more than one {self.kind} is named {self.name!r}; say which: {', '.join(self.choices)}"

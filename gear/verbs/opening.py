@@ -23,8 +23,8 @@ def open_dataset(path: str | Path, split: str | None = None) -> Dataset[Any]:
         split: its name; may be left out where there is only one.
 
     Returns:
-        A sequence of the task's samples, decoded one by one: `dataset[0].images["left"]`, `.record`, `.surfaces` and the
-        task's own fields.
+        A sequence of samples, decoded one by one: `dataset[0].images["left"]`, `.record`, `.surfaces` and
+        the task's own fields.
 
     Raises:
         DatasetError: there is no dataset, no such split, or it is not finished.

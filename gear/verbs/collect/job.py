@@ -14,7 +14,6 @@ import cv2
 import mujoco
 import numpy as np
 
-from gear.verbs.collect.patches import PatchSet, resolve_patch
 from gear.config.collection import CollectionConfig, SplitConfig, WeatherConfig
 from gear.config.dump import to_plain
 from gear.config.load import load_simulation, split_of
@@ -29,6 +28,7 @@ from gear.values.errors import ConfigError, UnknownNameError
 from gear.values.resources import data_dir
 from gear.values.scene import Weather
 from gear.values.serial import Json, to_json
+from gear.verbs.collect.patches import PatchSet, resolve_patch
 from gear.world.assets import AssetLibrary
 from gear.world.scene_spec import SceneLibrary, SceneSpec
 from gear.world.weather import PRESETS

@@ -6,10 +6,10 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 
-from gear.verbs.collect.session import Session
 from gear.dataset.store import Store
 from gear.values.frames import Frame
 from gear.values.scene import SceneRecord
+from gear.verbs.collect.session import Session
 
 IN_FLIGHT = 2
 """Frames that may wait for the writer; more would only cost memory."""

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from gear.camera.response import Response, response_for
-from gear.verbs.collect.job import Job
 from gear.contracts.rendering import RawView, Renderer
 from gear.contracts.tasks import Encoded, Sample, Task
 from gear.plugins.build import build_task
 from gear.render.opening import open_renderer
 from gear.values.frames import Frame, View
 from gear.values.scene import CameraRecord, SceneRecord
+from gear.verbs.collect.job import Job
 from gear.world.planner import ScenePlanner
 from gear.world.world import World
 

@@ -10,11 +10,11 @@ from multiprocessing.context import SpawnProcess
 from multiprocessing.queues import Queue
 from typing import Any
 
+from gear.dataset.store import Store
+from gear.values.errors import BackendError, GearError
 from gear.verbs.collect.job import Job
 from gear.verbs.collect.pipeline import collect_samples
 from gear.verbs.collect.session import open_session
-from gear.dataset.store import Store
-from gear.values.errors import BackendError, GearError
 
 SILENCE_S = 600.0
 """A pool that finishes nothing for so long is taken for hung (drivers do hang); slow machines need seconds a sample."""

@@ -1,0 +1,29 @@
+"""`gear sheet`."""
+
+from __future__ import annotations
+
+import argparse
+
+from gear.cli.collect import positive
+
+EXAMPLE = """examples:
+  gear sheet data/stereo3d/town10-billboard01-ClearNoon/none
+  gear sheet data/twin --split test --samples 4 --out twin.png
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the command's flags."""
+    parser.epilog = EXAMPLE
+    parser.add_argument("dataset", help="root of a dataset")
+    parser.add_argument("--split", help="its split, where it has several")
+    parser.add_argument("--samples", type=positive, default=12, metavar="N", help="rows of the sheet (12)")
+    parser.add_argument("--out", default="sheet.png", metavar="FILE", help="PNG to write (sheet.png)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Writes the sheet and says where."""
+    from gear.verbs.sheet import write_sheet
+
+    print(write_sheet(args.dataset, args.out, split=args.split, samples=args.samples))
+    return 0

@@ -1,0 +1,74 @@
+"""A contact sheet: what a person looks at first."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from gear.dataset.files import explained
+from gear.values.frames import UInt8Image
+from gear.verbs.opening import open_dataset
+
+CELL_WIDTH_PX = 640
+CAPTION_PX = 22
+INK, PAPER = (235, 235, 235), (24, 24, 24)
+
+
+def contact_sheet(path: str | Path, *, split: str | None = None, samples: int = 12) -> UInt8Image:
+    """Pictures of the first samples, one row each: every preview that the task offers, with its name.
+
+    Returns:
+        (H, W, 3) uint8 RGB.
+
+    Raises:
+        DatasetError: there is no finished split to show.
+    """
+    dataset = open_dataset(path, split)
+    rows: list[UInt8Image] = []
+    for sample in dataset[: min(samples, len(dataset))]:
+        record = sample.record
+        cells = []
+        for name, picture in dataset.task.preview(sample).items():
+            seen = ", ".join(f"{s.name} {s.visible_fraction:.0%} at {s.distance_m:.0f} m" for s in sample.surfaces[:2])
+            cells.append(_cell(picture, f"{record.split} {record.index:06d}  {name}  {record.scene}  {seen}"))
+        rows.append(_beside(cells))
+    width = max(row.shape[1] for row in rows)
+    return np.concatenate([_widened(row, width) for row in rows])
+
+
+def write_sheet(path: str | Path, out: str | Path, *, split: str | None = None, samples: int = 12) -> Path:
+    """Writes the contact sheet of a dataset as a PNG.
+
+    Raises:
+        DatasetError: there is nothing to show, or `out` cannot be written.
+    """
+    target = Path(out)
+    data = cv2.imencode(".png", contact_sheet(path, split=split, samples=samples)[..., ::-1])[1].tobytes()
+    with explained(target):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        temporary = target.with_name(f".{target.name}.part")
+        temporary.write_bytes(data)
+        temporary.replace(target)
+    return target
+
+
+def _cell(picture: UInt8Image, caption: str) -> UInt8Image:
+    height = round(picture.shape[0] * CELL_WIDTH_PX / picture.shape[1])
+    small = cv2.resize(picture, (CELL_WIDTH_PX, height), interpolation=cv2.INTER_AREA)
+    bar = np.full((CAPTION_PX, CELL_WIDTH_PX, 3), PAPER, np.uint8)
+    cv2.putText(bar, caption, (6, 15), cv2.FONT_HERSHEY_SIMPLEX, 0.4, INK, 1, cv2.LINE_AA)
+    return np.concatenate([bar, small])
+
+
+def _beside(cells: list[UInt8Image]) -> UInt8Image:
+    height = max(cell.shape[0] for cell in cells)
+    filled = [
+        np.concatenate([cell, np.full((height - cell.shape[0], cell.shape[1], 3), PAPER, np.uint8)]) for cell in cells
+    ]
+    return np.concatenate(filled, axis=1)
+
+
+def _widened(row: UInt8Image, width: int) -> UInt8Image:
+    return np.concatenate([row, np.full((row.shape[0], width - row.shape[1], 3), PAPER, np.uint8)], axis=1)

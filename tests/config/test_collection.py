@@ -1,0 +1,112 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from gear.config.collection import CollectionConfig, SplitConfig
+from gear.config.load import load_collection, load_simulation, split_of
+from gear.values.errors import ConfigError, UnknownNameError
+
+
+def test_the_task_alone_is_enough() -> None:
+    config = load_collection(None, {"task": "stereo3d"})
+    assert config == CollectionConfig(task="stereo3d", options=config.options)
+    assert (config.town, config.scene, config.split, config.patch) == ("town10", "billboard01", "test", "none")
+    assert (config.weather.preset, config.renderer, config.quality) == ("ClearNoon", "filament", "film")
+
+
+def test_flags_go_before_the_file_and_settings_before_flags(tmp_path: Path) -> None:
+    file = tmp_path / "c.yml"
+    file.write_text("task: semseg\nscene: billboard02\nsplit: val\nweather: {preset: CloudyNoon, cloudiness: 30}\n")
+    config = load_collection(str(file), {"scene": "billboard03", "split": None}, ["weather.cloudiness=40"])
+    assert (config.scene, config.split, config.weather.preset, config.weather.cloudiness) == (
+        "billboard03",
+        "val",
+        "CloudyNoon",
+        40.0,
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("task: semseg\nscen: a\n", r"c.yml:2:1: scen: unknown key \(did you mean 'scene'\?\)"),
+        ("task: semseg\nweather: {cloudiness: 140}\n", r"c.yml:2:23: weather.cloudiness: is a percentage, 0 to 100"),
+        ("task: semseg\nsplit: Test Split\n", r"c.yml:2:8: split: 'Test Split' is not a split's name"),
+        ("task: semseg\nsamples: 0\n", r"c.yml:2:10: samples: must be 1 to 1000000, got 0"),
+        ("task: semseg\nrenderer: filment\n", r"expected one of filament, classic, got 'filment'; did you mean filament\?"),
+        ("scene: a\n", r"c.yml:1:1: task: missing"),
+    ],
+)  # fmt: skip
+def test_mistakes_say_where(tmp_path: Path, text: str, message: str) -> None:
+    (tmp_path / "c.yml").write_text(text)
+    with pytest.raises(ConfigError, match=message):
+        load_collection(str(tmp_path / "c.yml"), {})
+
+
+def test_the_papers_splits() -> None:
+    simulation = load_simulation("default")
+    counts = {name: (s.seed, s.samples, s.frames) for name, s in simulation.splits.items()}
+    assert counts == {
+        "train": (123, 100, 1), "val": (131, 50, 1), "test": (363, 50, 1), "debug": (10, 2, 1),
+        "finetuning": (0, 300, 1), "video": (60, 1, 105),
+    }  # fmt: skip
+    assert split_of(simulation, "test_night") == SplitConfig(seed=363, samples=50)
+    with pytest.raises(UnknownNameError, match="no split named 'tst'; did you mean test"):
+        split_of(simulation, "tst")
+
+
+def test_a_carla_gear_config_is_accepted_as_it_is(tmp_path: Path) -> None:
+    file = tmp_path / "collection_config.yml"
+    file.write_text(
+        "basepath: /data/sets\nroot: three\n\ntown_name: Town10HD\nweather: # fixed\ntask: 3dod # one of four\n"
+        "split: train\nbillboard: billboard05\npatch_folder:\npatch_type:\nnet: # unused\ndebug: False\n"
+    )
+    config = load_collection(str(file), {})
+    assert (config.task, config.town, config.scene, config.split) == ("stereo3d", "town10", "billboard05", "train")
+    assert (config.patch, config.weather.preset) == ("none", "ClearNoon")
+    assert Path(config.root) == Path("/data/sets/three/billboard05")
+    assert load_collection(str(file), {"scene": "truck"}).scene == "truck"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("basepath: a\nroot: b\ntask: 4dod\n", r":3:7: task: expected one of ss, 2dod, 3dod, depth, got '4dod'"),
+        ("basepath: a\nroot: b\n", r"task: missing"),
+        ("basepath: a\ntask: ss\nbilboard: x\n", r":3:1: bilboard: unknown key in a CARLA-GeAR config"),
+    ],
+)
+def test_mistakes_in_a_carla_gear_config_say_where(tmp_path: Path, text: str, message: str) -> None:
+    (tmp_path / "c.yml").write_text(text)
+    with pytest.raises(ConfigError, match=message):
+        load_collection(str(tmp_path / "c.yml"), {})
+
+
+def test_the_original_simulation_config_is_read_and_never_run(tmp_path: Path) -> None:
+    trap = tmp_path / "trap"
+    file = tmp_path / "simulation_configs.py"
+    file.write_text(
+        "import os\n"
+        f"open({str(trap)!r}, 'w').close()\n"
+        "SEED_VALUES = {'test': 5, 'video': 6}\nITERATION_VALUES = {'test': 7, 'video': 1}\nMAX_VEHICLE_NPC = 3\n"
+        "def f():\n    return 1\n"
+    )
+    simulation = load_simulation(str(file))
+    assert simulation.splits == {
+        "test": SplitConfig(seed=5, samples=7),
+        "video": SplitConfig(seed=6, samples=1, frames=105),
+    }
+    assert simulation.max_vehicles == 3
+    assert not trap.exists()
+    file.write_text("SEED_VALUES = dict(test=5)\nITERATION_VALUES = {'test': 7}\n")
+    with pytest.raises(ConfigError, match=r"simulation_configs.py:1:1: SEED_VALUES: is computed.*write it as YAML"):
+        load_simulation(str(file))
+
+
+def test_unknown_configs_say_what_there_is() -> None:
+    with pytest.raises(UnknownNameError, match="no simulation config named 'defalt'; did you mean default"):
+        load_simulation("defalt")
+    with pytest.raises(UnknownNameError, match="that file does not exist"):
+        load_simulation("nowhere.yml")

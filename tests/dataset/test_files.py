@@ -1,0 +1,54 @@
+from __future__ import annotations
+
+import errno
+import os
+from pathlib import Path
+
+import pytest
+
+from gear.dataset.files import clear_scratch, inside, write_whole
+from gear.values.errors import DatasetError
+
+
+def test_a_file_appears_whole_and_leaves_nothing_beside_it(tmp_path: Path) -> None:
+    write_whole(tmp_path, "a/b/c.bin", b"12345")
+    assert (tmp_path / "a/b/c.bin").read_bytes() == b"12345"
+    assert [p.name for p in (tmp_path / "a/b").iterdir()] == ["c.bin"]
+    clear_scratch(tmp_path)
+    assert not (tmp_path / "gear/scratch").exists()
+
+
+@pytest.mark.parametrize("relative", ["/etc/passwd", "../x", "a/../../x", "", "a\\b", "a\0b"])
+def test_no_path_leaves_the_root(tmp_path: Path, relative: str) -> None:
+    with pytest.raises(DatasetError, match="not a path inside"):
+        inside(tmp_path, relative)
+
+
+def test_no_link_leaves_the_root(tmp_path: Path) -> None:
+    root = tmp_path / "root"
+    root.mkdir()
+    (root / "out").symlink_to(tmp_path)
+    with pytest.raises(DatasetError, match="through a link"):
+        write_whole(root, "out/x", b"")
+
+
+@pytest.mark.parametrize(
+    ("number", "message"), [(errno.ENOSPC, "disk is full"), (errno.EROFS, "read-only"), (errno.EACCES, "no permission")]
+)
+def test_a_refusing_disk_is_one_line_and_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, message: str
+) -> None:
+    def refuse(_: int) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(os, "fsync", refuse)
+    with pytest.raises(DatasetError, match=message):
+        write_whole(tmp_path, "a.bin", b"1")
+    assert not (tmp_path / "a.bin").exists()
+    assert list((tmp_path / "gear/scratch").iterdir()) == []
+
+
+def test_a_file_where_a_folder_should_be(tmp_path: Path) -> None:
+    (tmp_path / "a").write_text("x")
+    with pytest.raises(DatasetError, match="a file is where a folder should be"):
+        write_whole(tmp_path, "a/b", b"1")

@@ -1,0 +1,149 @@
+from __future__ import annotations
+
+import sys
+import types
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib.metadata import EntryPoint
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.specs import PROTOCOL_VERSION, DefenseSpec
+from gear.plugins.build import build
+from gear.plugins.manager import discover
+from gear.values.errors import DuplicateNameError, PluginError, UnknownNameError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Config:
+    radius_px: int = 2
+
+
+class Same:
+    def fit(self, clean: Any, patched: Any, model: Any, rng: np.random.Generator) -> None:
+        return None
+
+    def apply(self, views: Any, model: Any, state: Any, rng: np.random.Generator) -> Any:
+        return views
+
+    def wrap(self, model: Any) -> Any:
+        return model
+
+
+def spec(name: str, **changes: Any) -> DefenseSpec[Config]:
+    facts: dict[str, Any] = {"summary": "Does nothing.", "config": Config, "build": lambda config: Same()} | changes
+    return DefenseSpec(name=name, **facts)
+
+
+@pytest.fixture
+def package() -> Iterator[Any]:
+    made: list[str] = []
+
+    def make(name: str, hook: Any = None, **attributes: Any) -> EntryPoint:
+        module = types.ModuleType(name)
+        if hook is not None:
+            module.gear_defenses = hookimpl(hook, specname="gear_defenses")  # type: ignore[attr-defined]
+        for key, value in attributes.items():
+            setattr(module, key, value)
+        sys.modules[name] = module
+        made.append(name)
+        return EntryPoint(name=name.replace("_", "-"), value=name, group="gear")
+
+    yield make
+    for name in made:
+        del sys.modules[name]
+
+
+def test_a_plugin_is_found_with_its_owner(package: Any) -> None:
+    found = discover([package("good_one", lambda: [spec("median")])])
+    assert [(f.spec.name, f.owner.package) for f in found.of_kind("defense")] == [("median", "good_one")]
+    assert found.get("defense", "median") is found.get("defense", "good_one/median")
+    assert found.broken == ()
+
+
+def test_built_in_tasks_come_by_the_same_hooks() -> None:
+    assert set(discover([]).names("task")) >= {"semseg", "detect2d", "stereo3d", "depth"}
+
+
+def test_broken_plugins_are_reported_and_nobody_else_suffers(package: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    def leaves() -> list[Any]:
+        sys.exit(3)
+
+    def raises() -> list[Any]:
+        raise KeyError("boom")
+
+    def talks() -> list[Any]:
+        print("hello")
+        return [spec("talker")]
+
+    misspelt = types.ModuleType("misspelt")
+    misspelt.gear_defences = hookimpl(list)  # type: ignore[attr-defined]
+    sys.modules["misspelt"] = misspelt
+    entries = [
+        package("aa_good", lambda: [spec("median")]),
+        EntryPoint(name="bb-missing", value="no_such_module_anywhere", group="gear"),
+        package("cc_leaves", leaves),
+        package("dd_raises", raises),
+        package("ee_rubbish", lambda: [3, "x"]),
+        package("ff_number", lambda: 7),
+        package("gg_old", lambda: [spec("old", protocol=PROTOCOL_VERSION + 1)]),
+        package("hh_name", lambda: [spec("Bad Name")]),
+        package("ii_talks", talks),
+        EntryPoint(name="jj-misspelt", value="misspelt", group="gear"),
+    ]
+    found = discover(entries)
+    del sys.modules["misspelt"]
+    assert [f.spec.name for f in found.of_kind("defense")] == ["median", "talker"]
+    stages = {b.owner.plugin: (b.stage, b.problem) for b in found.broken}
+    assert stages["bb-missing"][0] == "import"
+    assert stages["cc-leaves"] == ("hook gear_defenses", "SystemExit: 3")
+    assert "boom" in stages["dd-raises"][1]
+    assert [b.problem for b in found.broken if b.owner.plugin == "ee-rubbish"] == [
+        "gear_defenses returns DefenseSpec objects, got int",
+        "gear_defenses returns DefenseSpec objects, got str",
+    ]
+    assert "got int" in stages["ff-number"][1]
+    assert "speaks protocol" in stages["gg-old"][1]
+    assert "'Bad Name' is not a plugin's name" in stages["hh-name"][1]
+    assert stages["jj-misspelt"][0] == "register"
+    assert capsys.readouterr().out == ""
+    with pytest.raises(
+        UnknownNameError, match=r"no defense named 'medain'; did you mean median\? \(.*failed to load: "
+    ):
+        found.get("defense", "medain")
+
+
+def test_two_of_a_name_and_nobody_wins(package: Any) -> None:
+    found = discover([package("one", lambda: [spec("median")]), package("two", lambda: [spec("median")])])
+    with pytest.raises(DuplicateNameError, match="one/median, two/median"):
+        found.get("defense", "median")
+    assert found.get("defense", "two/median").owner.package == "two"
+    assert found.names("defense") == ("one/median", "two/median")
+    assert found.clashes() == (("defense", "median", ("one/median", "two/median")),)
+
+
+def test_plugins_can_be_switched_off(package: Any) -> None:
+    entry = package("good_one", lambda: [spec("median")])
+    assert discover([entry], "good-one").of_kind("defense") == ()
+    assert discover([entry], "*").of_kind("defense") == ()
+
+
+def test_every_option_needs_a_default(package: Any) -> None:
+    @dataclass(frozen=True)
+    class Needy:
+        radius_px: int
+
+    found = discover([package("needy", lambda: [spec("median", config=Needy)])])
+    assert found.broken[0].problem == "'median': every option needs a default"
+
+
+def test_a_build_that_fails_says_whose_it_is(package: Any) -> None:
+    def fails(config: Config) -> Same:
+        raise RuntimeError("no such file")
+
+    found = discover([package("good_one", lambda: [spec("median", build=fails)])])
+    with pytest.raises(PluginError, match=r"median \(good_one \?\) failed at build: RuntimeError: no such file"):
+        build(found.get("defense", "median"))

@@ -1,0 +1,85 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from gear.values.errors import PatchError
+from gear.verbs.collect.patches import random_patch, resolve_patch
+
+
+def save(path: Path, picture: np.ndarray) -> Path:
+    assert cv2.imwrite(str(path), picture)
+    return path
+
+
+@pytest.fixture
+def picture() -> np.ndarray:
+    return np.random.default_rng(1).integers(0, 256, (15, 30, 3), dtype=np.uint8)
+
+
+def test_none_and_random() -> None:
+    assert resolve_patch("none", surfaces=2, seed=1).images == ()
+    first, again = resolve_patch("random", surfaces=2, seed=1), resolve_patch("random", surfaces=2, seed=1)
+    assert first.label == "random"
+    assert [i.shape for i in first.images] == [(150, 300, 3)] * 2
+    assert not np.array_equal(*first.images)
+    assert first.digest == again.digest != resolve_patch("random", surfaces=2, seed=2).digest
+    assert 120 < random_patch(1, 0).mean() < 135
+
+
+def test_a_picture_comes_as_rgb_and_is_named_by_its_hash(tmp_path: Path, picture: np.ndarray) -> None:
+    found = resolve_patch(str(save(tmp_path / "my patch.png", picture)), surfaces=1, seed=0)
+    assert np.array_equal(found.images[0], picture[..., ::-1])
+    assert found.label == f"my-patch-{found.digest[:8]}"
+    assert np.array_equal(cv2.imdecode(np.frombuffer(found.files["patch_0.png"], np.uint8), 1), picture)
+
+
+def test_grey_and_16_bit_pictures_are_read(tmp_path: Path, picture: np.ndarray) -> None:
+    grey = resolve_patch(str(save(tmp_path / "g.png", picture[..., 0])), surfaces=1, seed=0).images[0]
+    assert np.array_equal(grey, np.repeat(picture[..., :1], 3, 2))
+    deep = resolve_patch(str(save(tmp_path / "d.png", picture.astype(np.uint16) * 257)), surfaces=1, seed=0).images[0]
+    assert np.array_equal(deep, picture[..., ::-1])
+
+
+def test_a_folder_gives_one_picture_a_surface_in_order(tmp_path: Path, picture: np.ndarray) -> None:
+    for n in range(11):
+        save(tmp_path / f"patch_{n}.png", np.full((4, 8, 3), n, np.uint8))
+    save(tmp_path / "curves_0.png", picture)
+    (tmp_path / "attack.json").write_text("{}")
+    found = resolve_patch(str(tmp_path), surfaces=11, seed=0)
+    assert [int(i[0, 0, 0]) for i in found.images] == list(range(11))
+    assert len(resolve_patch(str(tmp_path), surfaces=2, seed=0).images) == 2
+
+
+def test_the_original_tools_names_are_read(tmp_path: Path, picture: np.ndarray) -> None:
+    save(tmp_path / "best_patch_1.png", picture[::-1])
+    save(tmp_path / "best_patch_0.png", picture)
+    assert np.array_equal(resolve_patch(str(tmp_path), surfaces=2, seed=0).images[1], picture[::-1, :, ::-1])
+
+
+def test_what_is_no_patch_is_refused_in_one_line(tmp_path: Path, picture: np.ndarray) -> None:
+    (tmp_path / "text.png").write_text("hello")
+    (tmp_path / "empty.png").write_bytes(b"")
+    save(tmp_path / "dot.png", picture[:1, :1])
+    clear = np.dstack([picture, np.full(picture.shape[:2], 100, np.uint8)])
+    save(tmp_path / "clear.png", clear)
+    for name, message in (
+        ("text.png", "not a picture"),
+        ("empty.png", "not a picture"),
+        ("dot.png", "is 1 x 1 px; sides of 2 to 8192"),
+        ("clear.png", "transparent"),
+        ("none.png", "is not there"),
+    ):
+        with pytest.raises(PatchError, match=message):
+            resolve_patch(str(tmp_path / name), surfaces=1, seed=0)
+    (tmp_path / "gap").mkdir()
+    save(tmp_path / "gap/patch_0.png", picture)
+    save(tmp_path / "gap/patch_2.png", picture)
+    with pytest.raises(PatchError, match=r"lacks patch_1\.png"):
+        resolve_patch(str(tmp_path / "gap"), surfaces=2, seed=0)
+    (tmp_path / "bare").mkdir()
+    with pytest.raises(PatchError, match=r"has no patch_0\.png"):
+        resolve_patch(str(tmp_path / "bare"), surfaces=2, seed=0)
