@@ -1,0 +1,219 @@
+"""Texture cells shared by all vehicles: where each one is, and the drawing of them.
+
+`details.png` dresses trim (plastic, grilles, number plates), `lamps.png` all lights. Each is 4 × 4 cells.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from authoring.mesh import Floats, Mesh
+
+__all__ = ["DETAILS", "LAMPS", "cell_uvs", "flat", "fitted", "write_atlases"]
+
+_SIZE, _OVER = 512, 4
+_CELL = _SIZE // 4
+_MARGIN = 0.06
+
+DETAILS = {  # fmt: skip
+    "plastic": (0, 0), "gloss": (1, 0), "bars": (2, 0), "mesh": (3, 0),
+    "plate": (0, 1), "silver": (1, 1), "reflector": (2, 1), "rubber": (3, 1),
+    "taxi": (0, 2), "slats": (1, 2), "chequer": (2, 2), "wood": (3, 2),
+    "display": (0, 3), "battenburg": (1, 3), "stripe": (2, 3), "white": (3, 3),
+}
+LAMPS = {
+    "head": (0, 0), "head_round": (1, 0), "head_slim": (2, 0), "fog": (3, 0),
+    "tail": (0, 1), "tail_led": (1, 1), "tail_tall": (2, 1), "brake": (3, 1),
+    "amber": (0, 2), "reverse": (1, 2), "tail_block": (2, 2), "blue": (3, 2),
+    "drl": (0, 3), "red": (1, 3), "head_block": (2, 3), "clear": (3, 3),
+}
+
+
+def cell_uvs(cell: tuple[int, int], unit: Floats) -> Floats:
+    """Texture coordinates of (N, 2) positions in a cell: 0 to 1, right and up."""
+    inner = _MARGIN + np.clip(unit, 0, 1) * (1 - 2 * _MARGIN)
+    return np.stack([(cell[0] + inner[:, 0]) / 4, 1 - (cell[1] + 1 - inner[:, 1]) / 4], axis=1)
+
+
+def flat(mesh: Mesh, cell: tuple[int, int]) -> Mesh:
+    """The mesh in the one colour of a cell's middle."""
+    return mesh.with_uvs(cell_uvs(cell, np.array([[0.5, 0.5]]))[0])
+
+
+def fitted(mesh: Mesh, cell: tuple[int, int]) -> Mesh:
+    """The mesh with its 0-to-1 texture coordinates moved into a cell."""
+    return mesh.with_uvs(cell_uvs(cell, mesh.uvs))
+
+
+def write_atlases(folder: Path) -> None:
+    """Draws both textures."""
+    _details().resize((_SIZE, _SIZE), Image.Resampling.LANCZOS).save(folder / "details.png", optimize=True)
+    _lamps().resize((_SIZE, _SIZE), Image.Resampling.LANCZOS).save(folder / "lamps.png", optimize=True)
+
+
+class _Cell:
+    """Drawing in one cell with coordinates 0 to 1, right and down, the margin outside."""
+
+    def __init__(self, draw: ImageDraw.ImageDraw, at: tuple[int, int], ground: tuple[int, int, int]) -> None:
+        side = _CELL * _OVER
+        self._draw, self._x, self._y, self._side = draw, at[0] * side, at[1] * side, side
+        draw.rectangle((self._x, self._y, self._x + side - 1, self._y + side - 1), fill=ground)
+
+    def _at(self, x: float, y: float) -> tuple[float, float]:
+        inner = self._side * (1 - 2 * _MARGIN)
+        return self._x + self._side * _MARGIN + x * inner, self._y + self._side * _MARGIN + y * inner
+
+    def rect(self, x0: float, y0: float, x1: float, y1: float, fill: tuple[int, int, int], radius: float = 0.0) -> None:
+        box = (*self._at(x0, y0), *self._at(x1, y1))
+        self._draw.rounded_rectangle(box, radius=radius * self._side, fill=fill)
+
+    def disc(self, x: float, y: float, rx: float, ry: float, fill: tuple[int, int, int]) -> None:
+        self._draw.ellipse((*self._at(x - rx, y - ry), *self._at(x + rx, y + ry)), fill=fill)
+
+    def poly(self, points: list[tuple[float, float]], fill: tuple[int, int, int]) -> None:
+        self._draw.polygon([self._at(x, y) for x, y in points], fill=fill)
+
+    def glyphs(self, text: str, x0: float, y0: float, x1: float, y1: float, fill: tuple[int, int, int]) -> None:
+        """Block letters of 3 × 5 strokes, so that no font file is needed."""
+        step = (x1 - x0) / len(text)
+        for k, letter in enumerate(text):
+            rows = _GLYPHS.get(letter, ("000",) * 5)
+            dx, dy = step * 0.78 / 3, (y1 - y0) / 5
+            for r, row in enumerate(rows):
+                for c, bit in enumerate(row):
+                    if bit == "1":
+                        left, top = x0 + k * step + step * 0.11 + c * dx, y0 + r * dy
+                        self.rect(left, top, left + dx * 1.02, top + dy * 1.02, fill)
+
+
+_GLYPHS = {
+    "A": ("111", "101", "111", "101", "101"), "B": ("110", "101", "110", "101", "110"),
+    "C": ("111", "100", "100", "100", "111"), "E": ("111", "100", "110", "100", "111"),
+    "G": ("111", "100", "101", "101", "111"), "I": ("111", "010", "010", "010", "111"),
+    "R": ("110", "101", "110", "101", "101"), "T": ("111", "010", "010", "010", "010"),
+    "X": ("101", "101", "010", "101", "101"), "0": ("111", "101", "101", "101", "111"),
+    "1": ("010", "110", "010", "010", "111"), "2": ("111", "001", "111", "100", "111"),
+    "4": ("101", "101", "111", "001", "001"), "7": ("111", "001", "010", "010", "010"),
+    "8": ("111", "101", "111", "101", "111"),
+}  # fmt: skip
+
+
+def _details() -> Image.Image:
+    image = Image.new("RGB", (_SIZE * _OVER,) * 2)
+    draw = ImageDraw.Draw(image)
+
+    def cell(name: str, ground: tuple[int, int, int]) -> _Cell:
+        return _Cell(draw, DETAILS[name], ground)
+
+    cell("plastic", (44, 45, 47))
+    cell("gloss", (14, 14, 15))
+    cell("silver", (186, 188, 190))
+    cell("rubber", (26, 26, 27))
+    cell("wood", (120, 94, 66))
+    cell("white", (218, 218, 214))
+    bars = cell("bars", (12, 12, 13))
+    for k in range(6):
+        bars.rect(-0.1, k / 6 + 0.02, 1.1, k / 6 + 0.075, (120, 122, 125))
+        bars.rect(-0.1, k / 6 + 0.075, 1.1, k / 6 + 0.10, (44, 45, 47))
+    mesh = cell("mesh", (9, 9, 10))
+    for k in range(-10, 22):
+        for lean in (1, -1):
+            x = k / 10
+            mesh.poly([(x, 0), (x + 0.018, 0), (x + 0.018 + lean * 0.5, 1), (x + lean * 0.5, 1)], (40, 41, 43))
+    # Lines that ran out of the cell are in its neighbours: those are drawn after.
+    plate = cell("plate", (60, 60, 62))
+    plate.rect(0.0, 0.0, 1.0, 1.0, (20, 20, 20), 0.02)
+    plate.rect(0.012, 0.05, 0.988, 0.95, (232, 232, 226), 0.02)
+    plate.rect(0.012, 0.05, 0.09, 0.95, (28, 58, 150), 0.02)
+    plate.glyphs("GR 47 AE", 0.12, 0.2, 0.97, 0.8, (16, 16, 18))
+    reflector = cell("reflector", (150, 12, 14))
+    for k in range(12):
+        reflector.rect(k / 12, 0, k / 12 + 0.02, 1, (190, 30, 30))
+    taxi = cell("taxi", (236, 196, 40))
+    taxi.glyphs("TAXI", 0.08, 0.2, 0.94, 0.8, (18, 18, 18))
+    slats = cell("slats", (30, 31, 33))
+    for k in range(10):
+        slats.rect(-0.1, k / 10, 1.1, k / 10 + 0.06, (70, 71, 74))
+    display = cell("display", (10, 10, 11))
+    display.glyphs("24 CENTER", 0.02, 0.28, 0.98, 0.72, (255, 170, 40))
+    chequer = cell("chequer", (222, 222, 218))
+    for k in range(44):
+        for row in range(2):
+            if (k + row) % 2 == 0:
+                chequer.rect(k / 44, row / 2, (k + 1) / 44, (row + 1) / 2, (18, 18, 20))
+    battenburg = cell("battenburg", (24, 70, 190))
+    for k in range(10):
+        for row in range(2):
+            if (k + row) % 2 == 0:
+                battenburg.rect(k / 10, row / 2, (k + 1) / 10, (row + 1) / 2, (226, 214, 40))
+    stripe = cell("stripe", (196, 24, 26))
+    for k in range(-2, 6):
+        stripe.poly([(k / 3, 1.1), (k / 3 + 0.18, 1.1), (k / 3 + 0.5, -0.1), (k / 3 + 0.32, -0.1)], (225, 225, 220))
+    return image
+
+
+def _lamps() -> Image.Image:
+    image = Image.new("RGB", (_SIZE * _OVER,) * 2)
+    draw = ImageDraw.Draw(image)
+
+    def cell(name: str, ground: tuple[int, int, int]) -> _Cell:
+        return _Cell(draw, LAMPS[name], ground)
+
+    dark, bright, steel = (38, 40, 44), (244, 247, 250), (150, 154, 160)
+    head = cell("head", (118, 122, 128))
+    head.rect(-0.1, -0.1, 1.1, 1.1, (96, 100, 106))
+    head.rect(-0.1, 0.0, 1.1, 0.12, bright)
+    for x, r in ((0.30, 0.15), (0.66, 0.13)):
+        head.disc(x, 0.56, r * 1.15, 0.40, (190, 194, 199))
+        head.disc(x, 0.56, r, 0.34, dark)
+        head.disc(x, 0.56, r * 0.72, 0.25, (205, 212, 220))
+        head.disc(x - 0.03, 0.48, r * 0.32, 0.11, bright)
+    head.rect(0.86, 0.2, 1.1, 0.9, (214, 150, 70))
+    round_ = cell("head_round", (150, 154, 160))
+    round_.disc(0.5, 0.5, 0.52, 0.52, (206, 210, 214))
+    round_.disc(0.5, 0.5, 0.42, 0.42, (120, 124, 130))
+    round_.disc(0.5, 0.5, 0.30, 0.30, (232, 238, 243))
+    round_.disc(0.42, 0.4, 0.10, 0.10, (255, 255, 255))
+    slim = cell("head_slim", (58, 60, 65))
+    slim.rect(-0.1, 0.72, 1.1, 0.96, bright)
+    for k in range(3):
+        slim.rect(0.10 + 0.27 * k, 0.18, 0.30 + 0.27 * k, 0.58, (176, 182, 190), 0.02)
+        slim.rect(0.14 + 0.27 * k, 0.24, 0.26 + 0.27 * k, 0.50, (238, 243, 248), 0.02)
+    fog = cell("fog", dark)
+    fog.disc(0.5, 0.5, 0.42, 0.42, steel)
+    fog.disc(0.5, 0.5, 0.32, 0.32, (225, 230, 235))
+    tail = cell("tail", (150, 10, 14))
+    tail.rect(-0.1, 0.06, 1.1, 0.34, (205, 22, 24))
+    tail.rect(0.05, 0.44, 0.48, 0.64, (226, 226, 224), 0.01)
+    tail.rect(0.52, 0.44, 0.95, 0.64, (206, 120, 40), 0.01)
+    tail.rect(-0.1, 0.72, 1.1, 0.92, (176, 14, 18))
+    led = cell("tail_led", (96, 8, 12))
+    led.rect(0.04, 0.14, 0.96, 0.34, (236, 40, 36), 0.03)
+    led.rect(0.04, 0.62, 0.96, 0.80, (210, 26, 28), 0.03)
+    led.rect(0.10, 0.42, 0.42, 0.54, (214, 214, 212), 0.01)
+    tall = cell("tail_tall", (150, 10, 14))
+    tall.rect(0.1, 0.03, 0.9, 0.34, (214, 26, 28), 0.03)
+    tall.rect(0.1, 0.38, 0.9, 0.56, (206, 120, 40), 0.03)
+    tall.rect(0.1, 0.60, 0.9, 0.76, (224, 224, 222), 0.03)
+    tall.rect(0.1, 0.80, 0.9, 0.97, (190, 18, 20), 0.03)
+    brake = cell("brake", (130, 8, 10))
+    for k in range(10):
+        brake.rect(k / 10 + 0.02, 0.2, k / 10 + 0.08, 0.8, (210, 26, 26))
+    cell("amber", (214, 128, 30))
+    reverse = cell("reverse", (205, 207, 208))
+    reverse.rect(0.1, 0.1, 0.9, 0.9, (232, 234, 235))
+    block = cell("tail_block", (30, 30, 32))
+    for k, colour in enumerate([(206, 22, 24), (206, 120, 40), (224, 224, 222)]):
+        block.rect(k / 3 + 0.015, 0.08, (k + 1) / 3 - 0.015, 0.92, colour, 0.02)
+    cell("blue", (20, 60, 210))
+    cell("drl", bright)
+    cell("red", (196, 18, 20))
+    wide = cell("head_block", dark)
+    for x in (0.28, 0.72):
+        wide.disc(x, 0.5, 0.2, 0.36, steel)
+        wide.disc(x, 0.5, 0.15, 0.27, (232, 238, 243))
+    cell("clear", (190, 194, 198))
+    return image

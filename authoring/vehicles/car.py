@@ -1,0 +1,284 @@
+"""A car from a specification: two shells (body, cabin), what is stamped into them, and what is bolted on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from authoring.mesh import Floats, Mesh, grid
+from authoring.vehicles.atlas import DETAILS, LAMPS, cell_uvs, flat
+from authoring.vehicles.patches import arch_flare, through
+from authoring.vehicles.shapes import Shape, disc, rounded
+from authoring.vehicles.sheet import Field, Sheet
+from authoring.vehicles.shell import Level, Shell, make_shell
+from authoring.vehicles.wheels import WheelSpec, make_wheel
+
+__all__ = ["CarSpec", "Parts", "Points", "Stamp", "build_car", "surface_point"]
+
+Points = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class Stamp:
+    """Something drawn on the body's front or rear.
+
+    Attributes:
+        at: "front" or "rear": distance along the outline from that end's middle, and z; or "side": x and z.
+        corners: of the polygon, counter-clockwise, metres.
+        radius: of its corners.
+        part: "trim" or "lights".
+        cell: its texture.
+        sink: how deep it lies, metres.
+        rim: width of a dark (trim) frame round it, metres.
+    """
+
+    at: str
+    corners: Points
+    radius: float
+    part: str
+    cell: str
+    sink: float = 0.0
+    rim: float = 0.0
+
+
+@dataclass(frozen=True)
+class CarSpec:
+    """What makes one car different from another; metres, x forward from the middle of its length."""
+
+    name: str
+    plan: Points
+    foot: Points
+    rim: Points
+    crown: Points
+    levels: tuple[Level, ...]
+    cabin_plan: Points
+    cabin_foot: Points
+    cabin_rim: Points
+    cabin_crown: Points
+    cabin_levels: tuple[Level, ...]
+    axles: tuple[float, ...]
+    wheel: WheelSpec
+    track: float
+    stamps: tuple[Stamp, ...] = ()
+    kind: str = "car"
+    palette: str = "car"
+    cabin_reach: tuple[float, float] = (1.0, 1.0)
+    reach: tuple[float, float] = (0.9, 0.9)
+    rise: float = 0.62
+    arch: float = 0.055
+    flare: float = 0.016
+    cladding: float = 0.0
+    sill_z: float = 0.0
+    pillar: float = 0.05
+    screen_v: tuple[float, float] = (0.05, 0.93)
+    side_v: tuple[float, float] = (0.10, 0.84)
+    side_glass: tuple[float, float] = (0.07, 0.10)
+    rear_glass: tuple[float, float, float] = (0.10, 0.10, 0.90)
+    glass_posts: tuple[tuple[float, float], ...] = ()
+    blind_sides: tuple[float, float] | None = None
+    lines_side: tuple[Points, ...] = ()
+    lines_top: tuple[Points, ...] = ()
+    lines_front: tuple[Points, ...] = ()
+    lines_rear: tuple[Points, ...] = ()
+    handles: Points = ()
+    plates: tuple[float, float] = (0.45, 0.6)
+    rails: tuple[float, float, float] | None = None
+    mirror: tuple[float, float, float] = (0.11, 0.20, 0.14)
+    bed: tuple[float, float, float] | None = None
+
+
+@dataclass
+class Parts:
+    """Meshes by material, in the vehicle's frame."""
+
+    meshes: dict[str, list[Mesh]] = field(default_factory=dict)
+
+    def add(self, name: str, mesh: Mesh, both_sides: bool = False) -> None:
+        """Adds a mesh; `both_sides` adds its mirror image across y = 0 as well."""
+        if len(mesh.faces) == 0:
+            return
+        self.meshes.setdefault(name, []).append(mesh)
+        if both_sides:
+            self.meshes[name].append(mesh.scaled(1, -1, 1))
+
+
+def build_car(spec: CarSpec) -> tuple[Parts, Shell, Shell]:
+    """Builds body, cabin, glass, stamped lamps and grilles, wheels and wheel wells.
+
+    Returns:
+        The parts, and the body's and the cabin's shells for what is bolted on afterwards.
+    """
+    hub_z = spec.wheel.radius
+    arch = spec.wheel.radius + spec.arch
+    body = make_shell(
+        spec.plan, spec.levels, through(spec.foot), through(spec.rim), through(spec.crown),
+        deform=arch_flare(spec.axles, hub_z, arch, spec.flare),
+        shift_reach=spec.reach,
+        extra_u=[a + d for a in spec.axles for d in (-arch, -arch * 0.6, 0.0, arch * 0.6, arch)],
+    )  # fmt: skip
+    cabin = make_shell(
+        spec.cabin_plan, spec.cabin_levels, through(spec.cabin_foot), through(spec.cabin_rim),
+        through(spec.cabin_crown), shift_reach=spec.cabin_reach, cells=(30, 8, 5), corner_deg=50,
+    )  # fmt: skip
+    parts = Parts()
+    _wells(spec, body, arch, parts)
+    for stamp in spec.stamps:
+        _stamp(body, stamp, parts)
+    _glaze(spec, cabin)
+    _hide_under(cabin, body)
+    if spec.bed is not None:
+        _sink_bed(spec.bed, body, parts)
+    parts.add("paint", body.side.part("paint"), both_sides=True)
+    parts.add("paint", body.top.part("paint"), both_sides=True)
+    parts.add("trim", flat(body.side.part("trim"), DETAILS["plastic"]), both_sides=True)
+    parts.add("trim", flat(body.foot(), DETAILS["rubber"]), both_sides=True)
+    for sheet in (cabin.side, cabin.top):
+        parts.add("paint", sheet.part("paint"), both_sides=True)
+        parts.add("glass", sheet.part("glass", 0.003), both_sides=True)
+        parts.add("trim", flat(sheet.part("trim"), DETAILS["gloss"]), both_sides=True)
+    _wheels(spec, parts)
+    return parts, body, cabin
+
+
+def side_view(points: Floats) -> Floats:
+    """(N, 2) x and z."""
+    return points[:, [0, 2]]
+
+
+def _wells(spec: CarSpec, body: Shell, arch: float, parts: Parts) -> None:
+    beside: Field = lambda p, q: 0.3 - p[:, 1]  # noqa: E731
+    for x in spec.axles:
+        ring = disc(x, spec.wheel.radius, arch)
+        if spec.cladding:
+            wide = disc(x, spec.wheel.radius, arch + spec.cladding)
+            body.side.stamp(_seen(wide), "trim", where=beside, finest_m=0.1)
+        body.side.stamp(_seen(ring), "hole", where=beside, finest_m=0.07)
+    if spec.sill_z:
+        below: Field = lambda p, q: p[:, 2] - spec.sill_z  # noqa: E731
+        body.side.stamp(below, "trim", on=("paint",), finest_m=0.2)
+    edges = body.side.border("hole")
+    points = body.side.points
+    inner = spec.track / 2 - spec.wheel.width / 2 - 0.10
+    a, b = points[edges[:, 0]], points[edges[:, 1]]
+    deep_a, deep_b = a * [1, 0, 1] + [0, inner, 0], b * [1, 0, 1] + [0, inner, 0]
+    corners = np.stack([a, b, deep_b, deep_a], axis=1).reshape(-1, 3)
+    base = np.arange(len(edges))[:, None] * 4
+    tunnel = Mesh.of(corners, np.concatenate([base + [0, 1, 2], base + [0, 2, 3]]))
+    parts.add("trim", flat(tunnel, DETAILS["rubber"]), both_sides=True)
+    for x in spec.axles:
+        angle = np.radians(np.linspace(-12, 192, 19))
+        rim = np.stack([x + 1.02 * arch * np.cos(angle), np.full(19, inner), hub_z(spec) + 1.02 * arch * np.sin(angle)], -1)
+        middle = np.array([[x, inner, hub_z(spec)]])
+        fan = np.stack([np.full(18, 19), np.arange(1, 19), np.arange(18)], axis=1)
+        parts.add("trim", flat(Mesh.of(np.concatenate([rim, middle]), fan), DETAILS["rubber"]), both_sides=True)
+
+
+def hub_z(spec: CarSpec) -> float:
+    """Height of the wheels' hubs."""
+    return spec.wheel.radius
+
+
+def _seen(shape: Shape) -> Field:
+    return lambda p, q: shape(side_view(p))
+
+
+def _stamp(body: Shell, stamp: Stamp, parts: Parts) -> None:
+    def project(points: Floats, params: Floats) -> Floats:
+        if stamp.at == "side":
+            return side_view(points)
+        run = body.along(params[:, 0])
+        return np.stack([run if stamp.at == "front" else body.arc_m - run, points[:, 2]], axis=1)
+
+    def field_of(shape: Shape) -> Field:
+        return lambda p, q: shape(project(p, q))
+
+    own = f"{stamp.part}:{stamp.cell}:{len(body.side.faces)}"
+    if stamp.rim:
+        body.side.stamp(field_of(rounded(stamp.corners, stamp.radius, stamp.rim)), "trim", finest_m=0.05)
+    body.side.stamp(field_of(rounded(stamp.corners, stamp.radius)), own, finest_m=0.05)
+    mesh = body.side.part(own, stamp.sink)
+    low, high = np.min(stamp.corners, axis=0), np.max(stamp.corners, axis=0)
+    low = np.maximum(low, [0, -9]) if stamp.at != "side" else low
+    faces = body.side.faces_of(own)
+    flat_at = project(body.side.points, body.side.params)[np.unique(faces)]
+    cells = DETAILS if stamp.part == "trim" else LAMPS
+    parts.add(stamp.part, mesh.with_uvs(cell_uvs(cells[stamp.cell], (flat_at - low) / (high - low))), both_sides=True)
+    if stamp.sink > 0.002:
+        parts.add("trim", flat(body.side.walls(own, stamp.sink), DETAILS["gloss"]), both_sides=True)
+
+
+def _glaze(spec: CarSpec, cabin: Shell) -> None:
+    sheet = cabin.side
+    rise = spec.rise
+    front, rear = cabin.along(np.array(cabin.corners))
+    pane = [
+        (-1.0, front - spec.pillar, *spec.screen_v, 0.05),
+        (front + spec.side_glass[0], rear - spec.side_glass[1], *spec.side_v, 0.045),
+        (rear + spec.rear_glass[0], cabin.arc_m + 1.0, *spec.rear_glass[1:], 0.06),
+    ]
+    cowl = rounded([(-1.0, -0.2), (front - spec.pillar, -0.2), (front - spec.pillar, 0.06), (-1.0, 0.06)])
+    sheet.stamp(_unrolled(cabin, cowl, rise), "trim", finest_m=0.2)
+    for left, right, low, high, radius in pane:
+        if right - left < 0.15:
+            continue
+        corners = [(left, low * rise), (right, low * rise), (right, high * rise), (left, high * rise)]
+        for material, grow in (("trim", 0.018), ("glass", 0.0)):
+            sheet.stamp(_unrolled(cabin, rounded(corners, radius, grow), rise), material, finest_m=0.06)
+    beside: Field = lambda p, q: np.maximum(0.3 - p[:, 1], np.abs(q[:, 0] - np.mean(cabin.corners)) - 0.3)  # noqa: E731
+    for x, width in spec.glass_posts:
+        post: Field = lambda p, q, x=x, width=width: np.abs(p[:, 0] - x) - width / 2  # type: ignore[misc]  # noqa: E731
+        sheet.stamp(post, "trim", where=beside, on=("glass",), finest_m=0.3)
+    if spec.blind_sides:
+        low_x, high_x = spec.blind_sides
+        blind: Field = lambda p, q: np.abs(p[:, 0] - (low_x + high_x) / 2) - (high_x - low_x) / 2  # noqa: E731
+        sheet.stamp(blind, "paint", where=beside, on=("glass", "trim"), finest_m=0.3)
+
+
+def _unrolled(cabin: Shell, shape: Shape, rise: float) -> Field:
+    return lambda p, q: shape(np.stack([cabin.along(q[:, 0]), q[:, 1] * rise], axis=1))
+
+
+def _hide_under(cabin: Shell, body: Shell) -> None:
+    """Drops the part of the body's cap that the cabin stands on."""
+    u = np.linspace(0, 1, 81)
+    ring = cabin.side.patch.evaluate(np.column_stack([u, np.full_like(u, 0.0)]))[:, :2]
+    inside = rounded(np.concatenate([ring, ring[::-1] * [1, -1]]), 0.0, -0.05)
+    middle = body.top.points[body.top.faces]
+    hidden = (inside(middle.reshape(-1, 3)[:, :2]).reshape(-1, 3) < 0).all(axis=1)
+    body.top.material = ["hidden" if h else m for h, m in zip(hidden.tolist(), body.top.material, strict=True)]
+
+
+def _sink_bed(bed: tuple[float, float, float], body: Shell, parts: Parts) -> None:
+    rear, front, half = bed
+    shape = rounded([(rear, -half), (front, -half), (front, half), (rear, half)], 0.04)
+    body.top.stamp(lambda p, q: shape(p[:, :2]), "bed", on=("paint",), finest_m=0.06)
+    depth = 0.46
+    parts.add("trim", flat(body.top.part("bed", depth), DETAILS["plastic"]), both_sides=True)
+    parts.add("trim", flat(body.top.walls("bed", depth), DETAILS["plastic"]), both_sides=True)
+
+
+def _wheels(spec: CarSpec, parts: Parts) -> None:
+    wheel = make_wheel(spec.wheel)
+    for x in spec.axles:
+        at = (x, spec.track / 2, spec.wheel.radius)
+        parts.add("tyre", wheel.tyre.translated(*at), both_sides=True)
+        parts.add("rim", wheel.rim.translated(*at), both_sides=True)
+        parts.add("trim", flat(wheel.drum.translated(*at), DETAILS["gloss"]), both_sides=True)
+
+
+def surface_point(sheet: Sheet, x: float, z: float) -> tuple[Floats, Floats]:
+    """The outermost point of a left half sheet at (x, z), and its normal, each (3,)."""
+    u, v = np.meshgrid(np.linspace(0, 1, 241), np.linspace(0, 1, 81), indexing="ij")
+    params = np.stack([u.reshape(-1), v.reshape(-1)], axis=1)
+    points = sheet.patch.evaluate(params)
+    best = np.hypot(points[:, 0] - x, points[:, 2] - z).argsort()[:6]
+    chosen = best[points[best, 1].argmax()]
+    point = points[chosen].copy()
+    point[[0, 2]] = x, z
+    return point, sheet.patch.normals(params[chosen : chosen + 1])[0]
+
+
+def strip(lower: Floats, upper: Floats) -> Mesh:
+    """A ribbon between two (P, 3) lines."""
+    return grid(np.stack([lower, upper]))

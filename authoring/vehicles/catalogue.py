@@ -1,0 +1,147 @@
+"""All vehicles by name, and the writing of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from authoring.mesh import Floats, Mesh, box, merge
+from authoring.vehicles.atlas import DETAILS, flat, write_atlases
+from authoring.vehicles.car import CarSpec, Parts, build_car
+from authoring.vehicles.cars import CITY, ESTATE, HATCHBACK, SALOON, SPORTS, SUV
+from authoring.vehicles.finish import Box, Finish, PaintMap, write_vehicle
+from authoring.vehicles.fittings import (
+    add_antenna,
+    add_handles,
+    add_light_bar,
+    add_mirrors,
+    add_plate,
+    add_rails,
+    add_roof_sign,
+    add_wipers,
+    panel,
+)
+from authoring.vehicles.shell import Shell
+from authoring.vehicles.trucks import write_box_truck, write_flatbed
+from authoring.vehicles.vans import AMBULANCE, BUS, PICKUP, POLICE, TAXI, VAN
+
+__all__ = ["CATALOGUE", "write"]
+
+Extra = Callable[[CarSpec, Parts, Shell, Shell], None]
+
+
+def _car(spec: CarSpec, extra: Extra | None = None) -> Callable[[Path], None]:
+    def make(out: Path) -> None:
+        parts, body, cabin = build_car(spec)
+        _fit(spec, parts, body, cabin)
+        if extra is not None:
+            extra(spec, parts, body, cabin)
+        meshes = {name: merge(pieces) for name, pieces in parts.meshes.items()}
+        bounds = meshes["paint"].bounds
+        finish = Finish(spec.name, spec.kind, spec.palette, _boxes(spec, bounds, cabin))
+        size = (2048, 1024) if bounds[1, 0] > 4 else (1024, 1024)
+        paint = PaintMap(
+            bounds[0], bounds[1], size, spec.lines_side, spec.lines_top, spec.lines_front, spec.lines_rear
+        )
+        write_vehicle(out, finish, meshes, paint)
+
+    return make
+
+
+def _fit(spec: CarSpec, parts: Parts, body: Shell, cabin: Shell) -> None:
+    front = cabin.side.patch.evaluate(np.array([[cabin.corners[0], 0.14]]))[0]
+    behind = 0.13 if spec.kind == "car" else 0.22
+    add_mirrors(parts, cabin, float(front[0]) - behind, float(front[2]), size=spec.mirror, paint=_mirror_part(spec))
+    add_handles(parts, body, spec.handles)
+    add_plate(parts, body, spec.plates[0], front=True)
+    add_plate(parts, body, spec.plates[1], front=False)
+    add_wipers(parts, cabin)
+    if spec.rails:
+        add_rails(parts, cabin, *spec.rails)
+
+
+def _mirror_part(spec: CarSpec) -> str:
+    return "paint" if spec.kind == "car" else "trim"
+
+
+def _boxes(spec: CarSpec, bounds: Floats, cabin: Shell) -> tuple[Box, ...]:
+    """A box round the body and one round the cabin; mirrors stand out of them."""
+    half = max(y for _, y in spec.plan) + 0.02
+    foot = cabin.side.points
+    belt, low = float(foot[:, 2].min()) + 0.05, 0.12
+    front, rear = spec.plan[0][0], spec.plan[-1][0]
+    top = float(bounds[1, 2])
+    cabin_front, cabin_rear = float(foot[:, 0].max()) - 0.25, float(foot[:, 0].min()) + 0.1
+    wide = float(foot[:, 1].max())
+    return (
+        _span((rear, front), half, (low, belt)),
+        _span((cabin_rear, cabin_front), wide, (belt, top)),
+    )
+
+
+def _span(x: tuple[float, float], half: float, z: tuple[float, float]) -> Box:
+    return Box(
+        (round((x[1] - x[0]) / 2, 3), round(half, 3), round((z[1] - z[0]) / 2, 3)),
+        (round((x[0] + x[1]) / 2, 3), 0.0, round((z[0] + z[1]) / 2, 3)),
+    )
+
+
+def _fin(spec: CarSpec, parts: Parts, body: Shell, cabin: Shell) -> None:
+    add_antenna(parts, cabin, float(cabin.top.points[:, 0].min()) + 0.25)
+
+
+def _taxi(spec: CarSpec, parts: Parts, body: Shell, cabin: Shell) -> None:
+    add_roof_sign(parts, cabin, -0.15)
+
+
+def _police(spec: CarSpec, parts: Parts, body: Shell, cabin: Shell) -> None:
+    add_light_bar(parts, cabin, -0.35)
+
+
+def _ambulance(spec: CarSpec, parts: Parts, body: Shell, cabin: Shell) -> None:
+    add_light_bar(parts, cabin, 0.35, 1.3)
+
+
+def _bus(spec: CarSpec, parts: Parts, body: Shell, cabin: Shell) -> None:
+    """Doors on the kerb side (the right), the destination over the windscreen, a cooling unit on the roof."""
+    y = -1.285
+    for x, width in ((4.72, 1.25), (0.35, 1.35), (-4.55, 1.2)):
+        parts.add("trim", flat(box((width + 0.10, 0.05, 2.16), (x, y, 1.43)), DETAILS["gloss"]))
+        for side in (-1, 1):
+            pane = box((width / 2 - 0.05, 0.012, 1.98), (x + side * width / 4, y - 0.028, 1.43))
+            parts.add("glass", pane)
+    parts.add("trim", panel(1.9, 0.26, (5.905, 0, 2.62), 0.0, DETAILS["display"]))
+    pod = box((2.6, 1.7, 0.22), (-2.2, 0, 3.12))
+    parts.add("paint", _rounded(pod))
+
+
+def _rounded(mesh: Mesh) -> Mesh:
+    low, high = mesh.bounds
+    v = mesh.vertices.copy()
+    top = v[:, 2] > (low[2] + high[2]) / 2
+    centre = (low + high) / 2
+    v[top, :2] = centre[:2] + (v[top, :2] - centre[:2]) * 0.93
+    return Mesh(v, mesh.faces, mesh.uvs)
+
+
+CATALOGUE: dict[str, Callable[[Path], None]] = {
+    **{spec.name: _car(spec, _fin) for spec in (HATCHBACK, SALOON, ESTATE, SUV)},
+    **{spec.name: _car(spec) for spec in (SPORTS, CITY, PICKUP, VAN)},
+    TAXI.name: _car(TAXI, _taxi),
+    POLICE.name: _car(POLICE, _police),
+    AMBULANCE.name: _car(AMBULANCE, _ambulance),
+    BUS.name: _car(BUS, _bus),
+    "truck_box": write_box_truck,
+    "truck_rigid": write_flatbed,
+}
+
+
+def write(out: Path, names: Sequence[str]) -> None:
+    """Writes the named vehicles and the textures they share into a folder."""
+    common = out / "common"
+    common.mkdir(parents=True, exist_ok=True)
+    write_atlases(common)
+    for name in names:
+        CATALOGUE[name](out)

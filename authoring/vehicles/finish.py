@@ -1,0 +1,223 @@
+"""From parts to files: paint maps with shut lines, OBJ meshes, and the vehicle's MJCF."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFilter
+
+from authoring.mesh import Floats, Mesh, merge, write_obj
+
+__all__ = ["PALETTES", "Box", "Finish", "PaintMap", "write_vehicle"]
+
+Line = tuple[tuple[float, float], ...]
+
+PALETTES = {
+    # Linear albedo and weight; the weights follow what European registrations look like.
+    "car": (
+        (0.70, 0.70, 0.69, 26), (0.020, 0.020, 0.022, 20), (0.10, 0.105, 0.11, 21), (0.42, 0.43, 0.44, 10),
+        (0.022, 0.060, 0.17, 8), (0.03, 0.11, 0.30, 3), (0.34, 0.018, 0.016, 5), (0.13, 0.012, 0.018, 2),
+        (0.030, 0.065, 0.040, 2), (0.22, 0.17, 0.12, 2), (0.55, 0.18, 0.02, 1),
+    ),
+    "van": (
+        (0.72, 0.72, 0.71, 62), (0.40, 0.41, 0.42, 10), (0.05, 0.05, 0.055, 8), (0.03, 0.08, 0.22, 8),
+        (0.32, 0.02, 0.018, 4), (0.62, 0.36, 0.02, 4), (0.10, 0.105, 0.11, 4),
+    ),
+    "taxi": ((0.66, 0.42, 0.015, 3), (0.72, 0.68, 0.52, 2)),
+    "bus": ((0.42, 0.02, 0.018, 3), (0.05, 0.16, 0.34, 3), (0.70, 0.70, 0.69, 3), (0.05, 0.22, 0.09, 1)),
+    "truck": ((0.72, 0.72, 0.71, 5), (0.03, 0.08, 0.24, 2), (0.34, 0.018, 0.016, 2), (0.06, 0.20, 0.10, 1)),
+    "white": ((0.72, 0.72, 0.71, 1),),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class PaintMap:
+    """Where paint lies in its texture, and the lines drawn there.
+
+    The map has a side view (x, z) at the bottom, a top view (x, |y|) above it, then front and rear views (|y|, z) side
+    by side: both sides of a vehicle share their texels.
+
+    Attributes:
+        low, high: (3,) bounds of the painted parts, metres.
+        size: (width, height) of the texture in pixels.
+        side, top, front, rear: polylines of dark shut lines in metres.
+    """
+
+    low: Floats
+    high: Floats
+    size: tuple[int, int]
+    side: tuple[Line, ...] = ()
+    top: tuple[Line, ...] = ()
+    front: tuple[Line, ...] = ()
+    rear: tuple[Line, ...] = ()
+
+    @property
+    def _scale(self) -> tuple[float, tuple[float, float, float]]:
+        """Pixels per metre and the three rows' lower edges in pixels from the bottom."""
+        length, half, tall = self.high[0] - self.low[0], self.high[1], self.high[2] - self.low[2]
+        gap = 8
+        per_metre = min((self.size[0] - 2 * gap) / length, (self.size[1] - 4 * gap) / (2 * tall + half))
+        rows = (gap, 2 * gap + tall * per_metre, 3 * gap + (tall + half) * per_metre)
+        return per_metre, rows
+
+    def pixel(self, view: str, a: Floats, b: Floats) -> Floats:
+        """(N, 2) pixels, right and up, of view coordinates: (x, z), (x, |y|) or (|y|, z)."""
+        per_metre, rows = self._scale
+        if view in ("side", "top"):
+            right = 8 + (a - self.low[0]) * per_metre
+            up = rows[0] + (b - self.low[2]) * per_metre if view == "side" else rows[1] + b * per_metre
+        else:
+            shift = 0.0 if view == "front" else self.size[0] / 2
+            right, up = 8 + shift + a * per_metre, rows[2] + (b - self.low[2]) * per_metre
+        return np.stack([right, up], axis=-1)
+
+    def unwrap(self, mesh: Mesh) -> Mesh:
+        """Gives every face the view it looks at; vertices between views are doubled."""
+        assert mesh.normals is not None
+        corners = mesh.vertices[mesh.faces]
+        normal = np.abs(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+        facing = normal.argmax(axis=1)
+        ahead = corners.mean(axis=1)[:, 0] > (self.low[0] + self.high[0]) / 2
+        view = np.where(facing == 1, 0, np.where(facing == 2, 1, np.where(ahead, 2, 3)))
+        pieces = []
+        for k, name in enumerate(("side", "top", "front", "rear")):
+            used, inverse = np.unique(mesh.faces[view == k], return_inverse=True)
+            p = mesh.vertices[used]
+            a = np.abs(p[:, 1]) if k > 1 else p[:, 0]
+            b = np.abs(p[:, 1]) if k == 1 else p[:, 2]
+            uvs = self.pixel(name, a, b) / np.array(self.size)
+            pieces.append(Mesh(p, inverse.reshape(-1, 3), uvs, mesh.normals[used]))
+        return merge(pieces)
+
+    def draw(self, path: Path) -> None:
+        """Writes the texture: white, with dark shut lines in a faint shade and some road dirt low down."""
+        over = 3
+        width, height = self.size
+        core = Image.new("L", (width * over, height * over), 255)
+        draw = ImageDraw.Draw(core)
+        per_metre = self._scale[0]
+        stroke = max(over, round(0.0065 * per_metre * over))
+        for view, lines in (("side", self.side), ("top", self.top), ("front", self.front), ("rear", self.rear)):
+            for line in lines:
+                at = np.asarray(line, dtype=np.float64)
+                p = self.pixel(view, at[:, 0], at[:, 1]) * over
+                draw.line([(float(x), height * over - float(y)) for x, y in p], fill=10, width=stroke, joint="curve")
+        small = core.resize((width, height), Image.Resampling.LANCZOS)
+        shade = np.asarray(small.filter(ImageFilter.GaussianBlur(2.0)), dtype=np.float64) / 255
+        value = np.asarray(small, dtype=np.float64) / 255 * (0.6 + 0.4 * shade)
+        rows = self._scale[1]
+        up = height - 1 - np.arange(height)
+        z = (up - rows[0]) / per_metre + self.low[2]
+        dirt = np.where(up < rows[1], 1 - 0.22 * np.clip((0.45 - z) / 0.3, 0, 1), 1.0)
+        image = np.clip(np.rint(value * dirt[:, None] * 255), 0, 255).astype(np.uint8)
+        Image.fromarray(image).convert("RGB").quantize(64, dither=Image.Dither.NONE).save(path, optimize=True)
+
+
+@dataclass(frozen=True)
+class Box:
+    """A collision box: half sizes and centre, metres."""
+
+    size: tuple[float, float, float]
+    at: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Finish:
+    """How a vehicle is written.
+
+    Attributes:
+        name: the file's stem.
+        kind: `actor.kind`: car, van, truck or bus; also the class prefix.
+        palette: a key of `PALETTES`.
+        boxes: collision boxes.
+        metallic, roughness: of the paint.
+        comment: what the file says about itself.
+    """
+
+    name: str
+    kind: str
+    palette: str
+    boxes: tuple[Box, ...]
+    metallic: float = 0.15
+    roughness: float = 0.22
+    comment: str = ""
+
+
+_MATERIALS = {
+    "glass": 'rgba="0.018 0.021 0.024 1" metallic="0" roughness="0.05"',
+    "trim": 'texture="details" metallic="0" roughness="0.5"',
+    "lights": 'texture="lamps" metallic="0" roughness="0.08"',
+    "tyre": 'rgba="0.022 0.022 0.023 1" metallic="0" roughness="0.85"',
+    "rim": 'rgba="0.46 0.47 0.48 1" metallic="0.85" roughness="0.3"',
+    "chrome": 'rgba="0.62 0.62 0.63 1" metallic="1" roughness="0.12"',
+    "body": 'rgba="0.62 0.62 0.61 1" metallic="0" roughness="0.45"',
+}
+
+
+def write_vehicle(
+    out: Path, finish: Finish, meshes: dict[str, Mesh], paint_map: PaintMap, *, face: tuple[str, str, str] | None = None
+) -> None:
+    """Writes `<name>.xml` and `<name>/*.obj`, `<name>/paint.png`.
+
+    Args:
+        out: the folder of vehicles.
+        finish: names, colours and boxes.
+        meshes: by material: paint, glass, trim, lights, tyre, rim, chrome, body.
+        paint_map: of the paint.
+        face: for a patchable truck, its extra asset, geom and site lines.
+    """
+    folder = out / finish.name
+    folder.mkdir(parents=True, exist_ok=True)
+    paint_map.draw(folder / "paint.png")
+    names = [n for n in ("paint", *_MATERIALS) if n in meshes]
+    for name in names:
+        mesh = meshes[name]
+        write_obj(folder / f"{name}.obj", paint_map.unwrap(mesh) if name == "paint" else mesh)
+    kind, stem = finish.kind, finish.name
+    rgb = " ".join(f"{v:g}" for v in PALETTES[finish.palette][0][:3])
+    palette = "  ".join(" ".join(f"{v:g}" for v in row) for row in PALETTES[finish.palette])
+    lines = [
+        f'<mujoco model="{stem}">',
+        f"  <!-- Made by `python -m authoring.vehicles`. {finish.comment} -->",
+        '  <compiler angle="degree" meshdir="." texturedir="."/>',
+        "  <default>",
+        '    <default class="seen">',
+        '      <mesh inertia="shell"/>',
+        '      <geom type="mesh" group="1" contype="0" conaffinity="0" mass="0"/>',
+        *(f'      <default class="{kind}.{n}"/>' for n in names),
+        *([f'      <default class="{kind}.face"/>'] if face else []),
+        "    </default>",
+        '    <default class="collision">',
+        '      <geom type="box" group="3" rgba="0.2 0.8 0.3 0.4"/>',
+        "    </default>",
+        "  </default>",
+        "  <asset>",
+        *(f'    <mesh class="seen" name="{n}" file="{stem}/{n}.obj"/>' for n in names),
+        f'    <texture name="paint" type="2d" file="{stem}/paint.png" colorspace="sRGB"/>',
+        '    <texture name="details" type="2d" file="common/details.png" colorspace="sRGB"/>',
+        '    <texture name="lamps" type="2d" file="common/lamps.png" colorspace="sRGB"/>',
+        f'    <material name="paint" texture="paint" rgba="{rgb} 1" metallic="{finish.metallic:g}" '
+        f'roughness="{finish.roughness:g}"/>',
+        *(f'    <material name="{n}" {_MATERIALS[n]}/>' for n in names if n != "paint"),
+        *([face[0]] if face else []),
+        "  </asset>",
+        "  <worldbody>",
+        f'    <body name="{stem}">',
+        *(f'      <geom class="{kind}.{n}" mesh="{n}" material="{n}"/>' for n in names),
+        *(list(face[1:]) if face else []),
+        *(
+            f'      <geom class="collision" size="{" ".join(f"{v:g}" for v in b.size)}" '
+            f'pos="{" ".join(f"{v:g}" for v in b.at)}"/>'
+            for b in finish.boxes
+        ),
+        "    </body>",
+        "  </worldbody>",
+        "  <custom>",
+        f'    <text name="actor.kind" data="{kind}"/>',
+        f'    <numeric name="paint.palette" data="{palette}"/>',
+        "  </custom>",
+        "</mujoco>",
+    ]
+    (out / f"{stem}.xml").write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")

@@ -1,0 +1,147 @@
+"""A half shell: belt and cap over one plan, with the lines that describe it in side view."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from authoring.mesh import Floats, Mesh, grid
+from authoring.vehicles.patches import Deform, Patch, belt, cap
+from authoring.vehicles.sheet import Sheet, lattice
+
+__all__ = ["Level", "Shell", "make_shell"]
+
+Line = Callable[[Floats], Floats]
+
+
+@dataclass(frozen=True)
+class Level:
+    """One level of a shell's control net.
+
+    Attributes:
+        height: 0 at the foot line, 1 at the rim line.
+        side, front, rear: how far the plan is drawn in here, metres; `front` and `rear` move along x.
+    """
+
+    height: float
+    side: float
+    front: float
+    rear: float
+
+
+@dataclass
+class Shell:
+    """Sheets of a left half shell.
+
+    Attributes:
+        side: the belt's sheet, foot to rim, front middle to rear middle.
+        top: the cap's sheet.
+        arc_m: length of the plan's half outline.
+        corners: belt parameters of the front and rear corners.
+    """
+
+    side: Sheet
+    top: Sheet
+    arc_m: float
+    corners: tuple[float, float]
+    _table: tuple[Floats, Floats]
+
+    def along(self, u: Floats) -> Floats:
+        """Distance round the outline from the front's middle, metres, of belt parameters."""
+        return np.interp(u, *self._table)
+
+    def foot(self) -> Mesh:
+        """A plate across the belt's lower rim (left half), facing down."""
+        u = np.linspace(0, 1, 25)
+        rim = self.side.patch.evaluate(np.column_stack([u, np.zeros_like(u)]))
+        axis = rim * [1, 0, 1]
+        return grid(np.stack([rim, axis], axis=1))
+
+
+def make_shell(
+    plan: ArrayLike,
+    levels: Sequence[Level],
+    foot: Line,
+    rim: Line,
+    crown: Line,
+    *,
+    deform: Deform | None = None,
+    shift_reach: tuple[float, float] = (0.9, 0.9),
+    cells: tuple[int, int, int] = (34, 10, 5),
+    extra_u: Sequence[float] = (),
+    corner_deg: float = 45.0,
+) -> Shell:
+    """Builds a shell.
+
+    Args:
+        plan: (C, 2) control polygon of the widest outline, front middle to rear middle, y >= 0.
+        levels: rows of the control net, foot to rim.
+        foot: z of the lower rim by x.
+        rim: z of the upper rim by x.
+        crown: z of the cap's centre line by x.
+        deform: moves the belt's points (wheel arch flares).
+        shift_reach: how far behind the front and ahead of the rear the levels' x shifts fade out, metres.
+        cells: lattice cells along the belt, up the belt, across the half cap.
+        extra_u: more lattice lines at these x positions (metres), for shapes that need them.
+        corner_deg: where in the plan's turn the cap's corners are.
+    """
+    outline = np.asarray(plan, dtype=np.float64)
+    front_x, rear_x = outline[0, 0], outline[-1, 0]
+    widest = outline[:, 1].max()
+    fore = _fade((outline[:, 0] - (front_x - shift_reach[0])) / shift_reach[0])
+    aft = _fade(((rear_x + shift_reach[1]) - outline[:, 0]) / shift_reach[1])
+    net = np.empty((len(outline), len(levels), 3))
+    for k, level in enumerate(levels):
+        net[:, k, 0] = outline[:, 0] - fore * level.front + aft * level.rear
+        net[:, k, 1] = outline[:, 1] * (1 - level.side / widest)
+        low = foot(outline[:, 0])
+        net[:, k, 2] = low + level.height * (rim(net[:, k, 0]) - low)
+    patch = belt(net, deform)
+    u = np.linspace(0, 1, 601)
+    ring = patch.evaluate(np.column_stack([u, np.full_like(u, 0.45)]))[:, :2]
+    steps = np.diff(ring, axis=0)
+    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))])
+    turn = np.degrees(np.arctan2(-steps[:, 0], steps[:, 1]))
+    corner_front = u[np.searchsorted(turn, corner_deg)]
+    corner_rear = u[np.searchsorted(turn, 180 - corner_deg)]
+    # Lattice lines: denser where the outline turns.
+    density = arc[1:] * 0 + np.linalg.norm(steps, axis=1) + 0.35 * np.abs(np.gradient(np.radians(turn)))
+    grown = np.concatenate([[0.0], np.cumsum(density)])
+    lines = np.interp(np.linspace(0, grown[-1], cells[0] + 1), grown, u)
+    lines = _snap(lines, [corner_front, corner_rear])
+    lines = np.unique(np.concatenate([lines, np.interp(-np.asarray(extra_u), -ring[:, 0], u)])) if extra_u else lines
+    up = _up_lines(patch, cells[1])
+    side = lattice(patch, lines, up, "paint")
+    top_patch = cap(patch, corner_front, corner_rear, crown)
+    inner = lines[(lines >= corner_front - 1e-9) & (lines <= corner_rear + 1e-9)]
+    across = 1 - np.interp(np.linspace(0, 1, cells[2] + 1), [0, 0.5, 1], [0, 0.62, 1])[::-1]
+    top = lattice(top_patch, (inner - corner_front) / (corner_rear - corner_front), np.sort(across), "paint")
+    return Shell(side, top, float(arc[-1]), (float(corner_front), float(corner_rear)), (u, arc))
+
+
+def _up_lines(patch: Patch, count: int) -> Floats:
+    v = np.linspace(0, 1, 301)
+    bend = np.zeros(300)
+    for at in (0.02, 0.25, 0.5, 0.75):
+        rise = np.diff(patch.evaluate(np.column_stack([np.full_like(v, at), v])), axis=0)
+        unit = rise / np.linalg.norm(rise, axis=1, keepdims=True)
+        angle = np.arccos(np.clip((unit[1:] * unit[:-1]).sum(axis=1), -1, 1))
+        bend += np.linalg.norm(rise, axis=1) + 0.25 * np.concatenate([angle, angle[-1:]])
+    grown = np.concatenate([[0.0], np.cumsum(bend)])
+    return np.asarray(np.interp(np.linspace(0, grown[-1], count + 1), grown, v), dtype=np.float64)
+
+
+def _snap(lines: Floats, targets: Sequence[float]) -> Floats:
+    out = lines.copy()
+    for target in targets:
+        inner = np.abs(out[1:-1] - target)
+        out[1 + int(inner.argmin())] = target
+    return out
+
+
+def _fade(t: Floats) -> Floats:
+    t = np.clip(t, 0, 1)
+    return np.asarray(t * t * (3 - 2 * t), dtype=np.float64)
