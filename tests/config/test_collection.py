@@ -35,7 +35,7 @@ def test_flags_go_before_the_file_and_settings_before_flags(tmp_path: Path) -> N
         ("task: semseg\nweather: {cloudiness: 140}\n", r"c.yml:2:23: weather.cloudiness: is a percentage, 0 to 100"),
         ("task: semseg\nsplit: Test Split\n", r"c.yml:2:8: split: 'Test Split' is not a split's name"),
         ("task: semseg\nsamples: 0\n", r"c.yml:2:10: samples: must be 1 to 1000000, got 0"),
-        ("task: semseg\nrenderer: filment\n", r"expected one of filament, classic, got 'filment'; did you mean filament\?"),
+        ("task: semseg\nrenderer: filment\n", r"filament, classic, got 'filment'; did you mean filament\?"),
         ("scene: a\n", r"c.yml:1:1: task: missing"),
     ],
 )  # fmt: skip

@@ -80,7 +80,7 @@ def test_broken_plugins_are_reported_and_nobody_else_suffers(package: Any, capsy
         return [spec("talker")]
 
     misspelt = types.ModuleType("misspelt")
-    misspelt.gear_defences = hookimpl(list)  # type: ignore[attr-defined]
+    misspelt.gear_defences = hookimpl(lambda: [spec("lost")])  # type: ignore[attr-defined]
     sys.modules["misspelt"] = misspelt
     entries = [
         package("aa_good", lambda: [spec("median")]),

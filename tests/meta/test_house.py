@@ -1,0 +1,96 @@
+"""What holds everywhere in gear."""
+
+from __future__ import annotations
+
+import ast
+import re
+import statistics
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+MODULES = sorted((ROOT / "gear").rglob("*.py"))
+NAMES = [".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for p in MODULES]
+TORCH_ROOMS = ("gear.camera.torch_response",)
+
+
+def test_modules_stay_small() -> None:
+    lines = {p: len(p.read_text().splitlines()) for p in MODULES}
+    assert not {str(p): n for p, n in lines.items() if n > 500}
+    assert statistics.median(n for n in lines.values() if n > 5) < 120
+
+
+def test_only_one_module_makes_generators() -> None:
+    makers = [p for p in MODULES if re.search(r"default_rng\(|np\.random\.(seed|rand|normal|choice)\(", p.read_text())]
+    assert [p.relative_to(ROOT / "gear").as_posix() for p in makers] == ["values/rng.py"]
+
+
+def test_the_library_never_prints() -> None:
+    guilty = [
+        p.relative_to(ROOT).as_posix()
+        for p in MODULES
+        if "cli" not in p.parts
+        and any(
+            isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "print"
+            for node in ast.walk(ast.parse(p.read_text()))
+        )
+    ]
+    assert guilty == []
+
+
+def test_public_names_are_documented() -> None:
+    bare = []
+    for path in MODULES:
+        tree = ast.parse(path.read_text())
+        if path.name != "__init__.py" and ast.get_docstring(tree) is None:
+            bare.append(f"{path.relative_to(ROOT)}")
+        for node in tree.body:
+            is_public = isinstance(node, (ast.FunctionDef, ast.ClassDef)) and not node.name.startswith("_")
+            if is_public and ast.get_docstring(node) is None:
+                bare.append(f"{path.relative_to(ROOT)}:{node.lineno} {node.name}")
+    assert bare == []
+
+
+def test_nothing_names_a_machine() -> None:
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False).stdout.split()
+    texts = [ROOT / name for name in listed if Path(name).suffix in {".py", ".md", ".yml", ".toml", ".xml", ".cff", ""}]
+    guilty = [
+        p.name for p in texts if p.is_file() and re.search(r"(?<!\w)/(work|root|tmp)/[a-z]", p.read_text(errors="ignore"))
+    ]
+    assert [name for name in guilty if name != Path(__file__).name] == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("chunk", range(4))
+def test_every_module_imports_alone(chunk: int) -> None:
+    for name in NAMES[chunk::4]:
+        done = subprocess.run(
+            [sys.executable, "-W", "error", "-c", f"import {name}"],
+            capture_output=True,
+            text=True,
+            cwd=ROOT,
+            check=False,
+        )
+        assert done.returncode == 0, f"{name}: {done.stderr}"
+
+
+def test_help_is_quick_because_it_imports_next_to_nothing() -> None:
+    code = (
+        "import sys; from gear.cli.main import main\n"
+        "try:\n    main(['--help'])\nexcept SystemExit:\n    pass\n"
+        "print(sorted({'numpy', 'mujoco', 'torch', 'cv2', 'dm_control', 'yaml', 'pluggy'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip().endswith("[]")
+
+
+def test_collecting_never_imports_torch() -> None:
+    code = (
+        "import sys; import gear.cli.collect, gear.verbs.collect.run, gear.verbs.collect.session\n"
+        "from gear.plugins.manager import catalogue; catalogue()\n"
+        "sys.exit('torch' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
