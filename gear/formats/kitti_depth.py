@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.values.frames import FloatImage
-from gear.values.geometry import Intrinsics
+from gear.values.geometry import Array
 
 UNITS_PER_M = 256
 MAX_PNG_DEPTH_M = 65535 / UNITS_PER_M
@@ -41,6 +41,6 @@ def file_list(pairs: Sequence[tuple[str, str]]) -> bytes:
     return "\n".join(f"/{image} /{depth}" for image, depth in pairs).encode()
 
 
-def intrinsics_text(intrinsics: Intrinsics) -> bytes:
-    """The nine numbers of K, row by row, as the devkit's selection has them."""
-    return (" ".join(f"{v:.6f}" for v in intrinsics.matrix.reshape(-1)) + "\n").encode()
+def intrinsics_text(matrix: Array) -> bytes:
+    """The nine numbers of a (3, 3) K, row by row, as the benchmark's selection has them."""
+    return (" ".join(f"{v:.6f}" for v in matrix.reshape(-1)) + "\n").encode()

@@ -1,0 +1,57 @@
+"""Equality of samples, which hold arrays and so have no `==` of their own."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+
+def difference(a: Any, b: Any, where: str = "value") -> str:
+    """Where two values differ first, or "" if they are equal: arrays in shape, dtype and every element, NaN equal to
+    NaN."""
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+        return _array_difference(np.asarray(a), np.asarray(b), where)
+    if dataclasses.is_dataclass(a) and not isinstance(a, type):
+        if type(a) is not type(b):
+            return f"{where}: {type(a).__name__} is not {type(b).__name__}"
+        names = [field.name for field in dataclasses.fields(a)]
+        return _first((getattr(a, name), getattr(b, name), f"{where}.{name}") for name in names)
+    if isinstance(a, Mapping) and isinstance(b, Mapping):
+        if a.keys() != b.keys():
+            return f"{where}: keys {sorted(a)} are not {sorted(b)}"
+        return _first((a[key], b[key], f"{where}[{key!r}]") for key in a)
+    if isinstance(a, (tuple, list)) and isinstance(b, (tuple, list)):
+        if len(a) != len(b):
+            return f"{where}: {len(a)} items are not {len(b)}"
+        return _first((x, y, f"{where}[{i}]") for i, (x, y) in enumerate(zip(a, b, strict=True)))
+    return "" if a == b or (a != a and b != b) else f"{where}: {a!r} is not {b!r}"
+
+
+def freeze(value: Any) -> Any:
+    """Makes every array inside read-only, in place, and returns the value."""
+    if isinstance(value, np.ndarray):
+        value.setflags(write=False)
+    elif dataclasses.is_dataclass(value) and not isinstance(value, type):
+        for field in dataclasses.fields(value):
+            freeze(getattr(value, field.name))
+    elif isinstance(value, Mapping):
+        for item in value.values():
+            freeze(item)
+    elif isinstance(value, (tuple, list)):
+        for item in value:
+            freeze(item)
+    return value
+
+
+def _first(triples: Any) -> str:
+    return next((text for a, b, where in triples if (text := difference(a, b, where))), "")
+
+
+def _array_difference(a: np.ndarray, b: np.ndarray, where: str) -> str:
+    if a.shape != b.shape or a.dtype != b.dtype:
+        return f"{where}: {a.shape} of {a.dtype} is not {b.shape} of {b.dtype}"
+    equal = (a == b) | ((a != a) & (b != b))
+    return "" if equal.all() else f"{where}: {int((~equal).sum())} of {equal.size} elements differ"

@@ -1,0 +1,223 @@
+"""What every task promises. Subclass in your plugin's tests, set `spec`, `options` and `headline`, and say how to
+spoil a prediction:
+
+    class TestMyTask(TaskContract):
+        spec = my_task
+        options = {"width_px": 320, "height_px": 160}
+        headline = "miou"
+
+        def spoil(self, prediction):
+            return np.roll(prediction, 20, axis=1)
+
+Frames come from `gear.testing.synthetic`, so no renderer is needed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path, PurePosixPath
+from typing import Any, ClassVar
+
+import numpy as np
+
+from gear.contracts.specs import TaskSpec
+from gear.contracts.tasks import Encoded, Sample, Sidecar, SplitInfo, Task
+from gear.testing.compare import difference, freeze
+from gear.testing.synthetic import synthetic_frame
+from gear.values.frames import Frame
+from gear.values.geometry import RigidTransform
+from gear.values.scene import SceneRecord
+from gear.values.serial import from_json, to_json
+
+INFO = SplitInfo(town="town10", scene="billboard01", split="val", seed=131, patch_label="none")
+WORLD_FROM_EGO = RigidTransform.from_yaw("world", "ego", (12.0, -34.0, 0.0), 0.7)
+
+
+class TaskContract:
+    """Attributes:
+    spec: the task.
+    options: of its config, small enough for quick tests.
+    headline: name of the figure that tells better from worse.
+    perfect: what the figure is for a perfect prediction.
+    repeats: how often samples are shown to the evaluator before it is read.
+    """
+
+    spec: ClassVar[TaskSpec[Any]]
+    options: ClassVar[Mapping[str, Any]] = {}
+    headline: ClassVar[str]
+    perfect: ClassVar[float] = 1.0
+    repeats: ClassVar[int] = 2
+
+    def spoil(self, prediction: Any) -> Any:
+        """A prediction that is clearly worse."""
+        raise NotImplementedError("say how to spoil a prediction of this task")
+
+    def task(self) -> Task[Any, Any]:
+        """A fresh one."""
+        return self.spec.build(self.spec.config(**self.options))
+
+    def frame(self, index: int = 0) -> tuple[Frame, SceneRecord]:
+        """A synthetic street, seen by the task's rig."""
+        return synthetic_frame(self.task().rig(), index=index, seed=5, world_from_ego=WORLD_FROM_EGO)
+
+    def sample(self, index: int = 0) -> Any:
+        """Its ground truth."""
+        return self.task().ground_truth(*self.frame(index))
+
+    def sidecar(self, sample: Sample, encoded: Encoded) -> Sidecar:
+        """As it comes back from disk: everything has been JSON."""
+        text = json.dumps([to_json(sample.record), to_json(sample.surfaces), encoded.facts], allow_nan=False)
+        record, surfaces, facts = json.loads(text)
+        truths = tuple(from_json(type(old), new) for old, new in zip(sample.surfaces, surfaces, strict=True))
+        return Sidecar(record=from_json(SceneRecord, record), surfaces=truths, facts=facts, files={})
+
+    def write(self, root: Path, indexes: Sequence[int] = (0, 1)) -> list[Sidecar]:
+        """Writes a small split as the collector would."""
+        task, sidecars = self.task(), []
+        for index in indexes:
+            sample = self.sample(index)
+            encoded = task.encode(sample, INFO)
+            sidecars.append(self.sidecar(sample, encoded))
+            _put(root, encoded.files)
+        _put(root, task.finalise(sidecars, INFO))
+        return sidecars
+
+    def test_spec_says_what_it_is(self) -> None:
+        """Name, summary, layout and a config with defaults."""
+        spec = self.spec
+        assert re.fullmatch(r"[a-z][a-z0-9_]*", spec.name)
+        assert spec.summary and "\n" not in spec.summary
+        assert spec.layout
+        assert dataclasses.is_dataclass(spec.config)
+        assert spec.config() == spec.config(), "every option needs a default"
+
+    def test_rig_has_the_views_of_the_spec(self) -> None:
+        """The rig's cameras are the spec's views."""
+        rig = self.task().rig()
+        assert tuple(camera.name for camera in rig.cameras) == self.spec.views
+        assert rig == self.task().rig()
+
+    def test_sample_has_images_and_surfaces(self) -> None:
+        """Pictures of every view, as rendered; every surface in every view."""
+        frame, record = self.frame()
+        sample = self.task().ground_truth(frame, record)
+        assert sample.record == record
+        assert set(sample.images) == set(self.spec.views)
+        for name, image in sample.images.items():
+            camera = record.camera(name)
+            assert image.shape == (camera.height_px, camera.width_px, 3)
+            assert image.dtype == np.uint8
+            assert not difference(image, frame.views[name].rgb)
+        expected = [(camera.name, surface.name) for camera in record.cameras for surface in record.surfaces]
+        assert [(truth.camera, truth.name) for truth in sample.surfaces] == expected
+
+    def test_ground_truth_leaves_the_frame_alone_and_repeats(self) -> None:
+        """Same frame, same sample; frozen input will do."""
+        frame, record = freeze(self.frame())
+        untouched, _ = self.frame()
+        first = self.task().ground_truth(frame, record)
+        second = self.task().ground_truth(frame, record)
+        assert not difference(first, second)
+        assert not difference(frame.views, untouched.views)
+
+    def test_encode_is_pure(self) -> None:
+        """Same sample, same bytes, and the sample is untouched."""
+        sample = freeze(self.sample())
+        first, second = self.task().encode(sample, INFO), self.task().encode(sample, INFO)
+        assert first.files == second.files
+        assert first.facts == second.facts
+        assert not difference(sample, self.sample())
+
+    def test_facts_are_json(self) -> None:
+        """Facts survive JSON as they are."""
+        facts = self.task().encode(self.sample(), INFO).facts
+        assert json.loads(json.dumps(facts, allow_nan=False)) == facts
+
+    def test_paths_stay_inside_and_apart(self, tmp_path: Path) -> None:
+        """No path leaves the root, none is written twice."""
+        task, sidecars = self.task(), self.write(tmp_path)
+        samples = [set(task.encode(self.sample(index), INFO).files) for index in (0, 1)]
+        indexes = set(task.finalise(sidecars, INFO))
+        assert not samples[0] & samples[1] and not (samples[0] | samples[1]) & indexes
+        for name in samples[0] | samples[1] | indexes:
+            path = PurePosixPath(name)
+            assert not path.is_absolute() and ".." not in path.parts and "\\" not in name and str(path) == name
+            assert path.parts[0] != "gear", "the dataset room keeps its own files there"
+
+    def test_splits_share_a_root(self) -> None:
+        """Two splits write different files."""
+        task, sample = self.task(), self.sample()
+        other = dataclasses.replace(INFO, split="test")
+        assert not set(task.encode(sample, INFO).files) & set(task.encode(sample, other).files)
+
+    def test_reading_gives_back_what_was_written(self, tmp_path: Path) -> None:
+        """`decode` is the inverse of `encode`, to the last bit."""
+        for index, sidecar in enumerate(self.write(tmp_path)):
+            read = self.task().decode(tmp_path, sidecar, INFO)
+            assert not difference(read, self.sample(index))
+
+    def test_finalise_repeats_and_needs_no_files(self, tmp_path: Path) -> None:
+        """Index files follow from the sidecars alone."""
+        sidecars = freeze(self.write(tmp_path))
+        first, second = self.task().finalise(sidecars, INFO), self.task().finalise(sidecars, INFO)
+        assert first == second
+        assert {name: (tmp_path / name).read_bytes() for name in first} == dict(first)
+
+    def test_finalise_takes_an_empty_split(self) -> None:
+        """A split without samples has index files too."""
+        assert all(isinstance(data, bytes) for data in self.task().finalise([], INFO).values())
+
+    def test_perfect_prediction_is_perfect(self) -> None:
+        """Ground truth scores perfect against itself."""
+        result = self.evaluate([0, 1])
+        assert math.isclose(result[self.headline], self.perfect, abs_tol=1e-9), result
+
+    def test_spoilt_prediction_is_worse(self) -> None:
+        """The headline can tell better from worse."""
+        result = self.evaluate([0, 1], spoilt=True)
+        assert abs(result[self.headline] - self.perfect) > 1e-3, result
+
+    def test_merged_evaluators_say_the_same(self) -> None:
+        """Two halves merged are the whole."""
+        whole = self.evaluate([0, 1])
+        parts = [self._gather(self.task().evaluator(), [index]) for index in (0, 1)]
+        parts[0].merge(parts[1])
+        assert not difference(dict(parts[0].result()), dict(whole))
+
+    def test_an_empty_evaluator_says_nan(self) -> None:
+        """Nothing gathered, no figure."""
+        result = self.task().evaluator().result()
+        assert all(value != value for value in result.values())
+
+    def test_preview_shows_pictures(self) -> None:
+        """At least one picture, in RGB."""
+        sample = freeze(self.sample())
+        pictures = self.task().preview(sample)
+        assert pictures
+        for picture in pictures.values():
+            assert picture.dtype == np.uint8 and picture.ndim == 3 and picture.shape[2] == 3
+
+    def evaluate(self, indexes: Sequence[int], *, spoilt: bool = False) -> Mapping[str, float]:
+        """The figures of ground truth as a prediction, as it is or spoilt."""
+        result: Mapping[str, float] = self._gather(self.task().evaluator(), indexes, spoilt=spoilt).result()
+        return result
+
+    def _gather(self, evaluator: Any, indexes: Sequence[int], *, spoilt: bool = False) -> Any:
+        task = self.task()
+        for index in indexes:
+            sample = freeze(self.sample(index))
+            prediction = freeze(task.as_prediction(sample))
+            for _ in range(self.repeats):
+                evaluator.update(sample, self.spoil(prediction) if spoilt else prediction)
+        return evaluator
+
+
+def _put(root: Path, files: Mapping[str, bytes]) -> None:
+    for name, data in files.items():
+        path = root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(data)

@@ -1,0 +1,144 @@
+import contextlib
+import io
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+from pycocotools import mask as coco_mask
+from pycocotools.coco import COCO
+from pycocotools.cocoeval import COCOeval
+
+from gear.formats import rle
+from gear.groundtruth.visibility import VisibilityLimits
+from gear.plugins.tasks.detect2d import Detect2dConfig, Detect2dTask, detect2d
+from gear.testing.synthetic import CAR, CYCLIST, PERSON, Thing, synthetic_frame
+from gear.testing.task_contract import TaskContract
+
+# pycocotools 2.0.11 has not caught up with NumPy 2's protocol.
+pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
+
+
+def load(path: Path) -> COCO:
+    with contextlib.redirect_stdout(io.StringIO()):
+        return COCO(str(path))
+
+
+class TestDetect2d(TaskContract):
+    spec = detect2d
+    options: ClassVar = {"width_px": 667, "height_px": 400}
+    headline = "ap"
+
+    def spoil(self, prediction: Any) -> Any:
+        return tuple(replace(found, box_px=tuple(v + 9 for v in found.box_px)) for found in prediction)
+
+    def test_pycocotools_reads_exact_masks_boxes_and_areas(self, tmp_path: Path) -> None:
+        self.write(tmp_path)
+        both = [tmp_path / "annotations/instances_val.json", tmp_path / "annotations/val/coco_annotations.json"]
+        assert both[0].read_bytes() == both[1].read_bytes()
+        coco = load(both[0])
+        assert len(coco.cats) == 80
+        assert sorted(coco.anns) == list(range(1, len(coco.anns) + 1))
+        for image_id in coco.imgs:
+            frame, _ = self.frame(image_id)
+            view = frame.views["left"]
+            picture = tmp_path / "images/val" / coco.imgs[image_id]["file_name"]
+            assert picture.is_file()
+            annotations = coco.imgToAnns[image_id]
+            assert {a["category_id"] for a in annotations} >= {1, 2, 3, 8, 10}
+            for annotation in annotations:
+                mask = coco.annToMask(annotation).astype(bool)
+                of_object = frame.geoms.object_id[view.geom_id] == annotation["gear"]["object_id"]
+                assert (mask & (view.geom_id < 0)).sum() == 0
+                assert (mask & ~of_object).sum() == 0
+                assert annotation["area"] == mask.sum() == coco_mask.area(coco.annToRLE(annotation))
+                assert annotation["bbox"] == list(coco_mask.toBbox(coco.annToRLE(annotation)))
+        assert any(a["iscrowd"] == 0 for a in coco.anns.values())
+
+    @pytest.mark.parametrize("kind", ["bbox", "segm"])
+    def test_ground_truth_scores_perfect_with_the_official_tool(self, tmp_path: Path, kind: str) -> None:
+        self.write(tmp_path)
+        coco = load(tmp_path / "annotations/instances_val.json")
+        found = [
+            {k: a[k] for k in ("image_id", "category_id", "bbox", "segmentation")} | {"score": 0.9}
+            for a in coco.anns.values()
+            if not a["iscrowd"]
+        ]
+        with contextlib.redirect_stdout(io.StringIO()):
+            evaluation = COCOeval(coco, coco.loadRes(found), kind)
+            evaluation.evaluate()
+            evaluation.accumulate()
+            evaluation.summarize()
+        assert evaluation.stats[0] == pytest.approx(1.0)
+
+    def test_half_an_iou_is_scored_as_by_hand(self) -> None:
+        # Boxes shrunk to 82 % of their width have IoU 0.82: right at 0.50, .55, …, .80 and wrong at .85, .90, .95.
+        task, sample = self.task(), self.sample()
+        evaluator = task.evaluator()
+        shrunk = []
+        for found in task.as_prediction(sample):
+            left, top, right, bottom = found.box_px
+            shrunk.append(replace(found, box_px=(left, top, left + 0.82 * (right - left), bottom)))
+        evaluator.update(sample, tuple(shrunk))
+        result = evaluator.result()
+        assert result["ap"] == pytest.approx(0.7)
+        assert result["ap50"] == pytest.approx(1.0)
+
+
+def observe(things: list[Thing], **limits: Any) -> list[Any]:
+    task = Detect2dTask(Detect2dConfig(width_px=667, height_px=400, visibility=VisibilityLimits(**limits)))
+    sample = task.ground_truth(*synthetic_frame(task.rig(), things))
+    return list(sample.objects)
+
+
+def car(ahead_m: float, left_m: float = 0.0, object_id: int = 2) -> Thing:
+    return Thing(parts=CAR, position_m=(ahead_m, left_m, 0.0), object_id=object_id, role="npc")
+
+
+def test_a_cyclist_is_a_bicycle_and_a_person() -> None:
+    objects = observe([Thing(parts=CYCLIST, position_m=(9.0, 0.0, 0.0), object_id=2, role="npc")])
+    assert sorted((o.category_id, o.label) for o in objects) == [(1, "rider"), (2, "bicycle")]
+    bicycle, rider = sorted(objects, key=lambda o: -o.category_id)
+    assert rider.box_px[3] <= bicycle.box_px[1] + 2
+
+
+def test_a_far_car_is_ignored_not_labelled() -> None:
+    (near,) = observe([car(12.0)])
+    assert not near.is_ignored
+    (far,) = observe([car(12.0)], max_distance_m=10.0)
+    assert far.is_ignored
+    assert far.distance_m == pytest.approx(np.hypot(10.5, 0.9), abs=1e-3)
+
+
+def test_a_hidden_person_is_never_labelled_as_whole() -> None:
+    behind = Thing(parts=PERSON, position_m=(16.0, 0.0, 0.0), object_id=3, role="pedestrian")
+    objects = {o.object_id: o for o in observe([car(10.0), behind], min_box_area_px2=0, min_visible_px=0)}
+    person = objects[3]
+    assert person.occluded_fraction > 0.4
+    assert person.amodal_box_px[3] > person.box_px[3] + 10
+    assert person.visible_fraction == pytest.approx(1 - person.occluded_fraction, abs=1e-6)
+    (ignored,) = (o for o in observe([car(10.0), behind], min_visible_fraction=0.95) if o.object_id == 3)
+    assert ignored.is_ignored
+
+
+def test_a_cropped_car_says_so() -> None:
+    (cropped,) = observe([car(4.5, 3.0)])
+    assert cropped.truncated_fraction > 0.3
+    assert cropped.amodal_box_px[0] < 0 <= cropped.box_px[0]
+
+
+def test_three_pixels_are_not_mentioned() -> None:
+    far = car(150.0)
+    (seen,) = observe([far], min_pixels_px=1)
+    assert seen.area_px > 3
+    assert observe([far], min_pixels_px=seen.area_px + 1) == []
+
+
+def test_annotations_keep_the_masks_order(tmp_path: Path) -> None:
+    objects = observe([car(10.0, 2.0, 2), car(12.0, -2.0, 3)])
+    left, right = objects
+    assert rle.decode(left.rle, 400, 667)[:, :333].any() and not rle.decode(left.rle, 400, 667)[:, 333:].any()
+    assert rle.decode(right.rle, 400, 667)[:, 334:].any()
+    assert json.dumps(left.rle)
