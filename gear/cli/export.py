@@ -25,7 +25,7 @@ def run(args: argparse.Namespace) -> int:
     from gear.cli.progress import ProgressBar
     from gear.verbs.export import export
 
-    with ProgressBar() as progress:
+    with ProgressBar("file") as progress:
         count = export(args.dataset, layout=args.layout, out=args.out, progress=progress)
     print(f"{args.out}: {count} samples in the layout {args.layout}")
     return 0

@@ -18,7 +18,7 @@ class ProgressBar:
         """Shows `finished` of `total`."""
         if self._bar is None:
             self._bar = tqdm(
-                total=total, initial=finished, unit=self._unit, disable=None, dynamic_ncols=True, smoothing=0.1
+                total=total or None, initial=finished, unit=self._unit, disable=None, dynamic_ncols=True, smoothing=0.1
             )
             return
         self._bar.update(finished - self._bar.n)

@@ -58,7 +58,9 @@ def test_nothing_names_a_machine() -> None:
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False).stdout.split()
     texts = [ROOT / name for name in listed if Path(name).suffix in {".py", ".md", ".yml", ".toml", ".xml", ".cff", ""}]
     guilty = [
-        p.name for p in texts if p.is_file() and re.search(r"(?<!\w)/(work|root|tmp)/[a-z]", p.read_text(errors="ignore"))
+        p.name
+        for p in texts
+        if p.is_file() and re.search(r"(?<!\w)/(work|root|tmp)/[a-z]", p.read_text(errors="ignore"))
     ]
     assert [name for name in guilty if name != Path(__file__).name] == []
 
