@@ -29,6 +29,8 @@ from gear.values.scene import CameraRecord
 
 _SAMPLES = {"film": 4, "fast": 0}
 _EXTRA_GEOMS = 100
+_SHADOW_AHEAD_M = 50.0
+_SHADOW_HEIGHT_M = 300.0
 _FLAGS = mujoco.mjtRndFlag
 
 
@@ -146,6 +148,11 @@ class ClassicRenderer:
             gl_camera.frustum_top = frustum.half_height_m
             gl_camera.frustum_near = NEAR_M
             gl_camera.frustum_far = FAR_M
+        for light in self._scene.lights[: self._scene.nlight]:
+            if light.type == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL:
+                # Shadows are cast from here, on a square about the line of the light.
+                centre = frustum.position_world_m + _SHADOW_AHEAD_M * frustum.forward_world
+                light.pos[:] = centre - _SHADOW_HEIGHT_M * light.dir
         if self._size != (camera.width_px, camera.height_px):
             self._size = (camera.width_px, camera.height_px)
             mujoco.mjr_resizeOffscreen(*self._size, self._context)

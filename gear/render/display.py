@@ -8,6 +8,11 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+SHADOW_REACH_M = 60.0
+"""Half the side of the square on which classic's sun casts shadows; the renderer lays it before the camera."""
+
+_DEFAULT_RGBA = np.array([0.5, 0.5, 0.5, 1.0], np.float32)
+
 
 def encode_srgb(linear: npt.ArrayLike) -> npt.NDArray[np.float64]:
     """Linear light (...) in 0..1 to sRGB values in 0..1."""
@@ -29,13 +34,19 @@ def displayed_model(model: mujoco.MjModel) -> mujoco.MjModel:
 
     OpenGL would decode a texture that is marked sRGB, light it, and show the linear result as it is: far too dark. In
     the copy such textures are not marked, and linear colours of geoms and materials are encoded. Lights of the
-    kind `image`, which OpenGL does not have, are off, and so is the headlight.
+    kind `image`, which OpenGL does not have, are off, and of the headlight only its ambient light remains.
     """
     shown = copy.copy(model)
     shown.tex_colorspace[:] = mujoco.mjtColorSpace.mjCOLORSPACE_LINEAR
     if has_linear_colours(model):
-        for rgba in (shown.mat_rgba, shown.geom_rgba):
-            rgba[:, :3] = encode_srgb(rgba[:, :3])
+        shown.mat_rgba[:, :3] = encode_srgb(shown.mat_rgba[:, :3])
+        # A geom with a material and this very colour shows the material's, so it must keep it.
+        own = (shown.geom_matid < 0) | (shown.geom_rgba != _DEFAULT_RGBA).any(axis=1)
+        shown.geom_rgba[own, :3] = encode_srgb(shown.geom_rgba[own, :3])
+        strength = np.maximum(shown.light_diffuse.max(axis=1, keepdims=True), 1e-6)
+        shown.light_diffuse[:] = strength * encode_srgb(shown.light_diffuse / strength)
     shown.light_active[shown.light_type == mujoco.mjtLightType.mjLIGHT_IMAGE] = 0
-    shown.vis.headlight.active = 0
+    shown.vis.headlight.diffuse[:] = 0
+    shown.vis.headlight.specular[:] = 0
+    shown.vis.map.shadowclip = SHADOW_REACH_M / shown.stat.extent
     return shown

@@ -20,6 +20,7 @@ Floats = npt.NDArray[np.float64]
 
 WHITE_ALBEDO = 0.7
 WHITE_LEVEL = 0.85
+SKY_LEVEL = 0.9
 FILAMENT_LUX = 38400.0
 """Filament's fixed exposure (f/16, 1/125 s, ISO 100) shows a radiance of so many cd/m² as 1.0."""
 
@@ -59,7 +60,8 @@ def lighting_of(weather: Weather, *, sky_face_px: int = SKY_FACE_PX) -> Lighting
         float((klx + sky.sun_klx * max(float(normal @ sky.towards_sun), 0.0)).max())
         for klx, normal in zip(from_sky, walls, strict=True)
     )
-    exposure = WHITE_LEVEL / (WHITE_ALBEDO / math.pi * brightest)
+    bright_sky = float(np.quantile(radiance[coarse[..., 2] > 0].max(axis=-1), 0.9))
+    exposure = min(WHITE_LEVEL / (WHITE_ALBEDO / math.pi * brightest), SKY_LEVEL / bright_sky)
     faces = encode_srgb(exposure * sky.radiance(face_directions(sky_face_px)))
     return Lighting(
         towards_sun=sky.towards_sun,

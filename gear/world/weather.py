@@ -12,7 +12,7 @@ from gear.config.nodes import Mapping, Scalar, parse_file
 from gear.config.reader import read_node
 from gear.values.resources import data_dir
 from gear.values.scene import Weather
-from gear.world.light import FACE_ORDER, FILAMENT_LUX, Lighting, encode_srgb, lighting_of
+from gear.world.light import FACE_ORDER, FILAMENT_LUX, Floats, Lighting, encode_srgb, lighting_of
 
 WET_LABELS = frozenset({"road", "road_marking", "sidewalk", "parking", "ground"})
 """What lies open to the rain and holds its water."""
@@ -20,7 +20,9 @@ WET_LABELS = frozenset({"road", "road_marking", "sidewalk", "parking", "ground"}
 _WET_DARKENING = 0.45
 _WET_SMOOTHING = 0.7
 _DENSEST_FOG_PER_M = 0.05
-_CLASSIC_SUN_SHARE = 0.75
+_CLASSIC_WHITE = 1.1
+_CLASSIC_SKY_SHARE = (0.4, 0.95)
+_CLASSIC_TINT = 0.2
 
 
 def _read_presets() -> dict[str, Weather]:
@@ -78,7 +80,6 @@ def _remove_old_light(root: mjcf.RootElement) -> None:
     for element in [*root.find_all("text"), *root.find_all("numeric")]:
         if element.name.rsplit("/", 1)[-1].startswith("filament."):
             element.remove()
-    root.visual.headlight.active = 0
 
 
 def _add_sky(root: mjcf.RootElement, lighting: Lighting) -> None:
@@ -96,36 +97,35 @@ def _add_sky(root: mjcf.RootElement, lighting: Lighting) -> None:
 
 
 def _add_sun(root: mjcf.RootElement, lighting: Lighting) -> None:
-    """One light for both: Filament multiplies `intensity` and `diffuse`, OpenGL knows `diffuse` and `ambient`.
+    """The sun for both renderers, and for OpenGL the sky's ambient light as well.
 
-    OpenGL shows light as it is added up, without a tone curve: its shares of sun and sky are those of display values.
+    Filament multiplies `intensity` and `diffuse`; OpenGL knows `diffuse` alone. It shows light as it is added up,
+    without a tone curve, so its shares of sun and sky are those of display values. Its ambient light hangs on the
+    headlight because shadows would swallow that of the sun.
     """
-    sky_share = _display(lighting.ambient) / _display(lighting.ambient + lighting.sun * lighting.towards_sun[2])
-    ambient = np.clip(sky_share, 0.35, 1.0) * _balanced(lighting.ambient)
-    strength = _CLASSIC_SUN_SHARE * float(1.15 - np.clip(sky_share, 0.35, 1.0).mean())
-    colour = lighting.sun / lighting.sun.max()
+    sunlit = lighting.ambient + lighting.sun
+    sky_share = float(np.clip((_display(lighting.ambient) / _display(sunlit)).mean(), *_CLASSIC_SKY_SHARE))
+    strength = _CLASSIC_WHITE - sky_share
     root.worldbody.add(
         "light",
         name="sun",
         type="directional",
         dir=tuple(-lighting.towards_sun),
         pos=tuple(200 * lighting.towards_sun),
-        diffuse=tuple(strength * colour),
-        ambient=tuple(ambient),
+        diffuse=tuple(strength * lighting.sun / lighting.sun.max()),
+        ambient=(0, 0, 0),
         specular=(0.1, 0.1, 0.1),
         intensity=float(lighting.sun.max() * FILAMENT_LUX / strength),
         castshadow=True,
     )
+    tint = (lighting.ambient / lighting.ambient.mean()) ** _CLASSIC_TINT
+    headlight = root.visual.headlight
+    headlight.active, headlight.ambient = 1, tuple(sky_share * tint)
+    headlight.diffuse = headlight.specular = (0, 0, 0)
 
 
-def _display(light: Any) -> Any:
-    return encode_srgb(np.asarray(light)).astype(np.float64) / 255
-
-
-def _balanced(light: Any) -> Any:
-    """Half the tint of a light, none of its strength."""
-    tint = np.asarray(light) / max(float(np.mean(light)), 1e-9)
-    return np.sqrt(tint)
+def _display(light: Floats) -> Floats:
+    return encode_srgb(light).astype(np.float64) / 255
 
 
 def _add_haze(root: mjcf.RootElement, weather: Weather, lighting: Lighting) -> None:
