@@ -15,9 +15,9 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from gear.values.errors import GearError
     from gear.verbs.collect.run import CollectReport, collect
     from gear.verbs.opening import Dataset, Twins, open_dataset, open_twins
-    from gear.values.errors import GearError
 
 __all__ = ["CollectReport", "Dataset", "GearError", "Twins", "collect", "open_dataset", "open_twins"]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from types import TracebackType
+from typing import Any
 
 from tqdm import tqdm
 
@@ -12,7 +13,7 @@ class ProgressBar:
 
     def __init__(self, unit: str = "sample") -> None:
         self._unit = unit
-        self._bar: tqdm[None] | None = None
+        self._bar: tqdm[Any] | None = None
 
     def __call__(self, finished: int, total: int) -> None:
         """Shows `finished` of `total`."""

@@ -52,10 +52,9 @@ def export(
         if target.exists() and any(target.iterdir()):
             raise DatasetError(target, "is not empty; export into a new folder")
         target.mkdir(parents=True, exist_ok=True)
-    written = 0
-    for relative, data in known[layout].tree(splits, lambda path: read_bytes(inside(source, path))):
+    tree = known[layout].tree(splits, lambda path: read_bytes(inside(source, path)))
+    for written, (relative, data) in enumerate(tree, start=1):
         write_whole(target, relative, data)
-        written += 1
         if progress is not None:
             progress(written, 0)
     clear_scratch(target)

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dm_control import mjcf
-
 from gear.values.errors import TownError
 from gear.world.faces import FACE_SIZE_PX
+from gear.world.quiet_mjcf import mjcf
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,13 +6,13 @@ from typing import Any
 
 import cv2
 import numpy as np
-from dm_control import mjcf
 
 from gear.config.nodes import Mapping, Scalar, parse_file
 from gear.config.reader import read_node
 from gear.values.resources import data_dir
 from gear.values.scene import Weather
 from gear.world.light import FACE_ORDER, FILAMENT_LUX, Floats, Lighting, encode_srgb, lighting_of
+from gear.world.quiet_mjcf import mjcf
 
 WET_LABELS = frozenset({"road", "road_marking", "sidewalk", "parking", "ground"})
 """What lies open to the rain and holds its water."""

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 import pytest
-from dm_control import mjcf
+from gear.world.quiet_mjcf import mjcf
 
 from authoring.surfaces.billboard import write_billboard
 from authoring.surfaces.face import FACE_SIZE_PX
