@@ -1,4 +1,4 @@
-"""Foliage: lumpy masses with a leafy texture inside, and twigs with leaves of geometry that stand out of them."""
+"""Foliage: lumpy masses with a leafy texture inside, and sprays of leaves, geometry too, that stand out of them."""
 
 from __future__ import annotations
 
@@ -56,62 +56,55 @@ def lump(
     )
 
 
-def scatter_sprigs(
+def scatter_leaves(
     sink: Sink,
     material: str,
     centres: Array,
     radii_m: Array,
     *,
     count: int,
-    leaf_m: float,
+    length_m: float,
     around: Array,
     rng: np.random.Generator,
-    simple: bool = False,
+    reach: tuple[float, float] = (0.7, 1.05),
 ) -> None:
-    """Twigs on the surfaces of foliage masses, three leaves each, every leaf seen from both sides.
+    """Sprays of leaves on foliage masses: one pointed triangle each, seen from both sides, with leaves drawn on it.
 
     Args:
         sink: takes the faces.
         material: a foliage material.
         centres: (K, 3) of the masses.
-        radii_m: (K,) of the masses.
-        count: twigs in all; larger masses get more.
-        leaf_m: length of a leaf.
+        radii_m: (K, 3) half extents of the masses.
+        count: sprays in all; larger masses get more.
+        length_m: of a spray; the texture keeps its own scale, so that a long spray shows several leaves.
         around: (3,) or (K, 3), the middle that leaves point away from.
         rng: places and turns them.
-        simple: one leaf a twig, for the distance.
+        reach: where a spray's foot is between a mass's centre (0) and its surface (1).
     """
-    share = radii_m**2 / (radii_m**2).sum()
-    mass = rng.choice(len(centres), size=count, p=share)
+    share = radii_m[:, 0] ** 2
+    mass = rng.choice(len(centres), size=count, p=share / share.sum())
     middle = np.broadcast_to(around, centres.shape)[mass]
-    direction = _unit(rng.normal(size=(count, 3)) + 0.9 * _unit(centres[mass] - middle) + (0, 0, 0.1))
-    foot = centres[mass] + direction * (radii_m[mass] * rng.uniform(0.82, 1.04, count))[:, None]
-    outward = _unit(direction + 0.5 * _unit(foot - middle))
-    side = _unit(np.cross(outward, rng.normal(size=(count, 3))))
-    other = np.cross(outward, side)
-    leaves = 1 if simple else 3
-    angle = np.arange(leaves) * 2 * np.pi / leaves + rng.uniform(-0.5, 0.5, (count, leaves))
-    spread = np.cos(angle)[..., None] * side[:, None] + np.sin(angle)[..., None] * other[:, None]
-    along = _unit(spread + outward[:, None] * rng.uniform(0.2, 0.8, (count, leaves, 1)) - (0, 0, 0.35))
-    across = _unit(np.cross(along, outward[:, None]))
-    length = leaf_m * rng.uniform(0.7, 1.25, (count, leaves, 1))
-    width = length * 0.36
-    fold = np.cross(across, along) * width * 0.5
-    base = np.broadcast_to(foot[:, None], along.shape)
-    # A leaf is two triangles folded along its midrib: base, right, tip and base, tip, left.
-    right = base + along * length * 0.45 + across * width + fold
-    left = base + along * length * 0.45 - across * width + fold
-    tip = base + along * length
-    corners = np.stack([base, right, tip, left], 2).reshape(-1, 3)
-    quads = np.arange(len(corners)).reshape(-1, 4)
-    faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-    normals = _unit(outward[:, None] + 0.45 * np.cross(across, along)).reshape(-1, 3).repeat(4, 0)
-    # Each leaf samples its own spot of the foliage texture, small enough to be nearly one shade.
-    spot = rng.uniform(0, 1, (len(quads), 1, 2))
-    shape = np.array([(0.0, 0.0), (0.05, 0.05), (0.0, 0.1), (-0.05, 0.05)])
-    uvs = (spot + shape).reshape(-1, 2)
-    sink.triangles(material, corners, faces, uvs=uvs, normals=normals)
-    sink.triangles(material, corners, faces[:, ::-1], uvs=uvs, normals=normals)
+    outside = _unit(centres[mass] - middle)
+    direction = _unit(rng.normal(size=(count, 3)) + 1.1 * outside + (0, 0, 0.15))
+    foot = centres[mass] + direction * radii_m[mass] * rng.uniform(*reach, (count, 1))
+    outward = _unit(direction + 0.6 * outside)
+    along = _unit(_unit(rng.normal(size=(count, 3))) + 0.75 * outward - (0, 0, 0.25))
+    across = _unit(np.cross(along, _unit(outward + 0.7 * rng.normal(size=(count, 3)))))
+    length = length_m * rng.uniform(0.6, 1.35, (count, 1))
+    width = length * rng.uniform(0.26, 0.40, (count, 1))
+    skew = along * length * rng.uniform(-0.1, 0.25, (count, 1))
+    back = foot - along * length * 0.25
+    corners = np.stack([back - across * width, back + across * width + skew, back + along * length], 1).reshape(-1, 3)
+    faces = np.arange(len(corners)).reshape(-1, 3)
+    face_normal = np.cross(across, along)
+    face_normal *= np.sign((face_normal * outward).sum(-1, keepdims=True))
+    normals = _unit(outward + 0.55 * face_normal + (0, 0, 0.3)).repeat(3, 0)
+    tile_m = MATERIALS[material].tile_m
+    shape = np.stack([-width, width, np.zeros_like(width)], 1)
+    rise = np.stack([np.zeros_like(length), length * 0.1, length], 1)
+    uvs = rng.uniform(0, 1, (count, 1, 2)) + np.concatenate([shape, rise], -1) / tile_m
+    sink.triangles(material, corners, faces, uvs=uvs.reshape(-1, 2), normals=normals)
+    sink.triangles(material, corners, faces[:, ::-1], uvs=uvs.reshape(-1, 2), normals=normals)
 
 
 def _unit(vectors: Array) -> Array:

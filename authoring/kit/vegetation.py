@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from authoring.kit.leaves import lump, scatter_sprigs
+from authoring.kit.leaves import lump, scatter_leaves
 from authoring.kit.parts import Part, Sink
 from authoring.kit.shapes import cylinder, ring_faces, sweep
 from authoring.materials.registry import MATERIALS
@@ -25,8 +25,8 @@ class Species:
         centre: height of the crown's middle.
         lumps: masses of foliage that make the crown.
         lump: radius of one.
-        sprigs: twigs with leaves in a near tree.
-        leaf_m: length of a leaf as drawn; a drawn leaf stands for a few real ones.
+        leaves: sprays of leaves on a near tree.
+        leaf_m: length of a spray on a tree of 8 m.
         trunk: radius at the foot.
         taper: how much the crown narrows upwards: 0 ellipsoid, 1 cone.
     """
@@ -36,7 +36,7 @@ class Species:
     centre: float
     lumps: int
     lump: float
-    sprigs: int
+    leaves: int
     leaf_m: float
     trunk: float
     taper: float = 0.0
@@ -44,27 +44,35 @@ class Species:
 
 SPECIES: dict[str, Species] = {
     "broad": Species(
-        foliage="foliage_green", crown=(0.36, 0.31), centre=0.66, lumps=11, lump=0.17, sprigs=420, leaf_m=0.34, trunk=0.026
+        foliage="foliage_green", crown=(0.37, 0.33), centre=0.65, lumps=30, lump=0.125, leaves=1500, leaf_m=0.30, trunk=0.026
     ),
     "columnar": Species(
-        foliage="foliage_light", crown=(0.14, 0.42), centre=0.55, lumps=10, lump=0.115, sprigs=420, leaf_m=0.26, trunk=0.016
+        foliage="foliage_light", crown=(0.14, 0.42), centre=0.55, lumps=26, lump=0.082, leaves=1500, leaf_m=0.24, trunk=0.016
     ),
     "street": Species(
-        foliage="foliage_olive", crown=(0.26, 0.27), centre=0.68, lumps=8, lump=0.145, sprigs=420, leaf_m=0.24, trunk=0.017
+        foliage="foliage_olive", crown=(0.26, 0.28), centre=0.68, lumps=24, lump=0.105, leaves=1500, leaf_m=0.24, trunk=0.017
     ),
     "conifer": Species(
         foliage="foliage_dark",
-        crown=(0.21, 0.47),
+        crown=(0.22, 0.47),
         centre=0.54,
-        lumps=14,
-        lump=0.10,
-        sprigs=460,
-        leaf_m=0.36,
+        lumps=30,
+        lump=0.085,
+        leaves=1500,
+        leaf_m=0.34,
         trunk=0.017,
         taper=1.0,
     ),
     "linden": Species(
-        foliage="foliage_light", crown=(0.25, 0.36), centre=0.60, lumps=11, lump=0.14, sprigs=420, leaf_m=0.28, trunk=0.022, taper=0.45
+        foliage="foliage_light",
+        crown=(0.26, 0.37),
+        centre=0.60,
+        lumps=28,
+        lump=0.105,
+        leaves=1500,
+        leaf_m=0.26,
+        trunk=0.022,
+        taper=0.45,
     ),
 }
 
@@ -87,19 +95,27 @@ def tree(species: str, height_m: float, rng: np.random.Generator, *, lod: str = 
     habit = SPECIES[species]
     near = lod == "near"
     sink = Sink("vegetation")
-    centres, radii = _crown(habit, height_m, rng, lumps=habit.lumps if near else max(4, habit.lumps // 2))
+    centres, radii = _crown(habit, height_m, rng, lumps=habit.lumps if near else 9)
     if not near:
-        radii = radii * 1.18
+        radii = radii * 1.5
     _wood(sink, habit, height_m, centres, near=near, rng=rng)
     middle = np.array([0.0, 0.0, habit.centre * height_m])
     for centre, radius in zip(centres, radii, strict=True):
-        squash = (1.0, 1.0, 0.62 if habit.taper == 1.0 else 0.85)
-        lump(sink, habit.foliage, centre, radius * np.asarray(squash), around=middle, detail=1 if near else 0, rng=rng)
-    sprigs = habit.sprigs if near else 40
-    leaf_m = habit.leaf_m * (height_m / 8) ** 0.35 * (1.0 if near else 2.6)
-    scatter_sprigs(
-        sink, habit.foliage, centres, radii, count=sprigs, leaf_m=leaf_m, around=middle, simple=not near, rng=rng
-    )
+        lump(sink, habit.foliage, centre, radius, around=middle, detail=0, rng=rng)
+    length_m = habit.leaf_m * (height_m / 8) ** 0.5
+    layers = ((0.42, 1.9, (0.75, 1.0)), (0.58, 0.8, (0.85, 1.15))) if near else ((0.035, 4.0, (0.7, 0.95)),)
+    for share, size, reach in layers:
+        scatter_leaves(
+            sink,
+            habit.foliage,
+            centres,
+            radii,
+            count=round(habit.leaves * share),
+            length_m=length_m * size,
+            around=middle,
+            reach=reach,
+            rng=rng,
+        )
     return sink.parts()
 
 
@@ -132,15 +148,7 @@ def hedge(length_m: float, height_m: float, depth_m: float, rng: np.random.Gener
         normal = np.tile([float(order), 0.0, 0.0], (len(ring), 1))
         faces = [(0, i, i + 1) for i in range(1, len(ring) - 1)]
         sink.triangles("foliage_dark", ring, faces, uvs=ring[:, 1:] / tile_m, normals=normal)
-    area = length_m * (2 * height_m + depth_m)
-    seeds = points[:, 1:-1].reshape(-1, 3)
-    inside = seeds * (1.0, 0.6, 0.8)
-    pick = rng.integers(len(seeds), size=int(area * 14))
-    at = seeds[pick] + rng.uniform(-0.22, 0.22, (len(pick), 3)) * (1, 0.3, 0.6)
-    out = seeds[pick] - inside[pick]
-    scatter_sprigs(
-        sink, "foliage_dark", at, np.full(len(at), 0.01), count=len(at), leaf_m=0.1, around=at - out - (0, 0, 0.02), rng=rng
-    )
+    _hedge_leaves(sink, length_m, height_m, depth_m, rng)
     return sink.parts()
 
 
@@ -196,41 +204,73 @@ def planter(kind: str, rng: np.random.Generator) -> list[Part]:
     else:
         raise ValueError(f"no planter named {kind!r}; there are box, round, wood")
     for x in np.linspace(-half_w * 0.6, half_w * 0.6, 1 if kind == "round" else 3):
-        _bush(sink, np.array([x, 0.0, top - 0.15]), float(rng.uniform(0.45, 0.7)), "foliage_green", rng=rng, sprigs=60)
+        _bush(sink, np.array([x, 0.0, top - 0.15]), float(rng.uniform(0.45, 0.7)), "foliage_green", rng=rng, leaves=150)
     flower = str(rng.choice(["flower_red", "flower_pink", "flower_yellow", "flower_white"]))
     for x, y, z in rng.uniform(-1, 1, (14, 3)) * (half_w * 0.85, half_d * 0.85, 0.12) + (0, 0, top + 0.18):
         sink.swatch_box(flower, (x - 0.03, y - 0.03, z), (x + 0.03, y + 0.03, z + 0.04), skip="z")
     return sink.parts()
 
 
+def _hedge_leaves(sink: Sink, length_m: float, height_m: float, depth_m: float, rng: np.random.Generator) -> None:
+    """Leaves all over a clipped box, thickest along its top."""
+    count = int(length_m * (2 * height_m + depth_m) * 55)
+    half = np.array([length_m / 2, depth_m / 2, height_m / 2])
+    at = rng.uniform(-1, 1, (count, 3)) * (half - 0.03)
+    # Each leaf is pushed to the front, the back or the top, by the areas of the three.
+    face = rng.choice(3, size=count, p=np.array([height_m, height_m, depth_m * 1.5]) / (2 * height_m + depth_m * 1.5))
+    at[face == 0, 1], at[face == 1, 1], at[face == 2, 2] = -half[1], half[1], half[2]
+    inward = np.array([(0.0, -1.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)])[face]
+    at += (0, 0, half[2])
+    scatter_leaves(
+        sink,
+        "foliage_dark",
+        at,
+        np.full((count, 3), 0.02),
+        count=count,
+        length_m=0.13,
+        around=at - inward,
+        rng=rng,
+    )
+
+
 def _bush(
-    sink: Sink, foot: Array, height_m: float, foliage: str, *, rng: np.random.Generator, sprigs: int = 150
+    sink: Sink, foot: Array, height_m: float, foliage: str, *, rng: np.random.Generator, leaves: int = 420
 ) -> None:
-    count = 4
-    centres = foot + rng.uniform(-0.28, 0.28, (count, 3)) * height_m + (0, 0, height_m * 0.48)
-    radii = rng.uniform(0.3, 0.42, count) * height_m
+    angle = np.arange(5) * 2 * np.pi / 5 + rng.uniform(0, 1)
+    ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(5)], 1) * 0.3 + (0, 0, 0.36)
+    shape = np.concatenate([ring, [[0.0, 0.0, 0.6]]]) + rng.uniform(-0.07, 0.07, (6, 3))
+    centres = foot + shape * height_m
+    radii = rng.uniform(0.28, 0.38, (6, 1)) * height_m * np.ones(3)
     around = foot + (0, 0, height_m * 0.2)
     for centre, radius in zip(centres, radii, strict=True):
-        lump(sink, foliage, centre, np.full(3, radius), around=around, detail=1, rng=rng)
-    leaf_m = 0.09 + 0.06 * height_m
-    scatter_sprigs(sink, foliage, centres, radii, count=sprigs, leaf_m=leaf_m, around=around, rng=rng)
+        lump(sink, foliage, centre, radius, around=around, detail=0, rng=rng)
+    length_m = 0.10 + 0.08 * height_m
+    scatter_leaves(sink, foliage, centres, radii, count=leaves, length_m=length_m, around=around, rng=rng)
 
 
 def _crown(habit: Species, height_m: float, rng: np.random.Generator, *, lumps: int) -> tuple[Array, Array]:
-    """Centres (K, 3) and radii (K,) of the foliage masses, evenly around and up the crown with some disorder."""
+    """Centres (K, 3) and half extents (K, 3) of the foliage masses, around and up the crown with some disorder.
+
+    The last two fill the crown's middle, so that no sky shows through it.
+    """
     number = np.arange(lumps) + 0.5
     up = 1 - 2 * number / lumps + rng.uniform(-0.08, 0.08, lumps)
     turn = number * np.pi * (3 - np.sqrt(5)) + rng.uniform(-0.3, 0.3, lumps)
     across, rise = habit.crown[0] * height_m, habit.crown[1] * height_m
-    radii = habit.lump * height_m * rng.uniform(0.85, 1.15, lumps)
+    radii = habit.lump * height_m * rng.uniform(0.8, 1.25, lumps)
     if habit.taper == 1.0:
         radii = radii * (1.35 - 0.75 * (up + 1) / 2)
     flat = np.sqrt(np.maximum(1 - up**2, 0)) if habit.taper < 1 else np.ones(lumps)
     narrow = 1 - habit.taper * (up + 1) / 2 * 0.95
-    reach = np.maximum(across * flat * narrow - radii * 0.75, 0.0)
+    reach = np.maximum(across * flat * narrow * rng.uniform(0.85, 1.1, lumps) - radii * 0.75, 0.0)
     height = habit.centre * height_m + np.clip(up, -0.95, 1.0) * np.maximum(rise - radii * 0.7, 0.1)
-    centres = np.stack([np.cos(turn) * reach, np.sin(turn) * reach, height], 1)
-    return centres, radii
+    shell = np.stack([np.cos(turn) * reach, np.sin(turn) * reach, height], 1)
+    squash = np.array([1.0, 1.0, 0.62 if habit.taper == 1.0 else 0.85])
+    core = np.array([(0.0, 0.0, habit.centre * height_m + sign * rise * 0.3) for sign in (-1, 1)])
+    core_radii = np.array([[across * 0.62, across * 0.62, rise * 0.5], [across * 0.5, across * 0.5, rise * 0.42]])
+    if habit.taper == 1.0:
+        core_radii = core_radii * [[0.8, 0.8, 1.0], [0.5, 0.5, 1.0]]
+    return np.concatenate([shell, core]), np.concatenate([radii[:, None] * squash, core_radii])
 
 
 def _wood(

@@ -170,7 +170,7 @@ def _shop(cell: Canvas, index: int, *, rng: np.random.Generator) -> None:
         cell.rect(0.03, 0.5, 0.97, 0.512, (0.08, 0.05, 0.03), **BEHIND)
     else:
         for x in (0.06, 0.38, 0.70):
-            tone = rng.uniform(0.08, 0.5, 3)
+            tone = _muted(rng)
             cell.rect(x, 0.2, x + 0.24, 0.66, tone, **BEHIND)
             cell.ellipse(x + 0.12, 0.38, 0.08, 0.08, np.clip(tone[::-1] * 1.3, 0, 0.65), **BEHIND)
             cell.rect(x + 0.03, 0.54, x + 0.21, 0.57, (0.6, 0.58, 0.54), **BEHIND)
@@ -183,13 +183,19 @@ def _goods(cell: Canvas, x0: float, x1: float, shelf: float, tall: float, *, rng
     x = x0
     while x < x1 - 0.03:
         width = float(rng.uniform(0.02, 0.06))
-        tone = rng.uniform(0.03, 0.55, 3) * float(rng.uniform(0.5, 1.0))
+        tone = _muted(rng) * float(rng.uniform(0.3, 0.9))
         cell.rect(x, shelf - tall * float(rng.uniform(0.45, 0.95)), min(x + width, x1), shelf, tone, **BEHIND)
         x += width + float(rng.uniform(0.0, 0.02))
 
 
+def _muted(rng: np.random.Generator) -> Array:
+    """A colour of goods: mostly earthy, sometimes bright."""
+    tone = float(rng.uniform(0.06, 0.42)) * np.ones(3)
+    return np.asarray(np.clip(tone + rng.normal(0, 0.05, 3) + rng.normal(0, 0.05) * np.array([1.0, 0.0, -1.0]), 0.02, 0.5))
+
+
 def _dummy(cell: Canvas, x: float, *, rng: np.random.Generator) -> None:
-    skin, coat, legs = (0.42, 0.38, 0.33), rng.uniform(0.04, 0.45, 3), rng.uniform(0.03, 0.2, 3)
+    skin, coat, legs = (0.36, 0.33, 0.29), _muted(rng) * 0.8, _muted(rng) * 0.35
     cell.ellipse(x, 0.27, 0.028, 0.038, skin, **BEHIND)
     cell.polygon([(x - 0.075, 0.34), (x + 0.075, 0.34), (x + 0.055, 0.62), (x - 0.055, 0.62)], coat, **BEHIND)
     cell.polygon([(x - 0.055, 0.62), (x + 0.055, 0.62), (x + 0.04, 0.93), (x - 0.04, 0.93)], legs, **BEHIND)

@@ -19,7 +19,7 @@ def asphalt(*, rng: np.random.Generator) -> Textures:
     stones = tileable_noise(size, period=256, octaves=3, rng=rng, gain=0.9)
     broad = tileable_noise(size, period=3, octaves=5, rng=rng, gain=0.6)
     speck = np.clip(tileable_noise(size, period=512, octaves=1, rng=rng) - 0.75, 0, 1) * 2.5
-    grey = 0.098 * (1 + 0.14 * stones + 0.10 * broad + 0.55 * speck)
+    grey = 0.098 * (1 + 0.14 * stones + 0.10 * broad + 0.28 * speck)
     tint = np.array([1.0, 0.985, 0.955])
     height = 0.0016 * stones + 0.0022 * speck
     textures: Textures = {
@@ -130,12 +130,12 @@ def grass(*, rng: np.random.Generator) -> Textures:
     broad = tileable_noise(size, period=4, octaves=5, rng=rng)
     picture = np.full((size, size, 3), (0.030, 0.042, 0.012))
     depth = np.zeros((size, size))
-    greens = np.array([(0.055, 0.105, 0.018), (0.075, 0.13, 0.026), (0.10, 0.14, 0.04), (0.17, 0.15, 0.06)])
+    greens = np.array([(0.060, 0.088, 0.024), (0.078, 0.108, 0.032), (0.105, 0.125, 0.045), (0.18, 0.155, 0.075)])
     for index in range(15000):
         x, y = rng.uniform(0, size, 2)
         angle, length = rng.uniform(0, np.pi), rng.uniform(10, 26)
         spot = broad[int(y) % size, int(x) % size]
-        colour = greens[rng.choice(4, p=[0.36, 0.36, 0.22, 0.06])] * rng.uniform(0.65, 1.25) * (1 + 0.25 * spot)
+        colour = greens[rng.choice(4, p=[0.34, 0.34, 0.22, 0.10])] * rng.uniform(0.65, 1.25) * (1 + 0.25 * spot)
         end = (x + np.cos(angle) * length, y + np.sin(angle) * length)
         level = index / 15000
         for dx in (0, -size, size) if end[0] > size - 1 or end[0] < 0 or x < 2 else (0,):
@@ -194,8 +194,8 @@ def foliage(*, rng: np.random.Generator) -> Textures:
                 rib = (round(np.cos(slope) * length), round(np.sin(slope) * length))
                 cv2.line(picture, (at[0] - rib[0], at[1] - rib[1]), (at[0] + rib[0], at[1] + rib[1]), tuple(map(float, hue * 1.3)), 1)
                 cv2.ellipse(height, at, axes, angle, 0, 360, level, -1, cv2.LINE_8)
-    relief = wrapped_blur(height, 1.6)
-    return {"foliage": linear_to_srgb(picture), "foliage_n": normal_from_height(0.05 * relief, (tile_m, tile_m))}
+    relief = wrapped_blur(height, 1.0)
+    return {"foliage": linear_to_srgb(picture), "foliage_n": normal_from_height(0.022 * relief, (tile_m, tile_m))}
 
 
 def _to_line(position: Array, pitch: float) -> Array:

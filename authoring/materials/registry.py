@@ -66,10 +66,10 @@ MATERIALS: dict[str, Material] = {
     "soil": Material(rgb="soil", normal="soil_n", tile_m=3.0, roughness=1.0),
     # vegetation
     "bark": Material(rgb="bark", normal="bark_n", tile_m=1.0, roughness=0.95),
-    "foliage_green": Material(rgb="foliage", normal="foliage_n", tile_m=1.6, tint=(0.62, 0.78, 0.36), roughness=0.75),
-    "foliage_light": Material(rgb="foliage", normal="foliage_n", tile_m=1.6, tint=(0.86, 0.92, 0.42), roughness=0.75),
-    "foliage_dark": Material(rgb="foliage", normal="foliage_n", tile_m=1.6, tint=(0.42, 0.58, 0.34), roughness=0.7),
-    "foliage_olive": Material(rgb="foliage", normal="foliage_n", tile_m=1.6, tint=(0.74, 0.70, 0.40), roughness=0.75),
+    "foliage_green": Material(rgb="foliage", normal="foliage_n", tile_m=1.6, tint=(0.62, 0.78, 0.36), roughness=1.0),
+    "foliage_light": Material(rgb="foliage", normal="foliage_n", tile_m=1.6, tint=(0.86, 0.92, 0.42), roughness=1.0),
+    "foliage_dark": Material(rgb="foliage", normal="foliage_n", tile_m=1.6, tint=(0.42, 0.58, 0.34), roughness=1.0),
+    "foliage_olive": Material(rgb="foliage", normal="foliage_n", tile_m=1.6, tint=(0.74, 0.70, 0.40), roughness=1.0),
     # street furniture
     "traffic_signs": Material(rgb="traffic_signs", tile_m=0, roughness=0.45),
     "lenses": Material(rgb="lenses", tile_m=0, roughness=0.3, emission=1.0),
@@ -101,7 +101,12 @@ def material_xml(names: list[str], *, texture_dir: str = "../textures") -> str:
         emission = f' emission="{material.emission:g}"' if material.emission else ""
         layers = "".join(
             f'<layer role="{role}" texture="{stem}"/>'
-            for role, stem in (("rgb", material.rgb), ("normal", material.normal), ("orm", material.orm))
+            for role, stem in (
+                ("rgb", material.rgb),
+                ("normal", material.normal),
+                ("orm", material.orm),
+                ("emissive", material.rgb if material.emission else None),
+            )
             if stem
         )
         lines.append(
