@@ -42,6 +42,9 @@ class Cast:
         poses: by the same bodies.
         keep_out: where nobody else may be.
         free: what is left of the pool.
+        leads: bodies of the ego car and the carrier.
+        ways: lanes that the ego car must take, from where it starts, by its body.
+        way_m: length of its way to where it would have stood, 0 where it only stands.
     """
 
     drafts: dict[str, Draft]
@@ -49,6 +52,8 @@ class Cast:
     keep_out: list[Footprint]
     free: FreeSlots
     leads: frozenset[str] = field(default_factory=frozenset)
+    ways: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    way_m: float = 0.0
 
     def drop(self, body: str) -> None:
         """Somebody leaves."""
@@ -154,7 +159,8 @@ class Crowd:
                 if kind is None:
                     return added
                 body = cast.free.bodies[kind.facts.name][0]
-                if self._add(cast, self.spawner.on_walk(kind, body, pieces, rng), PERSON_GAP_M):
+                draft = self.spawner.on_walk(kind, body, pieces, rng)
+                if draft is not None and self._add(cast, draft, PERSON_GAP_M):
                     added.append(body)
                     break
         return added

@@ -29,6 +29,9 @@ from gear.world.surfaces import Face
 from gear.world.view_limits import FaceInWorld, Verdict, ViewLimits, reference_camera
 
 LEAD_TRIES = 60
+LONGEST_WAY_M = 60.0
+"""A driving ego car starts at most this far before the place that it comes to."""
+
 CORRIDOR_M = 1.3
 """Half the width of the strip between the ego car and its truck that others keep out of."""
 
@@ -55,8 +58,13 @@ class Leads:
     spawner: Spawner
     space: PlacementSpace
 
-    def draw(self, seed: int, sequence: int) -> Cast:
+    def draw(self, seed: int, sequence: int, duration_s: float = 0.0) -> Cast:
         """A cast with its leads alone.
+
+        Args:
+            seed, sequence: what the draws derive from.
+            duration_s: how long they will drive. The ego car then starts so far up the road that it comes to where it
+                would have stood, and has the boards in view from there already.
 
         Raises:
             PlacementError: no place keeps the limits; says which is too tight.
@@ -64,7 +72,9 @@ class Leads:
         problems: Counter[str] = Counter()
         for attempt in range(LEAD_TRIES):
             cast = self.fresh_cast()
-            problem = self._place(cast, derive_rng(seed, "ego", sequence, attempt))
+            # Each failure halves the way to drive, so that the last tries start where the board is surely in view.
+            way_s = duration_s * 0.5 ** (attempt // 6)
+            problem = self._place(cast, derive_rng(seed, "ego", sequence, attempt), way_s)
             if problem is None:
                 return cast
             problems[problem] += 1
@@ -128,8 +138,11 @@ class Leads:
             return "widen truck.gap_m"
         return "widen ego.ahead_m or ego.lateral_m" if self.scene.boards else "the town's lanes are blocked"
 
-    def _place(self, cast: Cast, rng: np.random.Generator) -> str | None:
-        drafts = self._draw_behind_truck(cast, rng) if self.scene.truck is not None else self._draw_alone(cast, rng)
+    def _place(self, cast: Cast, rng: np.random.Generator, duration_s: float) -> str | None:
+        if self.scene.truck is not None:
+            drafts = self._draw_behind_truck(cast, rng)
+        else:
+            drafts = self._draw_alone(cast, rng, duration_s)
         if isinstance(drafts, str):
             return drafts
         problem = self.enter(cast, drafts)
@@ -138,9 +151,19 @@ class Leads:
         verdict = self.judge(cast)
         return None if verdict == "seen" else f"with a face {verdict}"
 
-    def _draw_alone(self, cast: Cast, rng: np.random.Generator) -> list[Draft]:
+    def _draw_alone(self, cast: Cast, rng: np.random.Generator, duration_s: float) -> list[Draft] | str:
         lane, s_m = self.spawner.lane_table.draw(self.places, rng)
-        return [self.ego_on(cast, lane, s_m, rng)]
+        lanes: tuple[str, ...] = (lane,)
+        if self.scene.boards and duration_s > 0:
+            speed_mps = self.spawner.lanes.lanes[lane].speed_mps
+            cast.way_m = float(rng.uniform(0.4, 0.8)) * min(LONGEST_WAY_M, speed_mps * duration_s)
+            way = back_up(self.spawner.lanes, lane, s_m, cast.way_m, rng)
+            if way is None:
+                return "before the start of the road"
+            lanes, s_m = way
+        ego = self.ego_on(cast, lanes[0], s_m, rng)
+        cast.ways[ego.body] = lanes
+        return [ego]
 
     def ego_on(self, cast: Cast, lane: str, s_m: float, rng: np.random.Generator) -> Draft:
         """The ego car on a lane."""
@@ -159,6 +182,7 @@ class Leads:
         lanes, ego_s_m = way
         ego = self.ego_on(cast, lanes[0], ego_s_m, rng)
         cast.keep_out.append(_between(ego, truck))
+        cast.ways[ego.body] = lanes
         return [ego, truck]
 
     @cached_property

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from gear.config.collection import SplitConfig
 from gear.values.geometry import RigidTransform
 from gear.values.rig import Rig
-from gear.values.scene import ActorRecord, Pose, SceneRecord, Vec3
+from gear.values.scene import POSE_DIGITS, ActorRecord, Pose, SceneRecord, Vec3
 from gear.world.cast import Cast, Crowd, HidingTest
 from gear.world.leads import Leads
 from gear.world.placement import PlacementSpace
+from gear.world.sequence import Director, Moment
 from gear.world.spawn import Draft, Spawner
 from gear.world.view_limits import reference_camera
 from gear.world.world import World
 
-POSE_TO_RECORD_DIGITS = 6
+SEQUENCES_KEPT = 4
 
 
 class ScenePlanner:
@@ -45,6 +48,8 @@ class ScenePlanner:
             spawner=spawner,
             space=space,
         )
+        self._director = Director(world.scene_name, world.lanes, space)
+        self._kept: dict[int, Sequence[Moment]] = {}
         self._crowd = Crowd(
             scene_name=world.scene_name, scene=world.scene, types=world.types, spawner=spawner, space=space
         )
@@ -56,13 +61,25 @@ class ScenePlanner:
             PlacementError: the scene's limits are too tight; says which.
         """
         sequence, frame = divmod(index, self._split.frames)
-        cast = self._still(sequence)
-        return self._record(cast, index, sequence, frame)
+        moment = self._moments(sequence)[frame]
+        return self._record(moment, index, sequence, frame)
 
-    def _still(self, sequence: int) -> Cast:
-        cast = self._leads.draw(self._split.seed, sequence)
-        self._crowd.fill(cast, self._split.seed, sequence, self._hiding(cast))
-        return cast
+    def _moments(self, sequence: int) -> Sequence[Moment]:
+        """All frames of a sequence. The last few are kept: frames are mostly asked for in their order."""
+        if sequence not in self._kept:
+            self._kept[sequence] = self._stage(sequence)
+            if len(self._kept) > SEQUENCES_KEPT:
+                self._kept.pop(next(iter(self._kept)))
+        return self._kept[sequence]
+
+    def _stage(self, sequence: int) -> Sequence[Moment]:
+        split = self._split
+        duration_s = split.frames * split.interval_s if split.frames > 1 else 0.0
+        cast = self._leads.draw(split.seed, sequence, duration_s)
+        self._crowd.fill(cast, split.seed, sequence, self._hiding(cast))
+        if split.frames == 1:
+            return [Moment(drafts=cast.drafts, poses=cast.poses)]
+        return self._director.drive(cast, split.seed, sequence, split.frames, split.interval_s)
 
     def _hiding(self, cast: Cast) -> HidingTest | None:
         if not self._leads.faces:
@@ -72,10 +89,11 @@ class ScenePlanner:
         grids_m = tuple(face.grid_m for face in self._leads.faces_in_world(cast))
         return HidingTest(camera.world_from_camera_transform.translation_m, grids_m, self._leads.limits.min_free)
 
-    def _record(self, cast: Cast, index: int, sequence: int, frame: int) -> SceneRecord:
+    def _record(self, moment: Moment, index: int, sequence: int, frame: int) -> SceneRecord:
         world = self._world
         actors = tuple(
-            _actor(number, draft, cast.poses[body]) for number, (body, draft) in enumerate(cast.drafts.items(), start=1)
+            _actor(number, draft, moment.poses[body])
+            for number, (body, draft) in enumerate(moment.drafts.items(), start=1)
         )
         carrier = next((actor.id for actor in actors if actor.role == "carrier"), None)
         return SceneRecord(
@@ -96,7 +114,7 @@ class ScenePlanner:
 
 def _actor(number: int, draft: Draft, world_from_actor: RigidTransform) -> ActorRecord:
     velocity = world_from_actor.rotation[:, 0] * draft.speed_mps
-    rounded = [round(float(v), POSE_TO_RECORD_DIGITS) + 0.0 for v in velocity]
+    rounded = [round(float(v), POSE_DIGITS) + 0.0 for v in velocity]
     velocity_mps: Vec3 = (rounded[0], rounded[1], rounded[2])
     return ActorRecord(
         id=number,

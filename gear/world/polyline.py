@@ -49,6 +49,15 @@ class Polyline:
         point[:2] += np.array([-step[1], step[0]]) * (lateral_m / length_m)
         return point, math.atan2(step[1], step[0])
 
+    def sample(self, s_m: Array, lateral_m: float = 0.0) -> tuple[Array, Array]:
+        """As `at`, for (N,) arc lengths: (N, 3) points and (N,) headings."""
+        index = np.clip(np.searchsorted(self.s_m, s_m, side="right") - 1, 0, len(self.s_m) - 2)
+        steps = self.points_m[index + 1] - self.points_m[index]
+        lengths_m = np.hypot(steps[:, 0], steps[:, 1])
+        points = self.points_m[index] + steps * ((s_m - self.s_m[index]) / lengths_m)[:, None]
+        points[:, :2] += np.stack([-steps[:, 1], steps[:, 0]], axis=1) * (lateral_m / lengths_m)[:, None]
+        return points, np.arctan2(steps[:, 1], steps[:, 0])
+
     def project(self, position_m: Array) -> tuple[float, float, float]:
         """Where the line is nearest to a point: arc length, how far to its left the point is, distance in space."""
         starts, steps = self.points_m[:-1], np.diff(self.points_m, axis=0)

@@ -24,17 +24,14 @@ def plan_pool(scene: SceneSpec, library: AssetLibrary) -> list[tuple[ActorFacts,
     if EGO_ASSET not in library.vehicles:
         raise UnknownNameError("vehicle", EGO_ASSET, library.vehicles)
     pool = [(library.vehicles[EGO_ASSET], 1)]
-    for actors, most in (
-        (library.vehicles, scene.npc_vehicles.count[1]),
-        (library.pedestrians, scene.pedestrians.count[1]),
-    ):
-        pool += _shares(actors, most)
+    if scene.npc_vehicles.count[1]:
+        pool += _shares(library.vehicles, scene.npc_vehicles.count[1])
+    if scene.pedestrians.count[1]:
+        pool += _shares(library.pedestrians, scene.pedestrians.count[1])
     return pool
 
 
 def _shares(actors: Mapping[str, ActorFacts], most: int) -> list[tuple[ActorFacts, int]]:
-    if most == 0:
-        return []
     total = sum(actor.weight for actor in actors.values())
     return [
         (actor, min(most, max(1, math.ceil(POOL_SLACK * most * actor.weight / total))))

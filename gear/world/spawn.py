@@ -201,10 +201,17 @@ class Spawner:
             paint_rgb=draw_paint(kind, rng),
         )
 
-    def on_walk(self, kind: ActorType, body: str, pieces: npt.NDArray[np.intp], rng: np.random.Generator) -> Draft:
-        """A person on a sidewalk or crossing: walkers keep to their right half, those who stand look anywhere."""
+    def on_walk(
+        self, kind: ActorType, body: str, pieces: npt.NDArray[np.intp], rng: np.random.Generator
+    ) -> Draft | None:
+        """A person on a sidewalk or crossing: walkers keep to their right half, those who stand look anywhere.
+
+        Nobody stands about on a crossing: None where that was drawn.
+        """
         name, s_m = self.walk_table.draw(pieces, rng)
         walk = self.lanes.walks[name]
+        if walk.is_crossing and kind.facts.gait != "walk":
+            return None
         direction = 1 if rng.random() < 0.5 else -1
         room_m = max(0.0, walk.width_m / 2 - SIDE_CLEARANCE_M)
         walks = kind.facts.gait == "walk"
