@@ -1,0 +1,167 @@
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gear.config.nodes import parse_text
+from gear.contracts.tasks import SplitInfo
+from gear.dataset.plan import Plan
+from gear.dataset.store import Store, remove_split
+from gear.plugins.build import build_task
+from gear.testing.synthetic import synthetic_frame
+from gear.values.errors import DatasetError
+from gear.verbs.export import export
+from gear.verbs.opening import open_dataset, open_twins
+from gear.verbs.sheet import contact_sheet
+
+OPTIONS = {"width_px": 160, "height_px": 80}
+
+
+def plan(split: str = "test", samples: int = 3, **changes: Any) -> Plan:
+    base = Plan(
+        task={"name": "depth", "package": "mujoco-gear", "version": "0.1.0"},
+        options=dict(OPTIONS),
+        content={"scene": "billboard01", "seed": 5},
+        patch={"label": "none", "sha256": ""},
+        info=SplitInfo(town="town10", scene="billboard01", split=split, seed=5, patch_label="none"),
+        samples=samples,
+    )
+    return dataclasses.replace(base, **changes)
+
+
+def fill(root: Path, given: Plan, indices: list[int] | None = None, *, is_closed: bool = True, seed: int = 5) -> Store:
+    _, task = build_task(given.task["name"], parse_text(json.dumps(given.options), "options"))
+    store = Store(root, given)
+    store.open({})
+    for index in store.missing() if indices is None else indices:
+        frame, record = synthetic_frame(task.rig(), index=index, seed=seed)
+        record = dataclasses.replace(record, split=given.info.split)
+        sample = task.ground_truth(frame, record)
+        store.write(sample, task.encode(sample, given.info))
+    if is_closed:
+        store.close(task, {"seed": 5})
+    return store
+
+
+def tree(root: Path) -> dict[str, bytes]:
+    return {p.relative_to(root).as_posix(): p.read_bytes() for p in sorted(root.rglob("*")) if p.is_file()}
+
+
+def test_a_broken_off_run_goes_on_and_ends_in_the_same_bytes(tmp_path: Path) -> None:
+    fill(tmp_path / "a", plan())
+    store = fill(tmp_path / "b", plan(), [2], is_closed=False)
+    assert store.missing() == [0, 1]
+    with pytest.raises(DatasetError, match="'test' is not finished; run its `gear collect` again"):
+        open_dataset(tmp_path / "b")
+    (tmp_path / "b/gear/scratch").mkdir(exist_ok=True)
+    (tmp_path / "b/gear/scratch/123-456").write_bytes(b"half")
+    before = (tmp_path / "b/gear/test/samples/000002.json").stat().st_mtime_ns
+    fill(tmp_path / "b", plan())
+    assert (tmp_path / "b/gear/test/samples/000002.json").stat().st_mtime_ns == before
+    assert tree(tmp_path / "a") == tree(tmp_path / "b")
+
+
+def test_a_dataset_reads_back(tmp_path: Path) -> None:
+    fill(tmp_path, plan())
+    dataset = open_dataset(tmp_path)
+    assert len(dataset) == 3
+    assert [s.record.index for s in dataset] == [0, 1, 2]
+    frame, _ = synthetic_frame(dataset.task.rig(), index=1, seed=5)
+    (name,) = frame.views
+    assert np.array_equal(dataset[1].images[name], frame.views[name].rgb)
+    assert dataset[-1].record.index == 2
+    assert dataset.verify() == []
+    with pytest.raises(IndexError):
+        dataset[3]
+    victim = next(iter(dataset.sidecar(1).files))
+    (tmp_path / victim).write_bytes(b"x")
+    assert dataset.verify() == [victim]
+
+
+def test_more_samples_are_added_and_fewer_are_refused(tmp_path: Path) -> None:
+    fill(tmp_path, plan(samples=2))
+    store = Store(tmp_path, plan(samples=3))
+    store.open({})
+    assert store.missing() == [2]
+    fill(tmp_path, plan(samples=3))
+    assert len(open_dataset(tmp_path)) == 3
+    with pytest.raises(DatasetError, match="has 3 samples already, 2 were asked for; use --force"):
+        Store(tmp_path, plan(samples=2)).open({})
+
+
+def test_another_configuration_is_never_mixed_in(tmp_path: Path) -> None:
+    fill(tmp_path, plan())
+    before = tree(tmp_path)
+    with pytest.raises(DatasetError, match=r'content.scene: "billboard01" there, "truck" now'):
+        Store(tmp_path, plan(content={"scene": "truck", "seed": 5})).open({})
+    with pytest.raises(DatasetError, match="holds a depth dataset, semseg was asked for"):
+        Store(tmp_path, plan("val", task={"name": "semseg", "package": "x", "version": "1"})).open({})
+    assert tree(tmp_path) == before
+
+
+def test_several_splits_share_a_root_and_go_one_by_one(tmp_path: Path) -> None:
+    fill(tmp_path, plan("test"))
+    alone = tree(tmp_path)
+    fill(tmp_path, plan("val"))
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(DatasetError, match=r"several splits \(test, val\); say which"):
+        open_dataset(tmp_path)
+    assert len(open_dataset(tmp_path, "val")) == 3
+    remove_split(tmp_path, "val")
+    assert tree(tmp_path) == alone | {"notes.txt": b"mine"}
+    with pytest.raises(DatasetError, match="has no split 'val'; there are: test"):
+        open_dataset(tmp_path, "val")
+
+
+def test_twins_are_paired_by_index_or_refused(tmp_path: Path) -> None:
+    fill(tmp_path / "a", plan())
+    fill(tmp_path / "b", plan(samples=2, patch={"label": "random", "sha256": "1"}))
+    fill(tmp_path / "c", plan(content={"scene": "billboard01", "seed": 6}))
+    twins = open_twins(tmp_path / "a", tmp_path / "b")
+    assert len(twins) == 2
+    assert [a.record == b.record for a, b in twins] == [True, True]
+    with pytest.raises(DatasetError, match="is no twin of"):
+        open_twins(tmp_path / "a", tmp_path / "c")
+
+
+def test_a_stranger_is_no_dataset(tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match="is not a dataset of gear's"):
+        open_dataset(tmp_path)
+    with pytest.raises(DatasetError, match="is not a dataset of gear's"):
+        open_dataset(tmp_path / "nowhere")
+
+
+def test_a_sidecar_that_leads_outside_is_refused(tmp_path: Path) -> None:
+    fill(tmp_path / "a", plan())
+    path = tmp_path / "a/gear/test/samples/000000.json"
+    sidecar = json.loads(path.read_text())
+    (tmp_path / "secret").write_text("s")
+    sidecar["files"] = {"../secret": "0"}
+    path.write_text(json.dumps(sidecar))
+    with pytest.raises(DatasetError, match="not a path inside"):
+        remove_split(tmp_path / "a", "test")
+    assert (tmp_path / "secret").exists()
+
+
+def test_a_sheet_shows_every_sample(tmp_path: Path) -> None:
+    fill(tmp_path, plan())
+    sheet = contact_sheet(tmp_path)
+    assert sheet.dtype == np.uint8
+    assert len(np.unique(sheet.reshape(3, -1, 3)[1], axis=0)) > 50
+    assert contact_sheet(tmp_path, samples=1).shape[0] * 3 == sheet.shape[0]
+
+
+def test_exports_go_into_new_folders_and_fit_their_task(tmp_path: Path) -> None:
+    fill(tmp_path / "a", plan())
+    assert export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b") == 3
+    assert len(list((tmp_path / "b").rglob("proj_depth/groundtruth/image_02/*.png"))) == 3
+    assert not (tmp_path / "b/gear").exists()
+    with pytest.raises(DatasetError, match="is not empty"):
+        export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b")
+    with pytest.raises(DatasetError, match="the layout 'kitti' is for stereo3d"):
+        export(tmp_path / "a", layout="kitti", out=tmp_path / "c")
