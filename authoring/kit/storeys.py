@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from authoring.kit.extras import air_conditioner, downpipe, fire_escape, flower_box, oriel
 from authoring.kit.facade import SIDES, Facade, Opening, belt, facades
 from authoring.kit.ground import ground_floor
 from authoring.kit.openings import balcony, window
@@ -56,27 +57,79 @@ def _street_side(
     holes = ground_floor(facade, style, main=main, rng=rng)
     facade.wall(style.base, 0.0, 0.0, width, style.ground_m, holes)
     centres = bays(width, style.bay_m, 0.7)
-    has_balcony = rng.random(len(centres)) < style.balconies
     pitch = centres[1] - centres[0] if len(centres) > 1 else width - 1.4
     half = min(style.window.width_m, pitch - (0.12 if style.fins else 0.5)) / 2
+    kinds = _bay_kinds(style, len(centres), floors, pitch, rng=rng)
     for floor in range(1, floors):
         level = style.ground_m + (floor - 1) * style.floor_m
         openings = []
-        for centre, outside in zip(centres, has_balcony, strict=True):
-            deep = bool(outside) and (floor > 1 or style.ground != "shops")
+        for centre, kind in zip(centres, kinds, strict=True):
+            if kind == "oriel":
+                continue
+            deep = kind == "balcony" and (floor > 1 or style.ground != "shops")
             sill = 0.1 if deep else style.window.sill_m
             top = min(style.window.sill_m + style.window.height_m, style.floor_m - 0.35)
             openings.append(Opening(centre - half, level + sill, centre + half, level + top))
             if deep:
-                reach, slab = (1.5, "concrete_light") if style.railing != "bars" or pitch > 3.4 else (0.7, style.trim)
-                balcony(facade, centre - min(half + 0.45, pitch / 2 - 0.05), centre + min(half + 0.45, pitch / 2 - 0.05), level, reach, railing=style.railing, slab=slab)
+                reach, slab = (0.7, style.trim) if style.railing == "bars" and pitch <= 3.4 else (1.5, "concrete_light")
+                side = min(half + 0.45, pitch / 2 - 0.05)
+                balcony(facade, centre - side, centre + side, level, reach, railing=style.railing, slab=slab)
         facade.wall(style.wall, 0.0, level, width, level + style.floor_m, openings)
         for opening in openings:
             window(facade, opening, style.window, rng=rng)
+            _window_extras(facade, opening, style, rng=rng)
+    levels = [style.ground_m + f * style.floor_m for f in range(floors - 1)]
+    for centre, kind in zip(centres, kinds, strict=True):
+        if kind == "oriel":
+            oriel(
+                facade,
+                centre,
+                min(pitch - 0.3, 2.9),
+                levels,
+                style.floor_m,
+                wall=style.wall,
+                trim=style.trim,
+                style=style.window,
+                rng=rng,
+            )
+        elif kind == "escape":
+            fire_escape(facade, centre - pitch / 2 + 0.15, centre + pitch / 2 - 0.15, levels)
+    if style.downpipes:
+        for u in (0.16, width - 0.16):
+            downpipe(facade, u, top_m - 0.35)
     if style.fins and floors > 1:
-        for left, right in zip([0.35, *centres], [*centres, width - 0.35], strict=True):
-            u = (left + right) / 2 if left != 0.35 and right != width - 0.35 else (0.2 if left == 0.35 else width - 0.2)
+        for u in (0.2, *(a + pitch / 2 for a in centres[:-1]), width - 0.2):
             facade.box(style.trim, (u - 0.13, u + 0.13), (style.ground_m, top_m), (0.0, 0.4))
+    if style.pilasters and floors > 1:
+        for u in (0.35, *(a + pitch / 2 for a in centres[:-1]), width - 0.35):
+            _pilaster(facade, u, style, top_m - 0.8)
+
+
+def _bay_kinds(style: Style, count: int, floors: int, pitch: float, *, rng: np.random.Generator) -> list[str]:
+    """What each column of windows is: plain, or with balconies, an oriel, a fire escape."""
+    kinds = ["balcony" if rng.random() < style.balconies else "plain" for _ in range(count)]
+    if style.oriels and floors > 2 and pitch > 2.2:
+        for index in range(int(rng.integers(0, 2)), count, int(rng.integers(2, 4))):
+            kinds[index] = "oriel"
+    elif style.escapes and floors > 3 and count > 2:
+        kinds[int(rng.integers(count))] = "escape"
+    return kinds
+
+
+def _window_extras(facade: Facade, opening: Opening, style: Style, *, rng: np.random.Generator) -> None:
+    chance = rng.random()
+    if chance < style.clutter * 0.4:
+        air_conditioner(facade, (opening.u0 + opening.u1) / 2, opening.v0)
+    elif chance < style.clutter:
+        flower_box(facade, opening, rng=rng)
+
+
+def _pilaster(facade: Facade, u: float, style: Style, top_m: float) -> None:
+    """A flat column from the first floor to the cornice, with base and capital."""
+    low = style.ground_m + 0.1
+    facade.box(style.trim, (u - 0.2, u + 0.2), (low + 0.35, top_m - 0.3), (0.0, 0.07), skip="but")
+    facade.box(style.trim, (u - 0.26, u + 0.26), (low, low + 0.35), (0.0, 0.11), skip="b")
+    facade.box(style.trim, (u - 0.27, u + 0.27), (top_m - 0.3, top_m), (0.0, 0.12), skip="b")
 
 
 def _plain_side(facade: Facade, style: Style, floors: int, top_m: float, *, rng: np.random.Generator) -> None:

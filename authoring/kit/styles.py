@@ -28,6 +28,10 @@ class Style:
         quoins: blocks of trim up the corners.
         water_tank: a wooden one on the roof.
         fins: vertical fins between the bays.
+        pilasters: flat columns between the bays.
+        oriels: bay windows through all upper floors; else `escapes`: a fire escape on one bay.
+        downpipes: at both ends of the facade.
+        clutter: share of windows with an air conditioner or a flower box.
     """
 
     wall: str
@@ -47,6 +51,11 @@ class Style:
     quoins: bool = False
     water_tank: bool = False
     fins: bool = False
+    pilasters: bool = False
+    oriels: bool = False
+    escapes: bool = False
+    downpipes: bool = False
+    clutter: float = 0.0
 
 
 def brick_apartment(rng: np.random.Generator) -> Style:
@@ -69,10 +78,14 @@ def brick_apartment(rng: np.random.Generator) -> Style:
         trim=stone,
         floor_m=float(rng.uniform(3.1, 3.4)),
         ground_m=4.0,
-        bay_m=float(rng.uniform(2.3, 3.1)),
+        bay_m=float(rng.uniform(2.1, 2.8)),
         window=window,
         cornice="bracket",
-        string_courses=str(rng.choice(["none", "first"])),
+        string_courses=str(rng.choice(["all", "first"])),
+        oriels=bool(rng.random() < 0.35),
+        escapes=bool(rng.random() < 0.6),
+        downpipes=bool(rng.random() < 0.5),
+        clutter=0.14,
         ground=str(rng.choice(["homes", "shops"])),
         door=str(rng.choice(["panel_green", "panel_black", "panel_brown"])),
         water_tank=bool(rng.random() < 0.4),
@@ -103,6 +116,9 @@ def plaster_apartment(rng: np.random.Generator) -> Style:
         window=window,
         cornice="simple",
         string_courses="first",
+        oriels=bool(rng.random() < 0.25) and not shutters,
+        downpipes=True,
+        clutter=0.16,
         roof=str(rng.choice(["flat", "gable"])),
         ground=str(rng.choice(["homes", "shops"])),
         balconies=float(rng.choice([0.0, 0.25])),
@@ -135,7 +151,8 @@ def stone_classic(rng: np.random.Generator) -> Style:
         ground=str(rng.choice(["shops", "homes"])),
         balconies=0.3,
         door="panel_green",
-        quoins=True,
+        quoins=bool(rng.random() < 0.4),
+        pilasters=bool(rng.random() < 0.6),
     )
 
 
@@ -170,7 +187,7 @@ def shop_house(rng: np.random.Generator) -> Style:
     """One narrow house of a shopping street; every one differs from its neighbours."""
     family = rng.choice([brick_apartment, plaster_apartment, plaster_apartment])
     style: Style = family(rng)
-    return replace(style, ground="shops", ground_m=3.9, water_tank=False, bay_m=float(rng.uniform(2.0, 2.6)), balconies=0.0)
+    return replace(style, ground="shops", ground_m=3.9, water_tank=False, bay_m=float(rng.uniform(2.0, 2.6)), balconies=0.0, oriels=False, escapes=False)
 
 
 def warehouse_loft(rng: np.random.Generator) -> Style:

@@ -148,10 +148,7 @@ def _shop(cell: Canvas, index: int, *, rng: np.random.Generator) -> None:
     for x in np.linspace(0.12, 0.88, 5):
         cell.ellipse(x, 0.07, 0.035, 0.012, (0.75, 0.68, 0.52), **BEHIND)
     if index >= 8:
-        cell.fill((0.10, 0.11, 0.115), **GLASS)
-        cell.gradient(0, 0, 1, 1, (0.085, 0.092, 0.098), (0.12, 0.12, 0.118))
-        for x in np.linspace(0.1, 0.9, 4) + 0.03 * (index - 8):
-            cell.rect(x, 0.1, x + 0.05, 0.92, (0.14, 0.135, 0.125), **GLASS)
+        _lobby(cell, index - 8)
     elif index % 4 == 0:
         for y in np.arange(0.22, 0.95, 0.145):
             _goods(cell, 0.04, 0.96, y, 0.11, rng=rng)
@@ -177,6 +174,25 @@ def _shop(cell: Canvas, index: int, *, rng: np.random.Generator) -> None:
         _goods(cell, 0.04, 0.96, 0.95, 0.16, rng=rng)
     # The upper edge lies in the fascia's shadow.
     cell.shade(0, 0, 1, 0.03, 0.35)
+
+
+def _lobby(cell: Canvas, index: int) -> None:
+    """A dim entrance hall behind reflecting glass: columns, a ceiling's lights, a desk, a plant."""
+    cell.fill((0.12, 0.125, 0.13), roughness=0.06, metallic=0.7)
+    cell.gradient(0, 0, 1, 1, (0.13, 0.128, 0.12), (0.10, 0.10, 0.098))
+    for y, x0 in ((0.10, 0.1), (0.16, 0.2), (0.205, 0.28)):
+        for x in np.linspace(x0, 1 - x0, 4):
+            cell.rect(x - 0.05, y, x + 0.05, y + 0.012, (0.55, 0.52, 0.44), **BEHIND)
+    for x in np.linspace(0.12, 0.88, 3) + 0.02 * index:
+        cell.rect(x, 0.06, x + 0.045, 0.93, (0.20, 0.195, 0.18), **BEHIND)
+    if index % 2:
+        cell.rect(0.34, 0.66, 0.72, 0.88, (0.16, 0.10, 0.06), **BEHIND)
+        cell.rect(0.32, 0.64, 0.74, 0.67, (0.30, 0.29, 0.27), **BEHIND)
+    else:
+        cell.rect(0.55, 0.78, 0.65, 0.9, (0.05, 0.05, 0.05), **BEHIND)
+        for x, y in ((0.56, 0.68), (0.64, 0.66), (0.6, 0.58), (0.53, 0.6), (0.68, 0.6)):
+            cell.ellipse(x, y, 0.05, 0.07, (0.03, 0.06, 0.025), **BEHIND)
+    cell.gradient(0, 0.9, 1, 1, (0.12, 0.115, 0.11), (0.07, 0.07, 0.068))
 
 
 def _goods(cell: Canvas, x0: float, x1: float, shelf: float, tall: float, *, rng: np.random.Generator) -> None:
