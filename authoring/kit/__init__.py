@@ -27,9 +27,10 @@ from authoring.kit.furniture import (
 )
 from authoring.kit.parts import Part, merge, place, triangle_count
 from authoring.kit.places import advertising_pillar, bus_stop, cafe, power_pole, road_cover
+from authoring.kit.plants import grass_tufts, hedge, planter, shrub
 from authoring.kit.signals import street_lamp, traffic_light, traffic_light_mast
 from authoring.kit.signs import street_name_sign, traffic_sign
-from authoring.kit.vegetation import SPECIES, grass_tufts, hedge, planter, shrub, tree
+from authoring.kit.trees import SPECIES, tree
 
 __all__ = [
     "SPECIES",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from authoring.kit.parts import Part, Sink
@@ -27,8 +29,16 @@ def wall(length_m: float, *, material: str = "brick_red", height_m: float = 1.8,
     sink.tiled_box(material, (-half_x, -half_y, 0), (half_x, half_y, height_m), tile_m=tile_m, skip="zZ")
     sink.swatch_box("concrete_light", (-half_x, -half_y - 0.04, height_m), (half_x, half_y + 0.04, height_m + 0.09))
     for x in _posts(length_m, 4.0):
-        sink.tiled_box(material, (x - 0.22, -half_y - 0.08, 0), (x + 0.22, half_y + 0.08, height_m + 0.09), tile_m=tile_m, skip="zZ")
-        sink.swatch_box("concrete_light", (x - 0.27, -half_y - 0.13, height_m + 0.09), (x + 0.27, half_y + 0.13, height_m + 0.2))
+        sink.tiled_box(
+            material,
+            (x - 0.22, -half_y - 0.08, 0),
+            (x + 0.22, half_y + 0.08, height_m + 0.09),
+            tile_m=tile_m,
+            skip="zZ",
+        )
+        sink.swatch_box(
+            "concrete_light", (x - 0.27, -half_y - 0.13, height_m + 0.09), (x + 0.27, half_y + 0.13, height_m + 0.2)
+        )
     return sink.parts()
 
 
@@ -36,8 +46,17 @@ def guard_rail(length_m: float) -> list[Part]:
     """A W-beam on posts, its face towards -y, 0.75 m high."""
     sink = Sink("guard_rail")
     half = length_m / 2
-    outline = [(0.0, 0.44), (-0.08, 0.48), (-0.08, 0.54), (-0.02, 0.58), (-0.02, 0.61), (-0.08, 0.65), (-0.08, 0.71), (0.0, 0.75)]
-    for (y0, z0), (y1, z1) in zip(outline[:-1], outline[1:], strict=True):
+    outline = [
+        (0.0, 0.44),
+        (-0.08, 0.48),
+        (-0.08, 0.54),
+        (-0.02, 0.58),
+        (-0.02, 0.61),
+        (-0.08, 0.65),
+        (-0.08, 0.71),
+        (0.0, 0.75),
+    ]
+    for (y0, z0), (y1, z1) in itertools.pairwise(outline):
         front = [(-half, y0, z0), (half, y0, z0), (half, y1, z1), (-half, y1, z1)]
         sink.swatch_quad("galvanised", front)
         sink.swatch_quad("galvanised", [(x, y + 0.006, z) for x, y, z in front[::-1]])
@@ -64,8 +83,17 @@ def jersey_barrier(length_m: float) -> list[Part]:
     """A concrete barrier of the New Jersey profile; label wall."""
     sink = Sink("wall")
     half = length_m / 2
-    outline = [(-0.3, 0.0), (-0.3, 0.08), (-0.16, 0.3), (-0.09, 0.82), (0.09, 0.82), (0.16, 0.3), (0.3, 0.08), (0.3, 0.0)]
-    for (y0, z0), (y1, z1) in zip(outline[:-1], outline[1:], strict=True):
+    outline = [
+        (-0.3, 0.0),
+        (-0.3, 0.08),
+        (-0.16, 0.3),
+        (-0.09, 0.82),
+        (0.09, 0.82),
+        (0.16, 0.3),
+        (0.3, 0.08),
+        (0.3, 0.0),
+    ]
+    for (y0, z0), (y1, z1) in itertools.pairwise(outline):
         sink.quad("concrete", [(-half, y0, z0), (half, y0, z0), (half, y1, z1), (-half, y1, z1)], tile_m=4.0)
     for sign in (-1, 1):
         end = [(sign * half, sign * y, z) for y, z in outline]
@@ -84,7 +112,12 @@ def _bars(sink: Sink, length_m: float, height_m: float) -> None:
     for x in np.arange(-half + 0.07, half - 0.05, 0.125):
         sink.swatch_box("black_paint", (x - 0.009, -0.009, 0.05), (x + 0.009, 0.009, height_m), skip="zZ")
         tip = (x, 0.0, height_m + 0.09)
-        foot = [(x - 0.016, -0.016, height_m), (x + 0.016, -0.016, height_m), (x + 0.016, 0.016, height_m), (x - 0.016, 0.016, height_m)]
+        foot = [
+            (x - 0.016, -0.016, height_m),
+            (x + 0.016, -0.016, height_m),
+            (x + 0.016, 0.016, height_m),
+            (x - 0.016, 0.016, height_m),
+        ]
         for i in range(4):
             sink.swatch_quad("black_paint", [foot[i], foot[(i + 1) % 4], tip])
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from authoring.kit.facade import Facade, Opening
@@ -14,7 +16,9 @@ def downpipe(facade: Facade, u: float, top_m: float, *, swatch: str = "zinc_roof
     facade.box(swatch, (u - half, u + half), (1.6, top_m), (near, far), skip="but")
     facade.box("cast_iron", (u - half - 0.01, u + half + 0.01), (0.0, 1.6), (near, far + 0.01), skip="bu")
     for v in np.arange(2.6, top_m - 0.5, 2.6):
-        facade.box("galvanised", (u - half - 0.02, u + half + 0.02), (float(v), float(v) + 0.04), (0.0, far + 0.012), skip="b")
+        facade.box(
+            "galvanised", (u - half - 0.02, u + half + 0.02), (float(v), float(v) + 0.04), (0.0, far + 0.012), skip="b"
+        )
 
 
 def air_conditioner(facade: Facade, u: float, v: float) -> None:
@@ -29,12 +33,24 @@ def air_conditioner(facade: Facade, u: float, v: float) -> None:
 def flower_box(facade: Facade, opening: Opening, *, rng: np.random.Generator) -> None:
     """A box of flowers on a window sill."""
     u0, u1, v = opening.u0 + 0.05, opening.u1 - 0.05, opening.v0
-    facade.box(str(rng.choice(["terracotta", "dark_green", "anthracite"])), (u0, u1), (v + 0.01, v + 0.17), (0.06, 0.24), skip="t")
+    facade.box(
+        str(rng.choice(["terracotta", "dark_green", "anthracite"])),
+        (u0, u1),
+        (v + 0.01, v + 0.17),
+        (0.06, 0.24),
+        skip="t",
+    )
     facade.box("dark_green", (u0 + 0.01, u1 - 0.01), (v + 0.15, v + 0.24), (0.04, 0.25), skip="b")
     bloom = str(rng.choice(["flower_red", "flower_pink", "flower_yellow", "flower_white"]))
     for u in np.arange(u0 + 0.06, u1 - 0.04, 0.11):
         lift, out = rng.uniform(0.0, 0.08), rng.uniform(-0.03, 0.03)
-        facade.box(bloom, (float(u) - 0.035, float(u) + 0.035), (v + 0.2 + lift, v + 0.27 + lift), (0.15 + out, 0.22 + out), skip="bu")
+        facade.box(
+            bloom,
+            (float(u) - 0.035, float(u) + 0.035),
+            (v + 0.2 + lift, v + 0.27 + lift),
+            (0.15 + out, 0.22 + out),
+            skip="bu",
+        )
 
 
 def fire_escape(facade: Facade, u0: float, u1: float, levels_m: list[float]) -> None:
@@ -74,7 +90,7 @@ def oriel(
     left, right = centre_m - width_m / 2, centre_m + width_m / 2
     plan = [(left, 0.0), (left + slant, out), (right - slant, out), (right, 0.0)]
     base, top = levels_m[0], levels_m[-1] + floor_m - 0.25
-    for (u0, d0), (u1, d1) in zip(plan[:-1], plan[1:], strict=True):
+    for (u0, d0), (u1, d1) in itertools.pairwise(plan):
         start, end = facade.at(u0, 0.0, d0), facade.at(u1, 0.0, d1)
         length = float(np.linalg.norm(end - start))
         face = Facade(facade.sink, start, (end - start) / length, length)
@@ -84,14 +100,27 @@ def oriel(
             low = level + style.sill_m
             hole = Opening(length / 2 - half, low, length / 2 + half, min(low + style.height_m, level + floor_m - 0.4))
             holes.append(hole)
-            window(face, hole, WindowStyle(kind=style.kind, width_m=2 * half, height_m=style.height_m, sill_m=style.sill_m, recess_m=0.1, reveal=wall, ledge=style.ledge), rng=rng)
+            window(
+                face,
+                hole,
+                WindowStyle(
+                    kind=style.kind,
+                    width_m=2 * half,
+                    height_m=style.height_m,
+                    sill_m=style.sill_m,
+                    recess_m=0.1,
+                    reveal=wall,
+                    ledge=style.ledge,
+                ),
+                rng=rng,
+            )
         face.wall(wall, 0.0, base, length, top, holes)
         for level in (base, *levels_m[1:], top - 0.08):
             face.box(trim, (-0.02, length + 0.02), (level - 0.02, level + 0.1), (0.0, 0.05))
     for level, grow, order in ((base - 0.02, 0.0, -1), (top + 0.02, 0.08, 1)):
         corners = [facade.at(u + np.sign(u - centre_m) * grow, level, d + (grow if d else 0.0)) for u, d in plan]
         peak = facade.at(centre_m, level + order * (0.5 if order < 0 else 0.45), 0.02)
-        for a, b in zip(corners[:-1], corners[1:], strict=True):
+        for a, b in itertools.pairwise(corners):
             ring = [a, b, peak] if order > 0 else [b, a, peak]
             facade.sink.swatch_quad("zinc_roof" if order > 0 else trim, ring)
 

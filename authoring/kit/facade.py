@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -98,13 +99,11 @@ class Facade:
         else:
             self.sink.swatch_quad(material, np.asarray(corners))
 
-    def wall(
-        self, material: str, u0: float, v0: float, u1: float, v1: float, openings: Sequence[Opening] = ()
-    ) -> None:
+    def wall(self, material: str, u0: float, v0: float, u1: float, v1: float, openings: Sequence[Opening] = ()) -> None:
         """The wall between two corners, less its openings (which must not overlap each other)."""
         inside = [o for o in openings if o.v1 > v0 + 1e-6 and o.v0 < v1 - 1e-6]
         levels = sorted({v0, v1, *(min(max(v, v0), v1) for o in inside for v in (o.v0, o.v1))})
-        for low, high in zip(levels[:-1], levels[1:], strict=True):
+        for low, high in itertools.pairwise(levels):
             cut = sorted((o.u0, o.u1) for o in inside if o.v0 < high - 1e-6 and o.v1 > low + 1e-6)
             start = u0
             for left, right in [*cut, (u1, u1)]:
@@ -133,7 +132,12 @@ class Facade:
 def facades(sink: Sink, width_m: float, depth_m: float, *, z_m: float = 0.0) -> dict[str, Facade]:
     """The four sides of a box footprint centred at the origin; `front` faces -y, `right` +x."""
     half_w, half_d = width_m / 2, depth_m / 2
-    corners = {"front": (-half_w, -half_d), "right": (half_w, -half_d), "back": (half_w, half_d), "left": (-half_w, half_d)}
+    corners = {
+        "front": (-half_w, -half_d),
+        "right": (half_w, -half_d),
+        "back": (half_w, half_d),
+        "left": (-half_w, half_d),
+    }
     turns = {"front": (1.0, 0.0), "right": (0.0, 1.0), "back": (-1.0, 0.0), "left": (0.0, -1.0)}
     return {
         side: Facade(
@@ -172,7 +176,7 @@ def belt(
         wall = walls[side]
         grow_left = SIDES[index - 1] in sides
         grow_right = SIDES[(index + 1) % 4] in sides
-        for (d0, v0), (d1, v1) in zip(profile[:-1], profile[1:], strict=True):
+        for (d0, v0), (d1, v1) in itertools.pairwise(profile):
             ends = [(-d if grow_left else 0.0, wall.width_m + (d if grow_right else 0.0), d) for d in (d0, d1)]
             (l0, r0, _), (l1, r1, _) = ends
             wall.surface(material, (wall.at(l0, v0, d0), wall.at(r0, v0, d0), wall.at(r1, v1, d1), wall.at(l1, v1, d1)))
@@ -184,7 +188,7 @@ def belt(
 
 def _cap(wall: Facade, material: str, outline: list[Array]) -> None:
     foot = outline[0]
-    for second, third in zip(outline[1:-1], outline[2:], strict=True):
+    for second, third in itertools.pairwise(outline):
         if np.linalg.norm(np.cross(second - foot, third - foot)) > 1e-6:
             corners = np.stack([foot, second, third])
             if material in MATERIALS:

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from authoring.kit.facade import belt, facades
 from authoring.kit.parts import Sink
 from authoring.materials.atlas import FAR_WIDTH_M, far_rows
 
-_STOREYS_M = {"glass_office": (3.7, 5.2), "concrete_office": (3.6, 4.4), "warehouse_loft": (4.0, 4.8), "stone_classic": (3.6, 4.6)}
+_STOREYS_M = {
+    "glass_office": (3.7, 5.2),
+    "concrete_office": (3.6, 4.4),
+    "warehouse_loft": (4.0, 4.8),
+    "stone_classic": (3.6, 4.6),
+}
 _TRIMS = {"glass_office": "anthracite", "concrete_office": "concrete_light", "modern_residential": "anthracite"}
 
 
@@ -23,7 +30,7 @@ def far_building(
     for facade in facades(sink, width_m, depth_m).values():
         u1 = shift + max(1, round(facade.width_m / FAR_WIDTH_M * 8)) / 8
         levels = [0.0, *np.linspace(ground_m, top_m, strips + 1)] if floors > 1 else [0.0, top_m]
-        for index, (low, high) in enumerate(zip(levels[:-1], levels[1:], strict=True)):
+        for index, (low, high) in enumerate(itertools.pairwise(levels)):
             v0, v1 = far_rows(style, ground=index == 0)
             corners = [
                 facade.at(0, low),

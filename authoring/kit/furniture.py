@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from authoring.kit.parts import Part, Sink
@@ -15,7 +17,13 @@ def bin_(*, style: str = "post") -> list[Part]:
         cylinder(sink, "galvanised", (0, 0.2, 0), 0.03, 1.05, segments=8)
         cylinder(sink, "plastic_green", (0, 0, 0.35), 0.17, 0.55, top_radius_m=0.2, segments=16, cap=False)
         disc(sink, "rubber", (0, 0, 0.82), 0.195, segments=16)
-        tube(sink, "plastic_green", [(0.2 * np.cos(a), 0.2 * np.sin(a), 0.9) for a in np.linspace(0, 2 * np.pi, 17)], 0.015, segments=6)
+        tube(
+            sink,
+            "plastic_green",
+            [(0.2 * np.cos(a), 0.2 * np.sin(a), 0.9) for a in np.linspace(0, 2 * np.pi, 17)],
+            0.015,
+            segments=6,
+        )
     elif style == "steel":
         cylinder(sink, "anthracite", (0, 0, 0), 0.24, 0.06, segments=20, cap=False)
         cylinder(sink, "steel", (0, 0, 0.06), 0.26, 0.74, segments=20, cap=False)
@@ -99,7 +107,9 @@ def parking_meter() -> list[Part]:
     cylinder(sink, "galvanised", (0, 0, 0), 0.035, 1.1, segments=10)
     sink.swatch_box("plastic_grey", (-0.09, -0.07, 1.1), (0.09, 0.07, 1.36))
     tube(sink, "plastic_grey", [(0, 0.07, 1.36), (0, -0.07, 1.36)], 0.09, segments=16, caps=True)
-    sink.swatch_quad("dark_glass", [(-0.06, -0.072, 1.27), (0.06, -0.072, 1.27), (0.06, -0.072, 1.4), (-0.06, -0.072, 1.4)])
+    sink.swatch_quad(
+        "dark_glass", [(-0.06, -0.072, 1.27), (0.06, -0.072, 1.27), (0.06, -0.072, 1.4), (-0.06, -0.072, 1.4)]
+    )
     sink.swatch_box("steel", (-0.035, -0.085, 1.14), (0.035, -0.07, 1.22), skip="Y")
     sink.swatch_box("signal_blue", (-0.06, -0.074, 1.23), (0.06, -0.071, 1.26), skip="Y")
     return sink.parts()
@@ -112,14 +122,16 @@ def letter_box(*, colour: str = "signal_yellow") -> list[Part]:
     sink.swatch_box(colour, (-0.25, -0.2, 0.08), (0.25, 0.2, 1.15), skip="zZ")
     angles = np.linspace(0, np.pi, 9)
     rim = [(0.25 * np.cos(a), 1.15 + 0.12 * np.sin(a)) for a in angles]
-    for (x0, z0), (x1, z1) in zip(rim[:-1], rim[1:], strict=True):
+    for (x0, z0), (x1, z1) in itertools.pairwise(rim):
         sink.swatch_quad(colour, [(x0, -0.2, z0), (x0, 0.2, z0), (x1, 0.2, z1), (x1, -0.2, z1)])
     for y, order in ((-0.2, -1), (0.2, 1)):
         face = [(x, y, z) for x, z in rim]
-        for second, third in zip(face[1:-1], face[2:], strict=True):
+        for second, third in itertools.pairwise(face):
             sink.swatch_quad(colour, [face[0], second, third][::-order])
     sink.swatch_box("black_paint", (-0.17, -0.204, 0.98), (0.17, -0.2, 1.03), skip="Y")
-    sink.swatch_quad("white_paint", [(-0.1, -0.203, 0.7), (0.1, -0.203, 0.7), (0.1, -0.203, 0.88), (-0.1, -0.203, 0.88)])
+    sink.swatch_quad(
+        "white_paint", [(-0.1, -0.203, 0.7), (0.1, -0.203, 0.7), (0.1, -0.203, 0.88), (-0.1, -0.203, 0.88)]
+    )
     return sink.parts()
 
 
@@ -134,11 +146,11 @@ def dumpster() -> list[Part]:
     sink.swatch_quad("plastic_grey", [low[3], low[2], low[1], low[0]])
     angles = np.linspace(0, np.pi, 8)
     rim = [(-0.55 * np.cos(a), 1.17 + 0.22 * np.sin(a)) for a in angles]
-    for (y0, z0), (y1, z1) in zip(rim[:-1], rim[1:], strict=True):
+    for (y0, z0), (y1, z1) in itertools.pairwise(rim):
         sink.swatch_quad("dark_green", [(-0.69, y0, z0), (0.69, y0, z0), (0.69, y1, z1), (-0.69, y1, z1)])
     for x, order in ((-0.69, 1), (0.69, -1)):
         face = [(x, y, z) for y, z in rim]
-        for second, third in zip(face[1:-1], face[2:], strict=True):
+        for second, third in itertools.pairwise(face):
             sink.swatch_quad("dark_green", [face[0], second, third][::order])
     sink.swatch_box("plastic_grey", (-0.7, -0.57, 1.1), (0.7, 0.57, 1.17))
     for x in (-0.5, 0.5):

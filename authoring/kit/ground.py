@@ -9,7 +9,16 @@ from authoring.kit.openings import door, shop_front, window
 from authoring.kit.styles import Style
 from authoring.materials.atlas import AWNING_COUNT, FASCIA_COUNT, door_rect, shop_rect
 
-FRAMES = ("anthracite", "dark_green", "dark_blue", "dark_red", "teal_paint", "black_paint", "cream_paint", "brown_paint")
+FRAMES = (
+    "anthracite",
+    "dark_green",
+    "dark_blue",
+    "dark_red",
+    "teal_paint",
+    "black_paint",
+    "cream_paint",
+    "brown_paint",
+)
 
 
 def ground_floor(facade: Facade, style: Style, *, main: bool, rng: np.random.Generator) -> list[Opening]:

@@ -139,9 +139,7 @@ def shop_front(
     return hole
 
 
-def balcony(
-    facade: Facade, u0: float, u1: float, v: float, depth_m: float, *, railing: str, slab: str
-) -> None:
+def balcony(facade: Facade, u0: float, u1: float, v: float, depth_m: float, *, railing: str, slab: str) -> None:
     """A slab with a railing: `bars`, `glass` or `solid`."""
     facade.box(slab, (u0, u1), (v - 0.18, v), (0.0, depth_m), skip="b")
     height, d0, d1 = 1.05, depth_m - 0.06, depth_m - 0.02
@@ -163,8 +161,8 @@ def balcony(
     for u in np.linspace(u0 + 0.02, u1 - 0.02, bars):
         facade.box("anthracite", (u - 0.009, u + 0.009), (v, v + height - 0.05), (d0 + 0.01, d0 + 0.028), skip="ut")
     for d in np.linspace(0.1, d0 - 0.1, max(2, int(depth_m / 0.13))):
-        for u in (u0 + 0.02, u1 - 0.02):
-            facade.box("anthracite", (u - 0.009, u + 0.009), (v, v + height - 0.05), (d, d + 0.018), skip="utb")
+        for end in (u0 + 0.02, u1 - 0.02):
+            facade.box("anthracite", (end - 0.009, end + 0.009), (v, v + height - 0.05), (d, d + 0.018), skip="utb")
 
 
 def _awning(facade: Facade, u0: float, u1: float, v: float, index: int) -> None:

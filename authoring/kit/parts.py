@@ -68,16 +68,12 @@ class Sink:
         bucket.faces.append(np.asarray(faces, np.int64) + bucket.count)
         bucket.count += len(points)
 
-    def polygon(
-        self, material: str, corners: npt.ArrayLike, uvs: npt.ArrayLike, *, label: str | None = None
-    ) -> None:
+    def polygon(self, material: str, corners: npt.ArrayLike, uvs: npt.ArrayLike, *, label: str | None = None) -> None:
         """Add one flat convex polygon: corners (K, 3) counter-clockwise from outside, uvs (K, 2)."""
         points = np.asarray(corners, np.float64)
         normal = _newell(points)
         faces = [(0, i, i + 1) for i in range(1, len(points) - 1)]
-        self.triangles(
-            material, points, faces, uvs=uvs, normals=np.broadcast_to(normal, points.shape), label=label
-        )
+        self.triangles(material, points, faces, uvs=uvs, normals=np.broadcast_to(normal, points.shape), label=label)
 
     def quad(
         self, material: str, corners: Sequence[Sequence[float]] | Array, *, tile_m: float, label: str | None = None

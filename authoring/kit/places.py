@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from authoring.kit.parts import Part, Sink
@@ -28,7 +30,11 @@ def bus_stop(rng: np.random.Generator) -> list[Part]:
     for x, order in ((-1.815, 1), (-1.985, -1)):
         y = (-0.58, 0.53)[::order]
         corners = [(x, y[0], 0.35), (x, y[1], 0.35), (x, y[1], 2.02), (x, y[0], 2.02)]
-        sink.polygon("signs", corners, [(poster[0], poster[1]), (poster[2], poster[1]), (poster[2], poster[3]), (poster[0], poster[3])])
+        sink.polygon(
+            "signs",
+            corners,
+            [(poster[0], poster[1]), (poster[2], poster[1]), (poster[2], poster[3]), (poster[0], poster[3])],
+        )
     sink.swatch_box("teak", (-1.3, 0.22, 0.44), (1.3, 0.56, 0.49), label="static")
     for x in (-1.0, 1.0):
         sink.swatch_box("steel", (x - 0.03, 0.3, 0), (x + 0.03, 0.5, 0.44), skip="zZ")
@@ -80,7 +86,7 @@ def cafe(rng: np.random.Generator, *, parasol: bool = True) -> list[Part]:
         sides, radius = 8, 1.35
         angle_at = np.arange(sides + 1) * 2 * np.pi / sides
         tip = (0.0, 0.0, 2.6)
-        for a, b in zip(angle_at[:-1], angle_at[1:], strict=True):
+        for a, b in itertools.pairwise(angle_at):
             p = (radius * np.cos(a), radius * np.sin(a), 2.15)
             q = (radius * np.cos(b), radius * np.sin(b), 2.15)
             sink.swatch_quad(canvas, [p, q, tip])
@@ -127,7 +133,9 @@ def _flag(sink: Sink, centre: tuple[float, float, float]) -> None:
     uvs = np.array([(u0 + u1) / 2, (v0 + v1) / 2]) + outline * ((u1 - u0) / 2, (v1 - v0) / 2)
     x, y, z = centre
     for depth, flip in ((0.0, 1), (0.02, -1)):
-        points = np.column_stack([outline[:, 0] * half_m * 0.8 * flip + x, np.full(4, y + depth), outline[:, 1] * half_m * 0.8 + z])
+        points = np.column_stack(
+            [outline[:, 0] * half_m * 0.8 * flip + x, np.full(4, y + depth), outline[:, 1] * half_m * 0.8 + z]
+        )
         sink.polygon("traffic_signs", points, uvs, label="traffic_sign")
 
 

@@ -32,7 +32,12 @@ def flat_roof(
         coping,
         width_m,
         depth_m,
-        [(0.0, top_m + parapet_m), (cap, top_m + parapet_m), (cap, top_m + parapet_m + 0.08), (-thickness_m, top_m + parapet_m + 0.09)],
+        [
+            (0.0, top_m + parapet_m),
+            (cap, top_m + parapet_m),
+            (cap, top_m + parapet_m + 0.08),
+            (-thickness_m, top_m + parapet_m + 0.09),
+        ],
     )
     inner_w, inner_d = width_m - 2 * thickness_m, depth_m - 2 * thickness_m
     x, y = inner_w / 2, inner_d / 2
@@ -64,20 +69,37 @@ def roof_machinery(
             continue
         w, d, h = rng.uniform(0.45, 0.95), rng.uniform(0.35, 0.7), rng.uniform(0.6, 1.3)
         sink.swatch_box("galvanised", (x - w, y - d, top_m + 0.2), (x + w, y + d, top_m + 0.2 + h), skip="")
-        sink.swatch_box("anthracite", (x - w * 0.7, y - d * 0.7, top_m + 0.2 + h), (x + w * 0.7, y + d * 0.7, top_m + 0.26 + h), skip="z")
+        sink.swatch_box(
+            "anthracite",
+            (x - w * 0.7, y - d * 0.7, top_m + 0.2 + h),
+            (x + w * 0.7, y + d * 0.7, top_m + 0.26 + h),
+            skip="z",
+        )
         sink.swatch_box("concrete_dark", (x - w, y - d, top_m), (x + w, y + d, top_m + 0.2), skip="zZ")
     if water_tank:
         x, y = -head_x * 0.8, -half_d * 0.3
         for dx in (-0.9, 0.9):
             for dy in (-0.9, 0.9):
-                sink.swatch_box("rust", (x + dx - 0.08, y + dy - 0.08, top_m), (x + dx + 0.08, y + dy + 0.08, top_m + 2.4), skip="zZ")
+                sink.swatch_box(
+                    "rust",
+                    (x + dx - 0.08, y + dy - 0.08, top_m),
+                    (x + dx + 0.08, y + dy + 0.08, top_m + 2.4),
+                    skip="zZ",
+                )
         sink.swatch_box("rust", (x - 1.1, y - 1.1, top_m + 2.4), (x + 1.1, y + 1.1, top_m + 2.55), skip="")
         cylinder(sink, "weathered_wood", (x, y, top_m + 2.55), 1.25, 2.3, segments=14, cap=False)
         dome(sink, "bitumen", (x, y, top_m + 4.85), 1.4, 0.9, segments=14, rings=1)
     mast_x, mast_y = half_w * float(rng.uniform(-0.8, 0.8)), half_d * 0.5
-    sink.swatch_box("galvanised", (mast_x - 0.03, mast_y - 0.03, top_m), (mast_x + 0.03, mast_y + 0.03, top_m + 3.4), skip="z")
+    sink.swatch_box(
+        "galvanised", (mast_x - 0.03, mast_y - 0.03, top_m), (mast_x + 0.03, mast_y + 0.03, top_m + 3.4), skip="z"
+    )
     for height in (2.6, 2.95, 3.3):
-        sink.swatch_box("galvanised", (mast_x - 0.5, mast_y - 0.012, top_m + height), (mast_x + 0.5, mast_y + 0.012, top_m + height + 0.024), skip="")
+        sink.swatch_box(
+            "galvanised",
+            (mast_x - 0.5, mast_y - 0.012, top_m + height),
+            (mast_x + 0.5, mast_y + 0.012, top_m + height + 0.024),
+            skip="",
+        )
 
 
 def mansard(
@@ -104,7 +126,9 @@ def mansard(
         for index in range(count):
             u = 1.25 + (index + 0.5) * pitch
             low_v, high_v, front = top_m + 0.45, top_m + 2.1, -0.12
-            wall.picture("windows", window_rect("casement", int(rng.integers(8))), u - 0.48, low_v, u + 0.48, high_v, d_m=front)
+            wall.picture(
+                "windows", window_rect("casement", int(rng.integers(8))), u - 0.48, low_v, u + 0.48, high_v, d_m=front
+            )
             for cheek in ((u - 0.6, u - 0.48), (u + 0.48, u + 0.6)):
                 wall.box("white_paint", cheek, (low_v - 0.1, high_v), (front - 0.8, front + 0.06), skip="bu")
             wall.box("zinc_roof", (u - 0.72, u + 0.72), (high_v, high_v + 0.16), (front - 0.9, front + 0.16), skip="b")
@@ -125,7 +149,9 @@ def gable_roof(sink: Sink, width_m: float, depth_m: float, top_m: float, *, wall
     sink.quad("tile_roof", [(-x, -y - eave, low), (x, -y - eave, low), (x, 0, ridge), (-x, 0, ridge)], tile_m=tile_m)
     sink.quad("tile_roof", [(x, y + eave, low), (-x, y + eave, low), (-x, 0, ridge), (x, 0, ridge)], tile_m=tile_m)
     for sign in (-1, 1):
-        sink.swatch_box("zinc_roof", (-x, sign * (y + eave) - 0.07, low - 0.08), (x, sign * (y + eave) + 0.07, low + 0.03), skip="")
+        sink.swatch_box(
+            "zinc_roof", (-x, sign * (y + eave) - 0.07, low - 0.08), (x, sign * (y + eave) + 0.07, low + 0.03), skip=""
+        )
     wall_tile = MATERIALS[wall].tile_m
     sink.quad(wall, [(x, -y, top_m), (x, y, top_m), (x, 0, ridge)], tile_m=wall_tile)
     sink.quad(wall, [(-x, y, top_m), (-x, -y, top_m), (-x, 0, ridge)], tile_m=wall_tile)
@@ -137,6 +163,8 @@ def chimneys(sink: Sink, width_m: float, depth_m: float, top_m: float, *, rng: n
         x, y = sign * (width_m / 2 - 1.3), float(rng.uniform(-0.2, 0.4)) * depth_m
         low = top_m - 1.2
         sink.tiled_box("brick_red", (x - 0.35, y - 0.7, low), (x + 0.35, y + 0.7, top_m + 1.3), tile_m=2.0, skip="z")
-        sink.swatch_box("concrete_light", (x - 0.42, y - 0.77, top_m + 1.3), (x + 0.42, y + 0.77, top_m + 1.42), skip="")
+        sink.swatch_box(
+            "concrete_light", (x - 0.42, y - 0.77, top_m + 1.3), (x + 0.42, y + 0.77, top_m + 1.42), skip=""
+        )
         for offset in (-0.4, 0.0, 0.4):
             cylinder(sink, "terracotta", (x, y + offset, top_m + 1.42), 0.11, 0.4, segments=8)

@@ -36,7 +36,12 @@ def cylinder(
     )
     if cap:
         disc(
-            sink, swatch, (x, y, z + height_m), radius_m if top_radius_m is None else top_radius_m, segments=segments, label=label
+            sink,
+            swatch,
+            (x, y, z + height_m),
+            radius_m if top_radius_m is None else top_radius_m,
+            segments=segments,
+            label=label,
         )
 
 
@@ -54,7 +59,7 @@ def tube(
     sink: Sink,
     swatch: str,
     path: Sequence[Sequence[float]] | Array,
-    radii_m: Sequence[float] | float,
+    radii_m: Sequence[float] | Array | float,
     *,
     segments: int = 10,
     caps: bool = False,
@@ -62,7 +67,9 @@ def tube(
 ) -> None:
     """A round tube along a path (K, 3), smooth around, its ring kept from twisting."""
     rings, normals = sweep(path, radii_m, segments=segments)
-    sink.swatch_mesh(swatch, rings.reshape(-1, 3), ring_faces(len(rings), segments), normals.reshape(-1, 3), label=label)
+    sink.swatch_mesh(
+        swatch, rings.reshape(-1, 3), ring_faces(len(rings), segments), normals.reshape(-1, 3), label=label
+    )
     if caps:
         points = np.asarray(path, np.float64)
         fan = np.array([(0, i, i + 1) for i in range(1, segments - 1)])
@@ -75,7 +82,7 @@ def tube(
 
 
 def sweep(
-    path: Sequence[Sequence[float]] | Array, radii_m: Sequence[float] | float, *, segments: int
+    path: Sequence[Sequence[float]] | Array, radii_m: Sequence[float] | Array | float, *, segments: int
 ) -> tuple[Array, Array]:
     """Rings (K, segments, 3) around a path (K, 3) and their outward unit normals."""
     points = np.asarray(path, np.float64)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -38,9 +39,7 @@ def traffic_light(*, lit: str = "red", post_m: float = 2.3, pedestrian: bool = T
     return sink.parts()
 
 
-def traffic_light_mast(
-    *, arm_m: float = 6.0, lit: Sequence[str] = ("red", "red"), height_m: float = 5.6
-) -> list[Part]:
+def traffic_light_mast(*, arm_m: float = 6.0, lit: Sequence[str] = ("red", "red"), height_m: float = 5.6) -> list[Part]:
     """A tall mast whose arm reaches over the lanes towards -x and carries one head for each of `lit`."""
     sink = Sink("traffic_light")
     cylinder(sink, "galvanised", (0, 0, 0), 0.16, height_m + 0.4, top_radius_m=0.11, segments=14, label="pole")
@@ -65,7 +64,9 @@ def head(sink: Sink, foot: Sequence[float], *, lit: str, backplate: bool = False
     w, d, h = HEAD_M
     sink.swatch_box("black_paint", (x - w / 2 + 0.03, y, z), (x + w / 2 - 0.03, y + d - 0.05, z + h), skip="")
     if backplate:
-        sink.swatch_box("black_paint", (x - w / 2 - 0.06, y + 0.05, z - 0.12), (x + w / 2 + 0.06, y + 0.07, z + h + 0.12), skip="")
+        sink.swatch_box(
+            "black_paint", (x - w / 2 - 0.06, y + 0.05, z - 0.12), (x + w / 2 + 0.06, y + 0.07, z + h + 0.12), skip=""
+        )
     for index, name in enumerate(("green", "amber", "red")):
         centre = (x, y - 0.004, z + 0.18 + index * 0.32)
         _lens(sink, centre, name if name == lit else "dark")
@@ -85,7 +86,13 @@ def street_lamp(*, height_m: float = 8.0, arm_m: float = 1.8, style: str = "mode
     sink.swatch_box("anthracite", (-0.06, -0.115, 0.5), (0.06, -0.09, 0.95), skip="Y")
     for sign in (-1,) if style == "modern" else (-1, 1):
         top = height_m
-        bend = [(0, 0, top - 0.85), (0, 0, top - 0.4), (0, sign * 0.25, top - 0.12), (0, sign * 0.7, top), (0, sign * arm_m, top + 0.06)]
+        bend = [
+            (0, 0, top - 0.85),
+            (0, 0, top - 0.4),
+            (0, sign * 0.25, top - 0.12),
+            (0, sign * 0.7, top),
+            (0, sign * arm_m, top + 0.06),
+        ]
         tube(sink, "galvanised", bend, [0.06, 0.055, 0.05, 0.045, 0.04], segments=10)
         low, high = sorted((sign * (arm_m - 0.1), sign * (arm_m + 0.65)))
         sink.swatch_box("anthracite", (-0.16, low, top + 0.0), (0.16, high, top + 0.09), skip="z")
@@ -95,8 +102,18 @@ def street_lamp(*, height_m: float = 8.0, arm_m: float = 1.8, style: str = "mode
 
 
 def _heritage(sink: Sink) -> None:
-    rings = [(0.2, 0.0), (0.2, 0.12), (0.13, 0.2), (0.12, 0.75), (0.15, 0.82), (0.07, 0.95), (0.05, 3.1), (0.09, 3.2), (0.05, 3.3)]
-    for (r0, z0), (r1, z1) in zip(rings[:-1], rings[1:], strict=True):
+    rings = [
+        (0.2, 0.0),
+        (0.2, 0.12),
+        (0.13, 0.2),
+        (0.12, 0.75),
+        (0.15, 0.82),
+        (0.07, 0.95),
+        (0.05, 3.1),
+        (0.09, 3.2),
+        (0.05, 3.3),
+    ]
+    for (r0, z0), (r1, z1) in itertools.pairwise(rings):
         if z1 > z0:
             cylinder(sink, "dark_green", (0, 0, z0), r0, z1 - z0, top_radius_m=r1, segments=14, cap=False)
     cylinder(sink, "lamp_glass", (0, 0, 3.32), 0.13, 0.42, top_radius_m=0.2, segments=8, cap=False)

@@ -99,7 +99,7 @@ def _plate(
     count = len(outline)
     front = np.column_stack([flat[:, 0] * flip, np.full(count, offset_m * flip), flat[:, 1] + z_m])
     sink.polygon("traffic_signs", front, uvs, label=label)
-    rear = front + (0, THICK_M * flip, 0)
+    rear = front + np.array([0.0, THICK_M * flip, 0.0])
     if back:
         normal = np.tile([0.0, 1.0, 0.0], (count, 1))
         faces = [(0, i + 1, i) for i in range(1, count - 1)]

@@ -162,12 +162,22 @@ def _ornament(
     elif style.cornice in ("bracket", "classic"):
         reach = 0.55 if style.cornice == "bracket" else 0.7
         ring([(0.0, top_m - 0.75), (0.07, top_m - 0.72), (0.09, top_m - 0.5), (0.09, top_m - 0.3)])
-        ring([(0.09, top_m - 0.3), (reach - 0.1, top_m - 0.12), (reach, top_m), (reach, top_m + 0.1), (0.0, top_m + 0.16)])
+        ring(
+            [
+                (0.09, top_m - 0.3),
+                (reach - 0.1, top_m - 0.12),
+                (reach, top_m),
+                (reach, top_m + 0.1),
+                (0.0, top_m + 0.16),
+            ]
+        )
         for side, facade in facades(sink, width_m, depth_m).items():
             if side in sides:
                 count = max(2, int(facade.width_m / (0.9 if style.cornice == "bracket" else 0.7)))
                 for u in np.linspace(0.3, facade.width_m - 0.3, count):
-                    facade.box(style.trim, (u - 0.08, u + 0.08), (top_m - 0.5, top_m - 0.12), (0.09, reach - 0.14), skip="bt")
+                    facade.box(
+                        style.trim, (u - 0.08, u + 0.08), (top_m - 0.5, top_m - 0.12), (0.09, reach - 0.14), skip="bt"
+                    )
     if style.quoins:
         for index, side in enumerate(SIDES):
             if side not in sides:

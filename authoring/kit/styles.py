@@ -185,9 +185,18 @@ def concrete_office(rng: np.random.Generator) -> Style:
 
 def shop_house(rng: np.random.Generator) -> Style:
     """One narrow house of a shopping street; every one differs from its neighbours."""
-    family = rng.choice([brick_apartment, plaster_apartment, plaster_apartment])
-    style: Style = family(rng)
-    return replace(style, ground="shops", ground_m=3.9, water_tank=False, bay_m=float(rng.uniform(2.0, 2.6)), balconies=0.0, oriels=False, escapes=False)
+    family = (brick_apartment, plaster_apartment, plaster_apartment)[int(rng.integers(3))]
+    style = family(rng)
+    return replace(
+        style,
+        ground="shops",
+        ground_m=3.9,
+        water_tank=False,
+        bay_m=float(rng.uniform(2.0, 2.6)),
+        balconies=0.0,
+        oriels=False,
+        escapes=False,
+    )
 
 
 def warehouse_loft(rng: np.random.Generator) -> Style:

@@ -6,8 +6,8 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from authoring.materials import far, glazing, graphics, ground, masonry
-from authoring.materials.image import Image, write_png
+from authoring.materials import far, glazing, graphics, ground, masonry, traffic_art
+from authoring.materials.image import Image, shrunk, write_png
 from authoring.materials.palette import palette_images
 from authoring.materials.registry import MATERIALS
 from gear.values.rng import derive_rng
@@ -38,13 +38,15 @@ PAINTERS: tuple[Painter, ...] = (
     glazing.curtain_wall,
     graphics.signs,
     graphics.awnings,
-    graphics.traffic_signs,
+    traffic_art.traffic_signs,
     graphics.lenses,
     graphics.ironwork,
     far.far_facades,
 )
 # Noise has few shades: as a palette image it takes a third of the bytes.
 FEW_COLOURS = 256
+# Normals and ORM say less than colours do, and cost as much.
+LARGEST_MAP_PX = 512
 
 
 def paint() -> dict[str, Image]:
@@ -66,8 +68,10 @@ def build(folder: Path) -> None:
     textures = paint()
     if missing := registered_stems() - set(textures):
         raise ValueError(f"nobody paints {', '.join(sorted(missing))}")
+    colours = {material.rgb for material in MATERIALS.values()}
     for stem in sorted(registered_stems()):
-        write_png(folder / f"{stem}.png", textures[stem], colours=FEW_COLOURS)
+        image = textures[stem] if stem in colours else shrunk(textures[stem], LARGEST_MAP_PX)
+        write_png(folder / f"{stem}.png", image, colours=FEW_COLOURS)
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import cv2
 import numpy as np
@@ -11,7 +11,8 @@ import numpy.typing as npt
 from authoring.materials.image import Image, linear_to_srgb, orm
 
 Array = npt.NDArray[np.float64]
-Colour = Sequence[float]
+Colour = Sequence[float] | Array
+Draw = Callable[[Image, int], object]
 
 
 class Canvas:
@@ -34,7 +35,15 @@ class Canvas:
         self.rect(0, 0, 1, 1, colour, roughness=roughness, metallic=metallic)
 
     def rect(
-        self, x0: float, y0: float, x1: float, y1: float, colour: Colour, *, roughness: float = 0.8, metallic: float = 0.0
+        self,
+        x0: float,
+        y0: float,
+        x1: float,
+        y1: float,
+        colour: Colour,
+        *,
+        roughness: float = 0.8,
+        metallic: float = 0.0,
     ) -> None:
         """Paint a rectangle."""
         box = self._box(x0, y0, x1, y1)
@@ -57,12 +66,23 @@ class Canvas:
         self._paint(lambda image, value: cv2.fillPoly(image, [pixels], value), colour, roughness, metallic)
 
     def ellipse(
-        self, x: float, y: float, radius_x: float, radius_y: float, colour: Colour, *, roughness: float = 0.8, metallic: float = 0.0
+        self,
+        x: float,
+        y: float,
+        radius_x: float,
+        radius_y: float,
+        colour: Colour,
+        *,
+        roughness: float = 0.8,
+        metallic: float = 0.0,
     ) -> None:
         """Paint an ellipse."""
         angle = np.arange(40) * 2 * np.pi / 40
         self.polygon(
-            np.stack([x + radius_x * np.cos(angle), y + radius_y * np.sin(angle)], 1), colour, roughness=roughness, metallic=metallic
+            np.stack([x + radius_x * np.cos(angle), y + radius_y * np.sin(angle)], 1),
+            colour,
+            roughness=roughness,
+            metallic=metallic,
         )
 
     def line(self, points: npt.ArrayLike, thickness: float, colour: Colour, *, closed: bool = False) -> None:
@@ -71,13 +91,17 @@ class Canvas:
         width = max(1, round(thickness * self.size[1]))
         self._paint(lambda image, value: cv2.polylines(image, [pixels], closed, value, width), colour, None, 0.0)
 
-    def text(self, words: str, x: float, y: float, height: float, colour: Colour, *, weight: float = 0.16, font: int = 2) -> None:
+    def text(
+        self, words: str, x: float, y: float, height: float, colour: Colour, *, weight: float = 0.16, font: int = 2
+    ) -> None:
         """Write words centred at (x, y); height is that of a capital letter as a share of the canvas's height."""
         scale = height * self.size[1] / 21.0
         thick = max(1, round(height * self.size[1] * weight))
         (wide, tall), _ = cv2.getTextSize(words, font, scale, thick)
         origin = (round(x * self.size[0] - wide / 2), round(y * self.size[1] + tall / 2))
-        self._paint(lambda image, value: cv2.putText(image, words, origin, font, scale, value, thick), colour, None, 0.0)
+        self._paint(
+            lambda image, value: cv2.putText(image, words, origin, font, scale, value, thick), colour, None, 0.0
+        )
 
     def image(self) -> Image:
         """The finished colour, sRGB bytes (height, width, 3)."""
@@ -99,7 +123,7 @@ class Canvas:
         rows = slice(max(0, round(y0 * height)), max(0, round(y1 * height)))
         return rows, slice(max(0, round(x0 * width)), max(0, round(x1 * width)))
 
-    def _paint(self, draw, colour: Colour, roughness: float | None, metallic: float) -> None:  # type: ignore[no-untyped-def]
+    def _paint(self, draw: Draw, colour: Colour, roughness: float | None, metallic: float) -> None:
         mask = np.zeros((self.size[1], self.size[0]), np.uint8)
         draw(mask, 255)
         inside = mask > 0

@@ -67,7 +67,9 @@ def _bay(
     strip.rect(x0 + edge, y0 + 0.02, x1 - edge, y1 - 0.02, (0.095, 0.105, 0.11), **GLASS)
     dressing = rng.random()
     if dressing < 0.35:
-        strip.rect(x0 + edge, y0 + 0.02, x1 - edge, y0 + height * float(rng.uniform(0.2, 0.6)), (0.34, 0.33, 0.30), **BEHIND)
+        strip.rect(
+            x0 + edge, y0 + 0.02, x1 - edge, y0 + height * float(rng.uniform(0.2, 0.6)), (0.34, 0.33, 0.30), **BEHIND
+        )
     elif dressing < 0.5:
         for left in (x0 + edge, x1 - edge - 0.008):
             strip.rect(left, y0 + 0.02, left + 0.008, y1 - 0.02, (0.36, 0.34, 0.30), **BEHIND)

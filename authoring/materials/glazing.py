@@ -66,7 +66,11 @@ def curtain_wall(*, rng: np.random.Generator) -> Textures:
     for pane in range(panes + 1):
         wall.rect(pane / panes - 0.003, 0, pane / panes + 0.003, 1, (0.03, 0.03, 0.032), roughness=0.5)
     normal = np.concatenate([tilt, np.ones((size, size, 1))], axis=-1)
-    return {"curtain_wall": wall.image(), "curtain_wall_orm": wall.orm(), "curtain_wall_n": to_bytes(normal * 0.5 + 0.5)}
+    return {
+        "curtain_wall": wall.image(),
+        "curtain_wall_orm": wall.orm(),
+        "curtain_wall_n": to_bytes(normal * 0.5 + 0.5),
+    }
 
 
 def _pair(stem: str, cells: list[Canvas], columns: int) -> Textures:
@@ -112,7 +116,12 @@ def _folds(cell: Canvas, x0: float, y0: float, x1: float, y1: float, tone: Colou
 
 def _frame(cell: Canvas, kind: str, dressing: int) -> None:
     """Sash bars and the frame's shadow on the glass."""
-    colours = {"casement": (0.60, 0.59, 0.56), "sash": (0.52, 0.50, 0.45), "modern": (0.045, 0.047, 0.05), "industrial": (0.03, 0.032, 0.034)}
+    colours = {
+        "casement": (0.60, 0.59, 0.56),
+        "sash": (0.52, 0.50, 0.45),
+        "modern": (0.045, 0.047, 0.05),
+        "industrial": (0.03, 0.032, 0.034),
+    }
     colour = colours[kind]
     side = 0.075 if kind != "modern" else 0.05
     bars = {
@@ -207,7 +216,9 @@ def _goods(cell: Canvas, x0: float, x1: float, shelf: float, tall: float, *, rng
 def _muted(rng: np.random.Generator) -> Array:
     """A colour of goods: mostly earthy, sometimes bright."""
     tone = float(rng.uniform(0.06, 0.42)) * np.ones(3)
-    return np.asarray(np.clip(tone + rng.normal(0, 0.05, 3) + rng.normal(0, 0.05) * np.array([1.0, 0.0, -1.0]), 0.02, 0.5))
+    return np.asarray(
+        np.clip(tone + rng.normal(0, 0.05, 3) + rng.normal(0, 0.05) * np.array([1.0, 0.0, -1.0]), 0.02, 0.5)
+    )
 
 
 def _dummy(cell: Canvas, x: float, *, rng: np.random.Generator) -> None:
@@ -223,7 +234,14 @@ def _dummy(cell: Canvas, x: float, *, rng: np.random.Generator) -> None:
 def _door(cell: Canvas, name: str) -> None:
     """One door with its frame."""
     if name.startswith("panel_"):
-        colour = np.array({"green": (0.02, 0.06, 0.035), "brown": (0.12, 0.06, 0.03), "blue": (0.02, 0.05, 0.12), "black": (0.022, 0.022, 0.024)}[name[6:]])
+        colour = np.array(
+            {
+                "green": (0.02, 0.06, 0.035),
+                "brown": (0.12, 0.06, 0.03),
+                "blue": (0.02, 0.05, 0.12),
+                "black": (0.022, 0.022, 0.024),
+            }[name[6:]]
+        )
         cell.fill(colour, roughness=0.35)
         cell.rect(0.06, 0.02, 0.94, 0.20, (0.09, 0.10, 0.105), **GLASS)
         cell.rect(0, 0.2, 1, 0.215, colour * 0.4)

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from authoring.materials.atlas import AWNING_COUNT, IRONWORK, LENSES, TRAFFIC_SIGNS
+from authoring.materials.atlas import AWNING_COUNT, IRONWORK, LENSES
 from authoring.materials.canvas import Canvas, Colour, tiled
 from authoring.materials.image import Image, linear_to_srgb, normal_from_height
 from authoring.materials.noise import tileable_noise
@@ -27,7 +27,6 @@ SIGN_COLOURS: tuple[tuple[Colour, Colour], ...] = (
     ((0.04, 0.20, 0.26), (0.68, 0.67, 0.64)),
     ((0.20, 0.05, 0.12), (0.66, 0.58, 0.50)),
 )
-WHITE, RED, BLUE, BLACK, YELLOW = (0.70, 0.70, 0.68), (0.45, 0.018, 0.02), (0.015, 0.09, 0.36), (0.02, 0.02, 0.02), (0.66, 0.42, 0.015)
 
 
 def signs(*, rng: np.random.Generator) -> Textures:
@@ -78,21 +77,14 @@ def awnings(*, rng: np.random.Generator) -> Textures:
     return {"awnings": linear_to_srgb(albedo * (1 + 0.10 * weave)[..., None])}
 
 
-def traffic_signs(*, rng: np.random.Generator) -> Textures:
-    """Sixteen signs, 256 px each, a little faded and dusty."""
-    cells = []
-    for name in TRAFFIC_SIGNS:
-        cell = Canvas(256, 256, oversample=4)
-        _SIGN_PAINTERS[name](cell)
-        dust = tileable_noise(cell.size[0], period=4, octaves=5, rng=rng)
-        cell.albedo *= (1 + 0.06 * dust)[..., None]
-        cells.append(cell.image())
-    return {"traffic_signs": tiled(cells, 4)}
-
-
 def lenses(*, rng: np.random.Generator) -> Textures:
     """Lit red, amber and green lenses of LED dots, and a dark one."""
-    lit = {"red": (0.85, 0.03, 0.012), "amber": (0.9, 0.36, 0.01), "green": (0.02, 0.72, 0.34), "dark": (0.016, 0.016, 0.017)}
+    lit = {
+        "red": (0.85, 0.03, 0.012),
+        "amber": (0.9, 0.36, 0.01),
+        "green": (0.02, 0.72, 0.34),
+        "dark": (0.016, 0.016, 0.017),
+    }
     cells = []
     for name in LENSES:
         cell = Canvas(128, 128, oversample=4)
@@ -116,16 +108,28 @@ def ironwork(*, rng: np.random.Generator) -> Textures:
     blocks = ((np.mod(x * 9, 1) < 0.62) & (np.mod(y * 9, 1) < 0.62)).astype(float)
     heights = {
         "manhole": np.where(radius > 0.88, 1.0, np.where(radius > 0.82, 0.0, np.where(radius < 0.2, 0.9, blocks))),
-        "manhole_square": np.where(np.maximum(abs(x), abs(y)) > 0.9, 1.0, np.where(np.maximum(abs(x), abs(y)) > 0.85, 0.0, ((np.mod((x + y) * 7, 1) < 0.4)).astype(float))),
-        "drain": np.where(np.maximum(abs(x), abs(y)) > 0.86, 1.0, np.where((np.mod(x * 5, 1) < 0.45) | (abs(y) < 0.06), 1.0, -3.0)),
-        "tree_grate": np.where(radius < 0.42, -3.0, np.where((np.mod(radius * 9, 1) < 0.55) | (np.mod(np.arctan2(y, x) * 8 / np.pi, 1) < 0.16), 1.0, -3.0)),
+        "manhole_square": np.where(
+            np.maximum(abs(x), abs(y)) > 0.9,
+            1.0,
+            np.where(np.maximum(abs(x), abs(y)) > 0.85, 0.0, (np.mod((x + y) * 7, 1) < 0.4).astype(float)),
+        ),
+        "drain": np.where(
+            np.maximum(abs(x), abs(y)) > 0.86, 1.0, np.where((np.mod(x * 5, 1) < 0.45) | (abs(y) < 0.06), 1.0, -3.0)
+        ),
+        "tree_grate": np.where(
+            radius < 0.42,
+            -3.0,
+            np.where((np.mod(radius * 9, 1) < 0.55) | (np.mod(np.arctan2(y, x) * 8 / np.pi, 1) < 0.16), 1.0, -3.0),
+        ),
     }
     noise = tileable_noise(2 * size, period=32, octaves=4, rng=rng)
     ordered = [heights[name] for name in IRONWORK]
     height = np.concatenate([np.concatenate(ordered[:2], 1), np.concatenate(ordered[2:], 1)])
     shade = np.where(height < -1, 0.012, 0.075 + 0.05 * np.clip(height, 0, 1))
     rust = np.clip(noise, 0, 1)[..., None] * np.array([0.05, 0.018, 0.004])
-    albedo = shade[..., None] * (1 + 0.25 * noise[..., None]) * np.array([1.0, 0.97, 0.93]) + rust * (height > -1)[..., None]
+    albedo = (
+        shade[..., None] * (1 + 0.25 * noise[..., None]) * np.array([1.0, 0.97, 0.93]) + rust * (height > -1)[..., None]
+    )
     relief = 0.004 * np.clip(height, -1, 1)
     return {"ironwork": linear_to_srgb(albedo), "ironwork_n": normal_from_height(relief, (1.4, 1.4))}
 
@@ -137,18 +141,28 @@ def _emblem(cell: Canvas, x: float, y: float, size: float, index: int, ink: Colo
     if index % 4 == 0:
         for turn in range(5):
             a = turn * 2 * np.pi / 5 - np.pi / 2
-            cell.ellipse(x + 0.62 * size * ratio * np.cos(a), y + 0.62 * size * np.sin(a), 0.3 * size * ratio, 0.3 * size, ink)
+            cell.ellipse(
+                x + 0.62 * size * ratio * np.cos(a), y + 0.62 * size * np.sin(a), 0.3 * size * ratio, 0.3 * size, ink
+            )
     elif index % 4 == 1:
         for k in range(3):
-            cell.rect(x + (k - 1.2) * 0.6 * size * ratio, y + size * (0.6 - 0.5 * k), x + (k - 0.7) * 0.6 * size * ratio, y + size, ink)
+            cell.rect(
+                x + (k - 1.2) * 0.6 * size * ratio,
+                y + size * (0.6 - 0.5 * k),
+                x + (k - 0.7) * 0.6 * size * ratio,
+                y + size,
+                ink,
+            )
     elif index % 4 == 2:
         ring = np.stack([x + size * ratio * np.cos(angle), y + size * np.sin(angle)], 1)
         cell.line(ring, 0.09 * size / 0.3, ink, closed=True)
         cell.ellipse(x, y, 0.4 * size * ratio, 0.4 * size, ink)
     else:
         t = np.linspace(-1, 1, 24)
-        for k in (-0.5, 0.0, 0.5):
-            cell.line(np.stack([x + t * size * ratio, y + size * (k + 0.25 * np.sin(t * 5))], 1), 0.06 * size / 0.3, ink)
+        for shift in (-0.5, 0.0, 0.5):
+            cell.line(
+                np.stack([x + t * size * ratio, y + size * (shift + 0.25 * np.sin(t * 5))], 1), 0.06 * size / 0.3, ink
+            )
 
 
 def _poster(index: int, *, rng: np.random.Generator) -> Image:
@@ -166,150 +180,3 @@ def _poster(index: int, *, rng: np.random.Generator) -> Image:
     for row in range(3):
         cell.rect(0.2, 0.85 + row * 0.03, 0.8 - 0.12 * row, 0.862 + row * 0.03, ink)
     return cell.image()
-
-
-def _disc(cell: Canvas, rim: Colour, ground: Colour, *, inner: float = 0.36) -> None:
-    cell.fill(rim)
-    cell.ellipse(0.5, 0.5, inner, inner, ground)
-
-
-def _stop(cell: Canvas) -> None:
-    cell.fill(WHITE)
-    angle = np.radians(22.5 + np.arange(8) * 45)
-    radius = 0.5 / np.cos(np.pi / 8) * 0.92
-    cell.polygon(np.stack([0.5 + radius * np.cos(angle), 0.5 + radius * np.sin(angle)], 1), RED)
-    cell.text("STOP", 0.5, 0.5, 0.27, WHITE, weight=0.15)
-
-
-def _triangle(cell: Canvas, *, down: bool) -> None:
-    cell.fill(RED)
-    points = np.array([(0.5, 0.8), (0.2, 0.235), (0.8, 0.235)])
-    cell.polygon(points if down else points * (1, -1) + (0, 1), WHITE)
-
-
-def _warning(cell: Canvas) -> None:
-    _triangle(cell, down=False)
-    for x, tall in ((0.43, 1.0), (0.57, 0.85)):
-        y = 0.72 - 0.30 * tall
-        cell.ellipse(x, y, 0.03, 0.03, BLACK)
-        cell.line([(x, y + 0.03), (x, y + 0.17 * tall)], 0.045, BLACK)
-        cell.line([(x, y + 0.15 * tall), (x - 0.05, 0.73)], 0.025, BLACK)
-        cell.line([(x, y + 0.15 * tall), (x + 0.05, 0.73)], 0.025, BLACK)
-        cell.line([(x - 0.07, y + 0.1), (x + 0.07, y + 0.07)], 0.025, BLACK)
-
-
-def _priority(cell: Canvas) -> None:
-    cell.fill(WHITE)
-    cell.polygon([(0.5, 0.13), (0.87, 0.5), (0.5, 0.87), (0.13, 0.5)], YELLOW)
-
-
-def _no_entry(cell: Canvas) -> None:
-    cell.fill(RED)
-    cell.rect(0.17, 0.42, 0.83, 0.58, WHITE)
-
-
-def _speed(limit: str) -> object:
-    def paint(cell: Canvas) -> None:
-        _disc(cell, RED, WHITE, inner=0.375)
-        cell.text(limit, 0.5, 0.5, 0.33, BLACK, weight=0.13)
-
-    return paint
-
-
-def _arrow(cell: Canvas, tail: tuple[float, float], tip: tuple[float, float], colour: Colour, width: float) -> None:
-    start, end = np.asarray(tail), np.asarray(tip)
-    along = (end - start) / np.linalg.norm(end - start)
-    side = np.array([-along[1], along[0]])
-    neck = end - along * width * 1.8
-    points = [start - side * width / 2, neck - side * width / 2, neck - side * width * 1.3, end, neck + side * width * 1.3, neck + side * width / 2, start + side * width / 2]
-    cell.polygon(points, colour)
-
-
-def _one_way(cell: Canvas) -> None:
-    cell.fill(BLUE)
-    _arrow(cell, (0.08, 0.5), (0.92, 0.5), WHITE, 0.13)
-
-
-def _parking(cell: Canvas) -> None:
-    cell.fill(BLUE)
-    cell.line([(0.36, 0.82), (0.36, 0.2), (0.52, 0.2)], 0.12, WHITE)
-    angle = np.linspace(-np.pi / 2, np.pi / 2, 20)
-    cell.line(np.stack([0.52 + 0.15 * np.cos(angle), 0.355 + 0.155 * np.sin(angle)], 1), 0.12, WHITE)
-    cell.line([(0.36, 0.51), (0.52, 0.51)], 0.12, WHITE)
-
-
-def _crossing(cell: Canvas) -> None:
-    cell.fill(BLUE)
-    cell.polygon([(0.5, 0.12), (0.9, 0.82), (0.1, 0.82)], WHITE)
-    cell.ellipse(0.52, 0.34, 0.04, 0.04, BLACK)
-    cell.line([(0.51, 0.4), (0.49, 0.56)], 0.07, BLACK)
-    cell.line([(0.49, 0.56), (0.58, 0.76)], 0.04, BLACK)
-    cell.line([(0.49, 0.56), (0.41, 0.76)], 0.04, BLACK)
-    cell.line([(0.51, 0.43), (0.62, 0.52)], 0.03, BLACK)
-    cell.line([(0.51, 0.43), (0.41, 0.53)], 0.03, BLACK)
-    for x in (0.24, 0.36, 0.62, 0.74):
-        cell.rect(x - 0.03, 0.775, x + 0.03, 0.805, BLACK)
-
-
-def _turn_right(cell: Canvas) -> None:
-    cell.fill(WHITE)
-    cell.ellipse(0.5, 0.5, 0.47, 0.47, BLUE)
-    cell.line([(0.36, 0.78), (0.36, 0.46), (0.5, 0.46)], 0.1, WHITE)
-    _arrow(cell, (0.45, 0.46), (0.8, 0.46), WHITE, 0.1)
-
-
-def _no_parking(cell: Canvas) -> None:
-    _disc(cell, RED, BLUE, inner=0.38)
-    cell.line([(0.22, 0.22), (0.78, 0.78)], 0.09, RED)
-
-
-def _roundabout(cell: Canvas) -> None:
-    cell.fill(WHITE)
-    cell.ellipse(0.5, 0.5, 0.47, 0.47, BLUE)
-    for turn in range(3):
-        angle = np.radians(turn * 120 + np.linspace(0, 75, 10))
-        arc = np.stack([0.5 + 0.24 * np.cos(angle), 0.5 - 0.24 * np.sin(angle)], 1)
-        cell.line(arc, 0.075, WHITE)
-        _arrow(cell, tuple(arc[-2]), tuple(arc[-1] + (arc[-1] - arc[-2]) * 3.4), WHITE, 0.075)
-
-
-def _street_name(cell: Canvas) -> None:
-    cell.fill((0.015, 0.07, 0.05))
-    cell.line([(0.03, 0.39), (0.97, 0.39), (0.97, 0.61), (0.03, 0.61)], 0.008, WHITE, closed=True)
-    cell.text("Via Lumera", 0.5, 0.5, 0.105, WHITE, weight=0.13)
-
-
-def _bus_stop(cell: Canvas) -> None:
-    cell.fill(BLUE)
-    cell.rect(0.14, 0.14, 0.86, 0.86, WHITE)
-    cell.rect(0.24, 0.3, 0.76, 0.68, BLUE)
-    for x in (0.29, 0.42, 0.55):
-        cell.rect(x, 0.36, x + 0.1, 0.48, WHITE)
-    for x in (0.34, 0.66):
-        cell.ellipse(x, 0.69, 0.055, 0.055, BLUE)
-
-
-def _chevron(cell: Canvas) -> None:
-    cell.fill(RED)
-    for x in (0.1, 0.42, 0.74):
-        cell.polygon([(x, 0.05), (x + 0.13, 0.05), (x + 0.29, 0.5), (x + 0.13, 0.95), (x, 0.95), (x + 0.16, 0.5)], WHITE)
-
-
-_SIGN_PAINTERS = {
-    "stop": _stop,
-    "yield": lambda cell: _triangle(cell, down=True),
-    "priority": _priority,
-    "no_entry": _no_entry,
-    "speed_30": _speed("30"),
-    "speed_50": _speed("50"),
-    "one_way": _one_way,
-    "parking": _parking,
-    "crossing": _crossing,
-    "turn_right": _turn_right,
-    "no_parking": _no_parking,
-    "warning_children": _warning,
-    "roundabout": _roundabout,
-    "street_name": _street_name,
-    "bus_stop": _bus_stop,
-    "chevron": _chevron,
-}

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from authoring.materials.image import Image, linear_to_srgb, normal_from_height, orm
-from authoring.materials.noise import tileable_noise, wrapped_blur, worley
+from authoring.materials.noise import tileable_noise, worley, wrapped_blur
 
 Array = npt.NDArray[np.float64]
 Textures = dict[str, Image]
@@ -52,7 +52,9 @@ def concrete(*, rng: np.random.Generator) -> Textures:
     groove = np.clip((0.008 - joint) / 0.004, 0, 1)
     holes = np.clip((0.018 - np.hypot(_to_line(x - 0.5, 1.0), _to_line(y - 0.5, 1.0))) / 0.005, 0, 1)
     pores = np.clip(tileable_noise(size, period=128, octaves=2, rng=rng) - 0.85, 0, 1) * 4
-    shade = (1 + 0.13 * broad + 0.04 * fine - 0.10 * streaks) * (1 - 0.45 * groove) * (1 - 0.5 * holes) * (1 - 0.3 * pores)
+    shade = (
+        (1 + 0.13 * broad + 0.04 * fine - 0.10 * streaks) * (1 - 0.45 * groove) * (1 - 0.5 * holes) * (1 - 0.3 * pores)
+    )
     albedo = np.array([0.36, 0.35, 0.325]) * shade[..., None]
     height = 0.0005 * fine + 0.0006 * broad - 0.006 * groove - 0.012 * holes - 0.002 * pores
     kerb_size = 512
@@ -76,7 +78,10 @@ def plaster(*, rng: np.random.Generator) -> Textures:
     shade = 0.80 * (1 + 0.05 * fine + 0.085 * broad - 0.06 * _streaks(size, rng=rng))
     tone = np.stack([np.ones_like(shade), 1 + 0.012 * broad, 1 + 0.03 * broad], -1)
     height = 0.0016 * fine + 0.003 * broad
-    return {"plaster": linear_to_srgb(shade[..., None] * tone), "plaster_n": normal_from_height(height, (tile_m, tile_m))}
+    return {
+        "plaster": linear_to_srgb(shade[..., None] * tone),
+        "plaster_n": normal_from_height(height, (tile_m, tile_m)),
+    }
 
 
 def metal_panel(*, rng: np.random.Generator) -> Textures:
@@ -143,7 +148,10 @@ def grass(*, rng: np.random.Generator) -> Textures:
                 start, stop = (int(x + dx), int(y + dy)), (int(end[0] + dx), int(end[1] + dy))
                 cv2.line(picture, start, stop, tuple(map(float, colour)), 2, cv2.LINE_8)
                 cv2.line(depth, start, stop, level, 2, cv2.LINE_8)
-    return {"grass": linear_to_srgb(picture), "grass_n": normal_from_height(0.014 * wrapped_blur(depth, 0.7), (tile_m, tile_m))}
+    return {
+        "grass": linear_to_srgb(picture),
+        "grass_n": normal_from_height(0.014 * wrapped_blur(depth, 0.7), (tile_m, tile_m)),
+    }
 
 
 def soil(*, rng: np.random.Generator) -> Textures:
@@ -166,7 +174,10 @@ def bark(*, rng: np.random.Generator) -> Textures:
     fine = _grain(size, rng=rng)
     plate = np.clip(0.55 + 0.9 * np.abs(ridges) + 0.25 * warp - 0.35 * np.clip(cross, 0, 1), 0, 1)
     albedo = np.array([0.135, 0.108, 0.082]) * ((0.3 + 0.9 * plate) * (1 + 0.2 * fine + 0.15 * warp))[..., None]
-    return {"bark": linear_to_srgb(albedo), "bark_n": normal_from_height(0.012 * plate + 0.002 * fine, (tile_m, tile_m))}
+    return {
+        "bark": linear_to_srgb(albedo),
+        "bark_n": normal_from_height(0.012 * plate + 0.002 * fine, (tile_m, tile_m)),
+    }
 
 
 def foliage(*, rng: np.random.Generator) -> Textures:
@@ -192,7 +203,13 @@ def foliage(*, rng: np.random.Generator) -> Textures:
                 cv2.ellipse(picture, at, axes, angle, 0, 360, tuple(map(float, hue)), -1, cv2.LINE_8)
                 cv2.ellipse(picture, at, axes, angle, 0, 180, tuple(map(float, hue * 0.8)), -1, cv2.LINE_8)
                 rib = (round(np.cos(slope) * length), round(np.sin(slope) * length))
-                cv2.line(picture, (at[0] - rib[0], at[1] - rib[1]), (at[0] + rib[0], at[1] + rib[1]), tuple(map(float, hue * 1.3)), 1)
+                cv2.line(
+                    picture,
+                    (at[0] - rib[0], at[1] - rib[1]),
+                    (at[0] + rib[0], at[1] + rib[1]),
+                    tuple(map(float, hue * 1.3)),
+                    1,
+                )
                 cv2.ellipse(height, at, axes, angle, 0, 360, level, -1, cv2.LINE_8)
     relief = wrapped_blur(height, 1.0)
     return {"foliage": linear_to_srgb(picture), "foliage_n": normal_from_height(0.022 * relief, (tile_m, tile_m))}
@@ -242,4 +259,5 @@ def _patch(size_px: int, *, rng: np.random.Generator) -> Array:
         np.minimum(columns - 0.18 * size_px, 0.46 * size_px - columns),
         np.minimum(rows - 0.55 * size_px, 0.80 * size_px - rows),
     )
-    return np.clip((inside + ragged) / 2, 0, 1)
+    patch: Array = np.clip((inside + ragged) / 2, 0, 1)
+    return patch

@@ -38,6 +38,14 @@ def orm(occlusion: npt.ArrayLike, roughness: npt.ArrayLike, metallic: npt.ArrayL
     return to_bytes(np.stack(np.broadcast_arrays(occlusion, roughness, metallic), -1))
 
 
+def shrunk(image: Image, largest_px: int) -> Image:
+    """Averages whole blocks of pixels until neither side is longer than `largest_px`."""
+    factor = -(-max(image.shape[:2]) // largest_px)
+    height, width = image.shape[0] // factor, image.shape[1] // factor
+    blocks = image[: height * factor, : width * factor].reshape(height, factor, width, factor, -1)
+    return np.rint(blocks.mean((1, 3))).astype(np.uint8)
+
+
 def write_png(path: Path, image: Image, *, colours: int | None = None) -> None:
     """Write (H, W, 3) as PNG; with `colours` as a palette image of so many, a third of the size for noise."""
     picture = PillowImage.fromarray(image)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from authoring.materials.image import Image, linear_to_srgb, normal_from_height, orm
-from authoring.materials.noise import tileable_noise, wrapped_blur, worley
+from authoring.materials.noise import tileable_noise, worley, wrapped_blur
 
 Array = npt.NDArray[np.float64]
 Textures = dict[str, Image]
@@ -76,7 +76,10 @@ def brick(*, rng: np.random.Generator) -> Textures:
     mortar = np.array([0.40, 0.37, 0.32])
     recipes = {
         "brick_red": ([(0.26, 0.075, 0.042), (0.21, 0.058, 0.036), (0.30, 0.10, 0.055), (0.15, 0.045, 0.034)], mortar),
-        "brick_brown": ([(0.15, 0.072, 0.042), (0.11, 0.05, 0.032), (0.19, 0.10, 0.06), (0.085, 0.045, 0.034)], mortar * 0.6),
+        "brick_brown": (
+            [(0.15, 0.072, 0.042), (0.11, 0.05, 0.032), (0.19, 0.10, 0.06), (0.085, 0.045, 0.034)],
+            mortar * 0.6,
+        ),
         "brick_buff": ([(0.42, 0.31, 0.18), (0.36, 0.26, 0.15), (0.47, 0.36, 0.23), (0.32, 0.21, 0.12)], mortar * 1.05),
     }
     for name, (colours, joint) in recipes.items():

@@ -8,9 +8,7 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 
-def tileable_noise(
-    size_px: int, *, period: int, octaves: int, rng: np.random.Generator, gain: float = 0.5
-) -> Array:
+def tileable_noise(size_px: int, *, period: int, octaves: int, rng: np.random.Generator, gain: float = 0.5) -> Array:
     """Fractal value noise (size_px, size_px), zero mean, within about -1..1.
 
     Args:
@@ -68,4 +66,5 @@ def _lattice(size_px: int, cells: int, values: Array) -> Array:
     blend = blend * blend * (3 - 2 * blend)
     low, high = low % cells, (low + 1) % cells
     rows = values[low] * (1 - blend)[:, None] + values[high] * blend[:, None]
-    return rows[:, low] * (1 - blend) + rows[:, high] * blend
+    mixed: Array = rows[:, low] * (1 - blend) + rows[:, high] * blend
+    return mixed

@@ -47,7 +47,9 @@ MATERIALS: dict[str, Material] = {
     "tile_roof": Material(rgb="tile_roof", normal="tile_roof_n", tile_m=3.0, roughness=0.8),
     # openings
     "windows": Material(rgb="windows", orm="windows_orm", tile_m=0, roughness=1.0),
-    "curtain_wall": Material(rgb="curtain_wall", normal="curtain_wall_n", orm="curtain_wall_orm", tile_m=12.0, roughness=1.0),
+    "curtain_wall": Material(
+        rgb="curtain_wall", normal="curtain_wall_n", orm="curtain_wall_orm", tile_m=12.0, roughness=1.0
+    ),
     "shop_fronts": Material(rgb="shop_fronts", orm="shop_fronts_orm", tile_m=0, roughness=1.0),
     "signs": Material(rgb="signs", tile_m=0, roughness=0.5),
     "awnings": Material(rgb="awnings", tile_m=0, roughness=0.95),
