@@ -31,7 +31,7 @@ def observe_objects(
     """Measures every object but the ego car in one view.
 
     A silhouette inside the picture is exact to the pixel. Of one that leaves the picture, the part inside is exact
-    and the part outside is sampled at a step that grows with it; what lies less than 5 cm before the camera is left
+    and the part outside is sampled at a step that grows with it; what lies less than 10 cm before the camera is left
     out.
 
     Args:

@@ -15,8 +15,8 @@ Mask = npt.NDArray[np.bool_]
 Window = tuple[int, int, int, int]
 """First column, first row, and one past the last column and row, in index pixels; may lie outside the picture."""
 
-NEAR_M = 0.05
-"""Nothing nearer than this along the optical axis is projected."""
+NEAR_M = 0.1
+"""Nothing nearer than this along the optical axis is projected: the renderers' own near plane."""
 
 SPANS_AT_ONCE = 2_000_000
 
@@ -38,11 +38,30 @@ def clip_near(triangles_m: Array, near_m: float = NEAR_M) -> Array:
 
 
 def project_mesh(vertices_camera_m: Array, faces: npt.NDArray[np.int32], intrinsics: Intrinsics) -> Array:
-    """(N, 3) camera-frame vertices and (M, 3) faces to (T, 3, 2) triangles in index pixels, cut at the near plane."""
-    used = vertices_camera_m[faces]
-    if used.size and used[..., 2].min() < NEAR_M:
-        used = clip_near(used)
-    return intrinsics.project(used)
+    """Projects the triangles that face the camera.
+
+    Args:
+        vertices_camera_m: (N, 3) in the camera's frame.
+        faces: (M, 3), outward by the right hand. Renderers do not show a triangle from behind; a closed shape covers the
+            same pixels without them.
+        intrinsics: the pinhole.
+
+    Returns:
+        (T, 3, 2) corners in index pixels, cut at the near plane. In memory, all values of one coordinate of one corner
+        lie together, which is how they are used.
+    """
+    if not len(faces):
+        return np.zeros((0, 3, 2))
+    if vertices_camera_m[:, 2].min() >= NEAR_M:
+        pixels = np.ascontiguousarray(intrinsics.project(vertices_camera_m).T)
+        corners = np.ascontiguousarray(faces.T)
+        x, y = pixels[0][corners], pixels[1][corners]
+    else:
+        cut = intrinsics.project(clip_near(vertices_camera_m[faces]))
+        x, y = np.ascontiguousarray(cut[..., 0].T), np.ascontiguousarray(cut[..., 1].T)
+    # The picture's y runs down, so what is counter-clockwise to the eye has a negative area.
+    facing = (x[1] - x[0]) * (y[2] - y[0]) - (y[1] - y[0]) * (x[2] - x[0]) < 0
+    return np.stack([x[:, facing], y[:, facing]]).transpose(2, 1, 0)
 
 
 def bounds(triangles_px: Array) -> Window:
@@ -69,45 +88,58 @@ def fill(triangles_px: Array, window: Window, step_px: int = 1) -> Mask:
     if not columns or not rows or not len(triangles_px):
         return np.zeros((rows, columns), dtype=np.bool_)
     centre = (step_px - 1) / 2
-    scaled = (triangles_px - (x0 + centre, y0 + centre)) / step_px
-    by_row = np.argsort(scaled[..., 1], axis=1)
-    scaled = np.take_along_axis(scaled, by_row[..., None], axis=1)
-    first = np.clip(np.ceil(scaled[:, 0, 1]), 0, rows).astype(np.int64)
-    last = np.clip(np.ceil(scaled[:, 2, 1]), 0, rows).astype(np.int64)
-    seen = (last > first) & (scaled[..., 0].max(axis=1) > 0) & (scaled[..., 0].min(axis=1) <= columns)
-    scaled, first, heights = scaled[seen], first[seen], (last - first)[seen]
+    x, y = triangles_px.transpose(2, 1, 0)
+    if (x0, y0, step_px) != (0, 0, 1):
+        x, y = (x - (x0 + centre)) / step_px, (y - (y0 + centre)) / step_px
+    first = np.clip(np.ceil(y.min(axis=0)), 0, rows).astype(np.int64)
+    last = np.clip(np.ceil(y.max(axis=0)), 0, rows).astype(np.int64)
+    left, right = np.clip(np.ceil(x.min(axis=0)), 0, columns), np.clip(np.ceil(x.max(axis=0)), 0, columns)
+    # Most triangles of a distant object lie between samples.
+    seen = np.flatnonzero((last > first) & (right > left))
+    x, y = _by_row(x[:, seen], y[:, seen])
+    first, heights = first[seen], (last - first)[seen]
     depth = np.zeros(rows * (columns + 1), dtype=np.int64)
     ends = np.cumsum(heights)
     start = 0
     while start < len(heights):
         done = ends[start - 1] if start else 0
         stop = max(start + 1, int(np.searchsorted(ends, done + SPANS_AT_ONCE, side="right")))
-        _add_spans(depth, scaled[start:stop], first[start:stop], heights[start:stop], columns)
+        part = slice(start, stop)
+        _add_spans(depth, x[:, part], y[:, part], first[part], heights[part], columns)
         start = stop
     return np.cumsum(depth.reshape(rows, columns + 1)[:, :-1], axis=1) > 0
 
 
+def _by_row(x: Array, y: Array) -> tuple[Array, Array]:
+    """Sorts the corners of (3, T) triangles from top to bottom, by three exchanges."""
+    for i, j in ((0, 1), (1, 2), (0, 1)):
+        below = y[i] > y[j]
+        for values in (x, y):
+            values[i], values[j] = np.where(below, values[j], values[i]), np.where(below, values[i], values[j])
+    return x, y
+
+
 def _add_spans(
     depth: npt.NDArray[np.int64],
-    corners: Array,
+    x: Array,
+    y: Array,
     first: npt.NDArray[np.int64],
     heights: npt.NDArray[np.int64],
     columns: int,
 ) -> None:
-    """Adds one at each span's first column and takes one away behind its last; corners are sorted by row."""
-    x, y = corners[..., 0], corners[..., 1]
+    """Adds one at each span's first column and takes one away behind its last; (3, T) corners are sorted by row."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        long_slope = (x[:, 2] - x[:, 0]) / (y[:, 2] - y[:, 0])
-        upper_slope = (x[:, 1] - x[:, 0]) / (y[:, 1] - y[:, 0])
-        lower_slope = (x[:, 2] - x[:, 1]) / (y[:, 2] - y[:, 1])
+        long_slope = (x[2] - x[0]) / (y[2] - y[0])
+        upper_slope = (x[1] - x[0]) / (y[1] - y[0])
+        lower_slope = (x[2] - x[1]) / (y[2] - y[1])
     owner = np.repeat(np.arange(len(heights)), heights)
     row = np.arange(len(owner)) + np.repeat(first - (np.cumsum(heights) - heights), heights)
-    along = row - y[owner, 0]
-    long_x = x[owner, 0] + along * long_slope[owner]
-    upper = row < y[owner, 1]
-    bend = np.where(upper, 0, 1)
-    slope = np.where(upper, upper_slope[owner], lower_slope[owner])
-    short_x = x[owner, bend] + (row - y[owner, bend]) * slope
+    long_x = x[0][owner] + (row - y[0][owner]) * long_slope[owner]
+    with np.errstate(invalid="ignore"):
+        # Level edges have no slope, and no row that would ask for it.
+        upper_x = x[0][owner] + (row - y[0][owner]) * upper_slope[owner]
+        lower_x = x[1][owner] + (row - y[1][owner]) * lower_slope[owner]
+    short_x = np.where(row < y[1][owner], upper_x, lower_x)
     left = np.clip(np.ceil(np.minimum(long_x, short_x)), 0, columns).astype(np.int64)
     right = np.clip(np.ceil(np.maximum(long_x, short_x)), 0, columns).astype(np.int64)
     base = row * (columns + 1)

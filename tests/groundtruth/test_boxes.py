@@ -1,0 +1,57 @@
+import math
+
+import numpy as np
+import pytest
+
+from gear.groundtruth.boxes import Box3d, box_in_camera, project_box
+from gear.testing.synthetic import CAR, Thing, synthetic_frame
+from gear.values.geometry import Intrinsics
+from gear.values.rig import CameraMount, Rig
+
+PINHOLE = Intrinsics(612, 185, 306.0)
+
+
+def test_corners_stand_where_the_box_says() -> None:
+    box = Box3d(height_m=1.5, width_m=1.8, length_m=4.2, bottom_m=(1.0, 1.65, 10.0), rotation_y_rad=-math.pi / 2)
+    low, high = box.corners_m.min(axis=0), box.corners_m.max(axis=0)
+    # Driving away: the length lies along z, the width along x, the height goes up from the bottom.
+    np.testing.assert_allclose(low, [0.1, 0.15, 7.9], atol=1e-12)
+    np.testing.assert_allclose(high, [1.9, 1.65, 12.1], atol=1e-12)
+    assert box.distance_m == pytest.approx(math.sqrt(1 + 0.9**2 + 100))
+
+
+def test_alpha_is_seen_along_the_ray() -> None:
+    box = Box3d(height_m=1, width_m=1, length_m=1, bottom_m=(10.0, 1.0, 10.0), rotation_y_rad=0.0)
+    assert box.alpha_rad == pytest.approx(-math.pi / 4)
+
+
+@pytest.mark.parametrize("yaw_rad", [0.0, 1.0, -2.5])
+def test_the_box_is_the_objects_own(yaw_rad: float) -> None:
+    rig = Rig(cameras=(CameraMount(name="left", width_px=612, height_px=185),))
+    thing = Thing(parts=CAR, position_m=(12.0, 2.0, 0.0), yaw_rad=yaw_rad, object_id=2, role="npc")
+    frame, record = synthetic_frame(rig, [thing])
+    box = box_in_camera(frame.objects[2], record.camera("left"))
+    assert (box.length_m, box.width_m, box.height_m) == pytest.approx((4.2, 1.8, 1.5))
+    world = record.camera("left").world_from_camera_transform.apply(box.corners_m).round(6)
+    own = frame.objects[2].world_from_object.apply(frame.objects[2].shape.vertices_m).round(6)
+    np.testing.assert_allclose(world[np.lexsort(world.T)], own[np.lexsort(own.T)], atol=1e-6)
+
+
+def test_projection_is_tight() -> None:
+    box = Box3d(height_m=1.5, width_m=1.8, length_m=4.2, bottom_m=(1.0, 1.65, 10.0), rotation_y_rad=0.4)
+    pixels = PINHOLE.project(box.corners_m)
+    expected = (*pixels.min(axis=0), *pixels.max(axis=0))
+    assert project_box(box.corners_m, PINHOLE) == pytest.approx(expected)
+
+
+def test_boxes_through_the_camera_plane_are_cut_there() -> None:
+    beside = Box3d(height_m=1.5, width_m=1.8, length_m=4.2, bottom_m=(-2.5, 1.65, 0.5), rotation_y_rad=-math.pi / 2)
+    found = project_box(beside.corners_m, PINHOLE)
+    assert found is not None
+    # It stands on the left, so no part of it may turn up on the right.
+    assert found[0] < -1000 and found[2] < PINHOLE.cx_px
+
+
+def test_boxes_behind_are_nowhere() -> None:
+    behind = Box3d(height_m=1.5, width_m=1.8, length_m=4.2, bottom_m=(0.0, 1.65, -8.0), rotation_y_rad=0.0)
+    assert project_box(behind.corners_m, PINHOLE) is None

@@ -1,0 +1,97 @@
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gear.groundtruth.objects import observe_objects
+from gear.testing.synthetic import CAR, CYCLIST, TRUCK, Thing, board, street, synthetic_frame
+from gear.values.frames import Frame
+from gear.values.labels import LABEL_BY_NAME
+from gear.values.rig import CameraMount, Rig
+
+RIG = Rig(cameras=(CameraMount(name="left", width_px=612, height_px=185),))
+# The same pinhole with three times the picture around it: 90 degrees to 143.1.
+WIDE = Rig(cameras=(CameraMount(name="left", width_px=1836, height_px=555, hfov_deg=2 * np.degrees(np.arctan(3.0))),))
+
+
+def observe(frame: Frame, **options: Any) -> tuple[Any, ...]:
+    return observe_objects(frame.views["left"], frame.geoms, frame.objects, **options)
+
+
+def thing(parts: Any, ahead_m: float, left_m: float, yaw_rad: float = 0.3, number: int = 2) -> Thing:
+    return Thing(parts=parts, position_m=(ahead_m, left_m, 0.0), yaw_rad=yaw_rad, object_id=number, role="npc")
+
+
+@pytest.mark.parametrize("index", range(3))
+def test_every_silhouette_is_what_the_object_shows_alone(index: int) -> None:
+    things = street(7, index)
+    frame, _ = synthetic_frame(RIG, things)
+    truths = observe(frame, by_label=False)
+    assert len(truths) > 6
+    for truth in truths:
+        alone, _ = synthetic_frame(RIG, [t for t in things if t.object_id == truth.object_id])
+        (single,) = observe(alone, by_label=False)
+        silhouette = alone.geoms.object_id[np.maximum(alone.views["left"].geom_id, 0)] == truth.object_id
+        assert truth.amodal_in_image_px == int((silhouette & (alone.views["left"].geom_id >= 0)).sum())
+        assert truth.amodal_box == single.visible_box
+        assert single.visible_fraction == 1.0 and single.occluded_fraction == 0.0
+
+
+def test_visible_pixels_are_counted_on_the_id_buffer() -> None:
+    frame, _ = synthetic_frame(RIG)
+    ids = frame.views["left"].geom_id
+    for truth in observe(frame):
+        geoms = np.flatnonzero(
+            (frame.geoms.object_id == truth.object_id) & (frame.geoms.label_code == truth.label_code)
+        )
+        expected = np.isin(ids, geoms)
+        left, top, right, bottom = (int(v) for v in truth.visible_box)
+        drawn = np.zeros_like(expected)
+        drawn[top:bottom, left:right] = truth.mask
+        np.testing.assert_array_equal(drawn, expected)
+        assert truth.visible_px == expected.sum() == truth.mask.sum()
+        assert truth.mask.any(axis=0).all() or truth.mask.any(axis=1)[[0, -1]].all()
+
+
+def test_what_leaves_the_picture_is_counted_outside_it() -> None:
+    truck = [thing(TRUCK, 9.5, 5.5)]
+    (cut,) = observe(synthetic_frame(RIG, truck)[0])
+    (whole,) = observe(synthetic_frame(WIDE, truck)[0])
+    assert whole.truncated_fraction == 0 and 0.2 < cut.truncated_fraction < 0.8
+    assert cut.amodal_px == pytest.approx(whole.amodal_px, rel=0.02)
+    assert cut.amodal_in_image_px == cut.visible_px
+    shifted = [v - d for v, d in zip(whole.amodal_box, (612, 185, 612, 185), strict=True)]
+    assert list(cut.amodal_box) == pytest.approx(shifted, abs=1)
+
+
+def test_a_truck_through_the_image_plane_stays_finite() -> None:
+    (beside,) = observe(synthetic_frame(RIG, [thing(TRUCK, 3.5, 3.4, 0.0)])[0])
+    assert beside.visible_px > 1000
+    assert beside.amodal_px >= beside.amodal_in_image_px >= beside.visible_px
+    assert beside.truncated_fraction > 0.9
+    assert beside.occluded_fraction == 0
+
+
+def test_a_cyclist_has_two_parts_and_is_one_object() -> None:
+    frame, _ = synthetic_frame(RIG, [thing(CYCLIST, 9.0, 0.0)])
+    parts = observe(frame)
+    assert [t.label_code for t in parts] == [LABEL_BY_NAME["rider"].code, LABEL_BY_NAME["bicycle"].code]
+    (whole,) = observe(frame, by_label=False)
+    assert whole.label_code == LABEL_BY_NAME["bicycle"].code
+    assert whole.visible_px == sum(t.visible_px for t in parts)
+    # Parts hide each other, so their silhouettes add up to more than the whole.
+    assert whole.amodal_px <= sum(t.amodal_px for t in parts)
+
+
+def test_hidden_objects_appear_on_request_alone() -> None:
+    frame, _ = synthetic_frame(RIG, [board(12.0), thing(CAR, 20.0, 0.0), thing(CAR, -20.0, 0.0, 0.0, 3)])
+    assert observe(frame) == ()
+    (hidden,) = observe(frame, include_hidden=True)
+    assert hidden.object_id == 2
+    assert hidden.visible_px == 0 and hidden.visible_box is None and hidden.mask.size == 0
+    assert hidden.occluded_fraction == 1.0 and hidden.visible_fraction == 0.0
+
+
+def test_the_ego_car_is_no_object() -> None:
+    ego = Thing(parts=CAR, position_m=(9.0, 0.0, 0.0), object_id=1, role="ego")
+    assert observe(synthetic_frame(RIG, [ego])[0], include_hidden=True) == ()

@@ -1,0 +1,93 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gear.groundtruth.raster import NEAR_M, bounds, clip_near, fill, project_mesh
+from gear.values.geometry import Intrinsics
+
+WINDOW = (0, 0, 40, 30)
+coordinate = st.floats(-60, 90, allow_nan=False).map(lambda v: round(v, 3) + 0.0004)
+
+
+def by_edge_functions(triangle: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
+    """Inside, and too close to an edge to say."""
+    x, y = np.meshgrid(np.arange(width), np.arange(height))
+    signs, nearest = [], np.full((height, width), np.inf)
+    for i in range(3):
+        (x0, y0), (x1, y1) = triangle[i], triangle[(i + 1) % 3]
+        value = (x1 - x0) * (y - y0) - (y1 - y0) * (x - x0)
+        signs.append(value > 0)
+        nearest = np.minimum(nearest, np.abs(value))
+    return (signs[0] & signs[1] & signs[2]) | ~(signs[0] | signs[1] | signs[2]), nearest < 1e-6
+
+
+def test_a_rectangle_covers_the_pixels_whose_centres_are_in_it() -> None:
+    corners = np.array([[1.2, 2.1], [5.7, 2.1], [5.7, 4.9], [1.2, 4.9]])
+    mask = fill(corners[[[0, 1, 2], [0, 2, 3]]], WINDOW)
+    rows, columns = np.nonzero(mask)
+    assert (rows.min(), rows.max(), columns.min(), columns.max()) == (3, 4, 2, 5)
+    assert mask.sum() == 8
+
+
+def test_edges_through_centres_count_on_the_left_and_at_the_top() -> None:
+    corners = np.array([[1.0, 2.0], [4.0, 2.0], [4.0, 5.0], [1.0, 5.0]])
+    mask = fill(corners[[[0, 1, 2], [0, 2, 3]]], WINDOW)
+    rows, columns = np.nonzero(mask)
+    assert (rows.min(), rows.max(), columns.min(), columns.max()) == (2, 4, 1, 3)
+    assert mask.sum() == 9
+
+
+@given(st.lists(st.tuples(coordinate, coordinate), min_size=3, max_size=3))
+@settings(max_examples=150, deadline=None)
+def test_a_triangle_is_what_its_edges_enclose(points: list[tuple[float, float]]) -> None:
+    triangle = np.array(points)
+    expected, unsure = by_edge_functions(triangle, 40, 30)
+    mask = fill(triangle[None], WINDOW)
+    assert not ((mask != expected) & ~unsure).any()
+
+
+def test_many_triangles_are_the_union() -> None:
+    rng = np.random.default_rng(3)
+    triangles = rng.uniform(-10, 50, (200, 1, 2)) + rng.uniform(-6, 6, (200, 3, 2))
+    expected = np.any([fill(t[None], WINDOW) for t in triangles], axis=0)
+    np.testing.assert_array_equal(fill(triangles, WINDOW), expected)
+
+
+def test_windows_may_lie_anywhere() -> None:
+    triangle = np.array([[[-30.5, -20.5], [25.5, -12.0], [-3.0, 60.5]]])
+    whole = fill(triangle, (-40, -30, 40, 70))
+    np.testing.assert_array_equal(fill(triangle, (-5, 3, 12, 20)), whole[33:50, 35:52])
+
+
+def test_coarse_steps_keep_the_area() -> None:
+    triangle = np.array([[[0.0, 0.0], [2000.0, 300.0], [500.0, 1500.0]]])
+    area = 0.5 * (2000 * 1500 - 500 * 300)
+    coarse = fill(triangle, bounds(triangle), 7)
+    assert coarse.sum() * 49 == pytest.approx(area, rel=0.01)
+
+
+def test_nothing_gives_nothing() -> None:
+    assert bounds(np.zeros((0, 3, 2))) == (0, 0, 0, 0)
+    assert fill(np.zeros((0, 3, 2)), WINDOW).shape == (30, 40)
+    assert not fill(np.zeros((0, 3, 2)), WINDOW).any()
+
+
+def test_the_near_plane_cuts_triangles() -> None:
+    corners = np.array([[[0.0, 0, -1], [1, 0, 1], [-1, 0, 1]], [[0, 0, 1], [1, 0, -1], [-1, 0, -1]], [[0, 0, -1]] * 3])
+    cut = clip_near(corners)
+    # One corner behind leaves two triangles, two behind leave one, three none.
+    assert len(cut) == 3
+    assert cut[..., 2].min() == pytest.approx(NEAR_M)
+    span = cut[np.abs(cut[..., 2] - NEAR_M) < 1e-9][:, 0]
+    assert np.abs(span).max() <= 0.55 + 1e-9
+
+
+def test_a_plane_through_the_camera_projects_below_the_horizon_only() -> None:
+    ground = np.array([[-5.0, 1.5, -3.0], [5.0, 1.5, -3.0], [5.0, 1.5, 20.0], [-5.0, 1.5, 20.0]])
+    pinhole = Intrinsics(40, 30, 20.0)
+    triangles = project_mesh(ground, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32), pinhole)
+    mask = fill(triangles, WINDOW)
+    horizon = pinhole.cy_px + 1.5 / 20 * 20.0
+    assert not mask[: int(horizon)].any()
+    assert mask[-1].all()

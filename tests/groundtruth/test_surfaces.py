@@ -1,0 +1,84 @@
+import math
+
+import numpy as np
+import pytest
+
+from gear.formats import rle
+from gear.groundtruth.surfaces import observe_surfaces
+from gear.testing.synthetic import CAR, Part, Thing, board, synthetic_frame
+from gear.values.rig import CameraMount, Rig
+from gear.values.truth import SurfaceTruth
+
+RIG = Rig(cameras=(CameraMount(name="left", width_px=612, height_px=306),))
+
+
+def observe(things: list[Thing]) -> tuple[SurfaceTruth, np.ndarray]:
+    frame, record = synthetic_frame(RIG, things)
+    view = frame.views["left"]
+    (truth,) = observe_surfaces(view, frame.geoms, record)
+    face = np.isin(view.geom_id, np.flatnonzero(frame.geoms.surface_index == 0))
+    return truth, face
+
+
+def test_a_board_ahead() -> None:
+    truth, face = observe([board(20.0)])
+    assert truth.name == "surface_0" and truth.camera == "left"
+    assert truth.corners_px is not None and truth.image_from_unit is not None
+    # 18.5 m ahead of the camera at focal length 306: 7.4 m x 3.7 m, its middle 0.35 m above the camera.
+    x, y = 7.4 / 2 * 306 / 18.5, 3.7 / 2 * 306 / 18.5
+    middle = 152.5 - 0.35 * 306 / 18.5
+    expected = [(305.5 - x, middle - y), (305.5 + x, middle - y), (305.5 + x, middle + y), (305.5 - x, middle + y)]
+    np.testing.assert_allclose(truth.corners_px, expected, atol=1e-5)
+    assert truth.visible_px == face.sum()
+    assert truth.visible_fraction == pytest.approx(1.0, abs=0.02)
+    np.testing.assert_array_equal(rle.decode(truth.mask_rle, 306, 612), face)
+    assert truth.distance_m == pytest.approx(math.hypot(18.5, 0.35))
+    assert truth.incidence_deg == pytest.approx(math.degrees(math.atan2(0.35, 18.5)))
+
+
+def test_the_homography_takes_the_patch_to_the_picture() -> None:
+    truth, face = observe([board(15.0, 4.0)])
+    assert truth.image_from_unit is not None and truth.corners_px is not None
+    homography = np.array(truth.image_from_unit).reshape(3, 3)
+    for (u, v), corner in zip(((0, 0), (1, 0), (1, 1), (0, 1)), truth.corners_px, strict=True):
+        x, y, w = homography @ [u, v, 1]
+        assert (x / w, y / w) == pytest.approx(corner, abs=1e-4)
+    # Every pixel of the face comes from inside the patch, every other one from outside.
+    rows, columns = np.nonzero(face)
+    unit = np.linalg.inv(homography) @ [columns, rows, np.ones(len(rows))]
+    unit = unit[:2] / unit[2]
+    assert unit.min() > -1e-3 and unit.max() < 1 + 1e-3
+
+
+def test_occluders_take_from_the_visible_share() -> None:
+    car = Thing(parts=CAR, position_m=(9.0, 0.0, 0.0), object_id=2, role="npc")
+    clear, _ = observe([board(20.0)])
+    covered, face = observe([board(20.0), car])
+    assert covered.visible_px == face.sum() < clear.visible_px
+    assert covered.visible_fraction == pytest.approx(covered.visible_px / clear.visible_px, abs=0.02)
+    assert covered.corners_px == clear.corners_px
+
+
+def test_a_board_half_outside_says_so() -> None:
+    truth, _ = observe([board(9.0, 7.5)])
+    assert truth.corners_px is not None and truth.corners_px[0][0] < 0
+    assert 0.3 < truth.visible_fraction < 0.7
+
+
+def test_a_board_behind_has_no_corners() -> None:
+    truth, _ = observe([board(-15.0)])
+    assert truth.corners_px is None and truth.image_from_unit is None
+    assert truth.visible_px == 0 and truth.visible_fraction == 0.0
+    assert truth.incidence_deg > 90
+
+
+def test_a_surface_rides_on_its_actor() -> None:
+    body = Part(label="truck", centre_m=(0.0, 0.0, 1.8), size_m=(8.0, 2.5, 3.6))
+    face = Part(label="truck", centre_m=(-4.01, 0.0, 1.8), size_m=(0.02, 2.2, 2.4), surface=0)
+    truck = Thing(parts=(body, face), position_m=(16.0, -1.0, 0.0), yaw_rad=0.2, object_id=5, role="carrier")
+    truth, seen = observe([truck])
+    assert truth.corners_px is not None
+    rows, columns = np.nonzero(seen)
+    xs, ys = [c[0] for c in truth.corners_px], [c[1] for c in truth.corners_px]
+    assert (columns.min(), columns.max()) == pytest.approx((min(xs), max(xs)), abs=1)
+    assert (rows.min(), rows.max()) == pytest.approx((min(ys), max(ys)), abs=1)

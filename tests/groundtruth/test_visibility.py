@@ -1,0 +1,60 @@
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gear.groundtruth.visibility import VisibilityLimits
+from gear.values.errors import FieldError
+from gear.values.truth import ObjectTruth
+
+
+def truth(**changes: Any) -> ObjectTruth:
+    values: dict[str, Any] = {
+        "object_id": 2,
+        "label_code": 25,
+        "visible_px": 1200,
+        "visible_box": (10.0, 10.0, 50.0, 50.0),
+        "amodal_px": 1500,
+        "amodal_in_image_px": 1400,
+        "amodal_box": (0.0, 0.0, 60.0, 60.0),
+        "mask": np.ones((40, 40), dtype=np.bool_),
+    }
+    return ObjectTruth(**(values | changes))
+
+
+def test_enough_is_enough() -> None:
+    assert VisibilityLimits().labels(truth(), 50.0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "distance_m"),
+    [
+        ({}, 201.0),
+        ({"visible_box": (10.0, 10.0, 39.0, 41.0)}, 50.0),
+        ({"visible_px": 99}, 50.0),
+        ({"visible_px": 130, "amodal_in_image_px": 1400}, 50.0),
+        ({"visible_px": 0, "visible_box": None}, 50.0),
+    ],
+)
+def test_each_limit_holds(changes: dict[str, Any], distance_m: float) -> None:
+    assert not VisibilityLimits().labels(truth(**changes), distance_m)
+
+
+def test_three_pixels_are_not_mentioned() -> None:
+    assert not VisibilityLimits().mentions(truth(visible_px=3))
+    assert VisibilityLimits().mentions(truth(visible_px=4))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("max_distance_m", 0.0),
+        ("min_box_area_px2", -1.0),
+        ("min_visible_fraction", 1.5),
+        ("min_visible_px", -1),
+        ("min_pixels_px", 0),
+    ],
+)
+def test_bad_limits_are_refused(name: str, value: float) -> None:
+    with pytest.raises(FieldError, match=name):
+        VisibilityLimits(**{name: value})  # type: ignore[arg-type]
