@@ -12,24 +12,24 @@ from PIL import Image, ImageDraw
 
 from authoring.mesh import Floats, Mesh
 
-__all__ = ["DETAILS", "LAMPS", "cell_uvs", "flat", "fitted", "write_atlases"]
+__all__ = ["DETAILS", "LAMPS", "cell_uvs", "flat", "write_atlases"]
 
 _SIZE, _OVER = 512, 4
 _CELL = _SIZE // 4
 _MARGIN = 0.06
 
-DETAILS = {  # fmt: skip
+DETAILS = {
     "plastic": (0, 0), "gloss": (1, 0), "bars": (2, 0), "mesh": (3, 0),
-    "plate": (0, 1), "silver": (1, 1), "reflector": (2, 1), "rubber": (3, 1),
+    "plate": (0, 1), "silver": (1, 1), "rescue": (2, 1), "rubber": (3, 1),
     "taxi": (0, 2), "slats": (1, 2), "chequer": (2, 2), "wood": (3, 2),
     "display": (0, 3), "battenburg": (1, 3), "stripe": (2, 3), "white": (3, 3),
-}
+}  # fmt: skip
 LAMPS = {
     "head": (0, 0), "head_round": (1, 0), "head_slim": (2, 0), "fog": (3, 0),
     "tail": (0, 1), "tail_led": (1, 1), "tail_tall": (2, 1), "brake": (3, 1),
     "amber": (0, 2), "reverse": (1, 2), "tail_block": (2, 2), "blue": (3, 2),
     "drl": (0, 3), "red": (1, 3), "head_block": (2, 3), "clear": (3, 3),
-}
+}  # fmt: skip
 
 
 def cell_uvs(cell: tuple[int, int], unit: Floats) -> Floats:
@@ -43,11 +43,6 @@ def flat(mesh: Mesh, cell: tuple[int, int]) -> Mesh:
     return mesh.with_uvs(cell_uvs(cell, np.array([[0.5, 0.5]]))[0])
 
 
-def fitted(mesh: Mesh, cell: tuple[int, int]) -> Mesh:
-    """The mesh with its 0-to-1 texture coordinates moved into a cell."""
-    return mesh.with_uvs(cell_uvs(cell, mesh.uvs))
-
-
 def write_atlases(folder: Path) -> None:
     """Draws both textures."""
     _details().resize((_SIZE, _SIZE), Image.Resampling.LANCZOS).save(folder / "details.png", optimize=True)
@@ -55,16 +50,16 @@ def write_atlases(folder: Path) -> None:
 
 
 class _Cell:
-    """Drawing in one cell with coordinates 0 to 1, right and down, the margin outside."""
+    """A picture of one cell, drawn with coordinates 0 to 1, right and down, the margin outside."""
 
-    def __init__(self, draw: ImageDraw.ImageDraw, at: tuple[int, int], ground: tuple[int, int, int]) -> None:
-        side = _CELL * _OVER
-        self._draw, self._x, self._y, self._side = draw, at[0] * side, at[1] * side, side
-        draw.rectangle((self._x, self._y, self._x + side - 1, self._y + side - 1), fill=ground)
+    def __init__(self, ground: tuple[int, int, int]) -> None:
+        self._side = _CELL * _OVER
+        self.image = Image.new("RGB", (self._side, self._side), ground)
+        self._draw = ImageDraw.Draw(self.image)
 
     def _at(self, x: float, y: float) -> tuple[float, float]:
         inner = self._side * (1 - 2 * _MARGIN)
-        return self._x + self._side * _MARGIN + x * inner, self._y + self._side * _MARGIN + y * inner
+        return self._side * _MARGIN + x * inner, self._side * _MARGIN + y * inner
 
     def rect(self, x0: float, y0: float, x1: float, y1: float, fill: tuple[int, int, int], radius: float = 0.0) -> None:
         box = (*self._at(x0, y0), *self._at(x1, y1))
@@ -101,12 +96,19 @@ _GLYPHS = {
 }  # fmt: skip
 
 
-def _details() -> Image.Image:
+def _sheet(cells: dict[str, _Cell], places: dict[str, tuple[int, int]]) -> Image.Image:
     image = Image.new("RGB", (_SIZE * _OVER,) * 2)
-    draw = ImageDraw.Draw(image)
+    for name, (column, row) in places.items():
+        image.paste(cells[name].image, (column * _CELL * _OVER, row * _CELL * _OVER))
+    return image
+
+
+def _details() -> Image.Image:
+    cells: dict[str, _Cell] = {}
 
     def cell(name: str, ground: tuple[int, int, int]) -> _Cell:
-        return _Cell(draw, DETAILS[name], ground)
+        cells[name] = _Cell(ground)
+        return cells[name]
 
     cell("plastic", (44, 45, 47))
     cell("gloss", (14, 14, 15))
@@ -123,15 +125,16 @@ def _details() -> Image.Image:
         for lean in (1, -1):
             x = k / 10
             mesh.poly([(x, 0), (x + 0.018, 0), (x + 0.018 + lean * 0.5, 1), (x + lean * 0.5, 1)], (40, 41, 43))
-    # Lines that ran out of the cell are in its neighbours: those are drawn after.
     plate = cell("plate", (60, 60, 62))
     plate.rect(0.0, 0.0, 1.0, 1.0, (20, 20, 20), 0.02)
     plate.rect(0.012, 0.05, 0.988, 0.95, (232, 232, 226), 0.02)
     plate.rect(0.012, 0.05, 0.09, 0.95, (28, 58, 150), 0.02)
     plate.glyphs("GR 47 AE", 0.12, 0.2, 0.97, 0.8, (16, 16, 18))
-    reflector = cell("reflector", (150, 12, 14))
+    rescue = cell("rescue", (226, 214, 40))
     for k in range(12):
-        reflector.rect(k / 12, 0, k / 12 + 0.02, 1, (190, 30, 30))
+        for row in range(2):
+            if (k + row) % 2 == 0:
+                rescue.rect(k / 12, row / 2, (k + 1) / 12, (row + 1) / 2, (186, 24, 26))
     taxi = cell("taxi", (236, 196, 40))
     taxi.glyphs("TAXI", 0.08, 0.2, 0.94, 0.8, (18, 18, 18))
     slats = cell("slats", (30, 31, 33))
@@ -152,15 +155,15 @@ def _details() -> Image.Image:
     stripe = cell("stripe", (196, 24, 26))
     for k in range(-2, 6):
         stripe.poly([(k / 3, 1.1), (k / 3 + 0.18, 1.1), (k / 3 + 0.5, -0.1), (k / 3 + 0.32, -0.1)], (225, 225, 220))
-    return image
+    return _sheet(cells, DETAILS)
 
 
 def _lamps() -> Image.Image:
-    image = Image.new("RGB", (_SIZE * _OVER,) * 2)
-    draw = ImageDraw.Draw(image)
+    cells: dict[str, _Cell] = {}
 
     def cell(name: str, ground: tuple[int, int, int]) -> _Cell:
-        return _Cell(draw, LAMPS[name], ground)
+        cells[name] = _Cell(ground)
+        return cells[name]
 
     dark, bright, steel = (38, 40, 44), (244, 247, 250), (150, 154, 160)
     head = cell("head", (118, 122, 128))
@@ -216,4 +219,4 @@ def _lamps() -> Image.Image:
         wide.disc(x, 0.5, 0.2, 0.36, steel)
         wide.disc(x, 0.5, 0.15, 0.27, (232, 238, 243))
     cell("clear", (190, 194, 198))
-    return image
+    return _sheet(cells, LAMPS)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from authoring.mesh import Floats, Mesh, grid
+from authoring.mesh import Floats, Mesh, merge
 from authoring.vehicles.atlas import DETAILS, LAMPS, cell_uvs, flat
 from authoring.vehicles.patches import arch_flare, through
 from authoring.vehicles.shapes import Shape, disc, rounded
@@ -83,6 +83,7 @@ class CarSpec:
     lines_rear: tuple[Points, ...] = ()
     handles: Points = ()
     plates: tuple[float, float] = (0.45, 0.6)
+    plate_stand_off: float = 0.012
     rails: tuple[float, float, float] | None = None
     mirror: tuple[float, float, float] = (0.11, 0.20, 0.14)
     bed: tuple[float, float, float] | None = None
@@ -102,6 +103,29 @@ class Parts:
         if both_sides:
             self.meshes[name].append(mesh.scaled(1, -1, 1))
 
+    def merged(self) -> dict[str, Mesh]:
+        """One mesh a material; paint runs smoothly from patch to patch."""
+        return {
+            name: _blended(merge(pieces)) if name == "paint" else merge(pieces) for name, pieces in self.meshes.items()
+        }
+
+
+def _blended(mesh: Mesh, crease_deg: float = 55.0) -> Mesh:
+    """Averages the normals of vertices at one place that differ by less than the crease angle."""
+    assert mesh.normals is not None
+    _, place = np.unique(np.floor(mesh.vertices * 5e3 + 0.5).astype(np.int64), axis=0, return_inverse=True)
+    place = place.reshape(-1)
+    order = np.argsort(place, kind="stable")
+    starts = np.flatnonzero(np.r_[True, np.diff(place[order]) != 0])
+    normals = mesh.normals.copy()
+    for members in np.split(order, starts[1:]):
+        if len(members) > 1:
+            around = mesh.normals[members]
+            close = around @ around.T >= np.cos(np.radians(crease_deg))
+            mean = close.astype(np.float64) @ around
+            normals[members] = mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-12)
+    return Mesh(mesh.vertices, mesh.faces, mesh.uvs, normals)
+
 
 def build_car(spec: CarSpec) -> tuple[Parts, Shell, Shell]:
     """Builds body, cabin, glass, stamped lamps and grilles, wheels and wheel wells.
@@ -112,14 +136,14 @@ def build_car(spec: CarSpec) -> tuple[Parts, Shell, Shell]:
     hub_z = spec.wheel.radius
     arch = spec.wheel.radius + spec.arch
     body = make_shell(
-        spec.plan, spec.levels, through(spec.foot), through(spec.rim), through(spec.crown),
+        spec.plan, spec.levels, through(spec.foot), through(spec.rim), through(spec.crown), cells=(20, 9, 4),
         deform=arch_flare(spec.axles, hub_z, arch, spec.flare),
         shift_reach=spec.reach,
         extra_u=[a + d for a in spec.axles for d in (-arch, -arch * 0.6, 0.0, arch * 0.6, arch)],
     )  # fmt: skip
     cabin = make_shell(
         spec.cabin_plan, spec.cabin_levels, through(spec.cabin_foot), through(spec.cabin_rim),
-        through(spec.cabin_crown), shift_reach=spec.cabin_reach, cells=(30, 8, 5), corner_deg=50,
+        through(spec.cabin_crown), shift_reach=spec.cabin_reach, cells=(18, 7, 4), corner_deg=50,
     )  # fmt: skip
     parts = Parts()
     _wells(spec, body, arch, parts)
@@ -135,13 +159,13 @@ def build_car(spec: CarSpec) -> tuple[Parts, Shell, Shell]:
     parts.add("trim", flat(body.foot(), DETAILS["rubber"]), both_sides=True)
     for sheet in (cabin.side, cabin.top):
         parts.add("paint", sheet.part("paint"), both_sides=True)
-        parts.add("glass", sheet.part("glass", 0.003), both_sides=True)
+        parts.add("glass", sheet.part("glass"), both_sides=True)
         parts.add("trim", flat(sheet.part("trim"), DETAILS["gloss"]), both_sides=True)
     _wheels(spec, parts)
     return parts, body, cabin
 
 
-def side_view(points: Floats) -> Floats:
+def _side_view(points: Floats) -> Floats:
     """(N, 2) x and z."""
     return points[:, [0, 2]]
 
@@ -152,8 +176,8 @@ def _wells(spec: CarSpec, body: Shell, arch: float, parts: Parts) -> None:
         ring = disc(x, spec.wheel.radius, arch)
         if spec.cladding:
             wide = disc(x, spec.wheel.radius, arch + spec.cladding)
-            body.side.stamp(_seen(wide), "trim", where=beside, finest_m=0.1)
-        body.side.stamp(_seen(ring), "hole", where=beside, finest_m=0.07)
+            body.side.stamp(_seen(wide), "trim", where=beside, finest_m=0.05)
+        body.side.stamp(_seen(ring), "hole", where=beside, finest_m=0.035)
     if spec.sill_z:
         below: Field = lambda p, q: p[:, 2] - spec.sill_z  # noqa: E731
         body.side.stamp(below, "trim", on=("paint",), finest_m=0.2)
@@ -164,47 +188,50 @@ def _wells(spec: CarSpec, body: Shell, arch: float, parts: Parts) -> None:
     deep_a, deep_b = a * [1, 0, 1] + [0, inner, 0], b * [1, 0, 1] + [0, inner, 0]
     corners = np.stack([a, b, deep_b, deep_a], axis=1).reshape(-1, 3)
     base = np.arange(len(edges))[:, None] * 4
-    tunnel = Mesh.of(corners, np.concatenate([base + [0, 1, 2], base + [0, 2, 3]]))
+    tunnel = Mesh.of(corners, np.concatenate([base + np.array(half) for half in ((0, 1, 2), (0, 2, 3))]))
     parts.add("trim", flat(tunnel, DETAILS["rubber"]), both_sides=True)
     for x in spec.axles:
         angle = np.radians(np.linspace(-12, 192, 19))
-        rim = np.stack([x + 1.02 * arch * np.cos(angle), np.full(19, inner), hub_z(spec) + 1.02 * arch * np.sin(angle)], -1)
-        middle = np.array([[x, inner, hub_z(spec)]])
+        across, up = 1.02 * arch * np.cos(angle), 1.02 * arch * np.sin(angle)
+        rim = np.stack([x + across, np.full(19, inner), spec.wheel.radius + up], axis=-1)
+        middle = np.array([[x, inner, spec.wheel.radius]])
         fan = np.stack([np.full(18, 19), np.arange(1, 19), np.arange(18)], axis=1)
         parts.add("trim", flat(Mesh.of(np.concatenate([rim, middle]), fan), DETAILS["rubber"]), both_sides=True)
 
 
-def hub_z(spec: CarSpec) -> float:
-    """Height of the wheels' hubs."""
-    return spec.wheel.radius
-
-
 def _seen(shape: Shape) -> Field:
-    return lambda p, q: shape(side_view(p))
+    return lambda p, q: shape(_side_view(p))
 
 
 def _stamp(body: Shell, stamp: Stamp, parts: Parts) -> None:
     def project(points: Floats, params: Floats) -> Floats:
         if stamp.at == "side":
-            return side_view(points)
+            return _side_view(points)
         run = body.along(params[:, 0])
         return np.stack([run if stamp.at == "front" else body.arc_m - run, points[:, 2]], axis=1)
 
     def field_of(shape: Shape) -> Field:
         return lambda p, q: shape(project(p, q))
 
+    solid = ("paint", "trim")
     own = f"{stamp.part}:{stamp.cell}:{len(body.side.faces)}"
+    if stamp.at == "side":
+        near = field_of(rounded(stamp.corners, 0.0, 0.4))
+        for z in (min(z for _, z in stamp.corners), max(z for _, z in stamp.corners)):
+            body.side.cut(_offset(2, z), where=near, on=solid)
     if stamp.rim:
-        body.side.stamp(field_of(rounded(stamp.corners, stamp.radius, stamp.rim)), "trim", finest_m=0.05)
-    body.side.stamp(field_of(rounded(stamp.corners, stamp.radius)), own, finest_m=0.05)
+        frame = field_of(rounded(stamp.corners, stamp.radius, stamp.rim))
+        body.side.stamp(frame, "trim", on=solid, finest_m=0.02, bend_m=0.003)
+    body.side.stamp(field_of(rounded(stamp.corners, stamp.radius)), own, on=solid, finest_m=0.012, bend_m=0.003)
     mesh = body.side.part(own, stamp.sink)
     low, high = np.min(stamp.corners, axis=0), np.max(stamp.corners, axis=0)
     low = np.maximum(low, [0, -9]) if stamp.at != "side" else low
     faces = body.side.faces_of(own)
     flat_at = project(body.side.points, body.side.params)[np.unique(faces)]
     cells = DETAILS if stamp.part == "trim" else LAMPS
-    parts.add(stamp.part, mesh.with_uvs(cell_uvs(cells[stamp.cell], (flat_at - low) / (high - low))), both_sides=True)
-    if stamp.sink > 0.002:
+    uvs = cell_uvs(cells[stamp.cell], (flat_at - low) / (high - low))
+    parts.add(stamp.part, mesh.with_uvs(uvs), both_sides=True)
+    if stamp.sink > 0.005:
         parts.add("trim", flat(body.side.walls(own, stamp.sink), DETAILS["gloss"]), both_sides=True)
 
 
@@ -224,15 +251,24 @@ def _glaze(spec: CarSpec, cabin: Shell) -> None:
             continue
         corners = [(left, low * rise), (right, low * rise), (right, high * rise), (left, high * rise)]
         for material, grow in (("trim", 0.018), ("glass", 0.0)):
-            sheet.stamp(_unrolled(cabin, rounded(corners, radius, grow), rise), material, finest_m=0.06)
+            sheet.stamp(_unrolled(cabin, rounded(corners, radius, grow), rise), material, finest_m=0.025)
     beside: Field = lambda p, q: np.maximum(0.3 - p[:, 1], np.abs(q[:, 0] - np.mean(cabin.corners)) - 0.3)  # noqa: E731
     for x, width in spec.glass_posts:
-        post: Field = lambda p, q, x=x, width=width: np.abs(p[:, 0] - x) - width / 2  # type: ignore[misc]  # noqa: E731
-        sheet.stamp(post, "trim", where=beside, on=("glass",), finest_m=0.3)
+        _band(sheet, x - width / 2, x + width / 2, "trim", beside, ("glass",))
     if spec.blind_sides:
-        low_x, high_x = spec.blind_sides
-        blind: Field = lambda p, q: np.abs(p[:, 0] - (low_x + high_x) / 2) - (high_x - low_x) / 2  # noqa: E731
-        sheet.stamp(blind, "paint", where=beside, on=("glass", "trim"), finest_m=0.3)
+        _band(sheet, *spec.blind_sides, "paint", beside, ("glass", "trim"))
+
+
+def _band(sheet: Sheet, low_x: float, high_x: float, material: str, where: Field, on: tuple[str, ...]) -> None:
+    """Names everything between two x positions; both lines are cut first, as the band may be narrower than a face."""
+    for x in (low_x, high_x):
+        sheet.cut(_offset(0, x), where=where, on=on)
+    middle, half = (low_x + high_x) / 2, (high_x - low_x) / 2
+    sheet.stamp(lambda p, q: np.abs(p[:, 0] - middle) - half, material, where=where, on=on, finest_m=9.0)
+
+
+def _offset(axis: int, value: float) -> Field:
+    return lambda p, q: p[:, axis] - value
 
 
 def _unrolled(cabin: Shell, shape: Shape, rise: float) -> Field:
@@ -245,8 +281,9 @@ def _hide_under(cabin: Shell, body: Shell) -> None:
     ring = cabin.side.patch.evaluate(np.column_stack([u, np.full_like(u, 0.0)]))[:, :2]
     inside = rounded(np.concatenate([ring, ring[::-1] * [1, -1]]), 0.0, -0.05)
     middle = body.top.points[body.top.faces]
-    hidden = (inside(middle.reshape(-1, 3)[:, :2]).reshape(-1, 3) < 0).all(axis=1)
-    body.top.material = ["hidden" if h else m for h, m in zip(hidden.tolist(), body.top.material, strict=True)]
+    corners = (inside(middle.reshape(-1, 3)[:, :2]) < 0).reshape(-1, 3)
+    hidden: list[bool] = np.all(corners, axis=1).tolist()
+    body.top.material = ["hidden" if h else m for h, m in zip(hidden, body.top.material, strict=True)]
 
 
 def _sink_bed(bed: tuple[float, float, float], body: Shell, parts: Parts) -> None:
@@ -278,7 +315,3 @@ def surface_point(sheet: Sheet, x: float, z: float) -> tuple[Floats, Floats]:
     point[[0, 2]] = x, z
     return point, sheet.patch.normals(params[chosen : chosen + 1])[0]
 
-
-def strip(lower: Floats, upper: Floats) -> Mesh:
-    """A ribbon between two (P, 3) lines."""
-    return grid(np.stack([lower, upper]))

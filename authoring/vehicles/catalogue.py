@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from authoring.mesh import Floats, Mesh, box, merge
+from authoring.mesh import Floats, Mesh, box
 from authoring.vehicles.atlas import DETAILS, flat, write_atlases
 from authoring.vehicles.car import CarSpec, Parts, build_car
 from authoring.vehicles.cars import CITY, ESTATE, HATCHBACK, SALOON, SPORTS, SUV
 from authoring.vehicles.finish import Box, Finish, PaintMap, write_vehicle
 from authoring.vehicles.fittings import (
     add_antenna,
+    add_exhaust,
     add_handles,
     add_light_bar,
     add_mirrors,
@@ -38,7 +39,7 @@ def _car(spec: CarSpec, extra: Extra | None = None) -> Callable[[Path], None]:
         _fit(spec, parts, body, cabin)
         if extra is not None:
             extra(spec, parts, body, cabin)
-        meshes = {name: merge(pieces) for name, pieces in parts.meshes.items()}
+        meshes = parts.merged()
         bounds = meshes["paint"].bounds
         finish = Finish(spec.name, spec.kind, spec.palette, _boxes(spec, bounds, cabin))
         size = (2048, 1024) if bounds[1, 0] > 4 else (1024, 1024)
@@ -55,8 +56,8 @@ def _fit(spec: CarSpec, parts: Parts, body: Shell, cabin: Shell) -> None:
     behind = 0.13 if spec.kind == "car" else 0.22
     add_mirrors(parts, cabin, float(front[0]) - behind, float(front[2]), size=spec.mirror, paint=_mirror_part(spec))
     add_handles(parts, body, spec.handles)
-    add_plate(parts, body, spec.plates[0], front=True)
-    add_plate(parts, body, spec.plates[1], front=False)
+    add_plate(parts, body, spec.plates[0], front=True, stand_off=spec.plate_stand_off)
+    add_plate(parts, body, spec.plates[1], front=False, stand_off=spec.plate_stand_off)
     add_wipers(parts, cabin)
     if spec.rails:
         add_rails(parts, cabin, *spec.rails)
@@ -90,6 +91,12 @@ def _span(x: tuple[float, float], half: float, z: tuple[float, float]) -> Box:
 
 def _fin(spec: CarSpec, parts: Parts, body: Shell, cabin: Shell) -> None:
     add_antenna(parts, cabin, float(cabin.top.points[:, 0].min()) + 0.25)
+    add_exhaust(parts, spec.plan[-1][0] + 0.05, 0.52, float(body.side.points[:, 2].min()) + 0.03)
+
+
+def _sports(spec: CarSpec, parts: Parts, body: Shell, cabin: Shell) -> None:
+    for y in (0.42, 0.54):
+        add_exhaust(parts, spec.plan[-1][0] + 0.07, y, 0.235, 0.045, both=True)
 
 
 def _taxi(spec: CarSpec, parts: Parts, body: Shell, cabin: Shell) -> None:
@@ -128,7 +135,8 @@ def _rounded(mesh: Mesh) -> Mesh:
 
 CATALOGUE: dict[str, Callable[[Path], None]] = {
     **{spec.name: _car(spec, _fin) for spec in (HATCHBACK, SALOON, ESTATE, SUV)},
-    **{spec.name: _car(spec) for spec in (SPORTS, CITY, PICKUP, VAN)},
+    **{spec.name: _car(spec) for spec in (CITY, PICKUP, VAN)},
+    SPORTS.name: _car(SPORTS, _sports),
     TAXI.name: _car(TAXI, _taxi),
     POLICE.name: _car(POLICE, _police),
     AMBULANCE.name: _car(AMBULANCE, _ambulance),

@@ -140,8 +140,8 @@ class Finish:
     kind: str
     palette: str
     boxes: tuple[Box, ...]
-    metallic: float = 0.15
-    roughness: float = 0.22
+    metallic: float = 0.12
+    roughness: float = 0.15
     comment: str = ""
 
 
@@ -150,7 +150,7 @@ _MATERIALS = {
     "trim": 'texture="details" metallic="0" roughness="0.5"',
     "lights": 'texture="lamps" metallic="0" roughness="0.08"',
     "tyre": 'rgba="0.022 0.022 0.023 1" metallic="0" roughness="0.85"',
-    "rim": 'rgba="0.46 0.47 0.48 1" metallic="0.85" roughness="0.3"',
+    "rim": 'rgba="0.60 0.61 0.62 1" metallic="0.6" roughness="0.32"',
     "chrome": 'rgba="0.62 0.62 0.63 1" metallic="1" roughness="0.12"',
     "body": 'rgba="0.62 0.62 0.61 1" metallic="0" roughness="0.45"',
 }

@@ -77,7 +77,7 @@ def add_plate(parts: Parts, body: Shell, z: float, front: bool, *, stand_off: fl
     x = float(line[nearest, 0]) + (stand_off if front else -stand_off)
     yaw = 0.0 if front else 180.0
     parts.add("trim", flat(box((0.03, 0.54, 0.13), (x - 0.017 if front else x + 0.017, 0, z)), DETAILS["plastic"]))
-    parts.add("trim", panel(0.52, 0.112, (x + (0.001 if front else -0.001), 0.0, z), yaw, DETAILS["plate"]))
+    parts.add("trim", panel(0.52, 0.112, (x + (0.005 if front else -0.005), 0.0, z), yaw, DETAILS["plate"]))
 
 
 def add_wipers(parts: Parts, cabin: Shell, *, rise: float = 0.1) -> None:
@@ -156,7 +156,10 @@ def add_light_bar(parts: Parts, cabin: Shell, x: float, width: float = 1.1) -> N
 
 def add_exhaust(parts: Parts, x: float, y: float, z: float, radius: float = 0.035, both: bool = False) -> None:
     """A tail pipe looking backwards."""
-    pipe = revolve([(radius * 0.85, -0.10), (radius * 0.85, 0.0), (radius, 0.0), (radius, -0.14)][::-1], 12, "x").scaled(-1, 1, 1)
+    profile = [(radius, -0.14), (radius, 0.0), (radius * 0.85, 0.0), (radius * 0.85, -0.10)]
+    pipe = revolve(profile, 12, "x").scaled(-1, 1, 1)
     parts.add("rim", pipe.translated(x, y, z), both_sides=both)
+    hollow = revolve([(radius * 0.86, 0.0), (0.0, 0.0)], 12, "x").scaled(-1, 1, 1)
+    parts.add("trim", flat(hollow, DETAILS["gloss"]).translated(x + 0.015, y, z), both_sides=both)
 
 

@@ -117,7 +117,7 @@ def cap(side: Patch, corner_front: float, corner_rear: float, centre_z: Callable
         shift = centre_z(line[:, 0])
         ends = centre_z(np.array([front[0], rear[0]])) - np.array([front[2], rear[2]])
         line[:, 2] = shift - ((1 - a) ** 6 * ends[0] + a**6 * ends[1])
-        return line
+        return np.asarray(line, dtype=np.float64)
 
     def evaluate(params: Floats) -> Floats:
         a, t = params[:, 0], 1.0 - params[:, 1]

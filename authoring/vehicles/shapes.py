@@ -10,7 +10,7 @@ from shapely.geometry import Polygon  # type: ignore[import-untyped]
 
 from authoring.mesh import Floats
 
-__all__ = ["Shape", "disc", "outline", "rounded"]
+__all__ = ["Shape", "disc", "rounded"]
 
 Shape = Callable[[Floats], Floats]
 
@@ -18,15 +18,6 @@ Shape = Callable[[Floats], Floats]
 def disc(x: float, y: float, radius: float) -> Shape:
     """A full circle."""
     return lambda p: np.hypot(p[:, 0] - x, p[:, 1] - y) - radius
-
-
-def outline(corners: ArrayLike, radius: float) -> Floats:
-    """(P, 2) counter-clockwise points of a polygon whose convex corners are rounded."""
-    shrunk = Polygon(np.asarray(corners, dtype=np.float64)).buffer(-radius, join_style="mitre")
-    ring = np.asarray(shrunk.buffer(radius, quad_segs=5).exterior.coords, dtype=np.float64)[:-1]
-    following = np.roll(ring, -1, axis=0)
-    turn = (ring[:, 0] * following[:, 1] - following[:, 0] * ring[:, 1]).sum()
-    return ring if turn > 0 else ring[::-1]
 
 
 def rounded(corners: ArrayLike, radius: float = 0.0, grow: float = 0.0) -> Shape:
@@ -50,6 +41,6 @@ def rounded(corners: ArrayLike, radius: float = 0.0, grow: float = 0.0) -> Shape
         rise = np.where(np.abs(along[:, 1]) > 1e-12, along[:, 1], 1.0)
         at = start[:, 0] + (p[:, 1:2] - y0) / rise * along[:, 0]
         inside = (crosses & (p[:, :1] < at)).sum(axis=1) % 2 == 1
-        return np.where(inside, -near, near) - radius - grow
+        return np.asarray(np.where(inside, -near, near) - radius - grow, dtype=np.float64)
 
     return distance

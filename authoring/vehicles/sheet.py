@@ -48,6 +48,7 @@ class Sheet:
         where: Field | None = None,
         on: tuple[str, ...] | None = None,
         finest_m: float = 0.03,
+        bend_m: float = 0.005,
     ) -> Sheet:
         """Cuts the outline of `shape` and names what lies inside.
 
@@ -56,14 +57,15 @@ class Sheet:
             material: the name given inside.
             where: a second signed distance; faces whose middle is outside it stay as they are.
             on: only faces of these materials change (and are cut).
-            finest_m: edges across the outline are first halved until they are this short, so that corners stay round.
+            finest_m: edges across the outline are first halved where the outline bends, down to this length.
+            bend_m: how far a straight cut through a face may miss the outline.
         """
 
         def value(params: Floats) -> Floats:
             return shape(self.patch.evaluate(params), params)
 
-        for _ in range(4):
-            if not self._refine(value, finest_m, where, on):
+        for _ in range(6):
+            if not self._refine(value, finest_m, bend_m, where, on):
                 break
         self._split(value, where, on)
         middle = self.params[self.faces].mean(axis=1)
@@ -75,6 +77,11 @@ class Sheet:
             material if hit and (on is None or old in on) else old
             for hit, old in zip(inside.tolist(), self.material, strict=True)
         ]
+        return self
+
+    def cut(self, line: Field, *, where: Field | None = None, on: tuple[str, ...] | None = None) -> Sheet:
+        """Cuts along the zero of `line` and names nothing: before a stamp narrower than the faces it falls on."""
+        self._split(lambda params: line(self.patch.evaluate(params), params), where, on)
         return self
 
     def faces_of(self, *materials: str) -> Ints:
@@ -96,7 +103,7 @@ class Sheet:
         deep_a, deep_b = a - na * sink_m, b - nb * sink_m
         corners = np.stack([a + na * margin_m, b + nb * margin_m, deep_b, deep_a], axis=1).reshape(-1, 3)
         base = np.arange(len(edges))[:, None] * 4
-        faces = np.concatenate([base + [0, 1, 2], base + [0, 2, 3]])
+        faces = np.concatenate([base + np.array(half) for half in ((0, 1, 2), (0, 2, 3))])
         return Mesh.of(corners, faces)
 
     def border(self, material: str) -> Ints:
@@ -123,18 +130,27 @@ class Sheet:
         return active
 
     def _refine(
-        self, value: Callable[[Floats], Floats], finest_m: float, where: Field | None, on: tuple[str, ...] | None
+        self,
+        value: Callable[[Floats], Floats],
+        finest_m: float,
+        bend_m: float,
+        where: Field | None,
+        on: tuple[str, ...] | None,
     ) -> bool:
-        """Halves long edges of faces that the outline crosses; returns whether there were any."""
-        sign = value(self.params)[self.faces] < 0
-        crossed = sign.any(axis=1) & ~sign.all(axis=1) & self._active(self.params, where, on)
+        """Halves edges of crossed faces where the outline bends between their ends; returns whether there were any."""
         half = np.concatenate([self.faces[:, [0, 1]], self.faces[:, [1, 2]], self.faces[:, [2, 0]]])
-        length = np.linalg.norm(self.points[half[:, 0]] - self.points[half[:, 1]], axis=1)
-        chosen = np.tile(crossed, 3) & (length > 2 * finest_m)
+        edges, inverse = np.unique(np.sort(half, axis=1), axis=0, return_inverse=True)
+        level, between = value(self.params), value(self.params[edges].mean(axis=1))
+        inside = np.concatenate([level[self.faces], between[inverse.reshape(3, -1)].T], axis=1) < 0
+        crossed = inside.any(axis=1) & ~inside.all(axis=1) & self._active(self.params, where, on)
+        bends = np.abs(between - level[edges].mean(axis=1)) > bend_m
+        length = np.linalg.norm(self.points[edges[:, 0]] - self.points[edges[:, 1]], axis=1)
+        touched = np.zeros(len(edges), dtype=bool)
+        touched[inverse.reshape(3, -1)[:, crossed]] = True
+        chosen = touched & bends & (length > 2 * finest_m)
         if not chosen.any():
             return False
-        edges = np.unique(np.sort(half[chosen], axis=1), axis=0)
-        self._insert(edges, np.full(len(edges), 0.5))
+        self._insert(edges[chosen], np.full(int(chosen.sum()), 0.5))
         return True
 
     def _split(self, value: Callable[[Floats], Floats], where: Field | None, on: tuple[str, ...] | None) -> None:

@@ -70,7 +70,7 @@ def make_shell(
     *,
     deform: Deform | None = None,
     shift_reach: tuple[float, float] = (0.9, 0.9),
-    cells: tuple[int, int, int] = (34, 10, 5),
+    cells: tuple[int, int, int] = (20, 9, 4),
     extra_u: Sequence[float] = (),
     corner_deg: float = 45.0,
 ) -> Shell:
@@ -107,18 +107,20 @@ def make_shell(
     turn = np.degrees(np.arctan2(-steps[:, 0], steps[:, 1]))
     corner_front = u[np.searchsorted(turn, corner_deg)]
     corner_rear = u[np.searchsorted(turn, 180 - corner_deg)]
-    # Lattice lines: denser where the outline turns.
-    density = arc[1:] * 0 + np.linalg.norm(steps, axis=1) + 0.35 * np.abs(np.gradient(np.radians(turn)))
-    grown = np.concatenate([[0.0], np.cumsum(density)])
-    lines = np.interp(np.linspace(0, grown[-1], cells[0] + 1), grown, u)
-    lines = _snap(lines, [corner_front, corner_rear])
-    lines = np.unique(np.concatenate([lines, np.interp(-np.asarray(extra_u), -ring[:, 0], u)])) if extra_u else lines
+    # The cap's columns continue the belt's, so that the two meet without a gap.
+    share = np.linspace(0, 1, cells[2] + 1) ** 0.8
+    middle = (u >= corner_front) & (u <= corner_rear)
+    weight = np.gradient(arc) + 0.35 * np.abs(np.gradient(np.radians(np.append(turn, turn[-1]))))
+    grown = np.cumsum(weight[middle])
+    inner = np.interp(np.linspace(grown[0], grown[-1], cells[0] + 1), grown, u[middle])
+    if extra_u:
+        inner = np.unique(np.concatenate([inner, np.interp(-np.asarray(extra_u), -ring[:, 0], u)]))
+    inner[0], inner[-1] = corner_front, corner_rear
+    lines = np.concatenate([corner_front * share[:-1], inner, 1 - (1 - corner_rear) * share[:-1][::-1]])
     up = _up_lines(patch, cells[1])
     side = lattice(patch, lines, up, "paint")
     top_patch = cap(patch, corner_front, corner_rear, crown)
-    inner = lines[(lines >= corner_front - 1e-9) & (lines <= corner_rear + 1e-9)]
-    across = 1 - np.interp(np.linspace(0, 1, cells[2] + 1), [0, 0.5, 1], [0, 0.62, 1])[::-1]
-    top = lattice(top_patch, (inner - corner_front) / (corner_rear - corner_front), np.sort(across), "paint")
+    top = lattice(top_patch, (inner - corner_front) / (corner_rear - corner_front), np.sort(1 - share), "paint")
     return Shell(side, top, float(arc[-1]), (float(corner_front), float(corner_rear)), (u, arc))
 
 
@@ -132,14 +134,6 @@ def _up_lines(patch: Patch, count: int) -> Floats:
         bend += np.linalg.norm(rise, axis=1) + 0.25 * np.concatenate([angle, angle[-1:]])
     grown = np.concatenate([[0.0], np.cumsum(bend)])
     return np.asarray(np.interp(np.linspace(0, grown[-1], count + 1), grown, v), dtype=np.float64)
-
-
-def _snap(lines: Floats, targets: Sequence[float]) -> Floats:
-    out = lines.copy()
-    for target in targets:
-        inner = np.abs(out[1:-1] - target)
-        out[1 + int(inner.argmin())] = target
-    return out
 
 
 def _fade(t: Floats) -> Floats:

@@ -8,7 +8,7 @@ import numpy as np
 from PIL import Image
 
 from authoring.mesh import Mesh, bevelled_box, box, merge, revolve, write_obj
-from authoring.vehicles.atlas import DETAILS, LAMPS, cell_uvs, fitted, flat
+from authoring.vehicles.atlas import DETAILS, LAMPS, flat
 from authoring.vehicles.car import Parts, build_car
 from authoring.vehicles.finish import Box, Finish, PaintMap, write_vehicle
 from authoring.vehicles.fittings import add_handles, add_mirrors, add_plate, add_wipers, panel
@@ -38,7 +38,7 @@ def write_box_truck(out: Path) -> None:
         parts.add("chrome", box((0.10, 0.02, size[2]), (x, width / 2 + 0.006, middle[2])), both_sides=True)
     _rear_doors(parts, low, high, width)
     half_w, half_h = FACE_SIZE_M[0] / 2, FACE_SIZE_M[1] / 2
-    face_x, face_z = _REAR_X - 0.012, 2.27
+    face_x, face_z = _REAR_X - 0.02, 2.27
     face = Mesh.of(
         [[0, half_w, -half_h], [0, -half_w, -half_h], [0, -half_w, half_h], [0, half_w, half_h]],
         [[0, 1, 2], [0, 2, 3]],
@@ -116,7 +116,8 @@ def _chassis() -> Parts:
     dark(box((0.9, 1.9, 0.42), (_CAB_X - 0.55, 0, 0.88)))
     for x in (1.4, 0.2, -1.0, -3.2):
         dark(box((0.08, 2.3, 0.10), (x, 0, 0.92)))
-    parts.add("rim", revolve([(0.0, 0.0), (0.27, 0.0), (0.27, 0.95), (0.0, 0.95)], 16, "x").translated(0.95, 0.90, 0.64))
+    tank = revolve([(0.0, 0.0), (0.27, 0.0), (0.27, 0.95), (0.0, 0.95)], 16, "x")
+    parts.add("rim", tank.translated(0.95, 0.90, 0.64))
     dark(bevelled_box((0.75, 0.42, 0.42), 0.03, 1, (1.35, -0.92, 0.66)))
     for z in (0.52, 0.78):
         rail = box((1.9, 0.03, 0.09), (-0.35, 1.18, z))
@@ -149,7 +150,8 @@ def _rear_doors(parts: Parts, low: float, high: float, width: float) -> None:
     x = _REAR_X
     leaf = (width - 0.10) / 2
     for y in (-leaf / 2 - 0.005, leaf / 2 + 0.005):
-        parts.add("body", bevelled_box((0.035, leaf - 0.01, high - low - 0.12), 0.008, 1, (x + 0.018, y, (low + high) / 2)))
+        door = bevelled_box((0.035, leaf - 0.01, high - low - 0.12), 0.008, 1, (x + 0.018, y, (low + high) / 2))
+        parts.add("body", door)
     for y in (0.10, leaf - 0.22):
         bar = revolve([(0.016, low + 0.04), (0.016, high - 0.04)], 8, "z").translated(x - 0.004, y, 0)
         # The bars pass behind the printed board, so they stop above and below it.
@@ -160,14 +162,13 @@ def _rear_doors(parts: Parts, low: float, high: float, width: float) -> None:
     frame = 0.06
     for z in (low + 0.03, high - 0.03):
         parts.add("chrome", box((0.05, width, frame), (x + 0.022, 0, z)))
-    parts.add("chrome", box((0.05, frame, high - low), (x + 0.022, width / 2 - 0.028, (low + high) / 2)), both_sides=True)
+    upright = box((0.05, frame, high - low), (x + 0.022, width / 2 - 0.028, (low + high) / 2))
+    parts.add("chrome", upright, both_sides=True)
     board = box((0.012, FACE_SIZE_M[0] + 0.04, FACE_SIZE_M[1] + 0.04), (x - 0.005, 0, 2.27))
     parts.add("trim", flat(board, DETAILS["plastic"]))
     for y, cell in ((1.08, "red"), (0.95, "red")):
         parts.add("lights", flat(box((0.02, 0.10, 0.04), (x - 0.005, y, high - 0.03)), LAMPS[cell]), both_sides=True)
-    stripe = fitted(panel(0.50, 0.14, (x - 0.004, 0.80, low + 0.26), 180, (0, 0)), DETAILS["stripe"])
-    uvs = cell_uvs(DETAILS["stripe"], np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]))
-    parts.add("trim", stripe.with_uvs(uvs), both_sides=True)
+    parts.add("trim", panel(0.50, 0.14, (x - 0.008, 0.80, low + 0.26), 180, DETAILS["stripe"]), both_sides=True)
 
 
 def _cut_bar(bar: Mesh, low: float, high: float) -> Mesh:
@@ -180,7 +181,7 @@ def _cut_bar(bar: Mesh, low: float, high: float) -> Mesh:
 def _write(
     out: Path, name: str, parts: Parts, boxes: tuple[Box, ...], comment: str, face: tuple[str, str, str] | None
 ) -> None:
-    meshes = {key: merge(pieces) for key, pieces in parts.meshes.items()}
+    meshes = parts.merged()
     bounds = meshes["paint"].bounds
     shift = _CAB_X
     paint = PaintMap(

@@ -59,13 +59,8 @@ def make_wheel(spec: WheelSpec) -> Wheel:
         "y",
     )
     lip = half - 0.012
-    barrel = revolve(
-        [(rim - 0.018, lip - 0.07), (rim - 0.015, lip - 0.012), (rim - 0.004, lip + 0.004), (rim + 0.006, lip - 0.004)][
-            ::-1
-        ],
-        spec.segments,
-        "y",
-    ).flipped()
+    edge = [(rim + 0.006, lip - 0.004), (rim - 0.012, lip + 0.004), (rim - 0.018, lip - 0.07)]
+    barrel = revolve(edge, spec.segments, "y").flipped()
     drum = revolve([(rim, lip - 0.07), (0.0, lip - 0.065)], spec.segments // 2, "y")
     if spec.spokes:
         face = _spokes(spec, lip)
@@ -77,21 +72,15 @@ def make_wheel(spec: WheelSpec) -> Wheel:
 def _spokes(spec: WheelSpec, lip: float) -> Mesh:
     inner, outer = 0.055, spec.rim - 0.010
     w0, w1 = spec.spoke_width / 2, spec.spoke_width / 2 * 0.72
-    spoke = extrude(
-        [(inner * 0.5, -w0), (outer * 0.55, -w1 * 0.9), (outer, -w1 * 1.25), (outer, w1 * 1.25), (outer * 0.55, w1 * 0.9), (inner * 0.5, w0)],
-        0.026,
-        0.007,
-    )
+    upper = [(inner * 0.5, w0), (outer * 0.55, w1 * 0.9), (outer, w1 * 1.25)]
+    spoke = extrude([*((x, -y) for x, y in upper), *reversed(upper)], 0.026, 0.007)
     top = spoke.vertices.copy()
     # Extruded along z, the spoke is laid down so that its face looks along +y, sunk towards the hub.
     sink = spec.dish * np.clip(1 - top[:, 0] / outer, 0, 1)
     laid = Mesh(np.stack([top[:, 0], top[:, 2] - sink + lip - 0.036, -top[:, 1]], axis=1), spoke.faces, spoke.uvs)
     arms = [laid.transformed(rotation("y", 360 / spec.spokes * k + 90)) for k in range(spec.spokes)]
-    hub = revolve(
-        [(0.072, lip - 0.05), (0.070, lip - spec.dish - 0.008), (0.058, lip - spec.dish), (0.030, lip - spec.dish), (0.0, lip - spec.dish + 0.008)],
-        14,
-        "y",
-    )
+    front = lip - spec.dish
+    hub = revolve([(0.072, lip - 0.05), (0.066, front), (0.030, front), (0.0, front + 0.008)], 14, "y")
     return merge([*arms, hub])
 
 
