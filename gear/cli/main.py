@@ -13,6 +13,7 @@ from gear.values.errors import GearError
 COMMANDS: dict[str, str] = {
     "collect": "collect a dataset split: pictures with exact ground truth",
     "sheet": "a contact sheet of a dataset, as one picture",
+    "view": "one self-contained HTML page of a dataset",
     "export": "write a dataset in another layout",
     "plugins": "list the installed tasks, models, attacks and defenses",
     "doctor": "render a reference frame with each renderer and say who renders",

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from gear.contracts.models import Model
 from gear.values.frames import UInt8Image
+
+if TYPE_CHECKING:
+    from torch import Tensor
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -45,6 +48,17 @@ class Defense(Protocol):
         self, views: Mapping[str, UInt8Image], model: Model | None, state: Any, rng: np.random.Generator
     ) -> DefenseResult:
         """Cleans one sample; never writes to its input."""
+        ...
+
+    def forward(self, views: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        """The cleaning in torch, for attacks that know of the defense.
+
+        (B, 3, H, W) float pictures in 0..1 to the same. Its values are those of `apply` up to rounding; its gradient is
+        exact where the spec says `differentiable`, a stand-in where it says `surrogate`.
+
+        Raises:
+            ValueError: the spec says `none`.
+        """
         ...
 
     def wrap(self, model: Model) -> Model:

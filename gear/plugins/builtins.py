@@ -7,4 +7,9 @@ BUILTINS: tuple[str, ...] = (
     "gear.plugins.tasks.detect2d",
     "gear.plugins.tasks.stereo3d",
     "gear.plugins.tasks.depth",
+    "gear.plugins.defenses.lgs",
+    "gear.plugins.defenses.jpeg",
+    "gear.plugins.defenses.median",
+    "gear.plugins.defenses.gaussian",
+    "gear.plugins.defenses.bit_depth",
 )

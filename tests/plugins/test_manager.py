@@ -29,6 +29,9 @@ class Same:
     def apply(self, views: Any, model: Any, state: Any, rng: np.random.Generator) -> Any:
         return views
 
+    def forward(self, views: Any) -> Any:
+        return views
+
     def wrap(self, model: Any) -> Any:
         return model
 

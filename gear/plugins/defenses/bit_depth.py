@@ -1,0 +1,63 @@
+"""Feature squeezing: fewer bits a channel (Xu et al., NDSS 2018)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.specs import DefenseSpec
+from gear.plugins.defenses.per_picture import Mask, PerPicture, each_as_uint8, straight_through
+from gear.values.errors import FieldError
+from gear.values.frames import UInt8Image
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BitDepthConfig:
+    """Options of bit-depth reduction.
+
+    Attributes:
+        bits: of each channel, 1 to 7.
+    """
+
+    bits: int = 4
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.bits <= 7:
+            raise FieldError("bits", f"must be 1 to 7, got {self.bits}")
+
+
+class BitDepth(PerPicture):
+    """Each value goes to the nearest of 2^bits evenly spaced levels."""
+
+    def __init__(self, config: BitDepthConfig) -> None:
+        steps = 2**config.bits - 1
+        self._table = np.rint(np.rint(np.arange(256) / 255 * steps) / steps * 255).astype(np.uint8)
+
+    def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
+        """The squeezed picture, no mask."""
+        return self._table[picture], None
+
+    def clean_tensor(self, pictures: Tensor) -> Tensor:
+        """The squeezed values, the identity's gradient."""
+        return straight_through(pictures, each_as_uint8(pictures, lambda picture: self._table[picture]))
+
+
+spec = DefenseSpec(
+    name="bit_depth",
+    summary="Fewer bits a channel (feature squeezing).",
+    config=BitDepthConfig,
+    build=BitDepth,
+    gradient="surrogate",
+)
+
+
+@hookimpl
+def gear_defenses() -> list[DefenseSpec[BitDepthConfig]]:
+    """This module's defense."""
+    return [spec]

@@ -1,0 +1,69 @@
+"""JPEG compression of every picture (Dziugaite et al., 2016)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.specs import DefenseSpec
+from gear.plugins.defenses.per_picture import Mask, PerPicture, each_as_uint8, straight_through
+from gear.values.errors import FieldError
+from gear.values.frames import UInt8Image
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JpegConfig:
+    """Options of JPEG compression.
+
+    Attributes:
+        quality: libjpeg's, 1 to 100.
+    """
+
+    quality: int = 50
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.quality <= 100:
+            raise FieldError("quality", f"must be 1 to 100, got {self.quality}")
+
+
+class Jpeg(PerPicture):
+    """Compresses and decompresses."""
+
+    def __init__(self, config: JpegConfig) -> None:
+        self._parameters = [cv2.IMWRITE_JPEG_QUALITY, config.quality]
+
+    def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
+        """The picture as it comes out of the decoder, no mask."""
+        return self._recode(picture), None
+
+    def clean_tensor(self, pictures: Tensor) -> Tensor:
+        """The decoder's values, the identity's gradient."""
+        return straight_through(pictures, each_as_uint8(pictures, self._recode))
+
+    def _recode(self, picture: UInt8Image) -> UInt8Image:
+        _, data = cv2.imencode(".jpg", picture[..., ::-1], self._parameters)
+        decoded = cv2.imdecode(data, cv2.IMREAD_COLOR)
+        assert decoded is not None  # it was encoded a line above
+        return np.ascontiguousarray(decoded[..., ::-1], np.uint8)
+
+
+spec = DefenseSpec(
+    name="jpeg",
+    summary="JPEG compression of every picture.",
+    config=JpegConfig,
+    build=Jpeg,
+    gradient="surrogate",
+)
+
+
+@hookimpl
+def gear_defenses() -> list[DefenseSpec[JpegConfig]]:
+    """This module's defense."""
+    return [spec]

@@ -1,0 +1,76 @@
+"""Defenses that clean every picture by itself: no model, no calibration, no draw."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.contracts.defenses import DefenseResult
+from gear.contracts.models import Model
+from gear.values.frames import UInt8Image
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+Mask = npt.NDArray[np.float32]
+
+
+class PerPicture(ABC):
+    """A `Defense` made of one picture's cleaning, in NumPy and in torch."""
+
+    @abstractmethod
+    def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
+        """The cleaned (H, W, 3) sRGB picture, a new array, and where the patch is believed to be, in 0..1."""
+
+    @abstractmethod
+    def clean_tensor(self, pictures: Tensor) -> Tensor:
+        """(B, 3, H, W) in 0..1 to the same, with the gradient that the spec declares."""
+
+    def fit(
+        self,
+        clean: Sequence[Mapping[str, UInt8Image]],
+        patched: Sequence[Mapping[str, UInt8Image]],
+        model: Model | None,
+        rng: np.random.Generator,
+    ) -> None:
+        """Nothing to learn."""
+        return
+
+    def apply(
+        self, views: Mapping[str, UInt8Image], model: Model | None, state: Any, rng: np.random.Generator
+    ) -> DefenseResult:
+        """Cleans each view."""
+        cleaned: dict[str, UInt8Image] = {}
+        masks: dict[str, Mask] = {}
+        for name, picture in views.items():
+            cleaned[name], mask = self.clean(picture)
+            if mask is not None:
+                masks[name] = mask
+        score = max(float(mask.mean()) for mask in masks.values()) if masks else None
+        return DefenseResult(views=cleaned, mask=masks or None, score=score)
+
+    def forward(self, views: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        """Cleans each view's batch."""
+        return {name: self.clean_tensor(pictures) for name, pictures in views.items()}
+
+    def wrap(self, model: Model) -> Model:
+        """The model as it is."""
+        return model
+
+
+def straight_through(pictures: Tensor, cleaned: Tensor) -> Tensor:
+    """The cleaned values with the gradient of doing nothing (BPDA with the identity; Athalye et al., ICML 2018)."""
+    return pictures + (cleaned - pictures).detach()
+
+
+def each_as_uint8(pictures: Tensor, clean: Any) -> Tensor:
+    """Takes every picture of a batch through a uint8 NumPy function, without a gradient."""
+    import torch
+
+    levels = (pictures.detach().clamp(0, 1) * 255).round().to(torch.uint8).permute(0, 2, 3, 1).cpu().numpy()
+    cleaned = np.stack([clean(picture) for picture in levels])
+    return torch.from_numpy(cleaned).to(pictures).permute(0, 3, 1, 2) / 255

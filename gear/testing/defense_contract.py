@@ -1,0 +1,179 @@
+"""What every defense promises. Subclass in your plugin's tests and set `spec`:
+
+class TestMedian(DefenseContract):
+    spec = median
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+from gear.config.dump import to_yaml
+from gear.config.nodes import parse_text
+from gear.config.reader import read_node
+from gear.contracts.defenses import Defense, DefenseResult
+from gear.contracts.models import Model
+from gear.contracts.specs import DefenseSpec
+from gear.plugins.manager import spec_problem
+from gear.values.frames import UInt8Image
+from gear.values.rng import derive_rng
+
+SEED = 7
+
+
+def street_picture(width_px: int, height_px: int, seed: int) -> UInt8Image:
+    """A smooth street-like picture: sky, buildings, road, with a few edges."""
+    rng = derive_rng(SEED, "picture", seed)
+    rows = np.linspace(0, 1, height_px)[:, None, None]
+    columns = np.linspace(0, 1, width_px)[None, :, None]
+    sky, road = np.array([150.0, 180.0, 220.0]), np.array([70.0, 72.0, 75.0])
+    picture = np.where(rows < 0.5, sky - 60 * rows, road + 30 * (rows - 0.5)) + 12 * np.sin(columns * 6 + seed)
+    for _ in range(6):
+        left, top = int(rng.integers(0, width_px * 3 // 4)), int(rng.integers(height_px // 5, height_px // 2))
+        picture[top : top + height_px // 4, left : left + width_px // 6] = rng.uniform(40, 200, 3)
+    street: UInt8Image = np.clip(picture, 0, 255).astype(np.uint8)
+    return street
+
+
+def noisy_patch(picture: UInt8Image, seed: int) -> tuple[UInt8Image, np.ndarray]:
+    """The picture with a rectangle of loud noise, and where it is: (H, W) bool."""
+    height, width = picture.shape[:2]
+    area = np.zeros((height, width), np.bool_)
+    area[height // 4 : height // 2, width // 3 : width * 3 // 4] = True
+    noise = derive_rng(SEED, "patch", seed).integers(0, 256, picture.shape, dtype=np.uint8)
+    return np.where(area[..., None], noise, picture), area
+
+
+class DefenseContract:
+    """Attributes:
+    spec: the defense.
+    options: of its config.
+    views: cameras that it is shown.
+    size_px: width and height of the pictures.
+    """
+
+    spec: ClassVar[DefenseSpec[Any]]
+    options: ClassVar[Mapping[str, Any]] = {}
+    views: ClassVar[tuple[str, ...]] = ("left", "right")
+    size_px: ClassVar[tuple[int, int]] = (128, 72)
+
+    def model(self) -> Model | None:
+        """What it guards; override where the defense looks into the model."""
+        return None
+
+    def make(self) -> Defense:
+        """A fresh one."""
+        return self.spec.build(self.spec.config(**self.options))
+
+    def pictures(self, seed: int = 0, *, is_patched: bool = True) -> dict[str, UInt8Image]:
+        """One sample."""
+        plain = {name: street_picture(*self.size_px, seed * 10 + i) for i, name in enumerate(self.views)}
+        return {name: noisy_patch(p, seed)[0] for name, p in plain.items()} if is_patched else plain
+
+    def state(self, defense: Defense) -> Any:
+        """What `fit` learns from four samples."""
+        clean = [self.pictures(i, is_patched=False) for i in range(4)]
+        patched = [self.pictures(i) for i in range(4)]
+        return defense.fit(clean, patched, self.model(), derive_rng(SEED, "fit"))
+
+    def result(self, pictures: Mapping[str, UInt8Image], seed: int = SEED) -> DefenseResult:
+        """A fresh defense, fitted and applied."""
+        defense = self.make()
+        return defense.apply(pictures, self.model(), self.state(defense), derive_rng(seed, "apply"))
+
+    def test_the_spec_can_be_used(self) -> None:
+        """Name, protocol, config and build are sound."""
+        assert spec_problem("defense", self.spec) is None
+
+    def test_the_config_survives_yaml(self) -> None:
+        """load(dump(config)) == config."""
+        config = self.spec.config(**self.options)
+        assert read_node(self.spec.config, parse_text(to_yaml(config), "config")) == config
+        assert dataclasses.replace(config) == config
+
+    def test_pictures_keep_shape_and_type(self) -> None:
+        """Every view comes back, cleaned or not."""
+        pictures = self.pictures()
+        result = self.result(pictures)
+        assert set(result.views) == set(pictures)
+        for name, picture in result.views.items():
+            assert picture.shape == pictures[name].shape
+            assert picture.dtype == np.uint8
+
+    def test_it_leaves_its_input_alone(self) -> None:
+        """Read-only input is enough, and what comes back is no view of it."""
+        pictures = self.pictures()
+        for picture in pictures.values():
+            picture.setflags(write=False)
+        result = self.result(pictures)
+        for name, picture in result.views.items():
+            assert picture is pictures[name] or not np.shares_memory(picture, pictures[name])
+
+    def test_the_same_generator_gives_the_same_result(self) -> None:
+        """All chance comes from `rng`."""
+        first, second = self.result(self.pictures()), self.result(self.pictures())
+        for name in self.views:
+            assert np.array_equal(first.views[name], second.views[name])
+            if first.mask is not None and second.mask is not None:
+                assert np.array_equal(first.mask[name], second.mask[name])
+        assert first.score == second.score
+
+    def test_outputs_are_what_the_spec_declares(self) -> None:
+        """Masks and scores are there if declared, and only then; both lie in 0..1."""
+        result = self.result(self.pictures())
+        assert (result.mask is not None) == ("mask" in self.spec.outputs)
+        assert (result.score is not None) == ("score" in self.spec.outputs)
+        for name, mask in (result.mask or {}).items():
+            assert mask.shape == result.views[name].shape[:2]
+            assert mask.dtype == np.float32
+            assert 0 <= float(mask.min()) <= float(mask.max()) <= 1
+        assert result.score is None or 0 <= result.score <= 1
+
+    def test_samples_do_not_touch_each_other(self) -> None:
+        """Nothing is kept between calls but the state."""
+        defense = self.make()
+        state = self.state(defense)
+        alone = defense.apply(self.pictures(1), self.model(), state, derive_rng(SEED, "apply"))
+        defense.apply(self.pictures(2), self.model(), state, derive_rng(SEED, "other"))
+        again = defense.apply(self.pictures(1), self.model(), state, derive_rng(SEED, "apply"))
+        for name in self.views:
+            assert np.array_equal(alone.views[name], again.views[name])
+
+    def test_gradients_pass_as_declared(self) -> None:
+        """`forward` has the values of `apply`, works alike for one and for many, and lets a gradient through."""
+        torch = pytest.importorskip("torch", reason="gradients need torch")
+        defense = self.make()
+        pictures = [self.pictures(i) for i in range(2)]
+
+        def batch(samples: list[dict[str, UInt8Image]]) -> dict[str, Any]:
+            return {
+                name: torch.from_numpy(np.stack([s[name] for s in samples])).permute(0, 3, 1, 2).float() / 255
+                for name in self.views
+            }
+
+        if self.spec.gradient == "none":
+            with pytest.raises(ValueError, match=r"\S"):
+                defense.forward(batch(pictures))
+            return
+        both, one = batch(pictures), defense.forward(batch(pictures[:1]))
+        for tensor in both.values():
+            tensor.requires_grad_(True)
+        cleaned = defense.forward(both)
+        state = self.state(defense)
+        for name in self.views:
+            assert torch.allclose(cleaned[name][:1], one[name], atol=1e-5)
+            assert cleaned[name].shape == both[name].shape
+            for i, sample in enumerate(pictures):
+                expected = defense.apply(sample, self.model(), state, derive_rng(SEED, "apply")).views[name]
+                got = cleaned[name][i].detach().permute(1, 2, 0).numpy() * 255
+                assert np.quantile(np.abs(got - expected), 0.99) <= 1.0
+        torch.stack([tensor.square().sum() for tensor in cleaned.values()]).sum().backward()
+        for tensor in both.values():
+            assert tensor.grad is not None
+            assert bool(torch.isfinite(tensor.grad).all())
+            assert float(tensor.grad.abs().sum()) > 0
