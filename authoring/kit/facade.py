@@ -188,7 +188,7 @@ def belt(
 
 def _cap(wall: Facade, material: str, outline: list[Array]) -> None:
     foot = outline[0]
-    for second, third in itertools.pairwise(outline):
+    for second, third in itertools.pairwise(outline[1:]):
         if np.linalg.norm(np.cross(second - foot, third - foot)) > 1e-6:
             corners = np.stack([foot, second, third])
             if material in MATERIALS:

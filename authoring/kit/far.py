@@ -10,6 +10,7 @@ from authoring.kit.facade import belt, facades
 from authoring.kit.parts import Sink
 from authoring.materials.atlas import FAR_WIDTH_M, far_rows
 
+BAYS = 8
 _STOREYS_M = {
     "glass_office": (3.7, 5.2),
     "concrete_office": (3.6, 4.4),
@@ -26,19 +27,20 @@ def far_building(
     floor_m, ground_m = _STOREYS_M.get(style, (3.2, 4.0))
     top_m = ground_m + (floors - 1) * floor_m
     strips = max(1, min(floors - 1, 18))
-    shift = float(rng.integers(8)) / 8
     for facade in facades(sink, width_m, depth_m).values():
-        u1 = shift + max(1, round(facade.width_m / FAR_WIDTH_M * 8)) / 8
+        bays = max(1, round(facade.width_m / FAR_WIDTH_M * BAYS)) / BAYS
         levels = [0.0, *np.linspace(ground_m, top_m, strips + 1)] if floors > 1 else [0.0, top_m]
         for index, (low, high) in enumerate(itertools.pairwise(levels)):
             v0, v1 = far_rows(style, ground=index == 0)
+            # Every storey starts at another bay of the strip, or drawn curtains would line up into columns.
+            u0 = float(rng.integers(BAYS)) / BAYS
             corners = [
                 facade.at(0, low),
                 facade.at(facade.width_m, low),
                 facade.at(facade.width_m, high),
                 facade.at(0, high),
             ]
-            sink.polygon("far_facades", corners, [(shift, v0), (u1, v0), (u1, v1), (shift, v1)])
+            sink.polygon("far_facades", corners, [(u0, v0), (u0 + bays, v0), (u0 + bays, v1), (u0, v1)])
     trim = _TRIMS.get(style, "limestone")
     belt(sink, trim, width_m, depth_m, [(0.0, top_m - 0.3), (0.3, top_m), (0.3, top_m + 0.5), (-0.3, top_m + 0.5)])
     x, y = width_m / 2, depth_m / 2

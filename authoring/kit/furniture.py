@@ -126,7 +126,7 @@ def letter_box(*, colour: str = "signal_yellow") -> list[Part]:
         sink.swatch_quad(colour, [(x0, -0.2, z0), (x0, 0.2, z0), (x1, 0.2, z1), (x1, -0.2, z1)])
     for y, order in ((-0.2, -1), (0.2, 1)):
         face = [(x, y, z) for x, z in rim]
-        for second, third in itertools.pairwise(face):
+        for second, third in itertools.pairwise(face[1:]):
             sink.swatch_quad(colour, [face[0], second, third][::-order])
     sink.swatch_box("black_paint", (-0.17, -0.204, 0.98), (0.17, -0.2, 1.03), skip="Y")
     sink.swatch_quad(
@@ -150,7 +150,7 @@ def dumpster() -> list[Part]:
         sink.swatch_quad("dark_green", [(-0.69, y0, z0), (0.69, y0, z0), (0.69, y1, z1), (-0.69, y1, z1)])
     for x, order in ((-0.69, 1), (0.69, -1)):
         face = [(x, y, z) for y, z in rim]
-        for second, third in itertools.pairwise(face):
+        for second, third in itertools.pairwise(face[1:]):
             sink.swatch_quad("dark_green", [face[0], second, third][::order])
     sink.swatch_box("plastic_grey", (-0.7, -0.57, 1.1), (0.7, 0.57, 1.17))
     for x in (-0.5, 0.5):

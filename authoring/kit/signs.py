@@ -18,13 +18,26 @@ def _ring(sides: int, first_deg: float) -> Array:
     return np.stack([np.cos(angle), np.sin(angle)], 1)
 
 
+def _rounded_triangle(corners: list[tuple[float, float]]) -> Array:
+    """A triangle whose tips are cut round, as sheet metal is."""
+    tips = np.asarray(corners)
+    centre = tips.mean(0)
+    angle = np.radians((-50, 0, 50))
+    rounded = []
+    for tip in tips:
+        along = (tip - centre) / np.linalg.norm(tip - centre)
+        side = np.array([-along[1], along[0]])
+        rounded += [tip + 0.1 * ((np.cos(a) - 1.15) * along + np.sin(a) * side) for a in angle]
+    return np.stack(rounded)
+
+
 # Outlines (K, 2) in -1..1, counter-clockwise as the driver sees them: x right, y up; and half the height in metres.
 _ROUND = (_ring(24, 0), 0.3)
 _SQUARE = (np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * 0.98, 0.3)
 OUTLINES: dict[str, tuple[Array, float]] = {
     "stop": (_ring(8, 22.5) / np.cos(np.pi / 8) * 0.98, 0.38),
-    "yield": (np.array([(0, -0.9), (0.98, 0.8), (-0.98, 0.8)]), 0.45),
-    "warning_children": (np.array([(-0.98, -0.8), (0.98, -0.8), (0, 0.9)]), 0.45),
+    "yield": (_rounded_triangle([(0, -0.9), (0.98, 0.8), (-0.98, 0.8)]), 0.45),
+    "warning_children": (_rounded_triangle([(-0.98, -0.8), (0.98, -0.8), (0, 0.9)]), 0.45),
     "priority": (np.array([(0, -0.98), (0.98, 0), (0, 0.98), (-0.98, 0)]), 0.42),
     "one_way": (np.array([(-1, -0.4), (1, -0.4), (1, 0.4), (-1, 0.4)]) * 0.98, 0.45),
     "street_name": (np.array([(-1, -0.25), (1, -0.25), (1, 0.25), (-1, 0.25)]) * 0.98, 0.5),

@@ -43,7 +43,8 @@ def shrunk(image: Image, largest_px: int) -> Image:
     factor = -(-max(image.shape[:2]) // largest_px)
     height, width = image.shape[0] // factor, image.shape[1] // factor
     blocks = image[: height * factor, : width * factor].reshape(height, factor, width, factor, -1)
-    return np.rint(blocks.mean((1, 3))).astype(np.uint8)
+    small: Image = np.rint(blocks.mean((1, 3))).astype(np.uint8)
+    return small
 
 
 def write_png(path: Path, image: Image, *, colours: int | None = None) -> None:
