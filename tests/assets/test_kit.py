@@ -1,0 +1,304 @@
+"""The kit's promises: the same bytes each time, within budget, sound meshes, textures that tile, known labels."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import mujoco
+import numpy as np
+import pytest
+
+from authoring import kit
+from authoring.kit.props import MAKERS, PROPS, write_prop
+from authoring.materials import MATERIALS, material_xml
+from authoring.materials.atlas import TRAFFIC_SIGNS
+from authoring.materials.build import TEXTURES, registered_stems
+from authoring.materials.palette import SWATCHES, swatch_rect
+from authoring.materials.registry import Material
+from authoring.mesh import write_obj
+from gear.values.rng import derive_rng
+
+DOCS = Path(__file__).parents[2] / "docs" / "mjcf-conventions.md"
+Maker = Callable[[np.random.Generator], list[kit.Part]]
+
+SMALL_THINGS: dict[str, Maker] = {
+    **MAKERS,
+    "fence_bars": lambda rng: kit.fence(8.0),
+    "fence_mesh": lambda rng: kit.fence(8.0, style="mesh"),
+    "fence_wood": lambda rng: kit.fence(8.0, style="wood"),
+    "wall": lambda rng: kit.wall(8.0),
+    "guard_rail": lambda rng: kit.guard_rail(8.0),
+    "bridge_railing": lambda rng: kit.bridge_railing(8.0),
+    "jersey_barrier": lambda rng: kit.jersey_barrier(4.0),
+    "cafe": lambda rng: kit.cafe(rng),
+    "cable_box": lambda rng: kit.cable_box(),
+    "power_pole": lambda rng: kit.power_pole(),
+    "grass": lambda rng: kit.grass_tufts((3.0, 2.0), 40, rng),
+    **{f"cover_{k}": lambda rng, k=k: kit.road_cover(k) for k in ("manhole", "manhole_square", "drain", "tree_grate")},
+    **{f"planter_{k}": lambda rng, k=k: kit.planter(k, rng) for k in ("box", "round", "wood")},
+    **{f"lamp_{k}": lambda rng, k=k: kit.street_lamp(style=k) for k in ("modern", "double", "heritage")},
+    **{f"traffic_sign_{k}": lambda rng, k=k: kit.traffic_sign(k) for k in TRAFFIC_SIGNS},
+}
+
+
+def a_building(style: str, seed: int = 0, lod: str = "near", floors: int = 5) -> list[kit.Part]:
+    rng = derive_rng(seed, "kit", style)
+    return kit.building(
+        style=style, width_m=20.0, depth_m=14.0, floors=floors, rng=rng, sides=("front", "right"), lod=lod
+    )
+
+
+def known_labels() -> set[str]:
+    rows = re.findall(r"^\| ([a-z_, /]+) \|", DOCS.read_text(encoding="utf-8"), re.MULTILINE)
+    return {label.strip() for row in rows for label in re.split(r"[,/]", row)} - {"label"}
+
+
+def check_sound(parts: list[kit.Part]) -> None:
+    assert parts
+    for part in parts:
+        mesh = part.mesh
+        assert mesh.normals is not None
+        for array in (mesh.vertices, mesh.uvs, mesh.normals):
+            assert np.isfinite(array).all()
+        assert mesh.faces.min() >= 0
+        assert mesh.faces.max() < len(mesh.vertices)
+        assert mesh.face_areas().min() > 1e-8, f"{part.material}: a face without area"
+        np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1.0, atol=1e-6)
+        assert part.material in MATERIALS
+        assert part.label in known_labels()
+        if MATERIALS[part.material].tile_m == 0 and part.material not in ("awnings", "far_facades"):
+            assert mesh.uvs.min() >= 0
+            assert mesh.uvs.max() <= 1
+
+
+def facing(part: kit.Part) -> np.ndarray:
+    """How well each face's winding agrees with its normals: 1 is quite, -1 is inside out."""
+    assert part.mesh.normals is not None
+    corners = part.mesh.vertices[part.mesh.faces]
+    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    flat /= np.linalg.norm(flat, axis=1, keepdims=True)
+    return np.einsum("ij,ij->i", flat, part.mesh.normals[part.mesh.faces].mean(1))
+
+
+@pytest.mark.parametrize("style", kit.STYLES)
+def test_near_building_is_sound_and_within_budget(style: str) -> None:
+    parts = a_building(style)
+    check_sound(parts)
+    assert 700 <= kit.triangle_count(parts) <= 8000
+    assert {part.label for part in parts} == {"building"}
+    assert all(facing(part).min() > 0.5 for part in parts)
+
+
+@pytest.mark.parametrize("style", kit.STYLES)
+@pytest.mark.parametrize("floors", [1, 6, 40])
+def test_far_building_is_cheap_and_as_large_as_the_near_one(style: str, floors: int) -> None:
+    far = a_building(style, lod="far", floors=floors)
+    check_sound(far)
+    assert kit.triangle_count(far) < 200
+    heights = [max(p.mesh.vertices[:, 2].max() for p in a_building(style, lod=lod)) for lod in ("near", "far")]
+    assert heights[1] == pytest.approx(heights[0], rel=0.4)
+
+
+@pytest.mark.parametrize("style", kit.STYLES)
+@pytest.mark.parametrize("seed", range(6))
+def test_any_draw_of_a_building_is_sound(style: str, seed: int) -> None:
+    rng = derive_rng(seed, "any", style)
+    parts = kit.building(
+        style=style,
+        width_m=float(rng.uniform(5, 40)),
+        depth_m=float(rng.uniform(5, 30)),
+        floors=int(rng.integers(1, 12)),
+        rng=rng,
+        sides=("back", "left", "front"),
+    )
+    check_sound(parts)
+
+
+def test_a_building_keeps_to_its_plot_but_for_what_hangs_over_the_street() -> None:
+    for style in kit.STYLES:
+        points = np.concatenate([part.mesh.vertices for part in a_building(style)])
+        assert points[:, 2].min() > -0.7
+        assert np.abs(points[:, 0]).max() < 10 + 2.5
+        assert np.abs(points[:, 1]).max() < 7 + 2.5
+        assert points[:, 0].min() > -10.4, f"{style} reaches into its neighbour"
+
+
+def test_same_rng_same_bytes_other_rng_other_building(tmp_path: Path) -> None:
+    def digest(seed: int, name: str) -> list[bytes]:
+        parts = a_building("brick_apartment", seed) + kit.tree("broad", 8.0, derive_rng(seed, "tree"))
+        for index, part in enumerate(parts):
+            write_obj(tmp_path / f"{name}{index}.obj", part.mesh)
+        return [(tmp_path / f"{name}{index}.obj").read_bytes() for index in range(len(parts))]
+
+    assert digest(1, "a") == digest(1, "b")
+    assert digest(1, "a") != digest(2, "c")
+
+
+@pytest.mark.parametrize("species", list(kit.SPECIES))
+def test_trees_are_sound_within_budget_and_as_high_as_asked(species: str) -> None:
+    for lod, low, high in (("near", 2000, 4500), ("far", 150, 400)):
+        parts = kit.tree(species, 9.0, derive_rng(3, species), lod=lod)
+        check_sound(parts)
+        assert low <= kit.triangle_count(parts) <= high
+        assert {part.label for part in parts} == {"vegetation"}
+        top = max(part.mesh.vertices[:, 2].max() for part in parts)
+        assert 0.85 * 9 < top < 1.2 * 9
+
+
+def test_leaves_are_seen_from_both_sides() -> None:
+    crown = next(p for p in kit.tree("broad", 8.0, derive_rng(0, "tree")) if p.material.startswith("foliage"))
+    agreement = facing(crown)
+    assert (agreement < 0).sum() > 1000
+    assert (agreement > 0).sum() > 1000
+
+
+@pytest.mark.parametrize("name", sorted(SMALL_THINGS))
+def test_small_things_are_sound_and_stand_on_the_ground(name: str) -> None:
+    parts = SMALL_THINGS[name](derive_rng(0, "small", name))
+    check_sound(parts)
+    lowest = min(part.mesh.vertices[:, 2].min() for part in parts)
+    assert -0.35 < lowest < 0.1
+
+
+def test_countable_things_have_the_labels_that_datasets_count() -> None:
+    rng = np.random.default_rng(0)
+    expected = {
+        "stop_sign": kit.traffic_sign("stop"),
+        "traffic_sign": kit.traffic_sign("yield"),
+        "traffic_light": kit.traffic_light(),
+        "bench": kit.bench(),
+        "fire_hydrant": kit.fire_hydrant(),
+        "parking_meter": kit.parking_meter(),
+        "fence": kit.fence(4.0),
+        "wall": kit.wall(4.0),
+        "guard_rail": kit.guard_rail(4.0),
+        "bridge": kit.bridge_railing(4.0),
+        "pole": kit.street_lamp(),
+        "static": kit.bus_stop(rng),
+    }
+    for label, parts in expected.items():
+        assert label in {part.label for part in parts}
+
+
+def test_place_turns_counter_clockwise_and_then_moves() -> None:
+    (part,) = [
+        p for p in kit.place(kit.traffic_sign("stop"), x_m=5.0, yaw_rad=np.pi / 2) if p.material == "traffic_signs"
+    ]
+    assert part.mesh.normals is not None
+    np.testing.assert_allclose(part.mesh.normals.mean(0), (1.0, 0.0, 0.0), atol=1e-9)
+    np.testing.assert_allclose(part.mesh.vertices[:, :2].mean(0), (5.005, 0.0), atol=1e-6)
+
+
+def test_merge_makes_one_part_a_material_and_label() -> None:
+    parts = kit.bench() + kit.place(kit.bench(), x_m=3.0) + kit.traffic_light()
+    merged = kit.merge(parts)
+    keys = [(part.material, part.label) for part in merged]
+    assert len(keys) == len(set(keys)) == 4
+    assert kit.triangle_count(merged) == kit.triangle_count(parts)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda rng: kit.building(style="castle", width_m=9, depth_m=9, floors=2, rng=rng), "no building style"),
+        (lambda rng: kit.building(style="shop_row", width_m=2, depth_m=9, floors=2, rng=rng), "too small"),
+        (lambda rng: kit.tree("palm", 5.0, rng), "no tree species"),
+        (lambda rng: kit.traffic_sign("halt"), "no traffic sign"),
+        (lambda rng: kit.fence(3.0, style="hedge"), "no fence style"),
+        (lambda rng: kit.traffic_light(lit="blue"), "not 'blue'"),
+        (lambda rng: material_xml(["gold"]), "no material"),
+    ],
+)
+def test_wrong_names_are_refused(call: Callable[[np.random.Generator], object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        call(np.random.default_rng(0))
+
+
+def texture(stem: str) -> np.ndarray:
+    bgr = cv2.imread(str(TEXTURES / f"{stem}.png"))
+    assert bgr is not None
+    return bgr[..., ::-1].astype(float)
+
+
+def edge_jump(image: np.ndarray, axis: int) -> float:
+    """The step across the wrap, relative to the largest step (a joint, say) between neighbours inside."""
+    lines = np.moveaxis(image, axis, 0)
+    usual = np.abs(np.diff(lines, axis=0)).mean((1, 2))
+    return float(np.abs(lines[0] - lines[-1]).mean() / max(usual.max(), 0.5))
+
+
+TILING = {stem for m in MATERIALS.values() if m.tile_m for stem in (m.rgb, m.normal, m.orm) if stem} - {
+    "curtain_wall",
+    "curtain_wall_n",
+    "curtain_wall_orm",
+}
+
+
+@pytest.mark.parametrize("stem", sorted(TILING))
+def test_tiling_textures_continue_over_their_edges(stem: str) -> None:
+    image = texture(stem)
+    assert edge_jump(image, 0) < 1.3
+    assert edge_jump(image, 1) < 1.3
+
+
+def test_the_tiling_test_notices_a_seam() -> None:
+    image = texture("plaster") + np.linspace(0, 60, 512)[:, None, None]
+    assert edge_jump(image, 0) > 1.3
+
+
+def test_textures_are_complete_power_of_two_and_small() -> None:
+    total = 0
+    for stem in registered_stems():
+        path = TEXTURES / f"{stem}.png"
+        total += path.stat().st_size
+        assert all(side & (side - 1) == 0 for side in texture(stem).shape[:2]), stem
+    assert total < 13e6
+
+
+def linear(image: np.ndarray) -> np.ndarray:
+    unit = image / 255
+    return np.where(unit <= 0.04045, unit / 12.92, ((unit + 0.055) / 1.055) ** 2.4)
+
+
+@pytest.mark.parametrize(
+    ("name", "low", "high"),
+    [
+        ("asphalt", 0.07, 0.12),
+        ("asphalt_worn", 0.07, 0.13),
+        ("pavement", 0.28, 0.45),
+        ("concrete", 0.28, 0.45),
+        ("road_paint_white", 0.5, 0.75),
+        ("grass", 0.04, 0.15),
+        ("foliage_green", 0.02, 0.15),
+        ("brick_red", 0.08, 0.25),
+        ("plaster_white", 0.55, 0.85),
+        ("soil", 0.03, 0.1),
+    ],
+)
+def test_albedo_is_what_such_a_surface_has(name: str, low: float, high: float) -> None:
+    material: Material = MATERIALS[name]
+    albedo = (linear(texture(material.rgb)) * material.tint).mean()
+    assert low < albedo < high
+
+
+def test_swatches_do_not_overlap() -> None:
+    rects = [swatch_rect(name) for name in SWATCHES]
+    assert len({(u0, v0) for u0, v0, _, _ in rects}) == len(rects)
+    assert all(0 <= u0 < u1 <= 1 and 0 <= v0 < v1 <= 1 for u0, v0, u1, v1 in rects)
+
+
+def test_props_on_disk_are_what_the_kit_makes_and_open_in_the_viewer(tmp_path: Path) -> None:
+    for name in ("bench_wood", "tree_street"):
+        write_prop(name, tmp_path)
+        made = sorted(p.relative_to(tmp_path) for p in tmp_path.rglob(f"{name}*/*.obj"))
+        assert made
+        for path in [*made, Path(f"{name}.xml")]:
+            assert (tmp_path / path).read_bytes() == (PROPS / path).read_bytes(), path
+    for name in MAKERS:
+        model = mujoco.MjModel.from_xml_path(str(PROPS / f"{name}.xml"))
+        solid = model.geom("solid")
+        assert solid.group == 3
+        assert (model.geom_group == 3).sum() == 1
