@@ -84,6 +84,8 @@ class CarSpec:
     handles: Points = ()
     plates: tuple[float, float] = (0.45, 0.6)
     plate_stand_off: float = 0.012
+    badges: tuple[float | None, float | None] = (None, None)
+    shown: int = 0
     rails: tuple[float, float, float] | None = None
     mirror: tuple[float, float, float] = (0.11, 0.20, 0.14)
     bed: tuple[float, float, float] | None = None

@@ -14,6 +14,7 @@ from authoring.vehicles.cars import CITY, ESTATE, HATCHBACK, SALOON, SPORTS, SUV
 from authoring.vehicles.finish import Box, Finish, PaintMap, write_vehicle
 from authoring.vehicles.fittings import (
     add_antenna,
+    add_badge,
     add_exhaust,
     add_handles,
     add_light_bar,
@@ -41,7 +42,7 @@ def _car(spec: CarSpec, extra: Extra | None = None) -> Callable[[Path], None]:
             extra(spec, parts, body, cabin)
         meshes = parts.merged()
         bounds = meshes["paint"].bounds
-        finish = Finish(spec.name, spec.kind, spec.palette, _boxes(spec, bounds, cabin))
+        finish = Finish(spec.name, spec.kind, spec.palette, _boxes(spec, bounds, cabin), shown=spec.shown)
         size = (2048, 1024) if bounds[1, 0] > 4 else (1024, 1024)
         paint = PaintMap(
             bounds[0], bounds[1], size, spec.lines_side, spec.lines_top, spec.lines_front, spec.lines_rear
@@ -59,6 +60,9 @@ def _fit(spec: CarSpec, parts: Parts, body: Shell, cabin: Shell) -> None:
     add_plate(parts, body, spec.plates[0], front=True, stand_off=spec.plate_stand_off)
     add_plate(parts, body, spec.plates[1], front=False, stand_off=spec.plate_stand_off)
     add_wipers(parts, cabin)
+    for z, ahead in zip(spec.badges, (True, False), strict=True):
+        if z is not None:
+            add_badge(parts, body, z, ahead)
     if spec.rails:
         add_rails(parts, cabin, *spec.rails)
 

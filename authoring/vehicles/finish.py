@@ -134,6 +134,7 @@ class Finish:
         boxes: collision boxes.
         metallic, roughness: of the paint.
         comment: what the file says about itself.
+        shown: which colour of the palette the file itself has.
     """
 
     name: str
@@ -143,6 +144,7 @@ class Finish:
     metallic: float = 0.12
     roughness: float = 0.15
     comment: str = ""
+    shown: int = 0
 
 
 _MATERIALS = {
@@ -176,7 +178,7 @@ def write_vehicle(
         mesh = meshes[name]
         write_obj(folder / f"{name}.obj", paint_map.unwrap(mesh) if name == "paint" else mesh)
     kind, stem = finish.kind, finish.name
-    rgb = " ".join(f"{v:g}" for v in PALETTES[finish.palette][0][:3])
+    rgb = " ".join(f"{v:g}" for v in PALETTES[finish.palette][finish.shown][:3])
     palette = "  ".join(" ".join(f"{v:g}" for v in row) for row in PALETTES[finish.palette])
     lines = [
         f'<mujoco model="{stem}">',

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from authoring.mesh import Mesh, bevelled_box, box, grid, revolve, rotation
+from authoring.mesh import Mesh, bevelled_box, box, extrude, grid, revolve, rotation
 from authoring.vehicles.atlas import DETAILS, LAMPS, cell_uvs, flat
 from authoring.vehicles.car import Parts, surface_point
 from authoring.vehicles.sheet import Sheet
@@ -12,6 +12,7 @@ from authoring.vehicles.shell import Shell
 
 __all__ = [
     "add_antenna",
+    "add_badge",
     "add_exhaust",
     "add_handles",
     "add_light_bar",
@@ -42,28 +43,31 @@ def add_mirrors(
     """Door mirrors on short arms, beside the point (x, z) of the cabin."""
     point, _ = surface_point(cabin.side, x, z)
     y = point[1] + 0.06 + size[1] / 2
-    shell = bevelled_box(size, min(size) * 0.42, 2)
+    shell = bevelled_box(size, min(size) * 0.42, 1)
     # The housing narrows outwards and forwards like a drop.
     v = shell.vertices.copy()
     ahead = np.clip(0.5 + v[:, :1] / size[0], 0, 1)
     v[:, 1:] *= 1 - 0.28 * ahead
     v[:, 2] *= 1 - 0.18 * np.clip(v[:, 1] / size[1] + 0.5, 0, 1)
-    housing = Mesh(v, shell.faces, shell.uvs)
+    housing = Mesh(v, shell.faces, shell.uvs, shell.normals)
     at = (x + 0.02, y, z + size[2] * 0.35)
     parts.add(paint, flat(housing, DETAILS["plastic"]).translated(*at), both_sides=True)
     glass = panel(size[1] * 0.84, size[2] * 0.78, (at[0] - size[0] / 2 - 0.003, at[1], at[2]), 180, DETAILS["silver"])
-    parts.add("glass", glass, both_sides=True)
+    parts.add("rim", glass, both_sides=True)
     arm = bevelled_box((0.06, y - point[1] + 0.06, 0.035), 0.012, 1, (x + 0.03, (y + point[1]) / 2 - 0.03, z + 0.005))
     parts.add("trim", flat(arm, DETAILS["plastic"]), both_sides=True)
 
 
 def add_handles(parts: Parts, body: Shell, places: tuple[tuple[float, float], ...], material: str = "paint") -> None:
     """Pull handles along the flanks at (x, z)."""
+    section = [(-0.016, -0.006), (0.016, -0.006), (0.016, 0.004), (0.008, 0.011), (-0.008, 0.011), (-0.016, 0.004)]
+    upright = extrude(section, 0.17).translated(z=-0.085)
+    grip = Mesh(upright.vertices[:, [2, 1, 0]], upright.faces[:, ::-1], upright.uvs)
     for x, z in places:
         point, normal = surface_point(body.side, x, z)
         lean = np.degrees(np.arctan2(normal[2], normal[1]))
         turn = rotation("x", lean)
-        bar = bevelled_box((0.17, 0.022, 0.030), 0.010, 1).transformed(turn).translated(*(point + normal * 0.026))
+        bar = grip.transformed(turn).translated(*(point + normal * 0.026))
         cup = box((0.13, 0.004, 0.055)).transformed(turn).translated(*(point + normal * 0.002))
         parts.add(material, flat(bar, DETAILS["plastic"]), both_sides=True)
         parts.add("trim", flat(cup, DETAILS["gloss"]), both_sides=True)
@@ -152,6 +156,21 @@ def add_light_bar(parts: Parts, cabin: Shell, x: float, width: float = 1.1) -> N
         span = width * (0.40 if cell == "blue" else 0.30)
         lamp = bevelled_box((0.26, span, 0.09), 0.03, 1, (x, share * width, z + 0.085))
         parts.add("lights", flat(lamp, LAMPS[cell]))
+
+
+def add_badge(parts: Parts, body: Shell, z: float, front: bool, radius: float = 0.045) -> None:
+    """A maker's badge, of no maker: a silver disc with a dark middle."""
+    v = np.linspace(0, 1, 201)
+    line = body.side.patch.evaluate(np.column_stack([np.full_like(v, 0.0 if front else 1.0), v]))
+    nearest = int(np.abs(line[:, 2] - z).argmin())
+    ahead = 1.0 if front else -1.0
+    lean = body.side.patch.normals(np.array([[0.0 if front else 1.0, v[nearest]]]))[0]
+    tilt = rotation("y", -np.degrees(np.arctan2(lean[2], lean[0] * ahead)))
+    ring = revolve([(radius, -0.012), (radius * 0.8, 0.008), (radius * 0.55, 0.004)], 14, "x").transformed(tilt)
+    field = revolve([(radius * 0.6, 0.002), (0.0, 0.002)], 14, "x").transformed(tilt)
+    at = (float(line[nearest, 0]), 0.0, z)
+    parts.add("rim", ring.scaled(ahead, 1, 1).translated(*at))
+    parts.add("trim", flat(field, DETAILS["gloss"]).scaled(ahead, 1, 1).translated(*at))
 
 
 def add_exhaust(parts: Parts, x: float, y: float, z: float, radius: float = 0.035, both: bool = False) -> None:

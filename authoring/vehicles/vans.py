@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from authoring.vehicles.car import CarSpec, Points, Stamp
-from authoring.vehicles.cars import ESTATE, SALOON, body_levels, body_plan, cabin_levels, cabin_plan
+from authoring.vehicles.cars import ESTATE, SALOON, body_levels, body_plan, cabin_levels, cabin_plan, flap
 from authoring.vehicles.shell import Level
 from authoring.vehicles.wheels import WheelSpec
 
@@ -15,6 +15,7 @@ TAXI = replace(
     SALOON,
     name="car_taxi",
     palette="taxi",
+    shown=0,
     wheel=WheelSpec(0.325, 0.205, 0.215, 7, 0.075),
     stamps=(
         Stamp("front", ((-0.5, 0.49), (0.34, 0.49), (0.40, 0.67), (-0.5, 0.67)), 0.04, "trim", "slats", 0.025, 0.014),
@@ -37,6 +38,7 @@ POLICE = replace(
     name="car_police",
     palette="white",
     rails=None,
+    shown=0,
     stamps=(
         *ESTATE.stamps,
         Stamp("side", ((-1.85, 0.60), (1.8, 0.60), (1.8, 0.80), (-1.85, 0.80)), 0.0, "trim", "battenburg", 0.0),
@@ -86,7 +88,10 @@ PICKUP = CarSpec(
         ((0.06, 0.42), (0.06, 0.7), (0.11, 1.12)),
         ((-0.84, 0.42), (-0.84, 1.1)),
         ((-0.93, 0.36), (-0.93, 1.1)),
+        flap(-1.25, 0.98),
     ),
+    badges=(0.79, None),
+    shown=2,
     lines_top=(((1.2, 0.74), (1.8, 0.78), (2.3, 0.74)),),
     lines_rear=(((0.0, 0.64), (0.72, 0.64), (0.72, 1.1)), ((-0.0, 0.86), (0.14, 0.86), (0.14, 0.94), (0.0, 0.94))),
     mirror=(0.12, 0.22, 0.19),
@@ -143,6 +148,7 @@ VAN = CarSpec(
     ),
     plates=(0.475, 0.60),
     plate_stand_off=0.024,
+    badges=(0.70, None),
     lines_side=(
         ((1.58, 0.40), (1.58, 0.8), (1.60, 1.2)),
         ((0.66, 0.38), (0.66, 2.02)),
