@@ -39,7 +39,7 @@ def load_mjcf(path: Path) -> mjcf.RootElement:
     """
     try:
         root = mjcf.from_path(str(path))
-    except (ValueError, OSError, AttributeError, KeyError) as error:
+    except (ValueError, OSError, AttributeError, KeyError, SyntaxError) as error:
         raise TownError(path, f"cannot be read as MJCF: {error}") from error
     root.model = path.stem
     # Writing an element without a name makes dm_control count all elements before it: quadratic in their number.

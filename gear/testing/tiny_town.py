@@ -1,0 +1,48 @@
+"""A tiny town of boxes, in MJCF like every town: quick to compile, and every length of it is easy to say.
+
+One straight road from west to east (lanes at y = -1.75 and 1.75, sidewalks at y = -5 and 7.5, 0.15 m high), one road
+across it at x = 30 that climbs 10 % north of y = 20, two houses, a lamp post, a bench, a traffic light, a stop sign and
+three parking bays.
+It brings its own box-shaped vehicles, people and billboard.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+from gear.config.nodes import parse_file
+from gear.config.reader import read_node
+from gear.values.rig import CameraMount, Rig
+from gear.values.scene import Weather
+from gear.world.scene_spec import SceneLibrary
+from gear.world.world import World
+
+DATA = Path(__file__).parent / "data"
+
+TINY_TOWN = DATA / "mjcf" / "towns" / "tiny.xml"
+"""The town's MJCF: `--town` takes this path."""
+
+TINY_SCENES = DATA / "scenes" / "tiny.yml"
+"""Its scene library: `board`, `double`, `truck`, `no_billboard`."""
+
+CLEAR = Weather(name="ClearNoon", cloudiness=5.0, sun_altitude_deg=60.0)
+
+SMALL_RIG = Rig(cameras=(CameraMount(name="rgb", width_px=320, height_px=160),))
+"""One small camera where the paper's stands."""
+
+
+def tiny_scenes() -> SceneLibrary:
+    """The tiny town's scenes."""
+    return read_node(SceneLibrary, parse_file(TINY_SCENES))
+
+
+def build_tiny_world(scene: str = "board", weather: Weather = CLEAR) -> World:
+    """A world of the tiny town, freshly compiled."""
+    return World.build(town=TINY_TOWN, scene_name=scene, scene=tiny_scenes().scenes[scene], weather=weather)
+
+
+@cache
+def tiny_world(scene: str = "board") -> World:
+    """A world of the tiny town that tests share: compiled once a process, moved by every `place`."""
+    return build_tiny_world(scene)

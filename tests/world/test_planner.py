@@ -1,0 +1,286 @@
+"""Plans: pure, in view, on the road, on the ground, and without overlaps."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+
+import mujoco
+import numpy as np
+import pytest
+
+from gear.config.collection import SplitConfig
+from gear.testing.tiny_town import CLEAR, SMALL_RIG, TINY_TOWN, tiny_scenes, tiny_world
+from gear.values.errors import PlacementError
+from gear.values.geometry import wrap_angle_rad
+from gear.values.scene import ActorRecord, SceneRecord
+from gear.values.serial import from_json, to_json
+from gear.world.planner import ScenePlanner
+from gear.world.scene_spec import EgoLimits, NpcLimits, SceneSpec, VehicleLimits
+from gear.world.world import World
+
+SCENES = ("board", "double", "truck", "no_billboard")
+STILL = SplitConfig(seed=7, samples=50)
+DRIVE = SplitConfig(seed=3, samples=2, frames=60, interval_s=0.1)
+
+
+def planner(scene: str, split: SplitConfig = STILL, name: str = "test") -> ScenePlanner:
+    return ScenePlanner(tiny_world(scene), SMALL_RIG, split, split_name=name)
+
+
+def records(scene: str, count: int = 12) -> list[SceneRecord]:
+    plans = planner(scene)
+    return [plans.plan(index) for index in range(count)]
+
+
+def yaw_rad(actor: ActorRecord) -> float:
+    return actor.world_from_actor.transform("world", "actor").yaw_rad
+
+
+def distances(record: SceneRecord) -> list[tuple[float, ActorRecord, ActorRecord]]:
+    """Between the boxes of all pairs of actors, by MuJoCo's distance function on a model made here."""
+    types = tiny_world(record.scene).types
+    spec = mujoco.MjSpec()
+    for actor in record.actors:
+        shape = types[actor.asset].shape
+        body = spec.worldbody.add_body(pos=actor.world_from_actor.position_m, quat=actor.world_from_actor.quat_wxyz)
+        body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=shape.box_size_m / 2, pos=shape.box_centre_m)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    return [
+        (mujoco.mj_geomDistance(model, data, i, j, 50.0, None), record.actors[i], record.actors[j])
+        for i, j in itertools.combinations(range(model.ngeom), 2)
+    ]
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_a_plan_depends_on_nothing_but_its_index(scene: str) -> None:
+    forward = [planner(scene).plan(index) for index in range(4)]
+    plans = planner(scene)
+    backward = [plans.plan(index) for index in (3, 2, 1, 0)][::-1]
+    assert forward == backward
+    other = World.build(town=TINY_TOWN, scene_name=scene, scene=tiny_scenes().scenes[scene], weather=CLEAR)
+    assert ScenePlanner(other, SMALL_RIG, STILL, split_name="test").plan(2) == forward[2]
+    assert len({record.actors for record in forward}) == 4, "samples differ"
+
+
+def test_records_survive_json() -> None:
+    for scene in SCENES:
+        record = planner(scene).plan(1)
+        assert from_json(SceneRecord, to_json(record)) == record
+
+
+def test_the_seed_changes_the_scene_and_the_name_of_the_split_does_not() -> None:
+    here = planner("board").plan(0)
+    night = planner("board", name="test_night").plan(0)
+    assert night == dataclasses.replace(here, split="test_night")
+    assert planner("board", SplitConfig(seed=8, samples=1)).plan(0).actors != here.actors
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_nobody_overlaps_anybody(scene: str) -> None:
+    for record in records(scene):
+        for distance_m, first, second in distances(record):
+            assert distance_m > 0.1, (record.index, first, second)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_everybody_is_where_such_people_are(scene: str) -> None:
+    world = tiny_world(scene)
+    seen = set()
+    for record in records(scene):
+        assert [actor.id for actor in record.actors] == list(range(1, len(record.actors) + 1))
+        assert record.actors[0].role == "ego"
+        for actor in record.actors:
+            place = np.array(actor.world_from_actor.position_m)
+            seen.add(actor.role)
+            if actor.role == "pedestrian":
+                off_m = min(
+                    max(0.0, abs(lateral) - walk.width_m / 2) + max(0.0, distance - walk.width_m)
+                    for walk in world.lanes.walks.values()
+                    for _, lateral, distance in [walk.line.project(place)]
+                )
+                assert off_m < 0.05, actor
+                assert np.linalg.norm(actor.velocity_world_mps) < 2
+            elif actor.role == "parked":
+                bay = min(world.lanes.bays, key=lambda bay: np.linalg.norm(place - bay.position_m))
+                assert np.linalg.norm(place - bay.position_m) < 0.4, actor
+                assert abs(math.sin(yaw_rad(actor) - bay.yaw_rad)) < 0.06
+                assert actor.velocity_world_mps == (0, 0, 0)
+            else:
+                nearest = world.lanes.project(place)
+                assert abs(nearest.lateral_m) < 1.75, actor
+                heading_rad = world.lanes.lanes[nearest.lane].line.at(nearest.s_m)[1]
+                if not world.lanes.lanes[nearest.lane].is_junction:
+                    assert abs(wrap_angle_rad(yaw_rad(actor) - heading_rad)) < 0.2, actor
+    assert {"ego", "npc", "pedestrian"} <= seen
+
+
+def test_the_ground_carries_them() -> None:
+    on_hill = 0
+    for scene in SCENES:
+        for record in records(scene, 25):
+            for actor in record.actors:
+                x, y, z = actor.world_from_actor.position_m
+                pose = actor.world_from_actor.transform("world", "actor")
+                if actor.role == "pedestrian":
+                    on_kerb = abs(y) > 3.5 and abs(x - 30) > 3.5
+                    assert z == pytest.approx(0.15 if on_kerb else 0, abs=1e-6), actor
+                    assert pose.rotation[2, 2] == 1
+                elif y > 24 and abs(x - 30) < 3.5:
+                    on_hill += 1
+                    assert z == pytest.approx((y - 20) / 10, abs=0.005), actor
+                    climb = math.degrees(math.asin(pose.rotation[2, 0]))
+                    assert climb == pytest.approx(math.copysign(5.71, math.sin(pose.yaw_rad)), abs=0.15)
+                elif y < 15:
+                    assert z == pytest.approx(0, abs=1e-6), actor
+    assert on_hill > 3
+
+
+@pytest.mark.parametrize("scene", ["board", "double", "truck"])
+def test_the_reference_camera_has_every_face_in_view(scene: str) -> None:
+    world = tiny_world(scene)
+    for record in records(scene):
+        camera = record.cameras[0]
+        placed = world.place(record)
+        camera_from_world = camera.world_from_camera_transform.inverse()
+        eye_m = camera.world_from_camera_transform.translation_m
+        assert len(record.surfaces) == len(world.faces)
+        for surface, face in zip(record.surfaces, world.faces, strict=True):
+            frame = record.world_from_surface(surface)
+            u, v = camera.intrinsics.project(camera_from_world.apply(frame.translation_m))
+            assert 10 < u < camera.width_px - 10
+            assert 5 < v < camera.height_px - 5
+            ray = eye_m - frame.translation_m
+            cosine = -frame.rotation[:, 2] @ ray / np.linalg.norm(ray)
+            assert cosine > math.cos(math.radians(75)), "the front, and not too obliquely"
+            hits = 0
+            for right, down in itertools.product(np.linspace(-0.45, 0.45, 7), repeat=2):
+                target = frame.apply([right * surface.width_m, down * surface.height_m, 0.0])
+                geom = np.zeros(1, np.int32)
+                mujoco.mj_ray(placed.stage.model, placed.stage.data, eye_m, target - eye_m, None, 1, -1, geom)
+                hits += int(geom[0]) == face.geom_id
+            assert hits >= 0.3 * 49, record.index
+
+
+def test_the_ego_car_keeps_its_limits() -> None:
+    places = np.array([record.ego.world_from_actor.position_m for record in records("board", 30)])
+    facing = math.radians(175)
+    offset = places[:, :2] - np.array([55.0, -8.5])
+    ahead_m = offset @ np.array([math.cos(facing), math.sin(facing)])
+    left_m = offset @ np.array([-math.sin(facing), math.cos(facing)])
+    assert (ahead_m > 11.4).all()
+    assert (ahead_m < 45.6).all()
+    assert (np.abs(left_m) < 12.5).all()
+    assert np.ptp(ahead_m) > 15, "they spread"
+
+
+def test_the_truck_is_ahead_in_the_same_lane() -> None:
+    world = tiny_world("truck")
+    gaps_m = []
+    for record in records("truck", 25):
+        ego, truck = record.actors[:2]
+        assert truck.role == "carrier"
+        assert record.surfaces[0].actor_id == truck.id
+        ego_from_truck = ego.world_from_actor.transform("world", "ego").inverse()
+        face_m = ego_from_truck.apply(record.world_from_surface(record.surfaces[0]).translation_m)
+        gaps_m.append(face_m[0] - world.types[ego.asset].front_m)
+        for other in record.actors[2:]:
+            x, y, _ = ego_from_truck.apply(other.world_from_actor.position_m)
+            assert not (0 < x < face_m[0] and abs(y) < 1), "nobody between"
+    assert min(gaps_m) > 2.5
+    assert max(gaps_m) < 20.5
+    assert np.ptp(gaps_m) > 5
+
+
+def test_counts_and_regions_are_kept() -> None:
+    for record in records("no_billboard", 30):
+        ego = np.array(record.ego.world_from_actor.position_m)
+        vehicles = [actor for actor in record.actors if actor.role in ("npc", "parked")]
+        people = [actor for actor in record.actors if actor.role == "pedestrian"]
+        assert 2 <= len(vehicles) <= 5
+        assert 2 <= len(people) <= 6
+        assert all(np.linalg.norm(ego - actor.world_from_actor.position_m) < 61.5 for actor in vehicles + people)
+
+
+def test_colours_come_from_the_palette() -> None:
+    palette = {colour for colour, _ in tiny_world("board").types["car_saloon"].facts.palette}
+    painted = {a.paint_rgb for record in records("board") for a in record.actors}
+    assert painted <= palette
+    assert len(painted) > 1
+
+
+def plan_scene(scene: SceneSpec) -> SceneRecord:
+    world = World.build(town=TINY_TOWN, scene_name="odd", scene=scene, weather=CLEAR)
+    return ScenePlanner(world, SMALL_RIG, STILL, split_name="test").plan(0)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"ego": EgoLimits(ahead_m=(500.0, 600.0), lateral_m=(0.0, 1.0))}, "no lane lies within ego.ahead_m"),
+        ({"ego": EgoLimits(ahead_m=(0.0, 3.0), lateral_m=(-20.0, 20.0))}, "have a face out of the picture"),
+        (
+            {"npc_vehicles": VehicleLimits(count=(30, 30), ahead_m=(0.0, 20.0), lateral_m=(-9.0, 0.0))},
+            "npc_vehicles.count asks for at least 30",
+        ),
+        (
+            {"pedestrians": NpcLimits(count=(3, 3), ahead_m=(900.0, 999.0))},
+            "pedestrians.count asks for at least 3, but only 0",
+        ),
+    ],
+)
+def test_limits_that_are_too_tight_are_named(change: dict[str, object], told: str) -> None:
+    scene = dataclasses.replace(tiny_scenes().scenes["board"], **change)  # type: ignore[arg-type]
+    with pytest.raises(PlacementError, match=told):
+        plan_scene(scene)
+
+
+def test_a_hidden_board_is_refused() -> None:
+    scene = tiny_scenes().scenes["board"]
+    behind_house = dataclasses.replace(scene.boards[0], position_m=(-20.0, 27.0, 0.0), facing_deg=270.0)
+    ego = EgoLimits(ahead_m=(5.0, 60.0), lateral_m=(-18.0, 18.0), max_incidence_deg=89.0)
+    with pytest.raises(PlacementError, match="have a face hidden"):
+        plan_scene(dataclasses.replace(scene, boards=(behind_house,), ego=ego))
+
+
+@pytest.mark.parametrize("scene", ["board", "truck", "no_billboard"])
+def test_sequences_drive_without_overlaps(scene: str) -> None:
+    plans = planner(scene, DRIVE, "video")
+    frames = [plans.plan(index) for index in range(DRIVE.frames)]
+    assert [frame.frame for frame in frames] == list(range(DRIVE.frames))
+    assert {frame.sequence for frame in frames} == {0}
+    assert frames[10].time_s == 1.0
+    for before, after in itertools.pairwise(frames):
+        assert [(a.id, a.asset, a.paint_rgb, a.role) for a in before.actors] == [
+            (a.id, a.asset, a.paint_rgb, a.role) for a in after.actors
+        ]
+        for a, b in zip(before.actors, after.actors, strict=True):
+            step_m = np.subtract(b.world_from_actor.position_m, a.world_from_actor.position_m)
+            expected_m = np.add(a.velocity_world_mps, b.velocity_world_mps) / 2 * DRIVE.interval_s
+            axes = 2 if b.role == "pedestrian" else 3  # people step up and down kerbs
+            assert np.linalg.norm((step_m - expected_m)[:axes]) < 0.08 + 0.02 * np.linalg.norm(expected_m), (b, step_m)
+            assert abs(wrap_angle_rad(yaw_rad(b) - yaw_rad(a))) < 0.25
+    for record in frames[::6]:
+        for distance_m, first, second in distances(record):
+            assert distance_m > 0, (record.frame, first, second)
+    went_m = np.subtract(frames[-1].ego.world_from_actor.position_m, frames[0].ego.world_from_actor.position_m)
+    assert np.linalg.norm(went_m) > 1
+    if scene == "board":
+        camera = frames[0].cameras[0]
+        centre_m = camera.world_from_camera_transform.inverse().apply((55.0, -8.5, 2.6))
+        u, v = camera.intrinsics.project(centre_m)
+        assert centre_m[2] > 0
+        assert 0 < u < camera.width_px
+        assert 0 < v < camera.height_px
+
+
+def test_a_frame_alone_is_the_frame_in_its_sequence() -> None:
+    plans = planner("board", DRIVE, "video")
+    frames = [plans.plan(index) for index in (0, 59, 60, 75)]
+    assert [frame.sequence for frame in frames] == [0, 0, 1, 1]
+    assert frames[3].frame == 15
+    assert planner("board", DRIVE, "video").plan(75) == frames[3]
+    assert planner("board", DRIVE, "video").plan(59) == frames[1]

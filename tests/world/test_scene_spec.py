@@ -1,0 +1,58 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from gear.config.nodes import parse_file
+from gear.config.reader import read_node
+from gear.testing.tiny_town import tiny_scenes
+from gear.values.errors import ConfigError, FieldError
+from gear.values.serial import from_json, to_json
+from gear.world.scene_spec import BoardSpec, EgoLimits, NpcLimits, SceneLibrary, SceneSpec, TruckSpec, VehicleLimits
+
+
+def test_the_library_reads_from_yaml_and_survives_json() -> None:
+    library = tiny_scenes()
+    assert list(library.scenes) == ["board", "double", "truck", "no_billboard"]
+    assert library.scenes["board"].boards[0].facing_deg == 175.0
+    assert library.scenes["truck"].truck == TruckSpec(asset="truck_box", gap_m=(3.0, 20.0))
+    assert from_json(SceneLibrary, to_json(library)) == library
+
+
+def test_errors_have_a_place(tmp_path: Path) -> None:
+    file = tmp_path / "scenes.yml"
+    file.write_text("town: t\nscenes:\n  a:\n    npc_vehicles: {count: [5, 2]}\n")
+    with pytest.raises(ConfigError, match=r"scenes.yml:4:.*count.*the smaller first"):
+        read_node(SceneLibrary, parse_file(file))
+
+
+BOARD = BoardSpec(position_m=(0.0, 0.0, 0.0), facing_deg=0.0)
+EGO = EgoLimits(ahead_m=(5.0, 10.0), lateral_m=(-1.0, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("make", "field"),
+    [
+        (lambda: SceneSpec(boards=(BOARD,)), "ego"),
+        (lambda: SceneSpec(ego=EGO), "ego"),
+        (lambda: SceneSpec(boards=(BOARD,), ego=EGO, truck=TruckSpec()), "truck"),
+        (lambda: SceneSpec(npc_vehicles=VehicleLimits(count=(1, 2), ahead_m=(0.0, 1.0))), "npc_vehicles"),
+        (lambda: EgoLimits(ahead_m=(9.0, 5.0), lateral_m=(0.0, 1.0)), "ahead_m"),
+        (lambda: EgoLimits(ahead_m=(-3.0, 5.0), lateral_m=(0.0, 1.0)), "ahead_m"),
+        (lambda: NpcLimits(count=(-1, 2)), "count"),
+        (lambda: TruckSpec(gap_m=(0.0, 2.0)), "gap_m"),
+        (lambda: VehicleLimits(count=(0, 1), parked_share=1.5), "parked_share"),
+        (lambda: BoardSpec(position_m=(0.0, 0.0, 0.0), facing_deg=1000.0), "facing_deg"),
+    ],
+)
+def test_nonsense_is_refused(make: object, field: str) -> None:
+    with pytest.raises(FieldError) as caught:
+        make()  # type: ignore[operator]
+    assert caught.value.field == field
+
+
+def test_caps_lower_both_ends() -> None:
+    capped = SceneSpec(npc_vehicles=VehicleLimits(count=(3, 7)), pedestrians=NpcLimits(count=(6, 20))).capped(2, 10)
+    assert capped.npc_vehicles.count == (2, 2)
+    assert capped.pedestrians.count == (6, 10)

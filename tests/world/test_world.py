@@ -1,0 +1,230 @@
+"""Worlds: shared parts, labels, and records put into place without compiling anything."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gear.testing.tiny_town import CLEAR, SMALL_RIG, TINY_TOWN, build_tiny_world, tiny_scenes, tiny_world
+from gear.values.errors import PlacementError, TownError, UnknownNameError
+from gear.values.frames import STATIC_OBJECT_BASE
+from gear.values.labels import LABEL_BY_NAME
+from gear.values.scene import ActorRecord, Pose, SceneRecord
+from gear.world.classes import NEVER_SEEN
+from gear.world.faces import FACE_SIZE_PX
+from gear.world.world import World
+
+POSE = Pose(position_m=(10.0, -1.75, 0.0), quat_wxyz=(0.8660254, 0.0, 0.0, 0.5))
+
+
+def record(world: World, *actors: ActorRecord) -> SceneRecord:
+    ego = ActorRecord(id=1, asset="car_saloon", role="ego", world_from_actor=POSE)
+    return SceneRecord(
+        town="tiny",
+        scene=world.scene_name,
+        split="test",
+        seed=0,
+        index=0,
+        sequence=0,
+        frame=0,
+        time_s=0.0,
+        weather=CLEAR,
+        actors=(ego, *actors),
+        surfaces=world.surface_records(),
+        cameras=SMALL_RIG.place(POSE.transform("world", "ego")),
+    )
+
+
+def actor(number: int, asset: str, x_m: float, **more: object) -> ActorRecord:
+    pose = Pose(position_m=(x_m, 1.75, 0.0))
+    return ActorRecord(id=number, asset=asset, role="npc", world_from_actor=pose, **more)  # type: ignore[arg-type]
+
+
+def geoms_of(world: World, body: str) -> list[int]:
+    return [g for g in range(world.model.ngeom) if world.model.geom_bodyid[g] in bodies_of(world, body)]
+
+
+def bodies_of(world: World, body: str) -> set[int]:
+    root = world.model.body(body).id
+    return {b for b in range(world.model.nbody) if world.model.body_rootid[b] == root}
+
+
+def test_instances_share_meshes_and_materials() -> None:
+    world = tiny_world("no_billboard")
+    slots = [slot.body for slot in world.slots if slot.actor.name == "truck_box"]
+    assert len(slots) > 1
+    first, second = (geoms_of(world, body) for body in slots[:2])
+    assert list(world.model.geom_matid[first]) == list(world.model.geom_matid[second])
+    assert list(world.model.geom_dataid[first]) == list(world.model.geom_dataid[second])
+    assert world.model.nmesh == 1, "the only mesh is the truck's face"
+
+
+def test_every_board_has_a_material_and_a_texture_of_its_own() -> None:
+    world = tiny_world("double")
+    model = world.model
+    materials = [int(model.geom_matid[face.geom_id]) for face in world.faces]
+    textures = [max(int(t) for t in model.mat_texid[m]) for m in materials]
+    assert len(set(materials)) == len(set(textures)) == 2
+    for material, texture in zip(materials, textures, strict=True):
+        assert (model.tex_width[texture], model.tex_height[texture]) == FACE_SIZE_PX
+        assert sum(int(m) == material for m in model.geom_matid) == 1
+
+
+def test_collision_geoms_are_not_in_the_render_model() -> None:
+    world = tiny_world()
+    assert not (world.model.geom_group >= 3).any()
+    assert not (world.classes.label_code == NEVER_SEEN).any()
+    assert {int(c) for c in world.classes.label_code} <= {label.code for label in LABEL_BY_NAME.values()} - {0}
+
+
+def test_labels_follow_the_first_part_of_the_class() -> None:
+    world = tiny_world()
+    for geom, label in (("main_road", "road"), ("hedge", "vegetation"), ("house_north", "building")):
+        assert world.classes.label_code[world.model.geom(geom).id] == LABEL_BY_NAME[label].code
+    rider = world.classes.label_code[world.model.geom("bicycle_rider_0_head").id]
+    assert rider == LABEL_BY_NAME["rider"].code
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('"vegetation"', '"shrub"', "geom 'hedge' can be seen but has class 'shrub'"),
+        ('name="hedge" class="vegetation"', 'name="hedge"', "geom 'hedge' can be seen but has no class"),
+        ('<body name="bench_0" pos="5 -6.1 0.15">', "<frame>", "cannot be read as MJCF"),
+        ('size="80 3.5 0.25"', 'size="80 3.5 -1"', "MuJoCo cannot compile it"),
+        ("next=lane.main_east_b", "next=lane.moon", "lane.x_east: next names lane.moon"),
+    ],
+)
+def test_a_town_that_breaks_the_rules_is_refused(tmp_path: Path, old: str, new: str, told: str) -> None:
+    text = TINY_TOWN.read_text()
+    assert old in text
+    town = tmp_path / "towns" / "odd.xml"
+    town.parent.mkdir()
+    town.write_text(text.replace(old, new))
+    for kind in ("vehicles", "pedestrians", "surfaces"):
+        (tmp_path / kind).symlink_to(TINY_TOWN.parents[1] / kind)
+    with pytest.raises(TownError, match=told) as caught:
+        World.build(town=town, scene_name="board", scene=tiny_scenes().scenes["board"], weather=CLEAR)
+    assert "odd.xml" in str(caught.value)
+
+
+def test_unknown_names_are_told_with_what_was_meant() -> None:
+    scenes = tiny_scenes().scenes
+    with pytest.raises(UnknownNameError, match="no town named 'twon10'"):
+        World.build(town="twon10", scene_name="board", scene=scenes["board"], weather=CLEAR)
+    board = dataclasses.replace(scenes["board"].boards[0], asset="bilboard")
+    with pytest.raises(UnknownNameError, match="did you mean billboard"):
+        World.build(
+            town=TINY_TOWN, scene_name="b", scene=dataclasses.replace(scenes["board"], boards=(board,)), weather=CLEAR
+        )
+
+
+def test_actors_stand_where_the_record_says_and_the_rest_is_out_of_sight() -> None:
+    world = build_tiny_world()
+    van = actor(2, "van_small", 20.0, paint_rgb=(0.1, 0.2, 0.3))
+    placed = world.place(record(world, van))
+    data, model = placed.stage.data, placed.stage.model
+    hull = model.geom("car_saloon_0_hull").id
+    assert data.geom_xpos[hull] == pytest.approx(POSE.transform("world", "ego").apply([0, 0, 0.6]))
+    assert placed.geoms.object_id[hull] == 1
+    van_hull = model.geom("van_small_0_hull").id
+    assert data.geom_xpos[van_hull] == pytest.approx([20, 1.75, 1.1])
+    assert placed.stage.paint_rgb == {van_hull: (0.1, 0.2, 0.3)}
+    used = placed.geoms.object_id > 0
+    slots = np.isin(model.body_rootid[model.geom_bodyid], [model.body(s.body).id for s in world.slots])
+    assert (data.geom_xpos[slots & ~used][:, 2] < -50).all()
+    assert placed.objects[1].is_ego
+    assert not placed.objects[2].is_ego
+    assert placed.objects[2].kitti_type == "Van"
+    assert np.allclose(placed.objects[1].world_from_object.translation_m, POSE.position_m)
+
+
+def test_an_object_is_where_its_pixels_are() -> None:
+    world = build_tiny_world()
+    placed = world.place(record(world, actor(2, "truck_box", 0.0), actor(3, "bicycle_rider", 30.0)))
+    data, model = placed.stage.data, placed.stage.model
+    for thing in placed.objects.values():
+        ids = np.flatnonzero(placed.geoms.object_id == thing.id)
+        corners_m = thing.world_from_object.apply(thing.shape.vertices_m)
+        for geom in ids:
+            reach_m = model.geom_rbound[geom] + 1e-6
+            assert np.linalg.norm(corners_m - data.geom_xpos[geom], axis=1).min() <= reach_m, thing.asset
+        low, high = thing.shape.vertices_m.min(axis=0), thing.shape.vertices_m.max(axis=0)
+        assert thing.shape.box_size_m == pytest.approx(high - low)
+        assert thing.shape.box_centre_m == pytest.approx((high + low) / 2)
+    rider = placed.objects[3]
+    assert rider.label_code == LABEL_BY_NAME["bicycle"].code
+    assert set(rider.shape.face_label_code) == {LABEL_BY_NAME["bicycle"].code, LABEL_BY_NAME["rider"].code}
+
+
+def test_countable_things_of_the_town_are_objects() -> None:
+    world = tiny_world()
+    things = {thing.asset: thing for thing in world.statics.objects.values()}
+    assert set(things) == {"light_main_east", "stop_cross_south", "bench_0"}
+    assert all(number >= STATIC_OBJECT_BASE for number in world.statics.objects)
+    bench = things["bench_0"]
+    assert bench.world_from_object.translation_m == pytest.approx([5, -6.1, 0.15])
+    assert bench.shape.box_size_m == pytest.approx([1.8, 0.45, 0.56])
+    post = world.model.geom("light_main_east_post").id
+    assert world.statics.object_id[post] == -1, "a pole is no traffic light"
+
+
+def test_placing_again_leaves_nothing_behind() -> None:
+    world = build_tiny_world()
+    first = record(world, actor(2, "van_small", 20.0))
+    alone = record(world)
+    fresh = world.place(alone).stage.data.geom_xpos.copy()
+    world.place(first)
+    again = world.place(alone)
+    assert np.array_equal(again.stage.data.geom_xpos, fresh)
+    assert 2 not in again.objects
+    assert 2 not in again.geoms.object_id
+
+
+def test_faces_show_what_they_are_told() -> None:
+    world = tiny_world("double")
+    patch = np.zeros((3, 5, 3), np.uint8)
+    patch[0, 0] = (255, 0, 0)
+    first, second = world.faces
+    placed = world.place(record(world), {"surface_0": patch, "surface_1": "white"})
+    assert tuple(placed.stage.faces[first.geom_id][0, 0]) == (255, 0, 0)
+    assert (placed.stage.faces[first.geom_id][-1, -1] == 0).all()
+    assert (placed.stage.faces[second.geom_id] == 255).all()
+    assert list(placed.geoms.surface_index[[first.geom_id, second.geom_id]]) == [0, 1]
+    assert (placed.geoms.surface_index >= 0).sum() == 2
+    plain = world.place(record(world), {"surface_1": "black"})
+    assert (plain.stage.faces[first.geom_id] == 153).all(), "the asset's own texture is albedo 0.6 in sRGB"
+    assert (plain.stage.faces[second.geom_id] == 0).all()
+    with pytest.raises(ValueError, match="no surface named surface_2"):
+        world.place(record(world), {"surface_2": "white"})
+
+
+def test_a_surface_is_where_its_face_is() -> None:
+    world = tiny_world("board")
+    (surface,) = world.surface_records()
+    assert (surface.width_m, surface.height_m, surface.actor_id) == (7.4, 3.7, None)
+    frame = surface.parent_from_surface.transform("world", "surface_0")
+    assert frame.translation_m == pytest.approx([55, -8.5, 2.6])
+    outward = -frame.rotation[:, 2]
+    assert np.degrees(np.arctan2(outward[1], outward[0])) == pytest.approx(175)
+    assert frame.rotation[:, 1] == pytest.approx([0, 0, -1], abs=1e-6), "y is down"
+
+
+def test_a_carried_surface_is_in_the_frame_of_its_truck() -> None:
+    world = tiny_world("truck")
+    (surface,) = world.surface_records(carrier_id=2)
+    assert surface.actor_id == 2
+    assert (surface.width_m, surface.height_m) == (2.2, 2.2)
+    frame = surface.parent_from_surface.transform("actor", "surface_0")
+    assert frame.translation_m == pytest.approx([-4.01, 0, 2.4])
+    assert -frame.rotation[:, 2] == pytest.approx([-1, 0, 0], abs=1e-6)
+
+
+def test_a_record_that_needs_too_much_is_refused() -> None:
+    world = tiny_world()
+    many = [actor(number, "van_small", 5.0 * number) for number in range(2, 30)]
+    with pytest.raises(PlacementError, match="one more van_small"):
+        world.place(record(world, *many))
