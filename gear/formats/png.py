@@ -52,10 +52,7 @@ def decode_rgb(data: bytes) -> UInt8Image:
     Raises:
         ValueError: the bytes are no picture.
     """
-    picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
-    if picture is None:
-        raise ValueError("not a picture")
-    return np.ascontiguousarray(picture[..., ::-1])
+    return np.ascontiguousarray(_decode(data, cv2.IMREAD_COLOR)[..., ::-1])
 
 
 def decode_plain(data: bytes) -> npt.NDArray[Any]:
@@ -64,7 +61,11 @@ def decode_plain(data: bytes) -> npt.NDArray[Any]:
     Raises:
         ValueError: the bytes are no picture.
     """
-    picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    return _decode(data, cv2.IMREAD_UNCHANGED)
+
+
+def _decode(data: bytes, mode: int) -> npt.NDArray[Any]:
+    picture = cv2.imdecode(np.frombuffer(data, np.uint8), mode) if data else None
     if picture is None:
         raise ValueError("not a picture")
     return np.asarray(picture)

@@ -21,8 +21,9 @@ def encode_crop(mask: Mask, left: int, top: int, height_px: int, width_px: int) 
     slab[:, top : top + rows] = mask.T
     padded = np.concatenate([[False], slab.reshape(-1), [False]])
     switches = np.flatnonzero(padded[1:] != padded[:-1]) + left * height_px
-    bounds = np.concatenate([[0], switches, [height_px * width_px]])
-    counts = np.diff(bounds)
+    counts = np.diff(np.concatenate([[0], switches, [height_px * width_px]]))
+    if len(counts) > 1 and counts[-1] == 0:
+        counts = counts[:-1]
     encoded = coco_mask.frPyObjects({"size": [height_px, width_px], "counts": counts.tolist()}, height_px, width_px)
     return str(encoded["counts"].decode("ascii"))
 

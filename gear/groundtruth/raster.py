@@ -42,8 +42,8 @@ def project_mesh(vertices_camera_m: Array, faces: npt.NDArray[np.int32], intrins
 
     Args:
         vertices_camera_m: (N, 3) in the camera's frame.
-        faces: (M, 3), outward by the right hand. Renderers do not show a triangle from behind; a closed shape covers the
-            same pixels without them.
+        faces: (M, 3), outward by the right hand. Renderers do not show a triangle from behind; a closed shape covers
+            the same pixels without them.
         intrinsics: the pinhole.
 
     Returns:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from gear.contracts.tasks import Sample
+from gear.formats.png import decode_plain, decode_rgb
 from gear.groundtruth.surfaces import observe_surfaces
 from gear.values.errors import DatasetError, FieldError
 from gear.values.frames import Frame, UInt8Image
@@ -70,16 +72,31 @@ def images_of(frame: Frame) -> dict[str, UInt8Image]:
     return {name: view.rgb for name, view in frame.views.items()}
 
 
-def read(root: Path, relative: str) -> bytes:
-    """A file of a dataset.
+def read_rgb(root: Path, relative: str) -> UInt8Image:
+    """A colour picture of a dataset.
 
     Raises:
-        DatasetError: it is not there or cannot be read.
+        DatasetError: it is not there, or damaged.
     """
+    return _read(root, relative, decode_rgb)
+
+
+def read_plain(root: Path, relative: str) -> npt.NDArray[Any]:
+    """A label or depth picture of a dataset.
+
+    Raises:
+        DatasetError: it is not there, or damaged.
+    """
+    return _read(root, relative, decode_plain)
+
+
+def _read(root: Path, relative: str, decode: Callable[[bytes], npt.NDArray[Any]]) -> npt.NDArray[Any]:
     try:
-        return (root / relative).read_bytes()
+        return decode((root / relative).read_bytes())
     except OSError as error:
         raise DatasetError(root / relative, error.strerror or str(error)) from error
+    except ValueError as error:
+        raise DatasetError(root / relative, f"{error}; delete its sidecar and collect again to repair it") from error
 
 
 def draw_surfaces(picture: UInt8Image, sample: Sample, camera: str) -> None:

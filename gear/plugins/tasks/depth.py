@@ -15,9 +15,9 @@ from gear.contracts.tasks import Encoded, Evaluator, Sample, Sidecar, SplitInfo
 from gear.formats import kitti_depth
 from gear.formats.billboard_info import billboard_info
 from gear.formats.jsontext import dump
-from gear.formats.png import decode_plain, decode_rgb, encode_labels, encode_rgb, encode_tiff
+from gear.formats.png import encode_labels, encode_rgb, encode_tiff
 from gear.metrics.depth import Crop, DepthEvaluator
-from gear.plugins.tasks.common import CameraOptions, draw_surfaces, images_of, read, surfaces_of
+from gear.plugins.tasks.common import CameraOptions, draw_surfaces, images_of, read_plain, read_rgb, surfaces_of
 from gear.values.errors import FieldError
 from gear.values.frames import FloatImage, Frame, UInt8Image
 from gear.values.rig import Rig
@@ -118,9 +118,9 @@ class DepthTask:
         image, _, metres = _paths(info.split, sidecar.record.index)
         return DepthSample(
             record=sidecar.record,
-            images={VIEW: decode_rgb(read(root, image))},
+            images={VIEW: read_rgb(root, image)},
             surfaces=sidecar.surfaces,
-            depth_m=kitti_depth.from_metres_file(decode_plain(read(root, metres))),
+            depth_m=kitti_depth.from_metres_file(read_plain(root, metres)),
         )
 
     def as_prediction(self, sample: DepthSample) -> FloatImage:

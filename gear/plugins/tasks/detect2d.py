@@ -15,12 +15,12 @@ from gear.contracts.tasks import Encoded, Evaluator, Sample, Sidecar, SplitInfo
 from gear.formats import coco, rle
 from gear.formats.billboard_info import billboard_info
 from gear.formats.jsontext import dump
-from gear.formats.png import decode_rgb, encode_rgb
+from gear.formats.png import encode_rgb
 from gear.groundtruth.boxes import box_in_camera
 from gear.groundtruth.objects import observe_objects
 from gear.groundtruth.visibility import VisibilityLimits
 from gear.metrics.coco_ap import CocoEvaluator
-from gear.plugins.tasks.common import CameraOptions, draw_box, draw_surfaces, expect, images_of, read, surfaces_of
+from gear.plugins.tasks.common import CameraOptions, draw_box, draw_surfaces, expect, images_of, read_rgb, surfaces_of
 from gear.values.frames import Frame, UInt8Image
 from gear.values.labels import LABELS
 from gear.values.rig import Rig
@@ -151,7 +151,7 @@ class Detect2dTask:
         """Reads the picture; the objects are in the sidecar."""
         return Detect2dSample(
             record=sidecar.record,
-            images={VIEW: decode_rgb(read(root, f"images/{info.split}/{_name(sidecar.record.index)}"))},
+            images={VIEW: read_rgb(root, f"images/{info.split}/{_name(sidecar.record.index)}")},
             surfaces=sidecar.surfaces,
             objects=_objects(sidecar, root),
         )

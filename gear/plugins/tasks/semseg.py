@@ -18,10 +18,10 @@ from gear.formats import cityscapes
 from gear.formats.billboard_info import billboard_info
 from gear.formats.cityscapes_polygons import polygons_json
 from gear.formats.jsontext import dump
-from gear.formats.png import decode_plain, decode_rgb, encode_labels, encode_rgb
+from gear.formats.png import encode_labels, encode_rgb
 from gear.groundtruth.labelmaps import coarsen, instance_map, label_map
 from gear.metrics.semantic import SemanticEvaluator
-from gear.plugins.tasks.common import CameraOptions, draw_surfaces, images_of, read, surfaces_of
+from gear.plugins.tasks.common import CameraOptions, draw_surfaces, images_of, read_plain, read_rgb, surfaces_of
 from gear.values.errors import FieldError
 from gear.values.frames import Frame, UInt8Image
 from gear.values.rig import Rig
@@ -131,10 +131,10 @@ class SemsegTask:
         paths = cityscapes.paths(info.town, info.split, record.sequence, record.frame)
         return SemsegSample(
             record=record,
-            images={VIEW: decode_rgb(read(root, paths.image))},
+            images={VIEW: read_rgb(root, paths.image)},
             surfaces=sidecar.surfaces,
-            label_ids=decode_plain(read(root, paths.label_ids)),
-            instance_ids=decode_plain(read(root, paths.instance_ids)),
+            label_ids=read_plain(root, paths.label_ids),
+            instance_ids=read_plain(root, paths.instance_ids),
         )
 
     def as_prediction(self, sample: SemsegSample) -> npt.NDArray[np.uint8]:

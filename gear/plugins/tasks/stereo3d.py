@@ -23,7 +23,7 @@ from gear.formats.kitti_object import (
     split_lists,
     truncation,
 )
-from gear.formats.png import decode_rgb, encode_rgb
+from gear.formats.png import encode_rgb
 from gear.groundtruth.boxes import Box3d, box_in_camera, project_box
 from gear.groundtruth.objects import observe_objects
 from gear.groundtruth.raster import NEAR_M
@@ -36,7 +36,7 @@ from gear.plugins.tasks.common import (
     draw_surfaces,
     expect,
     images_of,
-    read,
+    read_rgb,
     surfaces_of,
 )
 from gear.values.errors import FieldError
@@ -206,8 +206,8 @@ class Stereo3dTask:
         return Stereo3dSample(
             record=record,
             images={
-                LEFT: decode_rgb(read(root, f"{info.split}/image_2/{name}.png")),
-                RIGHT: decode_rgb(read(root, f"{info.split}/image_3/{name}.png")),
+                LEFT: read_rgb(root, f"{info.split}/image_2/{name}.png"),
+                RIGHT: read_rgb(root, f"{info.split}/image_3/{name}.png"),
             },
             surfaces=sidecar.surfaces,
             calibration=Calibration(

@@ -1,0 +1,39 @@
+import json
+
+import pytest
+
+from gear.formats.coco import CATEGORIES, CATEGORY_NAMES, Annotation, Picture, dataset_json
+from gear.formats.jsontext import dump
+from gear.values.labels import LABELS
+
+
+def test_all_eighty_categories() -> None:
+    assert len(CATEGORIES) == len(CATEGORY_NAMES) == 80
+    unused = {12, 26, 29, 30, 45, 66, 68, 69, 71, 83}
+    assert set(CATEGORY_NAMES) == set(range(1, 91)) - unused
+    assert (CATEGORY_NAMES[1], CATEGORY_NAMES[10], CATEGORY_NAMES[13], CATEGORY_NAMES[90]) == (
+        "person", "traffic light", "stop sign", "toothbrush")  # fmt: skip
+    supercategories = {category["id"]: category["supercategory"] for category in CATEGORIES}
+    assert (supercategories[9], supercategories[10], supercategories[44]) == ("vehicle", "outdoor", "kitchen")
+
+
+def test_gears_labels_point_at_categories() -> None:
+    for label in LABELS:
+        if label.coco_id is not None:
+            assert label.coco_id in CATEGORY_NAMES
+
+
+def test_annotations_are_numbered_from_one_through_all_pictures() -> None:
+    item = Annotation(category_id=3, box_xywh=(0, 0, 2, 2), area_px=4, rle="", is_crowd=False, extras={})
+    pictures = [Picture(id=i, file_name=f"{i}.png", height_px=4, width_px=4, annotations=(item,) * 2) for i in range(3)]
+    content = dataset_json(pictures, description="", created="2022-01-01")
+    assert [a["id"] for a in content["annotations"]] == [1, 2, 3, 4, 5, 6]
+    assert [a["image_id"] for a in content["annotations"]] == [0, 0, 1, 1, 2, 2]
+    assert content["info"]["year"] == 2022
+
+
+def test_json_text_is_steady() -> None:
+    assert dump({"b": 1, "a": [1.5, None]}) == b'{"b":1,"a":[1.5,null]}\n'
+    assert json.loads(dump({"a": "ä"})) == {"a": "ä"}
+    with pytest.raises(ValueError, match="JSON"):
+        dump({"a": float("nan")})
