@@ -316,4 +316,3 @@ def surface_point(sheet: Sheet, x: float, z: float) -> tuple[Floats, Floats]:
     point = points[chosen].copy()
     point[[0, 2]] = x, z
     return point, sheet.patch.normals(params[chosen : chosen + 1])[0]
-

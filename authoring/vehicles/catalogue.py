@@ -43,9 +43,8 @@ def _car(spec: CarSpec, extra: Extra | None = None) -> Callable[[Path], None]:
         meshes = parts.merged()
         bounds = meshes["paint"].bounds
         finish = Finish(spec.name, spec.kind, spec.palette, _boxes(spec, bounds, cabin), shown=spec.shown)
-        size = (2048, 1024) if bounds[1, 0] > 4 else (1024, 1024)
         paint = PaintMap(
-            bounds[0], bounds[1], size, spec.lines_side, spec.lines_top, spec.lines_front, spec.lines_rear
+            bounds[0], bounds[1], (1024, 512), spec.lines_side, spec.lines_top, spec.lines_front, spec.lines_rear
         )
         write_vehicle(out, finish, meshes, paint)
 
@@ -117,11 +116,11 @@ def _ambulance(spec: CarSpec, parts: Parts, body: Shell, cabin: Shell) -> None:
 
 def _bus(spec: CarSpec, parts: Parts, body: Shell, cabin: Shell) -> None:
     """Doors on the kerb side (the right), the destination over the windscreen, a cooling unit on the roof."""
-    y = -1.285
+    y = -1.274
     for x, width in ((4.72, 1.25), (0.35, 1.35), (-4.55, 1.2)):
-        parts.add("trim", flat(box((width + 0.10, 0.05, 2.16), (x, y, 1.43)), DETAILS["gloss"]))
+        parts.add("trim", flat(box((width + 0.08, 0.04, 2.16), (x, y, 1.44)), DETAILS["gloss"]))
         for side in (-1, 1):
-            pane = box((width / 2 - 0.05, 0.012, 1.98), (x + side * width / 4, y - 0.028, 1.43))
+            pane = box((width / 2 - 0.06, 0.012, 1.96), (x + side * width / 4, y - 0.018, 1.44))
             parts.add("glass", pane)
     parts.add("trim", panel(1.9, 0.26, (5.905, 0, 2.62), 0.0, DETAILS["display"]))
     pod = box((2.6, 1.7, 0.22), (-2.2, 0, 3.12))

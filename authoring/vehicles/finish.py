@@ -93,19 +93,19 @@ class PaintMap:
 
     def draw(self, path: Path) -> None:
         """Writes the texture: white, with dark shut lines in a faint shade and some road dirt low down."""
-        over = 3
+        over = 4
         width, height = self.size
         core = Image.new("L", (width * over, height * over), 255)
         draw = ImageDraw.Draw(core)
         per_metre = self._scale[0]
-        stroke = max(over, round(0.0065 * per_metre * over))
+        stroke = max(1, round(0.0065 * per_metre * over))
         for view, lines in (("side", self.side), ("top", self.top), ("front", self.front), ("rear", self.rear)):
             for line in lines:
                 at = np.asarray(line, dtype=np.float64)
                 p = self.pixel(view, at[:, 0], at[:, 1]) * over
                 draw.line([(float(x), height * over - float(y)) for x, y in p], fill=10, width=stroke, joint="curve")
         small = core.resize((width, height), Image.Resampling.LANCZOS)
-        shade = np.asarray(small.filter(ImageFilter.GaussianBlur(2.0)), dtype=np.float64) / 255
+        shade = np.asarray(small.filter(ImageFilter.GaussianBlur(float(0.009 * per_metre))), dtype=np.float64) / 255
         value = np.asarray(small, dtype=np.float64) / 255 * (0.6 + 0.4 * shade)
         rows = self._scale[1]
         up = height - 1 - np.arange(height)

@@ -180,5 +180,3 @@ def add_exhaust(parts: Parts, x: float, y: float, z: float, radius: float = 0.03
     parts.add("rim", pipe.translated(x, y, z), both_sides=both)
     hollow = revolve([(radius * 0.86, 0.0), (0.0, 0.0)], 12, "x").scaled(-1, 1, 1)
     parts.add("trim", flat(hollow, DETAILS["gloss"]).translated(x + 0.015, y, z), both_sides=both)
-
-

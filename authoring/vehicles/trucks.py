@@ -93,7 +93,7 @@ def write_flatbed(out: Path) -> None:
         Box((0.95, 1.13, 1.14), (_CAB_X, 0, 1.56)),
         Box((length / 2, width / 2, 0.9), (middle_x, 0, 1.35)),
     )
-    _write(out, "truck_rigid", parts, boxes, "A flat bed with drop sides and a load.", None)
+    _write(out, "truck_rigid", parts, boxes, "A flat bed with drop sides and a load.", None, shown=1)
 
 
 def _chassis() -> Parts:
@@ -179,14 +179,20 @@ def _cut_bar(bar: Mesh, low: float, high: float) -> Mesh:
 
 
 def _write(
-    out: Path, name: str, parts: Parts, boxes: tuple[Box, ...], comment: str, face: tuple[str, str, str] | None
+    out: Path,
+    name: str,
+    parts: Parts,
+    boxes: tuple[Box, ...],
+    comment: str,
+    face: tuple[str, str, str] | None,
+    shown: int = 0,
 ) -> None:
     meshes = parts.merged()
     bounds = meshes["paint"].bounds
     shift = _CAB_X
     paint = PaintMap(
-        bounds[0], bounds[1], (512, 1024),
+        bounds[0], bounds[1], (512, 512),
         tuple(tuple((x + shift, z) for x, z in line) for line in CAB.lines_side), (), CAB.lines_front,
     )  # fmt: skip
-    finish = Finish(name, "truck", "truck", boxes, comment=comment)
+    finish = Finish(name, "truck", "truck", boxes, comment=comment, shown=shown)
     write_vehicle(out, finish, meshes, paint, face=face)

@@ -105,5 +105,3 @@ def _dished(spec: WheelSpec, lip: float) -> Mesh:
         at = rotation("y", 360 / count * k) @ np.array([0.51 * r, lip - depth - 0.016, 0.0])
         nuts.append(nut.translated(*at))
     return merge([disc, *nuts])
-
-

@@ -103,7 +103,7 @@ def test_looks_ahead_along_x(model: mujoco.MjModel) -> None:
 def test_budgets(name: str, model: mujoco.MjModel) -> None:
     assert len(_visible(model)) <= 10
     assert model.nmeshface <= (12_600 if name in CARS else 14_000)
-    assert model.ntexdata < 11_000_000
+    assert model.ntexdata < 3_700_000
 
 
 def test_every_visible_geom_has_a_known_label_and_is_never_felt(name: str) -> None:
