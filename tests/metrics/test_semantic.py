@@ -1,0 +1,119 @@
+import contextlib
+import importlib
+import io
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from gear.formats.png import encode_labels
+from gear.metrics.semantic import AVERAGE_INSTANCE_PX, SemanticEvaluator
+
+
+@dataclass(frozen=True)
+class Labelled:
+    instance_ids: np.ndarray
+
+    @property
+    def label_ids(self) -> np.ndarray:
+        ids = self.instance_ids
+        return np.where(ids >= 1000, ids // 1000, ids).astype(np.uint8)
+
+
+def labelled(seed: int) -> Labelled:
+    rng = np.random.default_rng(seed)
+    picture = np.full((120, 200), 23, dtype=np.uint16)
+    picture[70:] = 7
+    picture[20:80, 20:90] = 11
+    picture[100:, :30] = 4
+    for number in range(4):
+        x, y = int(rng.integers(10, 190)), int(rng.integers(60, 110))
+        cv2.ellipse(
+            picture, (x, y), (int(rng.integers(4, 30)), 9), 0, 0, 360, int(rng.choice([24, 26, 33])) * 1000 + number, -1
+        )
+    return Labelled(picture)
+
+
+def spoilt(sample: Labelled, seed: int) -> np.ndarray:
+    prediction = np.roll(sample.label_ids, 5, axis=1)
+    prediction[:, 150:170] = 21
+    prediction[10:20, :50] = 9
+    prediction[np.random.default_rng(seed).random(prediction.shape) < 0.02] = 25
+    return prediction
+
+
+def test_by_hand() -> None:
+    # Cars of 8 and of 2 pixels on road: one pixel of the large one is missed, two of road are taken for car.
+    picture = np.full((4, 8), 7, dtype=np.uint16)
+    picture[0] = 26000
+    picture[3, :2] = 26001
+    sample = Labelled(picture)
+    prediction = sample.label_ids.copy()
+    prediction[0, 0] = 7
+    prediction[1, :2] = 26
+    evaluator = SemanticEvaluator()
+    own = evaluator.update(sample, prediction)
+    result = evaluator.result()
+    road, car = 20 / 23, 9 / 12
+    assert own["miou"] == result["miou"] == pytest.approx((road + car) / 2)
+    size = AVERAGE_INSTANCE_PX["car"]
+    tp, fn = 7 * size / 8 + 2 * size / 2, 1 * size / 8
+    assert result["iiou"] == pytest.approx(tp / (tp + fn + 2))
+    assert result["iou_road"] == pytest.approx(road) and result["iou_car"] == pytest.approx(car)
+    assert result["pixel_accuracy"] == pytest.approx(29 / 32)
+    assert np.isnan(result["iou_bus"])
+
+
+def test_what_is_not_evaluated_counts_nowhere() -> None:
+    picture = np.full((4, 8), 7, dtype=np.uint16)
+    picture[2:] = 4
+    prediction = np.full((4, 8), 7, dtype=np.uint8)
+    evaluator = SemanticEvaluator()
+    evaluator.update(Labelled(picture), prediction)
+    assert evaluator.result()["miou"] == 1.0
+
+
+def test_agrees_with_the_official_tool(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("cityscapesscripts")
+    monkeypatch.setattr(np, "in1d", lambda a, b, **k: np.isin(np.ravel(a), b, **k), raising=False)
+    tool = importlib.import_module("cityscapesscripts.evaluation.evalPixelLevelSemanticLabeling")
+    helpers = importlib.import_module("cityscapesscripts.helpers.labels")
+    evaluator, truths, found = SemanticEvaluator(), [], []
+    for seed in range(3):
+        sample, prediction = labelled(seed), spoilt(labelled(seed), seed)
+        evaluator.update(sample, prediction)
+        stem = tmp_path / f"gearaachen_{seed:06d}_000000_gtFine"
+        Path(f"{stem}_labelIds.png").write_bytes(encode_labels(sample.label_ids))
+        Path(f"{stem}_instanceIds.png").write_bytes(encode_labels(sample.instance_ids))
+        Path(f"{stem}_found.png").write_bytes(encode_labels(prediction))
+        truths.append(f"{stem}_labelIds.png")
+        found.append(f"{stem}_found.png")
+    tool.args.evalLabels = [label.id for label in helpers.labels if label.id >= 0]
+    tool.args.JSONOutput, tool.args.quiet = False, True
+    with contextlib.redirect_stdout(io.StringIO()):
+        official: dict[str, Any] = tool.evaluateImgLists(found, truths, tool.args)
+    result = evaluator.result()
+    pairs = {
+        "miou": "averageScoreClasses",
+        "iiou": "averageScoreInstClasses",
+        "category_miou": "averageScoreCategories",
+        "category_iiou": "averageScoreInstCategories",
+    }
+    for ours, theirs in pairs.items():
+        assert 0.1 < result[ours] < 0.99
+        assert result[ours] == pytest.approx(official[theirs], abs=1e-9), json.dumps(result)
+    for name, value in official["classScores"].items():
+        if value == value and f"iou_{name.replace(' ', '_')}" in result:
+            assert result[f"iou_{name.replace(' ', '_')}"] == pytest.approx(value, abs=1e-9)
+
+
+def test_wrong_predictions_are_refused() -> None:
+    sample = labelled(0)
+    with pytest.raises(ValueError, match="shape"):
+        SemanticEvaluator().update(sample, np.zeros((2, 2), dtype=np.uint8))
+    with pytest.raises(ValueError, match="label ids"):
+        SemanticEvaluator().update(sample, np.full((120, 200), 255, dtype=np.uint8))
