@@ -20,7 +20,7 @@ def apply(response: Response, light: torch.Tensor) -> torch.Tensor:
     x = light.clamp(0.0, 1.0)
     y = x * response.exposure / (1 + (response.exposure - 1) * x)
     # A power has no finite gradient at 0.
-    z = y.clamp_min(1e-8) ** response.contrast if response.contrast != 1 else y
+    z = y.clamp_min(1e-12) ** response.contrast if response.contrast != 1 else y
     return encode_srgb(z) if response.encoding == "srgb" else z
 
 

@@ -1,0 +1,87 @@
+"""What happens where a driver is missing, and what native code prints."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from gear.render import RENDERERS, describe, glcontext, open_renderer, probe
+from gear.render.quiet import native_output
+from gear.values.errors import BackendError, UnknownNameError
+
+
+def test_a_machine_without_vulkan_is_told_what_to_install() -> None:
+    code = "from gear.render import probe; probe('filament')"
+    environment = {**os.environ, "VK_ICD_FILENAMES": "/nowhere.json", "VK_DRIVER_FILES": "/nowhere.json"}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
+    last = done.stderr.strip().splitlines()[-1]
+    assert done.returncode == 1, "Filament must not end the process by itself"
+    assert "BackendError: renderer filament:" in last
+    assert "apt-get install mesa-vulkan-drivers libvulkan1" in last and "--renderer classic" in last
+
+
+def test_a_machine_without_opengl_is_told_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
+    monkeypatch.delenv("PYOPENGL_PLATFORM", raising=False)
+    monkeypatch.setattr(glcontext, "_egl_works", lambda: False)
+    assert glcontext.choose_backend() == "osmesa"
+    monkeypatch.setattr(glcontext, "_loads", lambda library: False)
+    with pytest.raises(BackendError, match="apt-get install libegl1 libgl1-mesa-dri"):
+        glcontext.choose_backend()
+
+
+def test_the_wish_of_the_environment_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    for wish in ("egl", "osmesa"):
+        monkeypatch.setenv("MUJOCO_GL", wish)
+        assert glcontext.choose_backend() == wish
+
+
+def test_osmesa_and_egl_render_the_same() -> None:
+    code = "from gear.render import probe; r = probe('classic'); print(r.info.backend, r.sha256)"
+    results = {}
+    for backend in ("egl", "osmesa"):
+        environment = {**os.environ, "MUJOCO_GL": backend}
+        environment.pop("PYOPENGL_PLATFORM", None)
+        done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+        used, results[backend] = done.stdout.split()
+        assert used == backend
+    if probe("classic").info.is_software:
+        assert results["egl"] == results["osmesa"]
+
+
+@pytest.mark.parametrize("name", RENDERERS)
+def test_a_probe_says_who_renders(name: str, capfd: pytest.CaptureFixture[str]) -> None:
+    result = probe(name)
+    assert result.info.name == name
+    assert result.info.backend in {"filament": ("vulkan",), "classic": ("egl", "osmesa")}[name]
+    assert result.info.driver and result.info.device
+    assert len(result.sha256) == 64 and result.sha256 == probe(name).sha256 != probe(name, quality="fast").sha256
+    assert result.start_s > 0 and result.frame_s > 0
+    assert capfd.readouterr() == ("", "")
+
+
+def test_an_unknown_renderer_is_named_with_what_was_meant() -> None:
+    for ask in (describe, probe):
+        with pytest.raises(UnknownNameError, match="did you mean filament"):
+            ask("filamnet")
+    with pytest.raises(UnknownNameError):
+        open_renderer("", None)  # type: ignore[arg-type]
+
+
+def test_only_known_chatter_is_kept_back(capfd: pytest.CaptureFixture[str]) -> None:
+    with native_output() as chatter:
+        os.write(1, b"FEngine (64 bits) created at 0x1 (threading is enabled)\nmore than chatter\n")
+        os.write(2, b"a real problem\n")
+    assert capfd.readouterr() == ("more than chatter\n", "a real problem\n")
+    assert chatter == ["FEngine (64 bits) created at 0x1 (threading is enabled)"]
+
+
+def test_output_comes_back_after_an_exception(capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(RuntimeError), native_output():
+        os.write(2, b"last words\n")
+        raise RuntimeError
+    os.write(1, b"alive\n")
+    assert capfd.readouterr() == ("alive\n", "last words\n")
