@@ -33,6 +33,8 @@ from gear.world.assets import AssetLibrary
 from gear.world.scene_spec import SceneLibrary, SceneSpec
 from gear.world.weather import PRESETS
 
+ASSET_SUFFIXES = (".xml", ".obj", ".msh", ".stl", ".png")
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Job:
@@ -102,7 +104,7 @@ def resolve(config: CollectionConfig) -> Job:
         "weather": to_json(weather),
         "renderer": to_json(renderer),
         "quality": config.quality,
-        "assets": assets_digest(library.town),
+        "assets": assets_digest(library),
         "versions": versions(),
     }
     plan = Plan(
@@ -202,16 +204,18 @@ def _version(distribution: str) -> str:
         return "source"
 
 
-def assets_digest(town: Path) -> str:
+def assets_digest(library: AssetLibrary) -> str:
     """sha256 over every MJCF file, mesh and texture that a town's pictures can show."""
     own = data_dir("mjcf")
-    files = {path.relative_to(own).as_posix(): path for path in own.rglob("*") if path.is_file()}
-    town = town.resolve()
-    if not town.is_relative_to(own):
-        files = {**files, f"town/{town.name}": town}
-        folder = town.with_suffix("")
-        if folder.is_dir():
-            files.update({f"town/{p.relative_to(folder).as_posix()}": p for p in folder.rglob("*") if p.is_file()})
+    roots = [library.town, library.town.with_suffix("")]
+    roots += [library.folder("vehicle"), library.folder("pedestrian"), library.folder("surface")]
+    if any(root.is_relative_to(own) for root in roots):
+        roots.append(own / "textures")
+    files: dict[str, Path] = {}
+    for root in roots:
+        for path in root.rglob("*") if root.is_dir() else [root]:
+            if path.suffix.lower() in ASSET_SUFFIXES and path.is_file():
+                files[f"{root.name}/{path.relative_to(root).as_posix()}"] = path
     digest = hashlib.sha256()
     for name in sorted(files):
         digest.update(f"{name}\0{hashlib.sha256(files[name].read_bytes()).hexdigest()}\n".encode())

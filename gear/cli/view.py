@@ -1,0 +1,57 @@
+"""`gear view`."""
+
+from __future__ import annotations
+
+import argparse
+
+from gear.cli.collect import positive
+
+EXAMPLE = """examples:
+  gear view data/stereo3d/town10-billboard01-ClearNoon/none
+  gear view data/twin --split test --samples 200 --out twin.html
+  gear view data/big --max-mb 400          # larger pictures; the page takes longer to open
+
+The page is one file; it needs no server and no network. In it: ? lists the keys.
+"""
+
+
+def megabytes(text: str) -> float:
+    """A size of at least 1 MB, for argparse."""
+    number = float(text)
+    if not 1 <= number <= 4000:
+        raise argparse.ArgumentTypeError("must be 1 to 4000")
+    return number
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the command's flags."""
+    parser.epilog = EXAMPLE
+    parser.add_argument("dataset", help="root of a dataset of any task")
+    parser.add_argument("--split", help="its split, where it has several")
+    parser.add_argument("--samples", type=positive, metavar="N", help="only the first N samples (all)")
+    parser.add_argument("--out", default="view.html", metavar="FILE", help="HTML file to write (view.html)")
+    parser.add_argument(
+        "--max-mb",
+        type=megabytes,
+        default=48.0,
+        metavar="MB",
+        help="about how large the page may get; pictures are scaled down until they fit (48)",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Writes the page and says where."""
+    from gear.cli.progress import ProgressBar
+    from gear.view.write import write_view
+
+    with ProgressBar() as progress:
+        report = write_view(
+            args.dataset,
+            args.out,
+            split=args.split,
+            samples=args.samples,
+            max_mb=args.max_mb,
+            progress=progress,
+        )
+    print(report.summary())
+    return 0

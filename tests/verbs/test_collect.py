@@ -1,0 +1,234 @@
+"""The main job on a tiny town: the four tasks, twins, resuming, workers, and what bad input gets."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+import gear
+from gear.formats import rle
+from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
+from gear.values.errors import BackendError, ConfigError, DatasetError, PatchError, PlacementError, UnknownNameError
+from gear.verbs.collect.run import CollectReport
+
+Collect = Callable[..., CollectReport]
+TASKS = ("semseg", "detect2d", "stereo3d", "depth")
+
+
+def tree(root: Path) -> dict[str, bytes]:
+    return {p.relative_to(root).as_posix(): p.read_bytes() for p in sorted(root.rglob("*")) if p.is_file()}
+
+
+def reach(sample: Any, camera: str, margin_px: int = 2) -> np.ndarray:
+    """Where the surfaces are seen, grown by a margin for the edge filter."""
+    height, width = sample.images[camera].shape[:2]
+    seen = np.zeros((height, width), np.uint8)
+    for surface in sample.surfaces:
+        if surface.camera == camera:
+            seen |= rle.decode(surface.mask_rle, height, width).astype(np.uint8)
+    return cv2.dilate(seen, np.ones((2 * margin_px + 1,) * 2, np.uint8)).astype(bool)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_a_task_is_collected_read_back_and_scores_itself_perfect(
+    task: str, tmp_path: Path, collect_small: Collect
+) -> None:
+    report = collect_small(task, tmp_path / "out")
+    assert (report.samples, report.made) == (2, 2)
+    dataset = gear.open_dataset(tmp_path / "out")
+    assert dataset.verify() == []
+    evaluator = dataset.task.evaluator()
+    for sample in dataset:
+        assert sample.record.town == "tiny"
+        for picture in sample.images.values():
+            assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 30
+        assert sample.surfaces[0].visible_px > 50
+        evaluator.update(sample, dataset.task.as_prediction(sample))
+    assert evaluator.result()
+    assert not list((tmp_path / "out").rglob("*scratch*"))
+    again = collect_small(task, tmp_path / "out")
+    assert again.made == 0
+
+
+def test_two_runs_and_two_workers_give_the_same_bytes(tmp_path: Path, collect_small: Collect) -> None:
+    collect_small("stereo3d", tmp_path / "a", samples=3, patch="random")
+    collect_small("stereo3d", tmp_path / "b", samples=3, patch="random", workers=2)
+    assert tree(tmp_path / "a") == tree(tmp_path / "b")
+
+
+def test_twins_differ_where_the_patch_is_seen_and_nowhere_else(tmp_path: Path, collect_small: Collect) -> None:
+    collect_small("semseg", tmp_path / "none", samples=3)
+    collect_small("semseg", tmp_path / "random", samples=3, patch="random")
+    twins = gear.open_twins(tmp_path / "none", tmp_path / "random")
+    for clean, patched in twins:
+        assert clean.record == patched.record
+        assert np.array_equal(clean.label_ids, patched.label_ids)
+        for camera, picture in clean.images.items():
+            differs = (picture != patched.images[camera]).any(axis=2)
+            inside = reach(clean, camera)
+            assert not (differs & ~inside).any()
+            assert differs[reach(clean, camera, 0)].mean() > 0.9
+    collect_small("semseg", tmp_path / "other", samples=3, patch="random", seed=11)
+    with pytest.raises(DatasetError, match="is no twin of"):
+        gear.open_twins(tmp_path / "none", tmp_path / "other")
+
+
+def test_a_sample_is_the_same_alone_and_in_company(tmp_path: Path, collect_small: Collect) -> None:
+    collect_small("depth", tmp_path / "long", samples=4)
+    collect_small("depth", tmp_path / "short", samples=2)
+    collect_small("depth", tmp_path / "short", samples=4)
+    assert tree(tmp_path / "long") == tree(tmp_path / "short")
+
+
+def test_double_boards_take_two_patches(tmp_path: Path, collect_small: Collect) -> None:
+    collect_small("detect2d", tmp_path, scene="double", patch="random")
+    sample = gear.open_dataset(tmp_path)[0]
+    assert [s.name for s in sample.record.surfaces] == ["surface_0", "surface_1"]
+    assert sorted(p.name for p in (tmp_path / "gear/patches/random").iterdir()) == ["patch_0.png", "patch_1.png"]
+    info = json.loads(next(tmp_path.rglob("camera_billboard_info.json")).read_text())
+    assert info["info"]["num_billboards"] == 2
+
+
+@pytest.mark.parametrize("scene", ["truck", "no_billboard"])
+def test_scenes_without_boards(scene: str, tmp_path: Path, collect_small: Collect) -> None:
+    collect_small("stereo3d", tmp_path, scene=scene, patch="random")
+    for sample in gear.open_dataset(tmp_path):
+        carriers = [a for a in sample.record.actors if a.role == "carrier"]
+        assert len(carriers) == len(sample.record.surfaces) == (scene == "truck")
+        if scene == "truck":
+            assert 2 < sample.surfaces[0].distance_m < 60
+            assert sample.surfaces[0].incidence_deg < 60
+
+
+def test_the_video_split_drives(tmp_path: Path, collect_small: Collect) -> None:
+    simulation = tmp_path / "simulation.yml"
+    simulation.write_text("splits: {video: {seed: 60, samples: 1, frames: 4, interval_s: 0.2}}\n")
+    out = tmp_path / "out"
+    report = collect_small("depth", out, split="video", samples=1, settings=[f"simulation={simulation}"])
+    assert report.samples == 4
+    records = [sample.record for sample in gear.open_dataset(out)]
+    assert [(r.sequence, r.frame) for r in records] == [(0, 0), (0, 1), (0, 2), (0, 3)]
+    assert [r.time_s for r in records] == pytest.approx([0.0, 0.2, 0.4, 0.6])
+    assert len({tuple(a.id for a in r.actors) for r in records}) == 1
+    ego = np.array([r.ego.world_from_actor.position_m for r in records])
+    speed = np.linalg.norm(np.diff(ego, axis=0), axis=1) / 0.2
+    assert speed == pytest.approx([np.linalg.norm(r.ego.velocity_world_mps) for r in records[1:]], abs=0.5)
+
+
+def command(out: Path, *more: str) -> list[str]:
+    return [
+        sys.executable, "-m", "gear.cli.main", "collect", "--task", "depth", "--town", str(TINY_TOWN), "--set",
+        f"scenes={TINY_SCENES}", "--scene", "board", "--renderer", "classic", "--quality", "fast", "--split", "debug",
+        "--set", "options.width_px=320", "--set", "options.height_px=96", "--out", str(out), *more,
+    ]  # fmt: skip
+
+
+def test_a_killed_run_goes_on_where_it_was(tmp_path: Path, collect_small: Collect) -> None:
+    out = tmp_path / "killed"
+    running = subprocess.Popen(command(out, "--samples", "200"), stderr=subprocess.PIPE, stdout=subprocess.PIPE)
+    samples = out / "gear/debug/samples"
+    for _ in range(1200):
+        if samples.is_dir() and len(list(samples.iterdir())) >= 3:
+            break
+        time.sleep(0.05)
+    os.kill(running.pid, signal.SIGKILL)
+    running.communicate()
+    kept = {p.name: p.stat().st_mtime_ns for p in samples.iterdir()}
+    assert 3 <= len(kept) < 200
+    total = len(kept) + 2
+    plan = out / "gear/debug/plan.json"
+    plan.write_text(plan.read_text().replace('"samples": 200', f'"samples": {total}'))
+    report = collect_small("depth", out, samples=total)
+    assert report.made == total - len(kept)
+    assert all((samples / name).stat().st_mtime_ns == stamp for name, stamp in kept.items())
+    collect_small("depth", tmp_path / "straight", samples=total)
+    assert tree(out) == tree(tmp_path / "straight")
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "message"),
+    [
+        ({"task": "stereo3"}, UnknownNameError, "no task named 'stereo3'; did you mean stereo3d"),
+        ({"scene": "bord"}, UnknownNameError, "no scene of tiny named 'bord'; did you mean board"),
+        ({"town": "town1"}, UnknownNameError, "no town named 'town1'; did you mean town10"),
+        ({"weather": "ClearNon"}, UnknownNameError, "no weather named 'ClearNon'; did you mean ClearNoon"),
+        ({"split": "tset"}, UnknownNameError, "no split named 'tset'; did you mean test"),
+        ({"patch": "nowhere.png"}, PatchError, "is not there"),
+        ({"settings": ["optoins.width_px=3"]}, ConfigError, r"optoins: unknown key \(did you mean 'options'\?\)"),
+        ({"settings": ["options.width=3"]}, ConfigError, r"options.width: unknown key \(did you mean 'width_px'\?\)"),
+        ({"settings": ["options.width_px=3cm"]}, ConfigError, "options.width_px: expected int, got '3cm'"),
+        ({"settings": ["weather.cloudiness=-1"]}, ConfigError, "is a percentage"),
+    ],
+)
+def test_bad_input_gets_one_line_and_leaves_nothing(
+    changes: dict[str, Any], error: type[Exception], message: str, tmp_path: Path, collect_small: Collect
+) -> None:
+    with pytest.raises(error, match=message) as caught:
+        collect_small(changes.pop("task", "depth"), tmp_path / "out", **changes)
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "out").exists()
+
+
+def test_another_configuration_needs_force(tmp_path: Path, collect_small: Collect) -> None:
+    collect_small("depth", tmp_path)
+    before = tree(tmp_path)
+    with pytest.raises(DatasetError, match=r"another configuration \(content\.seed: 10 there, 11 now"):
+        collect_small("depth", tmp_path, seed=11)
+    assert tree(tmp_path) == before
+    collect_small("depth", tmp_path, seed=11, force=True)
+    assert gear.open_dataset(tmp_path)[0].record.seed == 11
+
+
+def test_the_command_line_says_it_in_one_line_and_leaves_with_2(tmp_path: Path) -> None:
+    done = subprocess.run(command(tmp_path / "out", "--weather", "Foggy"), capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("gear: no weather named 'Foggy'")
+    assert done.stderr.count("\n") == 1
+    assert done.stdout == ""
+
+
+def test_a_folder_that_cannot_be_written_is_one_line(tmp_path: Path, collect_small: Collect) -> None:
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(DatasetError, match="choose another --out"):
+        collect_small("depth", tmp_path / "file" / "out")
+
+
+def test_limits_that_are_too_tight_say_which(tmp_path: Path, collect_small: Collect) -> None:
+    library = tmp_path / "s.yml"
+    library.write_text(
+        "town: tiny\nscenes:\n  far:\n    boards: [{position_m: [55, -8.5, 0], facing_deg: 175}]\n"
+        "    ego: {ahead_m: [900, 901], lateral_m: [900, 901]}\n"
+    )
+    with pytest.raises(PlacementError, match="scene far: "):
+        collect_small("depth", tmp_path / "out", scene="far", settings=[f"scenes={library}"])
+
+
+def test_a_worker_that_dies_is_reported(
+    tmp_path: Path, collect_small: Collect, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MUJOCO_GL", "no-such-backend")
+    with pytest.raises(BackendError):
+        collect_small("depth", tmp_path / "out", workers=2)
+
+
+@pytest.mark.slow
+def test_filament_keeps_the_same_promises(tmp_path: Path, collect_small: Collect) -> None:
+    for name, patch in (("a", "random"), ("b", "random"), ("none", "none")):
+        collect_small("stereo3d", tmp_path / name, renderer="filament", quality="film", patch=patch)
+    assert tree(tmp_path / "a") == tree(tmp_path / "b")
+    for clean, patched in gear.open_twins(tmp_path / "none", tmp_path / "a"):
+        for camera, picture in clean.images.items():
+            differs = (picture != patched.images[camera]).any(axis=2)
+            assert differs[reach(clean, camera, 0)].mean() > 0.9
+            assert (differs & ~reach(clean, camera)).mean() < 0.001
