@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 LEVEL_M = 3.0
 """Things this far apart in height are on different levels of the town."""
 
@@ -54,10 +52,3 @@ class Footprint:
             if abs(across) > first.half_width_m + second.half_length_m * s + second.half_width_m * c:
                 return False
         return True
-
-    def holds(self, x_m: float, y_m: float) -> bool:
-        """Whether a point lies inside."""
-        dx, dy = x_m - self.x_m, y_m - self.y_m
-        cy, sy = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
-        along, across = abs(dx * cy + dy * sy), abs(-dx * sy + dy * cy)
-        return bool(along <= self.half_length_m and across <= self.half_width_m)

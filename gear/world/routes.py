@@ -14,6 +14,9 @@ from gear.world.polyline import Polyline
 HALF_WHEELBASE_SHARE = 0.6
 """Axles stand this share of half a vehicle's length from its middle; its heading is from axle to axle."""
 
+BRAKING_WAY_M = 15.0
+"""Drivers heed the speed of lanes this far ahead."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Route:
@@ -22,12 +25,14 @@ class Route:
     Attributes:
         lanes: their names.
         starts_m: arc length at which each begins.
+        speeds_mps: usual on each.
         line: all of them.
         is_dead_end: whether nothing continues the last one.
     """
 
     lanes: tuple[str, ...]
     starts_m: tuple[float, ...]
+    speeds_mps: tuple[float, ...]
     line: Polyline
     is_dead_end: bool
 
@@ -42,11 +47,21 @@ class Route:
                 if not points or float(np.linalg.norm((point - points[-1])[:2])) > 1e-3:
                     points.append(point)
         line = Polyline.through(np.array(points))
-        return Route(lanes, tuple(float(line.s_m[i]) for i in firsts), line, not graph.lanes[lanes[-1]].next)
+        return Route(
+            lanes,
+            tuple(float(line.s_m[i]) for i in firsts),
+            tuple(graph.lanes[name].speed_mps for name in lanes),
+            line,
+            not graph.lanes[lanes[-1]].next,
+        )
 
-    def lane_at(self, s_m: float) -> str:
-        """Name of the lane at an arc length."""
-        return self.lanes[max(0, int(np.searchsorted(self.starts_m, s_m, side="right")) - 1)]
+    def lane_at(self, s_m: float) -> int:
+        """Number of the lane at an arc length."""
+        return max(0, int(np.searchsorted(self.starts_m, s_m, side="right")) - 1)
+
+    def speed_at(self, s_m: float) -> float:
+        """The lowest usual speed here and where a car that brakes comes to rest."""
+        return min(self.speeds_mps[self.lane_at(s_m) : self.lane_at(s_m + BRAKING_WAY_M) + 1])
 
 
 def drive_on(graph: LaneGraph, lane: str, length_m: float, rng: np.random.Generator) -> tuple[str, ...]:

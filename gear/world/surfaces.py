@@ -86,17 +86,17 @@ def _face(model: mujoco.MjModel, data: mujoco.MjData, number: int, name: FaceNam
         raise TownError(
             path, f"{name.asset}: the face must be flat, with the site {name.site!r} in its middle, z into the board"
         )
-    parent_from_surface = world_from_surface
-    if name.is_carried:
-        body = model.body(name.owner).id
-        world_from_actor = RigidTransform.from_parts("world", "actor", data.xmat[body].reshape(3, 3), data.xpos[body])
-        parent_from_surface = world_from_actor.inverse() @ world_from_surface
+    body = model.body(name.owner).id
+    world_from_owner = RigidTransform.from_parts("world", "actor", data.xmat[body].reshape(3, 3), data.xpos[body])
+    owner_from_surface = world_from_owner.inverse() @ world_from_surface
+    if not name.is_carried and owner_from_surface.rotation[0, 2] > -0.999:
+        raise TownError(path, f"{name.asset}: the face of a board must look along its +x axis")
     return Face(
         name=surface,
         asset=name.asset,
         is_carried=name.is_carried,
         geom_id=geom_id,
-        parent_from_surface=parent_from_surface,
+        parent_from_surface=owner_from_surface if name.is_carried else world_from_surface,
         width_m=float(high[0] - low[0]),
         height_m=float(high[1] - low[1]),
         neutral=_neutral(model, name.neutral_material),

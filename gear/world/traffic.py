@@ -29,6 +29,9 @@ PERSON_REACH_M = 0.9
 PERSON_FORESIGHT_S = (0.0, 0.7, 1.4)
 """Drivers see people where they are and where they will be."""
 
+HARDEST_SLOWING = 2.5
+"""Nobody brakes hard only for being too fast: the model's term for that goes no further."""
+
 ACCELERATION_MPS2, BRAKING_MPS2, HARDEST_MPS2 = 1.6, 2.0, 8.0
 STANDSTILL_GAP_M, HEADWAY_S = 2.0, 1.2
 GIVE_WAY_M = 25.0
@@ -165,7 +168,8 @@ class Traffic:
         speed_mps = driver.speed_mps
         closing = speed_mps * (speed_mps - leader_mps) / (2 * math.sqrt(ACCELERATION_MPS2 * BRAKING_MPS2))
         wanted_m = STANDSTILL_GAP_M + max(0.0, speed_mps * HEADWAY_S + closing)
-        free = (speed_mps / max(driver.cruise_mps, 0.1)) ** 4
+        cruise_mps = min(driver.cruise_mps, driver.route.speed_at(driver.s_m))
+        free = min(HARDEST_SLOWING, (speed_mps / max(cruise_mps, 0.1)) ** 4)
         acceleration = ACCELERATION_MPS2 * (1 - free - (wanted_m / max(gap_m, 0.1)) ** 2)
         return max(-HARDEST_MPS2, acceleration)
 

@@ -241,7 +241,7 @@ def test_limits_that_are_too_tight_are_named(change: dict[str, object], told: st
 def test_a_hidden_board_is_refused() -> None:
     scene = tiny_scenes().scenes["board"]
     behind_house = dataclasses.replace(scene.boards[0], position_m=(-20.0, 27.0, 0.0), facing_deg=270.0)
-    ego = EgoLimits(ahead_m=(5.0, 60.0), lateral_m=(-18.0, 18.0), max_incidence_deg=89.0)
+    ego = EgoLimits(ahead_m=(5.0, 60.0), lateral_m=(-50.0, 50.0), max_incidence_deg=89.0)
     with pytest.raises(PlacementError, match="have a face hidden"):
         plan_scene(dataclasses.replace(scene, boards=(behind_house,), ego=ego))
 
@@ -261,7 +261,7 @@ def test_sequences_drive_without_overlaps(scene: str) -> None:
             step_m = np.subtract(b.world_from_actor.position_m, a.world_from_actor.position_m)
             expected_m = np.add(a.velocity_world_mps, b.velocity_world_mps) / 2 * DRIVE.interval_s
             axes = 2 if b.role == "pedestrian" else 3  # people step up and down kerbs
-            assert np.linalg.norm((step_m - expected_m)[:axes]) < 0.08 + 0.02 * np.linalg.norm(expected_m), (b, step_m)
+            assert np.linalg.norm((step_m - expected_m)[:axes]) < 0.1 + 0.02 * np.linalg.norm(expected_m), (b, step_m)
             assert abs(wrap_angle_rad(yaw_rad(b) - yaw_rad(a))) < 0.25
     for record in frames[::6]:
         for distance_m, first, second in distances(record):
