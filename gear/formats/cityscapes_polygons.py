@@ -10,6 +10,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import numpy.typing as npt
+from scipy import ndimage
 
 from gear.formats.cityscapes import INSTANCE_FACTOR, LABELS
 from gear.values.serial import Json
@@ -29,19 +30,31 @@ def polygons_json(instances: npt.NDArray[np.uint16]) -> Json:
         borders. An instance that something cuts into pieces is one polygon a piece.
     """
     height, width = instances.shape
-    pieces: list[tuple[float, str, list[list[int]]]] = []
-    for value in np.flatnonzero(np.bincount(instances.reshape(-1))):
+    values = np.flatnonzero(np.bincount(instances.reshape(-1)))
+    numbers = np.zeros(65536, dtype=np.uint16)
+    numbers[values] = np.arange(1, len(values) + 1)
+    places = ndimage.find_objects(np.take(numbers, instances))
+    pieces: list[tuple[float, str, npt.NDArray[np.int32]]] = []
+    for value, (rows, columns) in zip(values.tolist(), places, strict=True):
         label = LABELS[value // INSTANCE_FACTOR if value >= INSTANCE_FACTOR else value]
         if label.id == 0:
             continue
-        inside = cv2.inRange(instances, int(value), int(value))
-        outlines, _ = cv2.findContours(inside, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
-        for outline in outlines:
-            # A polygon through pixel centres covers half a pixel less on each side than the pixels it runs through.
-            enclosed = cv2.contourArea(outline) + cv2.arcLength(outline, True) / 2 + 1
-            if enclosed >= MIN_PIECE_PX:
-                points = outline[:, 0, :].tolist()
-                pieces.append((enclosed, label.name, points if len(points) > 2 else (points * 3)[:3]))
-    pieces.sort(key=lambda piece: (-piece[0], piece[1], piece[2][0]))
-    objects = [{"label": name, "polygon": points} for _, name, points in pieces]
+        inside = cv2.inRange(instances[rows, columns], value, value)
+        corner = (columns.start, rows.start)
+        outlines, _ = cv2.findContours(inside, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE, offset=corner)
+        pieces += [(_enclosed_px(outline), label.name, outline) for outline in outlines]
+    kept = [piece for piece in pieces if piece[0] >= MIN_PIECE_PX]
+    kept.sort(key=lambda piece: (-piece[0], piece[1], piece[2][0, 0, 0], piece[2][0, 0, 1]))
+    objects = [{"label": name, "polygon": _corners(outline)} for _, name, outline in kept]
     return {"imgHeight": height, "imgWidth": width, "objects": objects}
+
+
+def _enclosed_px(outline: npt.NDArray[np.int32]) -> float:
+    """Pixels inside and on the outline, which runs through pixel centres (half a pixel inside the border)."""
+    return float(cv2.contourArea(outline) + cv2.arcLength(outline, True) / 2 + 1)
+
+
+def _corners(outline: npt.NDArray[np.int32]) -> list[list[int]]:
+    points: list[list[int]] = outline[:, 0].tolist()
+    # A piece one pixel thin has two ends; painters want three corners.
+    return points if len(points) > 2 else (points * 3)[:3]
