@@ -138,7 +138,7 @@ def build_car(spec: CarSpec) -> tuple[Parts, Shell, Shell]:
     hub_z = spec.wheel.radius
     arch = spec.wheel.radius + spec.arch
     body = make_shell(
-        spec.plan, spec.levels, through(spec.foot), through(spec.rim), through(spec.crown), cells=(20, 9, 4),
+        spec.plan, spec.levels, through(spec.foot), through(spec.rim), through(spec.crown), cells=(18, 9, 4),
         deform=arch_flare(spec.axles, hub_z, arch, spec.flare),
         shift_reach=spec.reach,
         extra_u=[a + d for a in spec.axles for d in (-arch, -arch * 0.6, 0.0, arch * 0.6, arch)],
@@ -187,13 +187,16 @@ def _wells(spec: CarSpec, body: Shell, arch: float, parts: Parts) -> None:
     points = body.side.points
     inner = spec.track / 2 - spec.wheel.width / 2 - 0.10
     a, b = points[edges[:, 0]], points[edges[:, 1]]
+    floor = through(spec.foot)
     deep_a, deep_b = a * [1, 0, 1] + [0, inner, 0], b * [1, 0, 1] + [0, inner, 0]
     corners = np.stack([a, b, deep_b, deep_a], axis=1).reshape(-1, 3)
     base = np.arange(len(edges))[:, None] * 4
     tunnel = Mesh.of(corners, np.concatenate([base + np.array(half) for half in ((0, 1, 2), (0, 2, 3))]))
     parts.add("trim", flat(tunnel, DETAILS["rubber"]), both_sides=True)
     for x in spec.axles:
-        angle = np.radians(np.linspace(-12, 192, 19))
+        # The disc that closes the well ends at the floor, or its back would show below.
+        dip = np.arcsin((floor(np.array([x]))[0] - spec.wheel.radius) / (1.02 * arch))
+        angle = np.linspace(dip, np.pi - dip, 19)
         across, up = 1.02 * arch * np.cos(angle), 1.02 * arch * np.sin(angle)
         rim = np.stack([x + across, np.full(19, inner), spec.wheel.radius + up], axis=-1)
         middle = np.array([[x, inner, spec.wheel.radius]])
@@ -292,7 +295,7 @@ def _sink_bed(bed: tuple[float, float, float], body: Shell, parts: Parts) -> Non
     rear, front, half = bed
     shape = rounded([(rear, -half), (front, -half), (front, half), (rear, half)], 0.04)
     body.top.stamp(lambda p, q: shape(p[:, :2]), "bed", on=("paint",), finest_m=0.06)
-    depth = 0.46
+    depth = 0.24
     parts.add("trim", flat(body.top.part("bed", depth), DETAILS["plastic"]), both_sides=True)
     parts.add("trim", flat(body.top.walls("bed", depth), DETAILS["plastic"]), both_sides=True)
 

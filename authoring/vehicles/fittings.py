@@ -43,7 +43,8 @@ def add_mirrors(
     """Door mirrors on short arms, beside the point (x, z) of the cabin."""
     point, _ = surface_point(cabin.side, x, z)
     y = point[1] + 0.06 + size[1] / 2
-    shell = bevelled_box(size, min(size) * 0.42, 1)
+    bevel = min(size) * 0.3
+    shell = bevelled_box(size, bevel, 1)
     # The housing narrows outwards and forwards like a drop.
     v = shell.vertices.copy()
     ahead = np.clip(0.5 + v[:, :1] / size[0], 0, 1)
@@ -52,7 +53,8 @@ def add_mirrors(
     housing = Mesh(v, shell.faces, shell.uvs, shell.normals)
     at = (x + 0.02, y, z + size[2] * 0.35)
     parts.add(paint, flat(housing, DETAILS["plastic"]).translated(*at), both_sides=True)
-    glass = panel(size[1] * 0.84, size[2] * 0.78, (at[0] - size[0] / 2 - 0.003, at[1], at[2]), 180, DETAILS["silver"])
+    wide, tall = size[1] - 2 * bevel, (size[2] - 2 * bevel) * 0.85
+    glass = panel(wide, tall, (at[0] - size[0] / 2 - 0.003, at[1], at[2]), 180, DETAILS["silver"])
     parts.add("rim", glass, both_sides=True)
     arm = bevelled_box((0.06, y - point[1] + 0.06, 0.035), 0.012, 1, (x + 0.03, (y + point[1]) / 2 - 0.03, z + 0.005))
     parts.add("trim", flat(arm, DETAILS["plastic"]), both_sides=True)
@@ -100,7 +102,6 @@ def add_wipers(parts: Parts, cabin: Shell, *, rise: float = 0.1) -> None:
         up /= np.linalg.norm(up, axis=1, keepdims=True)
         base = points + normals * 0.012
         parts.add("trim", flat(grid(np.stack([base - up * 0.011, base + up * 0.011])).flipped(), DETAILS["rubber"]))
-        parts.add("trim", flat(grid(np.stack([base - up * 0.011, base + up * 0.011])), DETAILS["rubber"]))
 
 
 def _roof_z(sheet: Sheet, x: float, y: float) -> float:
@@ -119,7 +120,7 @@ def add_rails(parts: Parts, cabin: Shell, x0: float, x1: float, y: float) -> Non
         ring = [(-0.015, -0.02), (0.015, -0.02), (0.015, up), (-0.015, up)]
         sections.append([(at, y + dy, base + dz) for dy, dz in ring])
     rings = np.array(sections)
-    rail = grid(rings[:, [0, 1, 2, 3, 0]]).flipped()
+    rail = grid(rings[:, [0, 1, 2, 3, 0]])
     parts.add("trim", flat(rail, DETAILS["plastic"]), both_sides=True)
 
 

@@ -48,6 +48,7 @@ class Shell:
     arc_m: float
     corners: tuple[float, float]
     _table: tuple[Floats, Floats]
+    _lines: Floats
 
     def along(self, u: Floats) -> Floats:
         """Distance round the outline from the front's middle, metres, of belt parameters."""
@@ -55,10 +56,10 @@ class Shell:
 
     def foot(self) -> Mesh:
         """A plate across the belt's lower rim (left half), facing down."""
-        u = np.linspace(0, 1, 25)
+        u = self._lines
         rim = self.side.patch.evaluate(np.column_stack([u, np.zeros_like(u)]))
         axis = rim * [1, 0, 1]
-        return grid(np.stack([rim, axis], axis=1))
+        return grid(np.stack([axis, rim], axis=1))
 
 
 def make_shell(
@@ -121,7 +122,7 @@ def make_shell(
     side = lattice(patch, lines, up, "paint")
     top_patch = cap(patch, corner_front, corner_rear, crown)
     top = lattice(top_patch, (inner - corner_front) / (corner_rear - corner_front), np.sort(1 - share), "paint")
-    return Shell(side, top, float(arc[-1]), (float(corner_front), float(corner_rear)), (u, arc))
+    return Shell(side, top, float(arc[-1]), (float(corner_front), float(corner_rear)), (u, arc), lines)
 
 
 def _up_lines(patch: Patch, count: int) -> Floats:

@@ -31,7 +31,7 @@ class WheelSpec:
     spokes: int = 5
     spoke_width: float = 0.075
     dish: float = 0.02
-    segments: int = 28
+    segments: int = 26
 
 
 @dataclass(frozen=True)
@@ -48,19 +48,20 @@ def make_wheel(spec: WheelSpec) -> Wheel:
     r, half, rim = spec.radius, spec.width / 2, spec.rim
     tyre = revolve(
         [
-            (rim + 0.01, half - 0.004),
+            (rim - 0.002, half - 0.010),
             (rim + 0.45 * (r - rim), half),
             (r - 0.014, half - 0.010),
             (r, half - 0.035),
             (r, -half + 0.035),
             (rim + 0.02, -half),
+            (0.0, -half + 0.02),
         ][::-1],
         spec.segments,
         "y",
     )
     lip = half - 0.012
     edge = [(rim + 0.006, lip - 0.004), (rim - 0.012, lip + 0.004), (rim - 0.018, lip - 0.07)]
-    barrel = revolve(edge, spec.segments, "y").flipped()
+    barrel = revolve(edge, spec.segments, "y")
     drum = revolve([(rim, lip - 0.07), (0.0, lip - 0.065)], spec.segments // 2, "y")
     if spec.spokes:
         face = _spokes(spec, lip)

@@ -169,6 +169,27 @@ def test_paint_looks_outwards(model: mujoco.MjModel) -> None:
     assert volume > 1.0
 
 
+def test_no_back_of_a_face_is_seen_from_outside(name: str, model: mujoco.MjModel) -> None:
+    """Renderers leave out backs and rays do not: a hole or a wrong winding would set depth and picture apart."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    rng = np.random.default_rng(7)
+    half = np.array([low for low, _ in SIZES[name]]) / 2
+    distance, backs, hits = float(half[0]) * 2.6, 0, 0
+    geom, normal = np.zeros(1, np.int32), np.zeros(3)
+    for azimuth, elevation in zip(rng.uniform(0, 2 * np.pi, 3000), rng.uniform(-0.02, 0.4, 3000), strict=True):
+        flat = np.cos(elevation)
+        eye = distance * np.array([np.cos(azimuth) * flat, np.sin(azimuth) * flat, np.sin(elevation)]) + [0, 0, 0.3]
+        aim = rng.uniform(-half * [1, 1, 0], half * [1, 1, 2])
+        along = (aim - eye) / np.linalg.norm(aim - eye)
+        groups = np.array([1, 1, 1, 0, 0, 0], np.uint8)
+        if mujoco.mj_ray(model, data, eye, along, groups, 1, -1, geom, normal) >= 0:
+            hits += 1
+            backs += int(normal @ along > 0)
+    assert hits > 1000
+    assert backs <= 0.002 * hits
+
+
 def test_composes_under_dm_control_twice_over(name: str, model: mujoco.MjModel) -> None:
     town = mjcf.RootElement(model="town")
     for copy in ("first", "second"):
