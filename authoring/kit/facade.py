@@ -55,11 +55,34 @@ class Facade:
         self.sink.polygon(material, self._rectangle(u0, v0, u1, v1, d_m), uvs)
 
     def picture(
-        self, material: str, rect: Rect, u0: float, v0: float, u1: float, v1: float, *, d_m: float = 0.0
+        self,
+        material: str,
+        rect: Rect,
+        u0: float,
+        v0: float,
+        u1: float,
+        v1: float,
+        *,
+        d_m: float = 0.0,
+        tilt: tuple[float, float] = (0.0, 0.0),
     ) -> None:
-        """A flat rectangle that shows one rectangle of an atlas."""
+        """A flat rectangle that shows one rectangle of an atlas.
+
+        Args:
+            material: an atlas material.
+            rect: what of it.
+            u0: left edge, metres; v0 the lower, u1 the right, v1 the upper one.
+            v0: see u0.
+            u1: see u0.
+            v1: see u0.
+            d_m: out of the wall.
+            tilt: how far its normal leans along (u, v), radians: no pane of glass mirrors quite what the next one does.
+        """
         uvs = [(rect[0], rect[1]), (rect[2], rect[1]), (rect[2], rect[3]), (rect[0], rect[3])]
-        self.sink.polygon(material, self._rectangle(u0, v0, u1, v1, d_m), uvs)
+        normal = self.outward + tilt[0] * self.right + np.array([0.0, 0.0, tilt[1]])
+        normals = np.tile(normal / np.linalg.norm(normal), (4, 1))
+        corners = self._rectangle(u0, v0, u1, v1, d_m)
+        self.sink.triangles(material, corners, [(0, 1, 2), (0, 2, 3)], uvs=uvs, normals=normals)
 
     def swatch(self, name: str, u0: float, v0: float, u1: float, v1: float, *, d_m: float = 0.0) -> None:
         """A flat rectangle of a plain colour."""

@@ -26,6 +26,7 @@ def far_building(
     """A box of at most forty drawn storeys with a coping, a roof and a stair head; under 200 triangles."""
     floor_m, ground_m = _STOREYS_M.get(style, (3.2, 4.0))
     top_m = ground_m + (floors - 1) * floor_m
+    material = str(rng.choice(["far_facades", "far_facades_warm", "far_facades_dark"]))
     strips = max(1, min(floors - 1, 18))
     for facade in facades(sink, width_m, depth_m).values():
         bays = max(1, round(facade.width_m / FAR_WIDTH_M * BAYS)) / BAYS
@@ -40,7 +41,7 @@ def far_building(
                 facade.at(facade.width_m, high),
                 facade.at(0, high),
             ]
-            sink.polygon("far_facades", corners, [(u0, v0), (u0 + bays, v0), (u0 + bays, v1), (u0, v1)])
+            sink.polygon(material, corners, [(u0, v0), (u0 + bays, v0), (u0 + bays, v1), (u0, v1)])
     trim = _TRIMS.get(style, "limestone")
     belt(sink, trim, width_m, depth_m, [(0.0, top_m - 0.3), (0.3, top_m), (0.3, top_m + 0.5), (-0.3, top_m + 0.5)])
     x, y = width_m / 2, depth_m / 2

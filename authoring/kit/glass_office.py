@@ -9,7 +9,7 @@ import numpy as np
 from authoring.kit.facade import Facade, Opening, facades
 from authoring.kit.parts import Sink
 from authoring.kit.roofs import flat_roof, roof_machinery
-from authoring.materials.atlas import door_rect
+from authoring.materials.atlas import LOBBY_PANES, door_rect, shop_rect
 
 FLOOR_M = 3.7
 LOBBY_M = 5.2
@@ -81,7 +81,9 @@ def _lobby(facade: Facade, frame: str, *, main: bool) -> None:
             middle = (hole.u0 + hole.u1) / 2
             facade.picture("shop_fronts", door_rect("glass_double"), middle - 1.2, 0.0, middle + 1.2, 2.7, d_m=-1.05)
             facade.box(frame, (hole.u0, hole.u1), (2.72, 2.95), (-1.1, 0.9))
-        facade.swatch("dark_glass", hole.u0, 0.0, hole.u1, hole.v1, d_m=-1.1)
+        facade.picture(
+            "shop_fronts", shop_rect(LOBBY_PANES[index % len(LOBBY_PANES)]), hole.u0, 0.0, hole.u1, hole.v1, d_m=-1.1
+        )
         for u in np.linspace(hole.u0, hole.u1, 4):
             facade.box(frame, (u - 0.03, u + 0.03), (0.0, hole.v1), (-1.1, -1.0), skip="but")
     facade.wall("ashlar", 0.0, 0.0, width, LOBBY_M, holes)

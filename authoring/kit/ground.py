@@ -7,7 +7,7 @@ import numpy as np
 from authoring.kit.facade import Facade, Opening
 from authoring.kit.openings import door, shop_front, window
 from authoring.kit.styles import Style
-from authoring.materials.atlas import AWNING_COUNT, FASCIA_COUNT, door_rect, shop_rect
+from authoring.materials.atlas import AWNING_COUNT, FASCIA_COUNT, LOBBY_PANES, door_rect, shop_rect
 
 FRAMES = (
     "anthracite",
@@ -93,7 +93,7 @@ def _lobby(facade: Facade, style: Style, main: bool, rng: np.random.Generator) -
         top = style.ground_m - 0.7
         hole = Opening(u0, 0.0 if index == entrance else 0.25, u1, top)
         facade.reveal("anthracite", hole, 0.5)
-        rect = door_rect("glass_double") if index == entrance else shop_rect(int(rng.integers(8, 12)))
+        rect = door_rect("glass_double") if index == entrance else shop_rect(int(rng.choice(LOBBY_PANES)))
         facade.picture("shop_fronts", rect, hole.u0, hole.v0, hole.u1, hole.v1, d_m=-0.5)
         holes.append(hole)
         if index == entrance:

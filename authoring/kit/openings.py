@@ -9,8 +9,7 @@ import numpy as np
 from authoring.kit.facade import Facade, Opening
 from authoring.materials.atlas import (
     AWNING_COUNT,
-    FASCIA_COUNT,
-    SHOP_COUNT,
+    LOBBY_PANES,
     WINDOW_COLUMNS,
     awning_rows,
     blade_rect,
@@ -54,7 +53,8 @@ def window(facade: Facade, opening: Opening, style: WindowStyle, *, rng: np.rand
     o = opening
     facade.reveal(style.reveal, o, style.recess_m, skip="s" if style.ledge else "")
     rect = window_rect(style.kind, int(rng.integers(WINDOW_COLUMNS)))
-    facade.picture("windows", rect, o.u0, o.v0, o.u1, o.v1, d_m=-style.recess_m)
+    tilt = (float(rng.normal(0, 0.012)), float(rng.normal(0, 0.02)))
+    facade.picture("windows", rect, o.u0, o.v0, o.u1, o.v1, d_m=-style.recess_m, tilt=tilt)
     if style.ledge:
         facade.box(
             style.ledge, (o.u0 - 0.06, o.u1 + 0.06), (o.v0 - 0.09, o.v0 + 0.01), (-style.recess_m, 0.07), skip="b"
@@ -115,7 +115,7 @@ def shop_front(
     step = (panes_u[1] - panes_u[0]) / count
     for index in range(count):
         left = panes_u[0] + index * step
-        rect = shop_rect(int(rng.integers(SHOP_COUNT)))
+        rect = shop_rect(int(rng.integers(LOBBY_PANES[0])))
         facade.picture("shop_fronts", rect, left, riser_m, left + step, top, d_m=-recess_m + 0.04)
         facade.box(frame, (left - 0.05, left + 0.05), (riser_m, top), (-recess_m + 0.04, -0.04), skip="but")
     door_d = -recess_m - 0.5
@@ -127,9 +127,11 @@ def shop_front(
     side = u0 if door_left else u1 - 0.1
     facade.box(frame, (side, side + 0.1), (0.0, top), (-recess_m, -0.02), skip="but")
     facade.box(frame, (u0, u1), (top, height_m), (0.0, 0.12))
-    facade.picture(
-        "signs", fascia_rect(sign % FASCIA_COUNT), u0 + 0.12, top + 0.08, u1 - 0.12, height_m - 0.08, d_m=0.125
-    )
+    # A sign is eight times as wide as high; what is left of the fascia keeps the frame's colour.
+    wide = min(u1 - u0 - 0.16, 8 * (fascia_m - 0.14))
+    middle_u, middle_v = (u0 + u1) / 2, (top + height_m) / 2
+    left, low = middle_u - wide / 2, middle_v - wide / 16
+    facade.picture("signs", fascia_rect(sign), left, low, left + wide, low + wide / 8, d_m=0.125)
     if awning is not None:
         _awning(facade, u0 + 0.05, u1 - 0.05, top + 0.02, awning)
     elif rng.random() < 0.5:
@@ -159,7 +161,7 @@ def balcony(facade: Facade, u0: float, u1: float, v: float, depth_m: float, *, r
     facade.box("anthracite", (u0, u1), (v + 0.08, v + 0.11), (d0, d1), skip="lr")
     bars = max(4, int((u1 - u0) / 0.13))
     for u in np.linspace(u0 + 0.02, u1 - 0.02, bars):
-        facade.box("anthracite", (u - 0.009, u + 0.009), (v, v + height - 0.05), (d0 + 0.01, d0 + 0.028), skip="ut")
+        facade.box("anthracite", (u - 0.009, u + 0.009), (v, v + height - 0.05), (d0 + 0.01, d0 + 0.028), skip="utb")
     for d in np.linspace(0.1, d0 - 0.1, max(2, int(depth_m / 0.13))):
         for end in (u0 + 0.02, u1 - 0.02):
             facade.box("anthracite", (end - 0.009, end + 0.009), (v, v + height - 0.05), (d, d + 0.018), skip="utb")

@@ -9,6 +9,7 @@ WINDOW_ROWS = {"casement": 0, "sash": 1, "modern": 2, "industrial": 3}
 WINDOW_COLUMNS = 8
 # shop_fronts.png: three rows of four shop windows, then a row of eight doors
 SHOP_COUNT = 12
+LOBBY_PANES = (8, 9, 10, 11)
 DOORS = ("panel_green", "panel_brown", "panel_blue", "panel_black", "glass", "glass_double", "steel", "shutter")
 # signs.png, upper half: two columns of eight fascias; below: posters, then blade signs
 FASCIA_COUNT = 16

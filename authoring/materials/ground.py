@@ -19,7 +19,7 @@ def asphalt(*, rng: np.random.Generator) -> Textures:
     stones = tileable_noise(size, period=256, octaves=3, rng=rng, gain=0.9)
     broad = tileable_noise(size, period=3, octaves=5, rng=rng, gain=0.6)
     speck = np.clip(tileable_noise(size, period=512, octaves=1, rng=rng) - 0.75, 0, 1) * 2.5
-    grey = 0.098 * (1 + 0.14 * stones + 0.10 * broad + 0.28 * speck)
+    grey = 0.098 * (1 + 0.14 * stones + 0.06 * broad + 0.28 * speck)
     tint = np.array([1.0, 0.985, 0.955])
     height = 0.0016 * stones + 0.0022 * speck
     textures: Textures = {
@@ -191,7 +191,7 @@ def foliage(*, rng: np.random.Generator) -> Textures:
         x, y = rng.uniform(0, size, 2)
         angle = float(rng.uniform(0, 360))
         length, width = rng.uniform(11, 19), rng.uniform(4.5, 7.5)
-        hue = np.array([0.115, 0.165, 0.050]) * rng.uniform(0.7, 1.3) * (0.12 + 0.95 * level**1.3)
+        hue = np.array([0.150, 0.205, 0.066]) * rng.uniform(0.7, 1.3) * (0.12 + 0.95 * level**1.3)
         hue = hue * (1 + rng.uniform(-0.12, 0.25) * np.array([1.0, 0.3, 0.0]))
         slope = np.radians(angle)
         for dx in (-size, 0, size):

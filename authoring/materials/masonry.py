@@ -128,7 +128,7 @@ def roof_tiles(*, rng: np.random.Generator) -> Textures:
     tone = roof.per_block(rng.uniform(0.75, 1.2, rows * columns))
     wave = np.sin(roof.along * 2 * np.pi)
     shade = 0.72 + 0.28 * np.clip(wave * 0.5 + 0.7, 0, 1) * np.clip((1 - roof.up) * 6, 0.35, 1)
-    albedo = np.array([0.32, 0.115, 0.06]) * (tone * shade * (1 + 0.2 * fine))[..., None]
+    albedo = np.array([0.26, 0.105, 0.062]) * (tone * shade * (1 + 0.2 * fine))[..., None]
     height = 0.03 * wave + 0.03 * (1 - roof.up) + 0.002 * fine
     return {"tile_roof": linear_to_srgb(albedo), "tile_roof_n": normal_from_height(height, (tile_m, tile_m))}
 

@@ -53,7 +53,9 @@ MATERIALS: dict[str, Material] = {
     "shop_fronts": Material(rgb="shop_fronts", orm="shop_fronts_orm", tile_m=0, roughness=1.0),
     "signs": Material(rgb="signs", tile_m=0, roughness=0.5),
     "awnings": Material(rgb="awnings", tile_m=0, roughness=0.95),
-    "far_facades": Material(rgb="far_facades", orm="far_facades_orm", tile_m=0, roughness=1.0),
+    "far_facades": Material(rgb="far_facades", orm="far_facades_orm", tile_m=0),
+    "far_facades_warm": Material(rgb="far_facades", orm="far_facades_orm", tile_m=0, tint=(0.86, 0.74, 0.64)),
+    "far_facades_dark": Material(rgb="far_facades", orm="far_facades_orm", tile_m=0, tint=(0.60, 0.62, 0.66)),
     # streets
     "asphalt": Material(rgb="asphalt", normal="asphalt_n", orm="asphalt_orm", tile_m=6.0),
     "asphalt_worn": Material(rgb="asphalt_worn", normal="asphalt_worn_n", orm="asphalt_orm", tile_m=6.0),

@@ -43,7 +43,7 @@ def _stop(cell: Canvas) -> None:
     angle = np.radians(22.5 + np.arange(8) * 45)
     radius = 0.5 / np.cos(np.pi / 8) * 0.92
     cell.polygon(np.stack([0.5 + radius * np.cos(angle), 0.5 + radius * np.sin(angle)], 1), RED)
-    cell.text("STOP", 0.5, 0.5, 0.27, WHITE, weight=0.15)
+    cell.text("STOP", 0.5, 0.5, 0.235, WHITE, weight=0.15)
 
 
 def _triangle(cell: Canvas, *, down: bool) -> None:

@@ -69,7 +69,7 @@ def check_sound(parts: list[kit.Part]) -> None:
         np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1.0, atol=1e-6)
         assert part.material in MATERIALS
         assert part.label in known_labels()
-        if MATERIALS[part.material].tile_m == 0 and part.material not in ("awnings", "far_facades"):
+        if MATERIALS[part.material].tile_m == 0 and not part.material.startswith(("awnings", "far_facades")):
             assert mesh.uvs.min() >= 0
             assert mesh.uvs.max() <= 1
 
@@ -87,7 +87,7 @@ def facing(part: kit.Part) -> np.ndarray:
 def test_near_building_is_sound_and_within_budget(style: str) -> None:
     parts = a_building(style)
     check_sound(parts)
-    assert 700 <= kit.triangle_count(parts) <= 8000
+    assert 700 <= kit.triangle_count(parts) <= 8500
     assert {part.label for part in parts} == {"building"}
     assert all(facing(part).min() > 0.5 for part in parts)
 
