@@ -6,7 +6,8 @@ import shutil
 from pathlib import Path
 
 import numpy as np
-from shapely.geometry import Polygon  # type: ignore[import-untyped]
+import numpy.typing as npt
+from shapely.geometry import LineString, Polygon  # type: ignore[import-untyped]
 from shapely.ops import unary_union  # type: ignore[import-untyped]
 
 from authoring.kit.parts import Sink
@@ -16,11 +17,14 @@ from authoring.towns.bridges import build_bridge
 from authoring.towns.chunks import chunked
 from authoring.towns.collision import town_solids
 from authoring.towns.document import Document, Geom, bay_rows
-from authoring.towns.ground import lay_ground
+from authoring.towns.furniture import Furnisher
+from authoring.towns.ground import lay_ground, tactile_paving
 from authoring.towns.lanes import Lane, lane_graph, turns_of
 from authoring.towns.lots import build_lots, plan_lots
 from authoring.towns.markings import paint_streets
+from authoring.towns.props import Ground, Props
 from authoring.towns.regions import Regions, canal_polygon
+from authoring.towns.sites import SiteBuilder
 from authoring.towns.skyline import build_skyline
 from authoring.towns.walks import crosswalks, sidewalks
 
@@ -45,7 +49,7 @@ def write_town10(folder: Path) -> None:
         folder: where the file goes; meshes go to `town10/` in it.
     """
     regions, lanes = town10_regions(), town10_lanes()
-    sites = unary_union([Polygon()])
+    sites = unary_union([site.ground(regions) for site in town10.SITES])
     sink = Sink("static")
     lay_ground(sink, regions, sites)
     paint_streets(sink, regions, lambda lane: turns_of(lanes, lane))
@@ -56,6 +60,8 @@ def write_town10(folder: Path) -> None:
     build_lots(sink, lots, seed=SEED)
     build_skyline(sink, regions, lots, rng=np.random.default_rng([SEED, 2]))
 
+    props, lot_bays = _furnish(sink, regions)
+
     document = Document("town10", town10.BOUNDS)
     meshes = folder / "town10"
     shutil.rmtree(meshes, ignore_errors=True)
@@ -64,9 +70,39 @@ def write_town10(folder: Path) -> None:
         write_obj(meshes / f"{chunk.name}.obj", chunk.mesh)
         document.meshes.append(chunk.name)
         document.geoms.append(Geom(mesh=chunk.name, material=chunk.material, label=chunk.label))
-    document.solids.extend(town_solids(regions, lots))
+    for name, mesh in props.meshes.items():
+        write_obj(meshes / f"{name}.obj", mesh)
+        document.meshes.append(name)
+    document.geoms.extend(props.geoms)
+    document.bodies.extend(props.bodies)
+    document.solids.extend([*town_solids(regions, lots), *props.solids])
     document.lanes.extend(lanes.values())
     document.sidewalks.extend(sidewalks(regions, town10.BOUNDS))
     document.crosswalks.extend(crosswalks(regions))
-    document.bays.extend(bay_rows(regions.bay_groups))
+    document.bays.extend([*bay_rows(regions.bay_groups), *lot_bays])
     (folder / "town10.xml").write_text(document.text(), encoding="utf-8", newline="\n")
+
+
+def _furnish(sink: Sink, regions: Regions) -> tuple[Props, list[tuple[str, float, float, npt.NDArray[np.float64]]]]:
+    props = Props(sink)
+    views = unary_union([LineString([view[:2], view[2:]]).buffer(3.0).union(_fan(view)) for view in town10.VIEWS])
+    ground = Ground(regions.sidewalks.buffer(-0.25), tactile_paving(regions), views)
+    furnisher = Furnisher(props, regions, ground, rng=np.random.default_rng([SEED, 3]))
+    for node in regions.network.nodes:
+        furnisher.node(node)
+    for name, side, share in town10.BUS_STOPS:
+        furnisher.bus_stop(regions.network.streets[name], side, share)
+    for street in regions.network.streets.values():
+        furnisher.street(street)
+    builder = SiteBuilder(props, regions, furnisher, town10.HILL, rng=np.random.default_rng([SEED, 4]))
+    for site in town10.SITES:
+        builder.build(site)
+    return props, builder.lot_bays
+
+
+def _fan(view: tuple[float, float, float, float]) -> Polygon:
+    """From a viewpoint to both ends of a board and a little beyond."""
+    board, eye = np.array(view[:2]), np.array(view[2:])
+    toward = (board - eye) / np.linalg.norm(board - eye)
+    across = np.array([-toward[1], toward[0]]) * 6.0
+    return Polygon([eye, board + across, board + toward * 3 + across, board + toward * 3 - across, board - across])

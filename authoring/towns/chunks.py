@@ -14,7 +14,7 @@ from authoring.mesh import Mesh
 REACH = 2
 LETTERS = "abcdef"
 # How coarse a part's cells are by its triangles: few large chunks are cheaper than many small ones.
-LEVELS = ((12000, 1), (2500, 2), (0, 4))
+LEVELS = ((25000, 1), (8000, 2), (0, 4))
 # A cell with fewer triangles joins the fullest one.
 CRUMBS = 24
 
@@ -53,4 +53,3 @@ def _submesh(mesh: Mesh, faces: npt.NDArray[np.int64]) -> Mesh:
     used, renumbered = np.unique(faces, return_inverse=True)
     normals = None if mesh.normals is None else np.asarray(mesh.normals)[used]
     return Mesh(np.asarray(mesh.vertices)[used], renumbered.reshape(-1, 3), np.asarray(mesh.uvs)[used], normals)
-

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from shapely.geometry import Polygon  # type: ignore[import-untyped]
+from shapely.geometry import LineString, Polygon  # type: ignore[import-untyped]
 from shapely.geometry.polygon import orient  # type: ignore[import-untyped]
 
 from authoring.towns import bridges, solids
@@ -17,7 +17,7 @@ from authoring.towns.regions import KERB_M, Regions, polygons
 Array = npt.NDArray[np.float64]
 STRIP_M = 5.2
 BASE_M = 0.5
-REACH_M = 235.0
+REACH_M = 240.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +62,7 @@ def level_box(name: str, footprint: Polygon, top_m: float) -> Solid:
 
 def _strips(name: str, rim: Array) -> Iterator[Solid]:
     """Boxes along a kerb, the land on its left; where the rim turns away they reach into the gap."""
+    rim = np.asarray(LineString(rim).simplify(0.02).coords)
     steps = np.diff(rim, axis=0)
     lengths = np.linalg.norm(steps, axis=1)
     for index in np.flatnonzero(lengths > 0.05):
@@ -75,7 +76,7 @@ def _strips(name: str, rim: Array) -> Iterator[Solid]:
         while high - low > 0.02:
             piece = min(high - low, 60.0)
             centre = start + along * (low + piece / 2) + inward * STRIP_M / 2
-            if np.abs(centre).max() < REACH_M + 30:
+            if np.abs(centre).max() < REACH_M:
                 yield Solid(
                     f"{name}_{centre[0]:.1f}_{centre[1]:.1f}_{np.degrees(np.arctan2(along[1], along[0])):.0f}",
                     "box",

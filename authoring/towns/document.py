@@ -145,4 +145,6 @@ def _numeric(name: str, head: Sequence[float], points: npt.NDArray[np.float64]) 
 
 
 def _row(values: Iterable[float], digits: int = 3) -> str:
-    return " ".join(f"{round(float(value), digits) + 0.0:g}" if abs(value) < 1e3 else f"{value:.2f}" for value in values)
+    return " ".join(
+        f"{round(float(value), digits) + 0.0:g}" if abs(value) < 1e3 else f"{value:.2f}" for value in values
+    )

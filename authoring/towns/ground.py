@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from shapely.geometry import LineString, Polygon, box  # type: ignore[import-untyped]
 from shapely.geometry.base import BaseGeometry  # type: ignore[import-untyped]
@@ -19,8 +21,13 @@ TACTILE_DEPTH_M = 0.8
 
 def lay_ground(sink: Sink, regions: Regions, sites: BaseGeometry) -> None:
     """Lay everything level but the sites, which are somebody else's."""
-    worn = unary_union([regions.band(s.name, -s.profile.half_width_m, s.profile.half_width_m)
-                        for s in regions.network.streets.values() if s.bays_left and s.bays_right])
+    worn = unary_union(
+        [
+            regions.band(s.name, -s.profile.half_width_m, s.profile.half_width_m)
+            for s in regions.network.streets.values()
+            if s.bays_left and s.bays_right
+        ]
+    )
     roads = regions.level_roads
     solids.flat(sink, roads.difference(worn), 0.0, "asphalt", "road")
     solids.flat(sink, roads.intersection(worn), 0.0, "asphalt_worn", "road")
@@ -35,7 +42,9 @@ def lay_ground(sink: Sink, regions: Regions, sites: BaseGeometry) -> None:
     quay = regions.canal.buffer(COPING_M, join_style="mitre").difference(regions.canal)
     taken = unary_union([sites, quay])
     for interior in regions.interiors:
-        solids.flat(sink, interior.difference(taken), KERB_M, "cobbles" if interior.area < 12000 else "concrete", "ground")
+        solids.flat(
+            sink, interior.difference(taken), KERB_M, "cobbles" if interior.area < 12000 else "concrete", "ground"
+        )
     for median in regions.medians.values():
         _median(sink, median)
     _canal(sink, regions)
@@ -73,7 +82,7 @@ def _canal(sink: Sink, regions: Regions) -> None:
     rim = np.asarray(canal.exterior.coords)[:, :2]
     if canal.exterior.is_ccw:
         rim = rim[::-1]
-    for start, end in zip(rim[:-1], rim[1:], strict=True):
+    for start, end in pairwise(rim):
         if abs(end[0] - start[0]) > 20:
             edge = paths.densified(np.array([start, end]), 60.0)
             solids.wall(sink, edge, WATER_M - 0.5, KERB_M, "ashlar", "wall")
@@ -86,4 +95,3 @@ def _canal(sink: Sink, regions: Regions) -> None:
             for part in getattr(near, "geoms", [near]):
                 if part.length > 2:
                     solids.railing(sink, np.asarray(part.coords)[:, :2], KERB_M, "anthracite", "fence")
-

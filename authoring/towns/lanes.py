@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -68,7 +69,7 @@ def problems(lanes: Mapping[str, Lane], *, max_turn_deg: float = 25.0, max_gap_m
             found.append(f"{lane.name} has {len(lane.points)} points")
         if not lane.following:
             found.append(f"{lane.name} is a dead end")
-        turns = [_turn_deg(a, b) for a, b in zip(headings[:-1], headings[1:], strict=True)]
+        turns = [_turn_deg(a, b) for a, b in pairwise(headings)]
         for name in lane.following:
             other = lanes[name]
             turns.append(_turn_deg(headings[-1], _headings(other.points)[0]))
@@ -163,11 +164,12 @@ def _connect(lanes: Mapping[str, Lane], name: str, source_name: str, target_name
     )
     points = np.column_stack([middle, np.zeros(len(middle))])
     points[0], points[-1] = source.points[-1], target.points[0]
+    rounded = np.round(points, 3).astype(np.float64)
     joint = Lane(
         name=lane_name,
         width_m=min(source.width_m, target.width_m),
         speed_mps=min(source.speed_mps, target.speed_mps, 7.0),
-        points=np.round(points, 3),
+        points=rounded,
         following=(target_name,),
         junction=True,
     )

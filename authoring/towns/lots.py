@@ -15,13 +15,22 @@ from shapely.geometry.polygon import orient  # type: ignore[import-untyped]
 from authoring.kit.buildings import building
 from authoring.kit.parts import Sink, place
 from authoring.towns import paths
+from authoring.towns.lod import without_hidden_edges
 from authoring.towns.regions import KERB_M, Regions
 
 Array = npt.NDArray[np.float64]
 NEAR_M = 232.0
-TALL = ("glass_office", "concrete_office", "modern_residential")
-MIDDLE = ("brick_apartment", "plaster_apartment", "stone_classic", "modern_residential", "warehouse_loft")
-LOW = ("shop_row", "brick_apartment", "plaster_apartment", "warehouse_loft")
+# Styles by height with how often each comes: by age and purpose, and by how many triangles a town can carry.
+TALL = {"glass_office": 0.45, "concrete_office": 0.35, "modern_residential": 0.2}
+MIDDLE = {
+    "brick_apartment": 0.27,
+    "plaster_apartment": 0.2,
+    "warehouse_loft": 0.2,
+    "stone_classic": 0.12,
+    "modern_residential": 0.11,
+    "concrete_office": 0.1,
+}
+LOW = {"shop_row": 0.3, "brick_apartment": 0.25, "plaster_apartment": 0.2, "warehouse_loft": 0.25}
 STREET_M = 0.6
 
 
@@ -71,12 +80,19 @@ def build_lots(sink: Sink, lots: list[Lot], *, seed: int) -> None:
             sides=lot.sides,
             lod="near" if lot.near else "far",
         )
+        if lot.near:
+            parts = without_hidden_edges(parts, lot.width_m, lot.depth_m)
         x, y = lot.centre
         sink.extend(place(parts, x_m=x, y_m=y, z_m=KERB_M, yaw_rad=lot.yaw_rad))
 
 
 def _along(
-    line: Array, free: BaseGeometry, street: BaseGeometry, walked: BaseGeometry, taken: list[Polygon], *,
+    line: Array,
+    free: BaseGeometry,
+    street: BaseGeometry,
+    walked: BaseGeometry,
+    taken: list[Polygon],
+    *,
     rng: np.random.Generator,
 ) -> Iterator[Lot]:
     total, station = paths.length(line), 0.0
@@ -101,8 +117,14 @@ def _along(
 
 
 def _fit(
-    line: Array, station: float, total: float, width: float, depth: float,
-    free: BaseGeometry, street: BaseGeometry, taken: list[Polygon],
+    line: Array,
+    station: float,
+    total: float,
+    width: float,
+    depth: float,
+    free: BaseGeometry,
+    street: BaseGeometry,
+    taken: list[Polygon],
 ) -> tuple[Array, float] | None:
     if station + width > total:
         return None
@@ -139,7 +161,7 @@ def _designed(
     if width < 10:
         floors = min(floors, 6)
     palette = TALL if floors >= 9 else MIDDLE if floors >= 5 else LOW
-    style = str(rng.choice(palette))
+    style = str(rng.choice(list(palette), p=list(palette.values())))
     sides = ["front"]
     cos, sin = np.cos(yaw), np.sin(yaw)
     reach = {"right": (width / 2 + 2, 0.0), "back": (0.0, depth / 2 + 2), "left": (-width / 2 - 2, 0.0)}

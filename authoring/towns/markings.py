@@ -53,11 +53,12 @@ class Painter:
         sign = 1 if forward else -1
         shape = np.asarray(corners, np.float64)
         plane = point + normal * left_m + sign * (shape[:, :1] * along + shape[:, 1:] * normal)
-        x, y = np.diff(plane, axis=0)[0], plane[2] - plane[1]
+        z = self.network.height_m(self.street.name, station_m + sign * shape[:, 0]) + LIFT_M
+        points = np.column_stack([plane, z])
+        x, y = points[1] - points[0], points[2] - points[1]
         if x[0] * y[1] - x[1] * y[0] < 0:
-            plane = plane[::-1]
-        z = float(self.network.height_m(self.street.name, station_m)) + LIFT_M
-        self.sink.polygon(WHITE, np.column_stack([plane, np.full(len(plane), z)]), plane / 2.0, label=LABEL)
+            points = points[::-1]
+        self.sink.polygon(WHITE, points, points[:, :2] / 2.0, label=LABEL)
 
 
 def paint_streets(sink: Sink, regions: Regions, turns: Callable[[str], set[str]]) -> None:
@@ -118,7 +119,10 @@ def _mouth(painter: Painter, at_start: bool) -> None:
     node = painter.network.nodes[street.start if at_start else street.end or ""]
     mouth = painter.network.mouths[street.name, at_start]
     line_m = paths.length(painter.line)
-    place = (lambda metres: metres) if at_start else (lambda metres: line_m - metres)
+
+    def place(back_m: float) -> float:
+        return back_m if at_start else line_m - back_m
+
     if node.control != "yield" or len(painter.network.arms(node.name)) > 3:
         middle = place(mouth - STOP_LINE_GAP_M - CROSSING_M / 2)
         reach = profile.half_width_m - 0.5
@@ -154,7 +158,12 @@ def _arrow(painter: Painter, station_m: float, left_m: float, turns: set[str], *
     for name, side in (("left", 1.0), ("right", -1.0)):
         if name in turns:
             foot = 1.3 if "straight" in turns else 2.0
-            arm = ((foot, side * 0.08), (foot + 0.45, side * 0.65), (foot + 0.65, side * 0.55), (foot + 0.3, side * 0.08))
+            arm = (
+                (foot, side * 0.08),
+                (foot + 0.45, side * 0.65),
+                (foot + 0.65, side * 0.55),
+                (foot + 0.3, side * 0.08),
+            )
             head = ((foot + 0.0, side * 0.85), (foot + 1.05, side * 1.0), (foot + 0.95, side * 0.3))
             painter.outline(station_m, left_m, arm, forward=forward)
             painter.outline(station_m, left_m, head, forward=forward)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -42,7 +43,8 @@ def _arc(before: Array, corner: Array, after: Array, radius_m: float) -> Array:
     angles = np.linspace(0, turn, steps + 1)
     spoke = start - centre
     cos, sin = np.cos(angles), np.sin(angles)
-    return centre + np.stack([spoke[0] * cos - spoke[1] * sin, spoke[0] * sin + spoke[1] * cos], 1)
+    arc: Array = centre + np.stack([spoke[0] * cos - spoke[1] * sin, spoke[0] * sin + spoke[1] * cos], 1)
+    return arc
 
 
 def stations(line: Array) -> Array:
@@ -88,7 +90,7 @@ def offset(line: Array, left_m: float) -> Array:
 def densified(line: Array, step_m: float) -> Array:
     """A line with points no farther apart than `step_m`."""
     pieces = [line[:1]]
-    for start, end in zip(line[:-1], line[1:], strict=True):
+    for start, end in pairwise(line):
         count = max(1, int(np.ceil(np.linalg.norm(end - start) / step_m - 1e-6)))
         pieces.append(start + np.linspace(0, 1, count + 1)[1:, None] * (end - start))
     return np.concatenate(pieces)

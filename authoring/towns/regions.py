@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from shapely.geometry import LineString, MultiPolygon, Polygon, box  # type: ignore[import-untyped]
+from shapely.geometry import LineString, Polygon, box  # type: ignore[import-untyped]
 from shapely.geometry.base import BaseGeometry  # type: ignore[import-untyped]
 from shapely.ops import unary_union  # type: ignore[import-untyped]
 
@@ -166,8 +166,3 @@ def polygons(shape: BaseGeometry, *, min_area_m2: float = 0.01) -> Iterator[Poly
 def canal_polygon(line: Iterable[tuple[float, float]], half_width_m: float) -> Polygon:
     """A canal's water surface."""
     return LineString(list(line)).buffer(half_width_m, cap_style="flat", join_style="mitre")
-
-
-def as_multi(shape: BaseGeometry) -> MultiPolygon:
-    """Any shape as a multipolygon."""
-    return MultiPolygon(list(polygons(shape)))

@@ -22,8 +22,14 @@ FIELD_Z_M = -0.12
 
 def build_skyline(sink: Sink, regions: Regions, lots: list[Lot], *, rng: np.random.Generator) -> None:
     """Add far blocks wherever the outer town is empty, the fields around it and the hills behind."""
-    solids.flat(sink, box(-720, -720, 720, 720).difference(box(-OUTER_M, -OUTER_M, OUTER_M, OUTER_M)), FIELD_Z_M,
-                "grass", "terrain", cell_m=720.0)
+    solids.flat(
+        sink,
+        box(-720, -720, 720, 720).difference(box(-OUTER_M, -OUTER_M, OUTER_M, OUTER_M)),
+        FIELD_Z_M,
+        "grass",
+        "terrain",
+        cell_m=720.0,
+    )
     _hills(sink)
     taken = unary_union([regions.carriageways.buffer(9.0), regions.canal.buffer(9.0), *[lot.footprint for lot in lots]])
     shapely.prepare(taken)
@@ -42,8 +48,12 @@ def build_skyline(sink: Sink, regions: Regions, lots: list[Lot], *, rng: np.rand
                 continue
             floors = int(np.clip(3 + 15 * draw**2.2, 2, 18))
             parts = building(
-                style=style, width_m=round(float(width), 1), depth_m=round(float(depth), 1), floors=floors,
-                rng=np.random.default_rng(seed), lod="far",
+                style=style,
+                width_m=round(float(width), 1),
+                depth_m=round(float(depth), 1),
+                floors=floors,
+                rng=np.random.default_rng(seed),
+                lod="far",
             )
             sink.extend(place(parts, x_m=float(x), y_m=float(y), z_m=-0.1, yaw_rad=yaw))
 
@@ -68,4 +78,6 @@ def _hills(sink: Sink) -> None:
     a, b, c, d = (part.ravel() for part in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]))
     faces = np.concatenate([np.stack([a, d, c], 1), np.stack([a, c, b], 1)])
     vertices = grid.reshape(-1, 3)
-    sink.triangles("grass", vertices, faces, uvs=vertices[:, :2] / 40.0, normals=normals.reshape(-1, 3), label="terrain")
+    sink.triangles(
+        "grass", vertices, faces, uvs=vertices[:, :2] / 40.0, normals=normals.reshape(-1, 3), label="terrain"
+    )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import mapbox_earcut
 import numpy as np
 import numpy.typing as npt
@@ -48,9 +50,7 @@ def triangulate(polygon: Polygon) -> tuple[Array, npt.NDArray[np.int64]]:
     return points, faces[np.abs(area) > 1e-6]
 
 
-def wall(
-    sink: Sink, line: Array, low_m: npt.ArrayLike, high_m: npt.ArrayLike, material: str, label: str
-) -> None:
+def wall(sink: Sink, line: Array, low_m: npt.ArrayLike, high_m: npt.ArrayLike, material: str, label: str) -> None:
     """Add a vertical sheet along a line (N, 2), seen from the right of the line's direction."""
     low, high = (np.broadcast_to(np.asarray(z, np.float64), len(line)) for z in (low_m, high_m))
     steps = np.diff(line, axis=0)
@@ -87,20 +87,6 @@ def ribbon(sink: Sink, left: Array, right: Array, material: str, label: str) -> 
     sink.triangles(
         material, vertices, faces, uvs=vertices[:, :2] / tile_m, normals=np.concatenate([normals, normals]), label=label
     )
-
-
-def block(
-    sink: Sink, centre: npt.ArrayLike, half: npt.ArrayLike, yaw_rad: float, material: str, label: str
-) -> None:
-    """Add an upright box; UVs run in metres round its sides."""
-    cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)
-    middle, size = np.asarray(centre, np.float64), np.asarray(half, np.float64)
-    ring = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]) * size[:2]
-    ring = ring @ np.array([[cos, sin], [-sin, cos]]) + middle[:2]
-    wall(sink, ring, middle[2] - size[2], middle[2] + size[2], material, label)
-    tile_m = tile_m_of(material)
-    top = np.column_stack([ring[:4], np.full(4, middle[2] + size[2])])
-    sink.polygon(material, top, top[:, :2] / tile_m, label=label)
 
 
 def boundary_towards(land: Polygon, road: BaseGeometry, *, reach_m: float = 0.06) -> list[Array]:
@@ -162,7 +148,7 @@ def sweep(
     along = paths.stations(line)
     tile_m = tile_m_of(material)
     across = 0.0
-    for (offset_a, rise_a), (offset_b, rise_b) in zip(outline[:-1], outline[1:], strict=True):
+    for (offset_a, rise_a), (offset_b, rise_b) in pairwise(outline):
         right = np.column_stack([paths.offset(line, offset_a), z + rise_a])
         left = np.column_stack([paths.offset(line, offset_b), z + rise_b])
         step = float(np.hypot(offset_b - offset_a, rise_b - rise_a))
@@ -182,18 +168,30 @@ def sweep(
             sink.swatch_mesh(swatch, vertices, faces, both, label=label)
         else:
             uvs = np.concatenate(
-                [np.column_stack([along, np.full(count, across)]), np.column_stack([along, np.full(count, across + step)])]
+                [
+                    np.column_stack([along, np.full(count, across)]),
+                    np.column_stack([along, np.full(count, across + step)]),
+                ]
             )
             sink.triangles(material, vertices, faces, uvs=uvs / tile_m, normals=both, label=label)
         across += step
 
 
 def railing(
-    sink: Sink, line: Array, heights: npt.ArrayLike, swatch: str, label: str, *, top_m: float = 1.05, post_m: float = 2.0
+    sink: Sink,
+    line: Array,
+    heights: npt.ArrayLike,
+    swatch: str,
+    label: str,
+    *,
+    top_m: float = 1.05,
+    post_m: float = 2.0,
 ) -> None:
     """Add posts and three rails along a line."""
     dense = paths.densified(line, post_m)
-    z = np.interp(paths.stations(dense), paths.stations(line), np.broadcast_to(np.asarray(heights, np.float64), len(line)))
+    z = np.interp(
+        paths.stations(dense), paths.stations(line), np.broadcast_to(np.asarray(heights, np.float64), len(line))
+    )
     for level, half in ((top_m, 0.03), (top_m * 0.62, 0.015), (top_m * 0.25, 0.015)):
         section = [(-half, level - half), (-half, level + half), (half, level + half), (half, level - half)]
         sweep(sink, dense, z, section[::1], "palette", label, swatch=swatch)

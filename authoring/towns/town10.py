@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from authoring.towns.network import Network, Node, Profile, Street
+from authoring.towns.sites import Hill, Site
 
 BOUNDS = (-220.0, -220.0, 220.0, 220.0)
 
@@ -87,3 +88,35 @@ NETWORK = Network({node.name: node for node in _NODES}, {street.name: street for
 
 CANAL_LINE = ((-430.0, -112.0), (-200.0, -119.0), (0.0, -122.0), (200.0, -119.0), (430.0, -110.0))
 CANAL_HALF_WIDTH_M = 8.5
+
+SITES = (
+    Site(name="vacant_birch", kind="vacant", corners=((-110, -16), (-76, -16), (-76, 14), (-110, 14))),
+    Site(name="plaza", kind="plaza", corners=((8, -60), (58, -60), (58, -20), (8, -20))),
+    Site(name="lot_south", kind="parking_lot", corners=((-168, -172), (-92, -172), (-92, -136), (-168, -136))),
+    Site(name="construction", kind="construction", corners=((-90, -172), (-36, -172), (-36, -136), (-90, -136))),
+    Site(name="park", kind="park", corners=((18, -174), (190, -174), (190, -128), (18, -128))),
+    Site(name="vacant_dove", kind="vacant", corners=((104, 14), (138, 14), (138, 48), (104, 48))),
+    Site(name="vacant_curve", kind="vacant", corners=((170, 196), (202, 162), (222, 188), (194, 218))),
+    Site(name="vacant_north", kind="vacant", corners=((84, 206), (116, 206), (116, 226), (84, 226))),
+    Site(name="vacant_west", kind="vacant", corners=((-224, 2), (-203, 2), (-203, 44), (-224, 44))),
+    Site(name="vacant_east", kind="vacant", corners=((204, -6), (224, -6), (224, 34), (204, 34))),
+    Site(name="quay_garden", kind="plaza", corners=((78, -100), (118, -100), (118, -64), (78, -64))),
+)
+HILL = Hill(centre=(132.0, -149.5), radius_m=14.0, height_m=2.6)
+
+# Where a driver sees a board from: (board x, y, viewpoint x, y); no tree is planted in between.
+VIEWS = (
+    (121, 30, 66, 8),
+    (24, -40, 4, -88),
+    (99, 213, 100, 150),
+    (-212, 26, -197, -30),
+    (-116, -162, -175, -179),
+    (-121, -155, -175, -179),
+    (56, -158, 110, -177),
+    (187, 186, 126, 197),
+    (191, 177, 126, 197),
+    (189, 182, 156, 190),
+    (213, 13, 165, 12),
+    (-94, 0, -96, 58),
+)
+BUS_STOPS = (("quay_1", 1, 0.3), ("ring_n2", -1, 0.5), ("mill_2", -1, 0.5), ("avenue_2", -1, 0.6), ("ring_w1", 1, 0.5))

@@ -39,8 +39,8 @@ def sidewalks(regions: Regions, bounds: tuple[float, float, float, float]) -> It
         for part, line in enumerate(_lines(ring.intersection(room))):
             if line.length > 4.0:
                 points = np.asarray(line.simplify(0.02).coords)[:, :2]
-                for piece, start in enumerate(range(0, len(points) - 1, MAX_POINTS - 1)):
-                    plan = points[start : start + MAX_POINTS]
+                for piece, first in enumerate(range(0, len(points) - 1, MAX_POINTS - 1)):
+                    plan = points[first : first + MAX_POINTS]
                     yield Walk(
                         f"block{index}_{part}_{piece}", WIDTH_M, np.column_stack([plan, np.full(len(plan), KERB_M)])
                     )
@@ -49,7 +49,7 @@ def sidewalks(regions: Regions, bounds: tuple[float, float, float, float]) -> It
             start, end = regions.network.ramp(street.name)
             line = paths.densified(paths.cut(regions.network.lines[street.name], start, end), 2.0)
             z = regions.network.height_m(street.name, paths.stations(line) + start) + KERB_M
-            for side, sign in (("left", 1), ("right", -1)):
+            for side, sign in (("left", 1.0), ("right", -1.0)):
                 left_m = sign * (street.profile.half_width_m + BRIDGE_SIDEWALK_M - 1.35)
                 yield Walk(f"{street.name}_{side}", 1.6, np.column_stack([paths.offset(line, left_m), z]))
 

@@ -1,0 +1,46 @@
+"""Takes out of a building what nobody sees from the street: the thin edges of frames and sills high up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from authoring.kit.parts import Part
+from authoring.mesh import Mesh
+
+FROM_M = 8.5
+THIN_M = 0.11
+TOP_THIN_M = 0.35
+
+
+def without_hidden_edges(parts: Iterable[Part], width_m: float, depth_m: float) -> list[Part]:
+    """A building's parts without slivers above the second floor that face along their facade or straight up.
+
+    Args:
+        parts: in the building's own frame, its footprint centred at the origin.
+        width_m: along x.
+        depth_m: along y.
+    """
+    return [_trimmed(part, width_m, depth_m) if part.material == "palette" else part for part in parts]
+
+
+def _trimmed(part: Part, width_m: float, depth_m: float) -> Part:
+    vertices, faces = np.asarray(part.mesh.vertices), np.asarray(part.mesh.faces)
+    corners = vertices[faces]
+    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(1)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    size = np.linalg.norm(normal, axis=1)
+    thickness = size / edges
+    unit = normal / np.maximum(size, 1e-12)[:, None]
+    middle = corners.mean(1)
+    to_side = np.abs(np.abs(middle[:, 0]) - width_m / 2)
+    to_front = np.abs(np.abs(middle[:, 1]) - depth_m / 2)
+    faces_out = np.where(to_front < to_side, np.abs(unit[:, 1]), np.abs(unit[:, 0])) > 0.7
+    roof = corners[..., 2].max() - 2.5
+    high = (middle[:, 2] > FROM_M) & (middle[:, 2] < roof)
+    hidden = high & ~faces_out & ((thickness < THIN_M) | ((unit[:, 2] > 0.7) & (thickness < TOP_THIN_M)))
+    used, renumbered = np.unique(faces[~hidden], return_inverse=True)
+    normals = None if part.mesh.normals is None else np.asarray(part.mesh.normals)[used]
+    mesh = Mesh(vertices[used], renumbered.reshape(-1, 3), np.asarray(part.mesh.uvs)[used], normals)
+    return Part(part.material, part.label, mesh)
