@@ -57,6 +57,18 @@ class TestSemseg(TaskContract):
         assert [p.name for p in (tmp_path / "leftImg8bit/val").iterdir()] == ["geartown10aachen"]
         assert (tmp_path / "gtFine/val/camera_billboard_info.json").is_file()
 
+    def test_the_originals_loader_pairs_pictures_with_labels(self, tmp_path: Path) -> None:
+        # Its rule: all pictures below the split, sorted; the suffix is cut for the names of three real cities only.
+        sidecars = self.write(tmp_path)
+        images = sorted((tmp_path / "leftImg8bit/val").rglob("*.png"))
+        assert len(images) == len(sidecars)
+        for image, sidecar in zip(images, sidecars, strict=True):
+            assert any(city in image.name for city in ("aachen", "tubingen", "munster"))
+            stem = image.name.removesuffix("leftImg8bit.png")
+            label = tmp_path / "gtFine/val" / image.parent.name / f"{stem}gtFine_labelIds.png"
+            expected = self.sample(sidecar.record.index).label_ids
+            np.testing.assert_array_equal(cv2.imread(str(label), cv2.IMREAD_UNCHANGED), expected)
+
 
 def test_default_camera_is_the_papers() -> None:
     (camera,) = SemsegTask(SemsegConfig()).rig().cameras
