@@ -19,11 +19,8 @@ __all__ = [
     "Mesh",
     "bevelled_box",
     "box",
-    "catmull_clark",
     "extrude",
     "grid",
-    "loft",
-    "loop_subdivide",
     "merge",
     "revolve",
     "rotation",
@@ -143,29 +140,6 @@ def grid(points: ArrayLike, uvs: ArrayLike | None = None, wrap: bool = False) ->
     return Mesh.of(p.reshape(-1, 3), faces, np.asarray(uvs, dtype=np.float64).reshape(-1, 2))
 
 
-def loft(sections: ArrayLike, closed: bool = True, capped: bool = False) -> Mesh:
-    """Skins (S, P, 3) cross-sections of equally many points.
-
-    Args:
-        sections: each section runs counter-clockwise seen from where the last one looks back at the first.
-        closed: the last point of a section joins its first.
-        capped: closes both ends with a fan about the section's mean.
-    """
-    p = np.asarray(sections, dtype=np.float64)
-    if closed:
-        p = np.concatenate([p, p[:, :1]], axis=1)
-    sheet = grid(p).flipped()
-    if not capped:
-        return sheet
-    caps = []
-    for ring, turn in ((p[0], True), (p[-1], False)):
-        count = len(ring) - 1
-        fan = np.stack([np.full(count, count + 1), np.arange(count), np.arange(1, count + 1)], axis=1)
-        cap = Mesh.of(np.concatenate([ring, ring[:-1].mean(axis=0, keepdims=True)]), fan)
-        caps.append(cap.flipped() if turn else cap)
-    return merge([sheet, *caps])
-
-
 def revolve(profile: ArrayLike, segments: int = 32, axis: str = "z") -> Mesh:
     """Turns a (P, 2) profile of (radius, height) a full circle about an axis.
 
@@ -243,61 +217,6 @@ def bevelled_box(size: ArrayLike, bevel: float, segments: int = 2, centre: Array
         side = replace(sheet, normals=normals.reshape(-1, 3))
         sides.append(side if sign > 0 else replace(side, faces=side.faces[:, ::-1]))
     return _without_slivers(merge(sides)).translated(*np.asarray(centre, dtype=np.float64))
-
-
-def catmull_clark(vertices: ArrayLike, quads: ArrayLike, levels: int = 1) -> tuple[Floats, Ints]:
-    """Catmull-Clark subdivision of a quad cage; open borders follow the cubic B-spline of their edges.
-
-    Args:
-        vertices: (N, 3) cage points.
-        quads: (Q, 4) faces.
-        levels: how many times every quad is split in four.
-
-    Returns:
-        The finer (N', 3) points and (Q', 4) quads; split quads along a diagonal with `quads[:, [0, 1, 2, 0, 2, 3]]`.
-    """
-    v, q = np.asarray(vertices, dtype=np.float64), np.asarray(quads, dtype=np.int64)
-    for _ in range(levels):
-        count = len(v)
-        face_points = v[q].mean(axis=1)
-        half_edges = np.stack([q, np.roll(q, -1, axis=1)], axis=-1).reshape(-1, 2)
-        edges, inverse, uses = np.unique(np.sort(half_edges, axis=1), axis=0, return_inverse=True, return_counts=True)
-        inverse = inverse.reshape(-1)
-        middle = v[edges].mean(axis=1)
-        face_sum = np.zeros_like(middle)
-        np.add.at(face_sum, inverse, np.repeat(face_points, 4, axis=0))
-        border = uses == 1
-        edge_points = np.where(border[:, None], middle, (middle * 2 + face_sum) / 4)
-
-        valence, face_mean, edge_mean = np.zeros(count), np.zeros_like(v), np.zeros_like(v)
-        np.add.at(valence, q.reshape(-1), 1.0)
-        np.add.at(face_mean, q.reshape(-1), np.repeat(face_points, 4, axis=0))
-        degree = np.zeros(count)
-        for end in (0, 1):
-            np.add.at(edge_mean, edges[:, end], middle)
-            np.add.at(degree, edges[:, end], 1.0)
-        n = np.maximum(valence, 1.0)[:, None]
-        moved = (face_mean / n + 2 * edge_mean / np.maximum(degree, 1.0)[:, None] + (n - 3) * v) / n
-        border_sum, on_border = np.zeros_like(v), np.zeros(count, dtype=bool)
-        for end in (0, 1):
-            np.add.at(border_sum, edges[border][:, end], middle[border])
-            on_border[edges[border][:, end]] = True
-        moved[on_border] = (2 * v + border_sum)[on_border] / 4
-
-        edge_id = (count + len(q) + inverse).reshape(-1, 4)
-        face_id = count + np.arange(len(q))
-        q = np.stack([np.stack([q[:, k], edge_id[:, k], face_id, edge_id[:, k - 1]], -1) for k in range(4)], 1)
-        q = q.reshape(-1, 4)
-        v = np.concatenate([moved, face_points, edge_points])
-    return v, q
-
-
-def loop_subdivide(mesh: Mesh, levels: int = 1) -> Mesh:
-    """Loop subdivision of a closed or open triangle mesh; texture coordinates and normals are dropped."""
-    vertices, faces = trimesh.remesh.subdivide_loop(  # type: ignore[no-untyped-call]
-        mesh.vertices, mesh.faces, iterations=levels
-    )
-    return Mesh.of(vertices, faces)
 
 
 def smooth_normals(mesh: Mesh, crease_deg: float = 40.0) -> Mesh:

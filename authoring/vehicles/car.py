@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from authoring.mesh import Floats, Mesh, merge
+from authoring.mesh import Floats, Mesh
 from authoring.vehicles.atlas import DETAILS, LAMPS, cell_uvs, flat
+from authoring.vehicles.parts import Parts
 from authoring.vehicles.patches import arch_flare, through
 from authoring.vehicles.shapes import Shape, disc, rounded
 from authoring.vehicles.sheet import Field, Sheet
 from authoring.vehicles.shell import Level, Shell, make_shell
 from authoring.vehicles.wheels import WheelSpec, make_wheel
 
-__all__ = ["CarSpec", "Parts", "Points", "Stamp", "build_car", "surface_point"]
+__all__ = ["CarSpec", "Points", "Stamp", "build_car"]
 
 Points = tuple[tuple[float, float], ...]
 
@@ -44,7 +45,29 @@ class Stamp:
 
 @dataclass(frozen=True)
 class CarSpec:
-    """What makes one car different from another; metres, x forward from the middle of its length."""
+    """What makes one car different from another; metres, x forward from the middle of its length.
+
+    Attributes:
+        name, kind, palette: the file's stem, its `actor.kind`, a key of `finish.PALETTES`.
+        shown: which colour of the palette the file itself has.
+        plan, foot, rim, crown, levels, reach: of the body's shell, as `make_shell` takes them.
+        cabin_plan, cabin_foot, cabin_rim, cabin_crown, cabin_levels, cabin_reach: of the greenhouse's.
+        rise: length of the cabin's slope; window heights below are shares of it.
+        axles, wheel, track: x of each axle, the wheels, distance between their middles.
+        arch, flare, cladding: gap round a tyre, how far the wing swells there, width of the black lip about it.
+        sill_z: below it the body is black plastic.
+        stamps: lamps, grilles, liveries.
+        pillar: half the windscreen pillars' width.
+        screen_v, side_v: lower and upper edge of windscreen and side windows.
+        side_glass: gaps between the side windows and the cabin's front and rear corners.
+        rear_glass: gap to the rear corner, lower and upper edge.
+        glass_posts: (x, width) of dark posts across the side windows.
+        blind_sides: the stretch in x without windows.
+        lines_side, lines_top, lines_front, lines_rear: shut lines, as `PaintMap` takes them.
+        handles: (x, z) of door handles. rails: front x, rear x and y of roof rails. mirror: size of a mirror.
+        plates, badges: z at front and rear; `plate_stand_off` is how far plates stand before the body.
+        bed: rear x, front x and half width of a pick-up's bed.
+    """
 
     name: str
     plan: Points
@@ -89,44 +112,6 @@ class CarSpec:
     rails: tuple[float, float, float] | None = None
     mirror: tuple[float, float, float] = (0.11, 0.20, 0.14)
     bed: tuple[float, float, float] | None = None
-
-
-@dataclass
-class Parts:
-    """Meshes by material, in the vehicle's frame."""
-
-    meshes: dict[str, list[Mesh]] = field(default_factory=dict)
-
-    def add(self, name: str, mesh: Mesh, both_sides: bool = False) -> None:
-        """Adds a mesh; `both_sides` adds its mirror image across y = 0 as well."""
-        if len(mesh.faces) == 0:
-            return
-        self.meshes.setdefault(name, []).append(mesh)
-        if both_sides:
-            self.meshes[name].append(mesh.scaled(1, -1, 1))
-
-    def merged(self) -> dict[str, Mesh]:
-        """One mesh a material; paint runs smoothly from patch to patch."""
-        return {
-            name: _blended(merge(pieces)) if name == "paint" else merge(pieces) for name, pieces in self.meshes.items()
-        }
-
-
-def _blended(mesh: Mesh, crease_deg: float = 55.0) -> Mesh:
-    """Averages the normals of vertices at one place that differ by less than the crease angle."""
-    assert mesh.normals is not None
-    _, place = np.unique(np.floor(mesh.vertices * 5e3 + 0.5).astype(np.int64), axis=0, return_inverse=True)
-    place = place.reshape(-1)
-    order = np.argsort(place, kind="stable")
-    starts = np.flatnonzero(np.r_[True, np.diff(place[order]) != 0])
-    normals = mesh.normals.copy()
-    for members in np.split(order, starts[1:]):
-        if len(members) > 1:
-            around = mesh.normals[members]
-            close = around @ around.T >= np.cos(np.radians(crease_deg))
-            mean = close.astype(np.float64) @ around
-            normals[members] = mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-12)
-    return Mesh(mesh.vertices, mesh.faces, mesh.uvs, normals)
 
 
 def build_car(spec: CarSpec) -> tuple[Parts, Shell, Shell]:
@@ -307,15 +292,3 @@ def _wheels(spec: CarSpec, parts: Parts) -> None:
         parts.add("tyre", wheel.tyre.translated(*at), both_sides=True)
         parts.add("rim", wheel.rim.translated(*at), both_sides=True)
         parts.add("trim", flat(wheel.drum.translated(*at), DETAILS["gloss"]), both_sides=True)
-
-
-def surface_point(sheet: Sheet, x: float, z: float) -> tuple[Floats, Floats]:
-    """The outermost point of a left half sheet at (x, z), and its normal, each (3,)."""
-    u, v = np.meshgrid(np.linspace(0, 1, 241), np.linspace(0, 1, 81), indexing="ij")
-    params = np.stack([u.reshape(-1), v.reshape(-1)], axis=1)
-    points = sheet.patch.evaluate(params)
-    best = np.hypot(points[:, 0] - x, points[:, 2] - z).argsort()[:6]
-    chosen = best[points[best, 1].argmax()]
-    point = points[chosen].copy()
-    point[[0, 2]] = x, z
-    return point, sheet.patch.normals(params[chosen : chosen + 1])[0]

@@ -9,8 +9,8 @@ import numpy as np
 
 from authoring.mesh import Floats, Mesh, box
 from authoring.vehicles.atlas import DETAILS, flat, write_atlases
-from authoring.vehicles.car import CarSpec, Parts, build_car
-from authoring.vehicles.cars import CITY, ESTATE, HATCHBACK, SALOON, SPORTS, SUV
+from authoring.vehicles.car import CarSpec, build_car
+from authoring.vehicles.cars import ESTATE, SALOON, SPORTS
 from authoring.vehicles.finish import Box, Finish, PaintMap, write_vehicle
 from authoring.vehicles.fittings import (
     add_antenna,
@@ -25,9 +25,12 @@ from authoring.vehicles.fittings import (
     add_wipers,
     panel,
 )
+from authoring.vehicles.hatchbacks import CITY, HATCHBACK, SUV
+from authoring.vehicles.heavy import BUS
+from authoring.vehicles.parts import Parts
 from authoring.vehicles.shell import Shell
 from authoring.vehicles.trucks import write_box_truck, write_flatbed
-from authoring.vehicles.vans import AMBULANCE, BUS, PICKUP, POLICE, TAXI, VAN
+from authoring.vehicles.vans import AMBULANCE, PICKUP, POLICE, TAXI, VAN
 
 __all__ = ["CATALOGUE", "write"]
 

@@ -6,9 +6,9 @@ import numpy as np
 
 from authoring.mesh import Mesh, bevelled_box, box, extrude, grid, revolve, rotation
 from authoring.vehicles.atlas import DETAILS, LAMPS, cell_uvs, flat
-from authoring.vehicles.car import Parts, surface_point
+from authoring.vehicles.parts import Parts
 from authoring.vehicles.sheet import Sheet
-from authoring.vehicles.shell import Shell
+from authoring.vehicles.shell import Shell, surface_point
 
 __all__ = [
     "add_antenna",

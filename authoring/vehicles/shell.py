@@ -12,7 +12,7 @@ from authoring.mesh import Floats, Mesh, grid
 from authoring.vehicles.patches import Deform, Patch, belt, cap
 from authoring.vehicles.sheet import Sheet, lattice
 
-__all__ = ["Level", "Shell", "make_shell"]
+__all__ = ["Level", "Shell", "make_shell", "surface_point"]
 
 Line = Callable[[Floats], Floats]
 
@@ -140,3 +140,15 @@ def _up_lines(patch: Patch, count: int) -> Floats:
 def _fade(t: Floats) -> Floats:
     t = np.clip(t, 0, 1)
     return np.asarray(t * t * (3 - 2 * t), dtype=np.float64)
+
+
+def surface_point(sheet: Sheet, x: float, z: float) -> tuple[Floats, Floats]:
+    """The outermost point of a left half sheet at (x, z), and its normal, each (3,)."""
+    u, v = np.meshgrid(np.linspace(0, 1, 241), np.linspace(0, 1, 81), indexing="ij")
+    params = np.stack([u.reshape(-1), v.reshape(-1)], axis=1)
+    points = sheet.patch.evaluate(params)
+    best = np.hypot(points[:, 0] - x, points[:, 2] - z).argsort()[:6]
+    chosen = best[points[best, 1].argmax()]
+    point = points[chosen].copy()
+    point[[0, 2]] = x, z
+    return point, sheet.patch.normals(params[chosen : chosen + 1])[0]

@@ -9,10 +9,11 @@ from PIL import Image
 
 from authoring.mesh import Mesh, bevelled_box, box, merge, revolve, write_obj
 from authoring.vehicles.atlas import DETAILS, LAMPS, flat
-from authoring.vehicles.car import Parts, build_car
+from authoring.vehicles.car import build_car
 from authoring.vehicles.finish import Box, Finish, PaintMap, write_vehicle
 from authoring.vehicles.fittings import add_handles, add_mirrors, add_plate, add_wipers, panel
-from authoring.vehicles.vans import CAB
+from authoring.vehicles.heavy import CAB
+from authoring.vehicles.parts import Parts
 from authoring.vehicles.wheels import WheelSpec, make_wheel
 
 __all__ = ["FACE_SIZE_M", "write_box_truck", "write_flatbed"]
