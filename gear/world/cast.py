@@ -44,7 +44,7 @@ class Cast:
         free: what is left of the pool.
         leads: bodies of the ego car and the carrier.
         ways: lanes that the ego car must take, from where it starts, by its body.
-        way_m: length of its way to where it would have stood, 0 where it only stands.
+        way_m: length of its way to the end of its limits, 0 where it only stands or has none.
     """
 
     drafts: dict[str, Draft]
@@ -99,7 +99,7 @@ class Crowd:
         regions: dict[str, Region] = {}
         for name, limits in self._limits():
             low, high = limits.count
-            wanted[name] = int(derive_rng(seed, name, "count", sequence).integers(low, high + 1))
+            wanted[name] = int(derive_rng(seed, self.scene_name, name, "count", sequence).integers(low, high + 1))
             regions[name] = region_of(limits, self.scene.boards, (ego.x_m, ego.y_m))
         for attempt in range(ROUNDS):
             fresh = self._draw_vehicles(cast, regions["npc_vehicles"], wanted["npc_vehicles"], seed, sequence, attempt)
@@ -126,7 +126,7 @@ class Crowd:
         bays = self.spawner.bays_inside(region)
         added: list[str] = []
         for number in range(wanted - cast.count(people=False)):
-            rng = derive_rng(seed, "npc_vehicles", sequence, attempt, number)
+            rng = derive_rng(seed, self.scene_name, "npc_vehicles", sequence, attempt, number)
             parks = rng.random() < self.scene.npc_vehicles.parked_share
             for _ in range(TRIES):
                 kind = cast.free.draw(self.types, rng, people=False)
@@ -153,7 +153,7 @@ class Crowd:
         if not len(pieces):
             return added
         for number in range(wanted - cast.count(people=True)):
-            rng = derive_rng(seed, "pedestrians", sequence, attempt, number)
+            rng = derive_rng(seed, self.scene_name, "pedestrians", sequence, attempt, number)
             for _ in range(TRIES):
                 kind = cast.free.draw(self.types, rng, people=True)
                 if kind is None:

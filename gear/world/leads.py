@@ -29,8 +29,9 @@ from gear.world.surfaces import Face
 from gear.world.view_limits import FaceInWorld, Verdict, ViewLimits, reference_camera
 
 LEAD_TRIES = 60
-LONGEST_WAY_M = 60.0
-"""A driving ego car starts at most this far before the place that it comes to."""
+LONGEST_WAY_M = 40.0
+USUAL_MPS = 5.0
+"""A driving ego car starts at most so far before its limits, and no further than it comes at this speed."""
 
 CORRIDOR_M = 1.3
 """Half the width of the strip between the ego car and its truck that others keep out of."""
@@ -63,8 +64,8 @@ class Leads:
 
         Args:
             seed, sequence: what the draws derive from.
-            duration_s: how long they will drive. The ego car then starts so far up the road that it comes to where it
-                would have stood, and has the boards in view from there already.
+            duration_s: how long they will drive. The ego car then starts where its limits begin or before, has the
+                boards in view from there already, and drives to where they end.
 
         Raises:
             PlacementError: no place keeps the limits; says which is too tight.
@@ -72,9 +73,9 @@ class Leads:
         problems: Counter[str] = Counter()
         for attempt in range(LEAD_TRIES):
             cast = self.fresh_cast()
-            # Each failure halves the way to drive, so that the last tries start where the board is surely in view.
-            way_s = duration_s * 0.5 ** (attempt // 6)
-            problem = self._place(cast, derive_rng(seed, "ego", sequence, attempt), way_s)
+            # Failures bring the start nearer to the limits, so that the last tries begin where the board is in view.
+            before_s = duration_s * 0.5 ** (attempt // 6)
+            problem = self._place(cast, derive_rng(seed, self.scene_name, "ego", sequence, attempt), before_s)
             if problem is None:
                 return cast
             problems[problem] += 1
@@ -138,11 +139,11 @@ class Leads:
             return "widen truck.gap_m"
         return "widen ego.ahead_m or ego.lateral_m" if self.scene.boards else "the town's lanes are blocked"
 
-    def _place(self, cast: Cast, rng: np.random.Generator, duration_s: float) -> str | None:
+    def _place(self, cast: Cast, rng: np.random.Generator, before_s: float) -> str | None:
         if self.scene.truck is not None:
             drafts = self._draw_behind_truck(cast, rng)
         else:
-            drafts = self._draw_alone(cast, rng, duration_s)
+            drafts = self._draw_alone(cast, rng, before_s)
         if isinstance(drafts, str):
             return drafts
         problem = self.enter(cast, drafts)
@@ -151,19 +152,34 @@ class Leads:
         verdict = self.judge(cast)
         return None if verdict == "seen" else f"with a face {verdict}"
 
-    def _draw_alone(self, cast: Cast, rng: np.random.Generator, duration_s: float) -> list[Draft] | str:
+    def _draw_alone(self, cast: Cast, rng: np.random.Generator, before_s: float) -> list[Draft] | str:
         lane, s_m = self.spawner.lane_table.draw(self.places, rng)
         lanes: tuple[str, ...] = (lane,)
-        if self.scene.boards and duration_s > 0:
-            speed_mps = self.spawner.lanes.lanes[lane].speed_mps
-            cast.way_m = float(rng.uniform(0.4, 0.8)) * min(LONGEST_WAY_M, speed_mps * duration_s)
-            way = back_up(self.spawner.lanes, lane, s_m, cast.way_m, rng)
+        if self.scene.boards and before_s > 0:
+            first_m, last_m = self._run(lane, s_m)
+            s_m = first_m + float(rng.uniform(0.0, 0.15)) * (last_m - first_m)
+            before_m = float(rng.uniform(0.4, 0.8)) * min(LONGEST_WAY_M, before_s * USUAL_MPS)
+            cast.way_m = before_m + last_m - s_m
+            way = back_up(self.spawner.lanes, lane, s_m, before_m, rng)
             if way is None:
                 return "before the start of the road"
             lanes, s_m = way
         ego = self.ego_on(cast, lanes[0], s_m, rng)
         cast.ways[ego.body] = lanes
         return [ego]
+
+    def _run(self, lane: str, s_m: float) -> tuple[float, float]:
+        """From where to where along a lane, around a place on it, the ego car may be without a gap."""
+        table = self.spawner.lane_table
+        pieces = np.array([piece for piece in self.places if table.names[piece] == lane])
+        here = int(pieces[np.argmin(np.abs(table.s_m[pieces] - s_m))])
+        inside = set(pieces.tolist())
+        first = last = here
+        while first - 1 in inside:
+            first -= 1
+        while last + 1 in inside:
+            last += 1
+        return float(table.s_m[first]), float(table.s_m[last])
 
     def ego_on(self, cast: Cast, lane: str, s_m: float, rng: np.random.Generator) -> Draft:
         """The ego car on a lane."""

@@ -130,14 +130,18 @@ class Director:
 
     def _driver(self, cast: Cast, draft: Draft, seed: int, sequence: int, duration_s: float) -> Driver:
         lane = self._lanes.lanes[draft.lane]
-        cruise_mps = lane.speed_mps * float(derive_rng(seed, "cruise", sequence, draft.body).uniform(0.6, 1.0))
+        cruise_mps = lane.speed_mps * float(
+            derive_rng(seed, self._scene_name, "cruise", sequence, draft.body).uniform(0.6, 1.0)
+        )
         if draft.role == "ego" and cast.way_m > 0:
             cruise_mps = min(lane.speed_mps, max(SLOWEST_MPS, cast.way_m / duration_s))
         elif draft.kind.facts.kind == "bicycle":
             cruise_mps = min(cruise_mps, CYCLING_MPS)
         way = cast.ways.get(draft.body, (draft.lane,))
         # The ego car and its truck turn the same way at every junction, because they draw the same numbers.
-        turns = derive_rng(seed, "route", sequence, "leads" if draft.body in cast.leads else draft.body)
+        turns = derive_rng(
+            seed, self._scene_name, "route", sequence, "leads" if draft.body in cast.leads else draft.body
+        )
         spent_m = sum(self._lanes.lanes[name].line.length_m for name in way[:-1])
         length_m = draft.s_m + lane.speed_mps * duration_s + ROOM_M - spent_m
         lanes = (*way[:-1], *drive_on(self._lanes, way[-1], max(1.0, length_m), turns))

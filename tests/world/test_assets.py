@@ -1,0 +1,109 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from gear.testing.tiny_town import CLEAR, TINY_TOWN, tiny_scenes
+from gear.values.errors import TownError, UnknownNameError
+from gear.world.assets import AssetLibrary, read_actor_facts
+from gear.world.pool import plan_pool
+from gear.world.scene_spec import NpcLimits, SceneSpec, VehicleLimits
+from gear.world.world import World
+
+
+def actor(folder: Path, custom: str) -> Path:
+    path = folder / "thing.xml"
+    path.write_text(f"<mujoco><custom>{custom}</custom></mujoco>")
+    return path
+
+
+def test_facts_are_read_without_compiling() -> None:
+    library = AssetLibrary.for_town(TINY_TOWN)
+    assert library.town_name == "tiny"
+    assert list(library.vehicles) == ["bicycle_rider", "car_saloon", "truck_box", "van_small"]
+    walker = library.pedestrians["adult_walk"]
+    assert (walker.kind, walker.gait) == ("person", "walk")
+    car = library.vehicles["car_saloon"]
+    assert car.palette[0] == ((0.6, 0.6, 0.6), 3.0)
+    assert car.label.kitti_type == "Car"
+    assert car.weight > library.vehicles["truck_box"].weight > 0
+
+
+def test_a_town_by_name_uses_the_assets_of_gear() -> None:
+    library = AssetLibrary.for_town("town10")
+    assert library.path("vehicle", "car_saloon").is_file()
+    with pytest.raises(UnknownNameError, match="did you mean car_saloon"):
+        library.path("vehicle", "car_salon")
+
+
+def test_a_town_elsewhere_without_assets_of_its_own_uses_those_of_gear(tmp_path: Path) -> None:
+    town = tmp_path / "mine.xml"
+    town.write_text("<mujoco/>")
+    assert AssetLibrary.for_town(town).folder("vehicle").parent.name == "mjcf"
+    with pytest.raises(UnknownNameError, match="path of a MJCF"):
+        AssetLibrary.for_town(tmp_path / "other.xml")
+
+
+@pytest.mark.parametrize(
+    ("custom", "told"),
+    [
+        ("", "actor.kind must be one of car,"),
+        ('<text name="actor.kind" data="tank"/>', "got 'tank'"),
+        ('<text name="actor.kind" data="person"/><text name="actor.pose" data="sit"/>', "actor.pose must be walk"),
+        ('<text name="actor.kind" data="car"/><numeric name="paint.palette" data="1 1 1"/>', "groups of four"),
+        ('<text name="actor.kind" data="car"/><numeric name="paint.palette" data="1 1 x 1"/>', "must be numbers"),
+        ('<text name="actor.kind" data="car"/><numeric name="actor.weight" data="-1"/>', "not negative, got '-1'"),
+        ("<text", "cannot be read as MJCF"),
+    ],
+)
+def test_actors_that_break_the_rules_are_refused(tmp_path: Path, custom: str, told: str) -> None:
+    with pytest.raises(TownError, match=told):
+        read_actor_facts(actor(tmp_path, custom))
+
+
+def test_a_person_does_not_park_among_vehicles(tmp_path: Path) -> None:
+    (tmp_path / "towns").mkdir()
+    (tmp_path / "vehicles").mkdir()
+    (tmp_path / "towns" / "t.xml").write_text("<mujoco/>")
+    actor(tmp_path / "vehicles", '<text name="actor.kind" data="person"/>')
+    with pytest.raises(TownError, match="a person does not belong into vehicles"):
+        _ = AssetLibrary.for_town(tmp_path / "towns" / "t.xml").vehicles
+
+
+def test_the_pool_is_enough_for_the_largest_crowd() -> None:
+    library = AssetLibrary.for_town(TINY_TOWN)
+    scene = SceneSpec(npc_vehicles=VehicleLimits(count=(0, 9)), pedestrians=NpcLimits(count=(0, 30)))
+    pool = plan_pool(scene, library)
+    assert pool[0] == (library.vehicles["car_saloon"], 1)
+    assert sum(count for facts, count in pool[1:] if facts.kind != "person") >= 9
+    assert sum(count for facts, count in pool if facts.kind == "person") >= 30
+    nobody = SceneSpec(npc_vehicles=VehicleLimits(count=(0, 0)), pedestrians=NpcLimits(count=(0, 0)))
+    assert plan_pool(nobody, library) == [(library.vehicles["car_saloon"], 1)]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('xyaxes="0 1 0 0 0 -1"', 'xyaxes="-1 0 0 0 0 -1"', "must be flat"),
+        ('pos="0 0 2.6" xyaxes', 'pos="0 0 2" xyaxes', "in its middle"),
+        ('name="surface"', 'name="front"', "a site `surface`"),
+        ('class="billboard.face" type', 'class="billboard.back" type', "has 0"),
+        ('name="back" class="billboard.back"', 'name="back" class="billboard.face"', "has 2"),
+        ('<body name="billboard">', '<body name="billboard" euler="0 0 90">', r"along its \+x axis"),
+    ],
+)
+def test_a_board_must_keep_the_conventions(tmp_path: Path, old: str, new: str, told: str) -> None:
+    for folder in ("vehicles", "pedestrians"):
+        (tmp_path / folder).symlink_to(TINY_TOWN.parents[1] / folder)
+    text = (TINY_TOWN.parents[1] / "surfaces" / "billboard.xml").read_text()
+    assert old in text
+    for folder, name, content in (
+        ("surfaces", "billboard.xml", text.replace(old, new)),
+        ("towns", "tiny.xml", TINY_TOWN.read_text()),
+    ):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / name).write_text(content)
+    town = tmp_path / "towns" / "tiny.xml"
+    with pytest.raises(TownError, match=told):
+        World.build(town=town, scene_name="board", scene=tiny_scenes().scenes["board"], weather=CLEAR)
