@@ -59,7 +59,7 @@ def guard_rail(length_m: float) -> list[Part]:
     for (y0, z0), (y1, z1) in itertools.pairwise(outline):
         front = [(-half, y0, z0), (half, y0, z0), (half, y1, z1), (-half, y1, z1)]
         sink.swatch_quad("galvanised", front)
-        sink.swatch_quad("galvanised", [(x, y + 0.006, z) for x, y, z in front[::-1]])
+        sink.swatch_quad("galvanised", [front[0], front[3], front[2], front[1]])
     for x in _posts(length_m, 2.0):
         sink.swatch_box("galvanised", (x - 0.05, 0.02, 0), (x + 0.05, 0.14, 0.78), skip="z")
     return sink.parts()
@@ -98,8 +98,7 @@ def jersey_barrier(length_m: float) -> list[Part]:
     for sign in (-1, 1):
         end = [(sign * half, sign * y, z) for y, z in outline]
         for a, b, c, d in ((0, 1, 6, 7), (1, 2, 5, 6), (2, 3, 4, 5)):
-            quad = [end[d], end[c], end[b], end[a]]
-            sink.quad("concrete", quad[::-1] if sign < 0 else [end[a], end[d], end[c], end[b]][::1], tile_m=4.0)
+            sink.quad("concrete", [end[a], end[d], end[c], end[b]], tile_m=4.0)
     return sink.parts()
 
 
@@ -142,7 +141,7 @@ def _mesh(sink: Sink, length_m: float, height_m: float) -> None:
             side = np.array([-(high - low)[2], 0.0, (high - low)[0]])
             side *= rod / np.linalg.norm(side)
             sink.swatch_quad("galvanised", [low - side, high - side, high + side, low + side])
-            sink.swatch_quad("galvanised", [low + side, high + side, high - side, low - side])
+            sink.swatch_quad("galvanised", [low - side, low + side, high + side, high - side])
 
 
 def _boards(sink: Sink, length_m: float, height_m: float) -> None:

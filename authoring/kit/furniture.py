@@ -16,7 +16,7 @@ def bin_(*, style: str = "post") -> list[Part]:
     if style == "post":
         cylinder(sink, "galvanised", (0, 0.2, 0), 0.03, 1.05, segments=8)
         cylinder(sink, "plastic_green", (0, 0, 0.35), 0.17, 0.55, top_radius_m=0.2, segments=16, cap=False)
-        disc(sink, "rubber", (0, 0, 0.82), 0.195, segments=16)
+        disc(sink, "rubber", (0, 0, 0.895), 0.198, segments=16)
         tube(
             sink,
             "plastic_green",
@@ -26,7 +26,7 @@ def bin_(*, style: str = "post") -> list[Part]:
         )
     elif style == "steel":
         cylinder(sink, "anthracite", (0, 0, 0), 0.24, 0.06, segments=20, cap=False)
-        cylinder(sink, "steel", (0, 0, 0.06), 0.26, 0.74, segments=20, cap=False)
+        cylinder(sink, "steel", (0, 0, 0.06), 0.26, 0.74, segments=20)
         cylinder(sink, "rubber", (0, 0, 0.8), 0.22, 0.12, segments=20, cap=False)
         cylinder(sink, "anthracite", (0, 0, 0.92), 0.28, 0.05, segments=20)
         dome(sink, "anthracite", (0, 0, 0.97), 0.27, 0.1, segments=20, rings=3)

@@ -15,6 +15,7 @@ FLOOR_M = 3.7
 LOBBY_M = 5.2
 PANE_M = 1.5
 PANES_PER_TILE = 8
+CORNER_M = 1.3
 FLOORS_PER_TILE = 4
 
 
@@ -74,7 +75,10 @@ def _lobby(facade: Facade, frame: str, *, main: bool) -> None:
     pitch = width / count
     holes = []
     for index in range(count):
-        hole = Opening(index * pitch + 0.35, 0.0, (index + 1) * pitch - 0.35, LOBBY_M - 0.6)
+        # Two deep recesses must not meet behind the corner's pier.
+        left = CORNER_M if index == 0 else 0.35
+        right = CORNER_M if index == count - 1 else 0.35
+        hole = Opening(index * pitch + left, 0.0, (index + 1) * pitch - right, LOBBY_M - 0.6)
         facade.reveal("limestone", hole, 1.1, skip="s")
         holes.append(hole)
         if main and index == count // 2:

@@ -90,10 +90,10 @@ def cafe(rng: np.random.Generator, *, parasol: bool = True) -> list[Part]:
             p = (radius * np.cos(a), radius * np.sin(a), 2.15)
             q = (radius * np.cos(b), radius * np.sin(b), 2.15)
             sink.swatch_quad(canvas, [p, q, tip])
-            sink.swatch_quad(canvas, [q, p, (0.0, 0.0, 2.58)])
+            sink.swatch_quad(canvas, [q, p, tip])
             low_p, low_q = (p[0], p[1], 1.97), (q[0], q[1], 1.97)
             sink.swatch_quad(canvas, [low_p, low_q, q, p])
-            sink.swatch_quad(canvas, [low_q, low_p, p, q])
+            sink.swatch_quad(canvas, [low_p, p, q, low_q])
     return sink.parts()
 
 
@@ -121,7 +121,8 @@ def power_pole(height_m: float = 8.5) -> list[Part]:
         sink.swatch_box("weathered_wood", (-1.1, -0.17, z), (1.1, -0.08, z + 0.11))
         for x in (-1.0, -0.5, 0.5, 1.0):
             cylinder(sink, "brown_paint", (x, -0.125, z + 0.11), 0.035, 0.13, top_radius_m=0.025, segments=8)
-    cylinder(sink, "galvanised", (0, 0.38, height_m - 3.0), 0.24, 0.85, segments=14)
+    drum = [(0, 0.38, height_m - 3.0), (0, 0.38, height_m - 2.15)]
+    tube(sink, "galvanised", drum, 0.24, segments=14, caps=True)
     disc(sink, "anthracite", (0, 0.38, height_m - 2.14), 0.2, segments=14)
     sink.swatch_box("galvanised", (-0.08, 0.1, height_m - 2.5), (0.08, 0.2, height_m - 2.35))
     return sink.parts()
@@ -143,8 +144,9 @@ def _chair(sink: Sink, x: float, y: float, angle: float) -> None:
     out, side = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
     centre = np.array([x, y])
     corners = [centre + out * a * 0.2 + side * b * 0.2 for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    for z, order in ((0.46, 1), (0.44, -1)):
-        sink.swatch_quad("oak", [(*p, z) for p in corners][::order])
+    seat = [(*p, 0.46) for p in corners]
+    sink.swatch_quad("oak", seat)
+    sink.swatch_quad("oak", [seat[0], seat[3], seat[2], seat[1]])
     for corner in corners:
         tube(sink, "anthracite", [(*corner, 0), (*corner, 0.45)], 0.012, segments=4)
     back = [centre + out * 0.21 + side * b * 0.2 for b in (-1, 1)]
@@ -153,4 +155,4 @@ def _chair(sink: Sink, x: float, y: float, angle: float) -> None:
     low, high = [(*b, 0.62) for b in back], [(*(b + out * 0.05), 0.82) for b in back]
     panel = [low[0], low[1], high[1], high[0]]
     sink.swatch_quad("oak", panel)
-    sink.swatch_quad("oak", panel[::-1])
+    sink.swatch_quad("oak", [panel[0], panel[3], panel[2], panel[1]])

@@ -45,12 +45,12 @@ def hedge(length_m: float, height_m: float, depth_m: float, rng: np.random.Gener
     points[..., 1:] = outline
     points[:, 1:-1] += rng.uniform(-0.05, 0.05, points[:, 1:-1].shape)
     _sheet(sink, "foliage_dark", points)
-    for end, order in ((points[0], -1), (points[-1], 1)):
-        ring = end[::order]
-        tile_m = MATERIALS["foliage_dark"].tile_m
-        normal = np.tile([float(order), 0.0, 0.0], (len(ring), 1))
+    tile_m = MATERIALS["foliage_dark"].tile_m
+    for end, towards in ((points[0], -1.0), (points[-1], 1.0)):
+        ring = end if towards < 0 else end[::-1]
+        normals = np.tile([towards, 0.0, 0.0], (len(ring), 1))
         faces = [(0, i, i + 1) for i in range(1, len(ring) - 1)]
-        sink.triangles("foliage_dark", ring, faces, uvs=ring[:, 1:] / tile_m, normals=normal)
+        sink.triangles("foliage_dark", ring, faces, uvs=ring[:, 1:] / tile_m, normals=normals)
     _hedge_leaves(sink, length_m, height_m, depth_m, rng)
     return sink.parts()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -43,6 +44,22 @@ def cylinder(
             segments=segments,
             label=label,
         )
+
+
+def turned(
+    sink: Sink, swatch: str, profile: Sequence[tuple[float, float]], *, segments: int = 12, label: str | None = None
+) -> None:
+    """A profile of (radius, height) points turned about z, its outside to the right of its course upwards."""
+    angle = np.arange(segments) * 2 * np.pi / segments
+    circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(segments)], 1)
+    for (r0, z0), (r1, z1) in itertools.pairwise(profile):
+        rings = np.concatenate([circle * r0 + (0, 0, z0), circle * r1 + (0, 0, z1)])
+        normal = circle * (z1 - z0) + (0, 0, r0 - r1)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        # Where the profile meets the axis a ring is one point and half of its faces are nothing.
+        faces = ring_faces(2, segments)
+        kept = faces if r0 and r1 else (faces[:segments] if r0 else faces[segments:])
+        sink.swatch_mesh(swatch, rings, kept, np.concatenate([normal, normal]), label=label)
 
 
 def disc(

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 
 import numpy as np
 
 from authoring.kit.parts import Part, Sink
-from authoring.kit.shapes import cylinder, dome, ring_faces, tube
+from authoring.kit.shapes import cylinder, dome, ring_faces, tube, turned
 from authoring.materials.atlas import lens_rect
 
 LENS_M = 0.1
@@ -95,34 +94,22 @@ def street_lamp(*, height_m: float = 8.0, arm_m: float = 1.8, style: str = "mode
         ]
         tube(sink, "galvanised", bend, [0.06, 0.055, 0.05, 0.045, 0.04], segments=10)
         low, high = sorted((sign * (arm_m - 0.1), sign * (arm_m + 0.65)))
-        sink.swatch_box("anthracite", (-0.16, low, top + 0.0), (0.16, high, top + 0.09), skip="z")
+        sink.swatch_box("anthracite", (-0.16, low, top + 0.0), (0.16, high, top + 0.09))
         sink.swatch_box("anthracite", (-0.1, low + 0.1, top + 0.09), (0.1, high - 0.1, top + 0.13), skip="z")
-        sink.swatch_quad("lamp_glass", [(-0.14, high, top), (0.14, high, top), (0.14, low, top), (-0.14, low, top)])
+        sink.swatch_quad(
+            "lamp_glass", [(x, y, top - 0.003) for x, y in ((-0.14, high), (0.14, high), (0.14, low), (-0.14, low))]
+        )
     return sink.parts()
 
 
 def _heritage(sink: Sink) -> None:
-    rings = [
-        (0.2, 0.0),
-        (0.2, 0.12),
-        (0.13, 0.2),
-        (0.12, 0.75),
-        (0.15, 0.82),
-        (0.07, 0.95),
-        (0.05, 3.1),
-        (0.09, 3.2),
-        (0.05, 3.3),
-    ]
-    for (r0, z0), (r1, z1) in itertools.pairwise(rings):
-        if z1 > z0:
-            cylinder(sink, "dark_green", (0, 0, z0), r0, z1 - z0, top_radius_m=r1, segments=14, cap=False)
-    cylinder(sink, "lamp_glass", (0, 0, 3.32), 0.13, 0.42, top_radius_m=0.2, segments=8, cap=False)
+    post = [(0.2, 0.0), (0.2, 0.12), (0.13, 0.2), (0.12, 0.75), (0.15, 0.82), (0.07, 0.95), (0.05, 3.1), (0.09, 3.2)]
+    turned(sink, "dark_green", [*post, (0.14, 3.27), (0.14, 3.33), (0.0, 3.33)], segments=14)
+    turned(sink, "lamp_glass", [(0.13, 3.33), (0.2, 3.75)], segments=8)
+    turned(sink, "dark_green", [(0.0, 3.73), (0.26, 3.73), (0.26, 3.76), (0.06, 3.97), (0.0, 4.1)], segments=14)
     for angle in np.arange(4) * np.pi / 2:
         x, y = np.cos(angle), np.sin(angle)
         tube(sink, "dark_green", [(x * 0.135, y * 0.135, 3.3), (x * 0.205, y * 0.205, 3.75)], 0.012, segments=5)
-    cylinder(sink, "dark_green", (0, 0, 3.28), 0.14, 0.05, segments=14)
-    cylinder(sink, "dark_green", (0, 0, 3.74), 0.26, 0.22, top_radius_m=0.06, segments=14)
-    dome(sink, "dark_green", (0, 0, 3.96), 0.06, 0.12, segments=10, rings=3)
 
 
 def _lens(sink: Sink, centre: Sequence[float], name: str) -> None:

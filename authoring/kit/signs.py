@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from authoring.kit.parts import Part, Sink
+from authoring.kit.parts import Part, Sink, place
 from authoring.kit.shapes import cylinder, disc
 from authoring.materials.atlas import TRAFFIC_SIGNS, traffic_sign_rect
 
@@ -77,19 +77,13 @@ def traffic_sign(*names: str, post_m: float = 2.2) -> list[Part]:
 def street_name_sign(height_m: float = 2.9) -> list[Part]:
     """Two crossed street-name plates on a post."""
     sink = Sink("traffic_sign")
-    cylinder(sink, "galvanised", (0, 0, 0), 0.035, height_m + 0.3, segments=10, label="pole")
     outline, half_m = OUTLINES["street_name"]
-    for level, turn in ((height_m, False), (height_m + 0.27, True)):
+    cylinder(sink, "galvanised", (0, 0, 0), 0.035, height_m - 0.12, segments=10, label="pole")
+    for level, yaw_rad in ((height_m, 0.0), (height_m + 0.26, np.pi / 2)):
         plate = Sink("traffic_sign")
         for flip in (1, -1):
-            _plate(plate, "street_name", outline, half_m, level - 0.0, offset_m=-0.04, flip=flip, back=False)
-        for part in plate.parts():
-            mesh = part.mesh
-            points, normals = mesh.vertices, mesh.normals
-            assert normals is not None
-            if turn:
-                points, normals = points[:, [1, 0, 2]] * (-1, 1, 1), normals[:, [1, 0, 2]] * (-1, 1, 1)
-            sink.triangles(part.material, points, mesh.faces, uvs=mesh.uvs, normals=normals, label=part.label)
+            _plate(plate, "street_name", outline, half_m, level, offset_m=-THICK_M / 2, flip=flip, back=False)
+        sink.extend(place(plate.parts(), yaw_rad=yaw_rad))
     return sink.parts()
 
 
