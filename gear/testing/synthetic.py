@@ -6,19 +6,17 @@ against a renderer. Texture is painted on the things themselves, so that two cam
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from gear.testing.things import Part, Thing, street
 from gear.values.frames import LINEAR_FULL_SCALE, Frame, GeomTable, SceneObject, Shape, View
 from gear.values.geometry import Array, RigidTransform
 from gear.values.labels import LABEL_BY_NAME, LABELS
 from gear.values.rig import Rig
-from gear.values.rng import derive_rng
-from gear.values.scene import ActorRecord, CameraRecord, Pose, SceneRecord, SurfaceRecord, Vec3, Weather
+from gear.values.scene import ActorRecord, CameraRecord, Pose, SceneRecord, SurfaceRecord, Weather
 
 GROUND_GEOM = 0
 CELL_M = 0.4
@@ -30,102 +28,6 @@ UNIT_FACES = np.array(
     dtype=np.int32,
 )  # fmt: skip
 """Triangles of a box whose corner i has the signs of i's bits: 4 is x, 2 is y, 1 is z."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Part:
-    """One box of a thing, in the thing's frame.
-
-    Attributes:
-        label: name of a gear label.
-        centre_m, size_m: middle, and length (x), width (y), height (z).
-        surface: number of the surface whose face this box is, or -1.
-    """
-
-    label: str
-    centre_m: Vec3
-    size_m: Vec3
-    surface: int = -1
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Thing:
-    """Boxes that move together.
-
-    Attributes:
-        parts: its boxes; the first says what it mainly is.
-        position_m, yaw_rad: where its frame stands in the world.
-        object_id: as in `GeomTable.object_id`; -1 for what cannot be counted.
-        role: of the actor, or None for a thing of the town.
-    """
-
-    parts: tuple[Part, ...]
-    position_m: Vec3
-    yaw_rad: float = 0.0
-    object_id: int = -1
-    role: str | None = None
-
-    @property
-    def world_from_thing(self) -> RigidTransform:
-        """Its pose."""
-        return RigidTransform.from_yaw("world", "object", self.position_m, self.yaw_rad)
-
-
-def box_part(label: str, length_m: float, width_m: float, height_m: float) -> Part:
-    """A box that stands on the ground in the middle of its frame."""
-    return Part(label=label, centre_m=(0.0, 0.0, height_m / 2), size_m=(length_m, width_m, height_m))
-
-
-CAR = (box_part("car", 4.2, 1.8, 1.5),)
-VAN = (box_part("van", 5.0, 2.0, 2.2),)
-TRUCK = (box_part("truck", 8.0, 2.5, 3.5),)
-PERSON = (box_part("person", 0.5, 0.6, 1.75),)
-CYCLIST = (
-    box_part("bicycle", 1.8, 0.4, 1.0),
-    Part(label="rider", centre_m=(0.0, 0.0, 1.4), size_m=(0.5, 0.5, 0.8)),
-)
-TRAFFIC_LIGHT = (Part(label="traffic_light", centre_m=(0.0, 0.0, 4.0), size_m=(0.4, 0.4, 1.2)),)
-
-SLOTS = (
-    (CAR, 9.5, -2.6),
-    (CYCLIST, 9.0, 1.0),
-    (PERSON, 11.0, -5.2),
-    (CAR, 15.0, 3.4),
-    (PERSON, 16.0, 5.8),
-    (VAN, 20.0, 3.2),
-    (TRUCK, 24.0, -2.8),
-    (CAR, 30.0, 0.4),
-    (CAR, 37.0, -1.0),
-    (PERSON, 42.0, 7.5),
-)
-"""What stands in `street`: what, how far ahead and how far to the left in metres; far enough apart never to overlap."""
-
-
-def board(distance_m: float, left_m: float = 0.0, *, surface: int = 0, bottom_m: float = 0.15) -> Thing:
-    """A billboard ahead of an ego car at the origin, facing it: a 7.4 m x 3.7 m face on a thicker board."""
-    middle = bottom_m + 1.85
-    face = Part(label="billboard", centre_m=(0.005, 0.0, middle), size_m=(0.01, 7.4, 3.7), surface=surface)
-    back = Part(label="billboard", centre_m=(0.16, 0.0, middle), size_m=(0.3, 7.8, 4.1))
-    return Thing(parts=(back, face), position_m=(distance_m, left_m, 0.0))
-
-
-def street(seed: int = 0, index: int = 0) -> tuple[Thing, ...]:
-    """A street ahead of the origin: a board, cars, a van, a truck, people, a cyclist, a traffic light; drawn from the
-    seed."""
-    rng = derive_rng(seed, "synthetic", index)
-    things = [
-        board(24.0, 6.0),
-        Thing(parts=(box_part("building", 2.0, 60.0, 14.0),), position_m=(60.0, 0.0, 0.0)),
-        Thing(parts=(box_part("pole", 0.12, 0.12, 5.0),), position_m=(12.0, -5.5, 0.0)),
-        Thing(parts=(box_part("vegetation", 3.0, 3.0, 5.0),), position_m=(30.0, -12.0, 0.0)),
-        Thing(parts=TRAFFIC_LIGHT, position_m=(18.0, -6.0, 0.0), object_id=1000),
-    ]
-    for number, (parts, ahead_m, left_m) in enumerate(SLOTS):
-        position = (ahead_m + rng.uniform(-0.4, 0.4), left_m + rng.uniform(-0.4, 0.4), 0.0)
-        role = "pedestrian" if parts is PERSON else "npc"
-        yaw = float(rng.normal(0.0, 0.15)) + math.pi * int(rng.integers(2))
-        things.append(Thing(parts=parts, position_m=position, yaw_rad=yaw, object_id=number + 2, role=role))
-    return tuple(things)
 
 
 def synthetic_frame(
@@ -215,14 +117,26 @@ def _render(camera: CameraRecord, boxes: Sequence[tuple[Thing, Part]], geoms: Ge
     depth = np.where((depth > 0) & (depth < 1000), depth, np.inf)
     ids = np.where(np.isfinite(depth), GROUND_GEOM, -1).astype(np.int32)
     for number, (thing, part) in enumerate(boxes, start=1):
-        nearest = _enter(origin, rays, thing, part)
-        closer = nearest < depth
-        depth[closer], ids[closer] = nearest[closer], number
+        window = _window(camera, thing, part)
+        nearest = _enter(origin, rays[window], thing, part)
+        closer = nearest < depth[window]
+        depth[window][closer], ids[window][closer] = nearest[closer], number
     points = origin + np.where(np.isfinite(depth), depth, 0.0)[..., None] * rays
     rgb = _paint(points, ids, geoms)
     linear = np.round((rgb / 255.0) ** 2.2 * LINEAR_FULL_SCALE).astype(np.uint16)
     depth_m = np.where(np.isfinite(depth), depth, np.nan).astype(np.float32)
     return View(camera=camera, linear_rgb=linear, rgb=rgb, depth_m=depth_m, geom_id=ids)
+
+
+def _window(camera: CameraRecord, thing: Thing, part: Part) -> tuple[slice, slice]:
+    """Rows and columns outside which no ray can meet the box."""
+    camera_from_world = camera.world_from_camera_transform.inverse()
+    corners = camera_from_world.apply(thing.world_from_thing.apply(_corners(part)))
+    if corners[:, 2].min() < 0.01:
+        return slice(None), slice(None)
+    pixels = camera.intrinsics.project(corners)
+    (left, top), (right, bottom) = np.floor(pixels.min(axis=0)) - 1, np.ceil(pixels.max(axis=0)) + 2
+    return slice(max(0, int(top)), max(0, int(bottom))), slice(max(0, int(left)), max(0, int(right)))
 
 
 def _enter(origin: Array, rays: Array, thing: Thing, part: Part) -> Array:
@@ -260,7 +174,7 @@ def _record(
         pose = Pose.from_transform(thing.world_from_thing)
         if thing.role in ("npc", "parked", "pedestrian", "carrier"):
             asset = f"synthetic_{thing.parts[0].label}"
-            actors.append(ActorRecord(id=thing.object_id, asset=asset, role=thing.role, world_from_actor=pose))  # type: ignore[arg-type]
+            actors.append(ActorRecord(id=thing.object_id, asset=asset, role=thing.role, world_from_actor=pose))
         surfaces += [_surface(thing, part) for part in thing.parts if part.surface >= 0]
     return SceneRecord(
         town="synthetic",

@@ -8,7 +8,8 @@ import pytest
 
 from gear.formats.billboard_info import billboard_info, world_from_board, xyzrpy
 from gear.groundtruth.surfaces import observe_surfaces
-from gear.testing.synthetic import Thing, board, synthetic_frame
+from gear.testing.synthetic import synthetic_frame
+from gear.testing.things import Thing, board
 from gear.values.geometry import RigidTransform
 from gear.values.rig import CameraMount, Rig
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from gear.groundtruth.boxes import Box3d, box_in_camera, project_box
-from gear.testing.synthetic import CAR, Thing, synthetic_frame
+from gear.testing.synthetic import synthetic_frame
+from gear.testing.things import CAR, Thing
 from gear.values.geometry import Intrinsics
 from gear.values.rig import CameraMount, Rig
 

@@ -1,7 +1,8 @@
 import numpy as np
 
 from gear.groundtruth.labelmaps import coarsen, instance_map, label_map
-from gear.testing.synthetic import CAR, PERSON, TRAFFIC_LIGHT, Thing, synthetic_frame
+from gear.testing.synthetic import synthetic_frame
+from gear.testing.things import CAR, PERSON, TRAFFIC_LIGHT, Thing
 from gear.values.rig import CameraMount, Rig
 
 RIG = Rig(cameras=(CameraMount(name="left", width_px=320, height_px=160),))

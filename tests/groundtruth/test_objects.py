@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from gear.groundtruth.objects import observe_objects
-from gear.testing.synthetic import CAR, CYCLIST, TRUCK, Thing, board, street, synthetic_frame
+from gear.testing.synthetic import synthetic_frame
+from gear.testing.things import CAR, CYCLIST, TRUCK, Thing, board, street
 from gear.values.frames import Frame
 from gear.values.labels import LABEL_BY_NAME
 from gear.values.rig import CameraMount, Rig

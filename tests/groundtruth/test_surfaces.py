@@ -5,7 +5,8 @@ import pytest
 
 from gear.formats import rle
 from gear.groundtruth.surfaces import observe_surfaces
-from gear.testing.synthetic import CAR, Part, Thing, board, synthetic_frame
+from gear.testing.synthetic import synthetic_frame
+from gear.testing.things import CAR, Part, Thing, board
 from gear.values.rig import CameraMount, Rig
 from gear.values.truth import SurfaceTruth
 

@@ -159,9 +159,9 @@ def evaluate(pictures: Sequence[Picture]) -> dict[str, float]:
     return dict(evaluator.result())
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", [0, 1])
 def test_agrees_with_the_second_evaluator(seed: int) -> None:
-    pictures = [picture(100 * seed + i) for i in range(20)]
+    pictures = [picture(100 * seed + i) for i in range(12)]
     result = evaluate(pictures)
     for name in NEIGHBOUR:
         for kind in ("2d", "bev", "3d"):

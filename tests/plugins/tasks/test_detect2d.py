@@ -14,8 +14,9 @@ from pycocotools.cocoeval import COCOeval
 from gear.formats import rle
 from gear.groundtruth.visibility import VisibilityLimits
 from gear.plugins.tasks.detect2d import Detect2dConfig, Detect2dTask, detect2d
-from gear.testing.synthetic import CAR, CYCLIST, PERSON, Thing, synthetic_frame
+from gear.testing.synthetic import synthetic_frame
 from gear.testing.task_contract import TaskContract
+from gear.testing.things import CAR, CYCLIST, PERSON, Thing
 
 # pycocotools 2.0.11 has not caught up with NumPy 2's protocol.
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")

@@ -7,8 +7,9 @@ import pytest
 
 from gear.formats import cityscapes
 from gear.plugins.tasks.semseg import LabelOptions, SemsegConfig, SemsegTask, semseg
-from gear.testing.synthetic import CAR, Part, Thing, synthetic_frame
+from gear.testing.synthetic import synthetic_frame
 from gear.testing.task_contract import TaskContract
+from gear.testing.things import CAR, Part, Thing
 from gear.values.errors import FieldError
 
 SMALL = {"width_px": 512, "height_px": 256}

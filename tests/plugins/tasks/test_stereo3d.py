@@ -9,8 +9,9 @@ import pytest
 
 from gear.formats.kitti_object import parse_calibration, parse_labels, read_baseline_m
 from gear.plugins.tasks.stereo3d import Stereo3dConfig, Stereo3dTask, stereo3d
-from gear.testing.synthetic import CAR, CYCLIST, VAN, Thing, synthetic_frame
+from gear.testing.synthetic import synthetic_frame
 from gear.testing.task_contract import TaskContract
+from gear.testing.things import CAR, CYCLIST, VAN, Thing
 from gear.values.errors import FieldError
 
 
