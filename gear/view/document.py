@@ -1,0 +1,119 @@
+"""The page's text: template, style, script, index, pictures. Everything of the dataset goes in as data, never as HTML.
+
+The index is JSON in a script block that no browser runs, with every `<` written as an escape, and the script writes it
+into the page as text. A content security policy lets nothing run but the page's own script, by its hash, and nothing
+be fetched but pictures.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import json
+import re
+from collections.abc import Iterator, Sequence
+from importlib.resources import files
+
+from gear.values.serial import Json
+from gear.view.build import Entry
+from gear.view.channels import Channel
+from gear.view.counts import without_identifiers
+from gear.view.encoding import MEDIA_TYPE
+
+SCRIPTS = ("dom", "store", "histogram", "filters", "picture", "grid", "map", "tables", "sample", "statistics", "app")
+"""Files of the script, in order; together they are one function without globals."""
+
+
+def asset(name: str) -> str:
+    """A file of `gear/view/page`."""
+    return (files("gear.view") / "page" / name).read_text(encoding="utf-8")
+
+
+def script() -> str:
+    """The page's script."""
+    body = "\n".join(asset(f"{name}.js") for name in SCRIPTS)
+    return f'(() => {{\n"use strict";\n{body}\n}})();\n'
+
+
+def index_of(entries: Sequence[Entry], about: dict[str, Json]) -> dict[str, Json]:
+    """What the script reads first."""
+    channels = channels_of(entries)
+    rows = []
+    for entry, counts in zip(entries, without_identifiers([e.row["counts"] for e in entries]), strict=True):
+        rows.append(entry.row | {"counts": counts, "problem": entry.problem, "pictures": _pictures(entry, channels)})
+    return {
+        "about": about,
+        "mediaType": MEDIA_TYPE,
+        "channels": [{"kind": channel.kind, "name": channel.name} for channel in channels],
+        "samples": rows,
+    }
+
+
+def channels_of(entries: Sequence[Entry]) -> list[Channel]:
+    """All channels, pictures before previews, in the order in which samples name them."""
+    found = dict.fromkeys(channel for entry in entries for channel in entry.pictures)
+    return sorted(found, key=lambda channel: channel.kind)
+
+
+def _pictures(entry: Entry, channels: Sequence[Channel]) -> list[Json]:
+    return [
+        {
+            "width": picture.width_px,
+            "height": picture.height_px,
+            "whole": picture.is_whole,
+            "camera": entry.cameras[channel],
+            "original": entry.originals.get(channel),
+        }
+        if (picture := entry.pictures.get(channel))
+        else None
+        for channel in channels
+    ]
+
+
+def document(title: str, entries: Sequence[Entry], about: dict[str, Json]) -> Iterator[str]:
+    """The page, piece by piece; pictures come last, so that a browser can begin before it has read them all."""
+    style, code = asset("style.css"), script()
+    fillings = {
+        "policy": html.escape(policy(style, code)),
+        "title": html.escape(title),
+        "style": style,
+        "index": embedded(index_of(entries, about)),
+        "script": code,
+    }
+    head, tail = asset("page.html").split("{{pictures}}")
+    yield _filled(head, fillings)
+    channels = channels_of(entries)
+    for number, entry in enumerate(entries):
+        yield _block(f"d{number}", entry.detail)
+        for place, channel in enumerate(channels):
+            if channel in entry.pictures:
+                yield _block(f"p{number}.{place}", entry.pictures[channel].data)
+    yield tail
+
+
+def policy(style: str, code: str) -> str:
+    """The content security policy."""
+
+    def digest(text: str) -> str:
+        return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+    return (
+        f"default-src 'none'; script-src {digest(code)}; style-src {digest(style)};"
+        " img-src data: 'self' file:; base-uri 'none'; form-action 'none'"
+    )
+
+
+def embedded(value: Json) -> str:
+    """JSON that cannot end the script block that holds it."""
+    text = json.dumps(value, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _filled(template: str, fillings: dict[str, str]) -> str:
+    """One pass, so that nothing inside a filling is taken for a place to fill."""
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: fillings[match[1]], template)
+
+
+def _block(name: str, data: bytes) -> str:
+    return f'<script type="text/plain" id="{name}">{base64.b64encode(data).decode()}</script>\n'

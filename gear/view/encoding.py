@@ -1,0 +1,68 @@
+"""Pictures small enough that a page of all of them still opens quickly."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from gear.values.frames import UInt8Image
+
+MEDIA_TYPE = "image/webp"
+QUALITY = 80
+SCALES = (1.0, 0.8, 0.65, 0.5, 0.45, 0.4, 0.35, 0.3, 0.25, 0.2, 0.15, 0.1)
+"""Sides of an embedded picture as shares of the original's; one for the whole page, so that samples compare."""
+
+LEAST_WIDTH_PX = 160
+"""Nothing is made narrower than this, whatever the budget."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """A picture as the page carries it.
+
+    Attributes:
+        data: encoded bytes.
+        width_px, height_px: of the original, before any scaling.
+        is_whole: whether it has the original's size.
+    """
+
+    data: bytes
+    width_px: int
+    height_px: int
+    is_whole: bool
+
+
+def encode(pixels: UInt8Image, scale: float) -> Picture:
+    """Scales (H, W, 3) RGB down by area and compresses it."""
+    height, width = pixels.shape[:2]
+    target = max(round(width * scale), min(width, LEAST_WIDTH_PX))
+    small = pixels
+    if target < width:
+        size = (target, max(1, round(height * target / width)))
+        small = np.asarray(cv2.resize(pixels, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    done, data = cv2.imencode(".webp", small[..., ::-1], [cv2.IMWRITE_WEBP_QUALITY, QUALITY])
+    if not done:
+        raise ValueError(f"cannot encode a picture of shape {pixels.shape}")
+    return Picture(data.tobytes(), width, height, is_whole=small is pixels)
+
+
+def largest_scale(probes: Sequence[Sequence[UInt8Image]], samples: int, budget_bytes: float) -> float:
+    """The largest of `SCALES` at which all samples fit the budget, as far as a few of them tell.
+
+    Args:
+        probes: the pictures of some samples.
+        samples: how many there are altogether.
+        budget_bytes: for all pictures, encoded.
+    """
+    for scale in SCALES:
+        allowed = budget_bytes * len(probes) / samples
+        for pixels in (pixels for pictures in probes for pixels in pictures):
+            allowed -= len(encode(pixels, scale).data)
+            if allowed < 0:
+                break
+        else:
+            return scale
+    return SCALES[-1]

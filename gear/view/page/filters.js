@@ -1,0 +1,128 @@
+// Which samples are shown. A sample passes when one of its surfaces, in one camera, satisfies everything at once.
+const METRICS = [
+  { key: "visible", label: "Patch visible", unit: " %", factor: 100, ceiling: 100, hint: "visible share of the face's whole silhouette" },
+  { key: "occluded", label: "Patch occluded", unit: " %", factor: 100, ceiling: 100, hint: "share of what lies inside the picture that other things cover" },
+  { key: "distance", label: "Distance", unit: " m", factor: 1, hint: "camera to the middle of the face" },
+  { key: "incidence", label: "Incidence", unit: "°", factor: 1, ceiling: 180, hint: "0° is head-on, above 90° is seen from behind" },
+];
+for (const metric of METRICS) {
+  metric.values = SAMPLES.flatMap((sample) => sample.surfaces.map((surface) => surface[metric.key]))
+    .filter(isNumber)
+    .map((value) => value * metric.factor);
+  metric.high = metric.ceiling ?? niceCeiling(Math.max(0, ...metric.values));
+}
+const unique = (values) => [...new Set(values)].sort();
+const SURFACE_NAMES = unique(SAMPLES.flatMap((sample) => sample.surfaces.map((surface) => surface.name)));
+const CAMERA_NAMES = unique(SAMPLES.flatMap((sample) => sample.surfaces.map((surface) => surface.camera)));
+const ASSETS = unique(SAMPLES.flatMap((sample) => sample.actors.map((actor) => actor[0])));
+
+const filters = { ranges: new Map(), surface: "", camera: "", asset: "", text: "" };
+const whenFiltered = [];
+let shown = SAMPLES;
+
+function passes(sample) {
+  const { ranges, surface: name, camera, asset, text } = filters;
+  if (asset && !sample.actors.some((actor) => actor[0] === asset)) return false;
+  if (text && !`${sampleName(sample)} ${sample.sequence} ${sample.weather} ${sample.problem && "problem"}`.toLowerCase().includes(text)) return false;
+  if (!ranges.size && !name && !camera) return true;
+  return sample.surfaces.some(
+    (surface) =>
+      (!name || surface.name === name) &&
+      (!camera || surface.camera === camera) &&
+      METRICS.every((metric) => {
+        const range = ranges.get(metric.key);
+        const value = surface[metric.key];
+        return !range || (isNumber(value) && value * metric.factor >= range[0] && value * metric.factor <= range[1]);
+      }),
+  );
+}
+
+function refilter() {
+  shown = SAMPLES.filter(passes);
+  const total = grouped(SAMPLES.length);
+  byId("count").textContent = shown.length === SAMPLES.length ? `${total} samples` : `${grouped(shown.length)} of ${total} samples`;
+  for (const listener of whenFiltered) listener();
+}
+
+function resetFilters() {
+  Object.assign(filters, { ranges: new Map(), surface: "", camera: "", asset: "", text: "" });
+  buildFilters();
+  refilter();
+}
+
+function filtersToParams() {
+  const params = new URLSearchParams();
+  for (const [key, [low, high]] of filters.ranges) params.set(key, `${low}~${high}`);
+  for (const key of ["surface", "camera", "asset", "text"]) if (filters[key]) params.set(key, filters[key]);
+  return params.toString();
+}
+
+function filtersFromParams(params) {
+  filters.ranges = new Map();
+  for (const metric of METRICS) {
+    const [low, high] = (params.get(metric.key) ?? "").split("~").map(Number);
+    if (isNumber(low) && isNumber(high) && params.has(metric.key)) filters.ranges.set(metric.key, [low, high]);
+  }
+  for (const key of ["surface", "camera", "asset", "text"]) filters[key] = params.get(key) ?? "";
+}
+
+function rangeFilter(metric) {
+  const output = h("output");
+  const chart = h("div");
+  const bins = 30;
+  const counts = binned(metric.values, 0, metric.high, bins);
+  const step = metric.high > 20 ? 1 : 0.1;
+  const slider = (end, value) =>
+    h("input", { type: "range", min: 0, max: metric.high, step, value, "aria-label": `${metric.label}, ${end}`, oninput: change });
+  const [from, to] = filters.ranges.get(metric.key) ?? [0, metric.high];
+  const low = slider("at least", from);
+  const high = slider("at most", to);
+
+  function draw() {
+    const [a, b] = [Number(low.value), Number(high.value)];
+    output.textContent = `${rounded(a, 1)} to ${rounded(b, 1)}${metric.unit}`;
+    const isIn = (bin) => ((bin + 1) * metric.high) / bins > a && (bin * metric.high) / bins < b + 1e-9;
+    chart.replaceChildren(columns(counts, isIn));
+  }
+
+  function change(event) {
+    if (Number(low.value) > Number(high.value)) (event.target === low ? high : low).value = event.target.value;
+    const range = [Number(low.value), Number(high.value)];
+    if (range[0] <= 0 && range[1] >= metric.high) filters.ranges.delete(metric.key);
+    else filters.ranges.set(metric.key, range);
+    draw();
+    refilter();
+  }
+
+  draw();
+  return h("div", { class: "range", role: "group", "aria-label": metric.label, title: metric.hint },
+    h("div", { class: "head" }, h("h3", {}, metric.label), output), chart, h("div", { class: "track" }, low, high));
+}
+
+function choice(label, key, names, any) {
+  const options = [["", any], ...names.map((name) => [name, name])].map(([value, text]) =>
+    h("option", { value, selected: filters[key] === value }, text));
+  return h("label", {}, label, h("select", { onchange: (event) => { filters[key] = event.target.value; refilter(); } }, options));
+}
+
+function buildFilters() {
+  const search = h("input", {
+    type: "search", value: filters.text, placeholder: "index, sequence, weather", autocomplete: "off",
+    oninput: (event) => { filters.text = event.target.value.trim().toLowerCase(); refilter(); },
+  });
+  byId("filters").replaceChildren(
+    h("div", { class: "head" }, h("h2", {}, "Filters"), h("button", { type: "button", id: "reset", onclick: resetFilters }, "Reset")),
+    ...(SURFACE_NAMES.length ? METRICS.map(rangeFilter) : [h("p", { class: "dim" }, "No sample has a surface for a patch.")]),
+    ...(SURFACE_NAMES.length > 1 ? [choice("Surface", "surface", SURFACE_NAMES, "any surface")] : []),
+    ...(CAMERA_NAMES.length > 1 ? [choice("Camera", "camera", CAMERA_NAMES, "any camera")] : []),
+    choice("Contains", "asset", ASSETS, "anything"),
+    h("label", {}, "Search", search),
+    h("p", { class: "dim" }, "A sample is shown when one surface in one camera satisfies all of this."),
+  );
+}
+
+function toggleFilters(open = byId("filters").hidden) {
+  byId("filters").hidden = !open;
+  byId("filters-button").setAttribute("aria-expanded", String(open));
+  if (open) byId("filters").querySelector("input, select")?.focus();
+}

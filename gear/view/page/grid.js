@@ -1,0 +1,99 @@
+// The contact sheet.
+const look = { place: Math.max(0, CHANNELS.findIndex((channel) => channel.kind === "preview")) };
+const cells = [];
+
+function buildGrid() {
+  const list = h("ul", { class: "cells", id: "cells" });
+  for (const sample of SAMPLES) {
+    const cell = h("a", { class: "cell", href: "#", "aria-label": described(sample) }, caption(sample));
+    cell.addEventListener("click", (event) => { event.preventDefault(); openSample(sample); });
+    cells.push(cell);
+    list.append(h("li", {}, cell));
+  }
+  const nothing = h("p", { class: "empty", id: "nothing" }, SAMPLES.length ? "No sample passes the filters." : "This split has no samples.",
+    SAMPLES.length ? h("button", { type: "button", onclick: resetFilters }, "Reset the filters") : null);
+  byId("samples").append(gridTools(), list, nothing);
+  byId("samples").addEventListener("keydown", moveInGrid);
+  showChannel(look.place);
+  whenFiltered.push(showFiltered);
+}
+
+function best(sample) {
+  return sample.surfaces.reduce((top, surface) => (!top || surface.visible > top.visible ? surface : top), null);
+}
+
+function described(sample) {
+  const surface = best(sample);
+  const patch = surface ? `, ${surface.name} ${percent(surface.visible)} visible at ${metres(surface.distance)}` : "";
+  return `Sample ${sampleName(sample)}${patch}`;
+}
+
+function caption(sample) {
+  const surface = best(sample);
+  const facts = surface ? `${percent(surface.visible)} · ${metres(surface.distance)} · ${degrees(surface.incidence)}` : sample.weather;
+  return h("div", { class: "caption" }, h("b", {}, sampleName(sample)),
+    sample.problem ? h("span", { class: "warn" }, "incomplete") : null, h("span", {}, facts));
+}
+
+function gridTools() {
+  const channels = h("select", { id: "channel", onchange: (event) => showChannel(Number(event.target.value)) },
+    ...["image", "preview"].map((kind) =>
+      h("optgroup", { label: kind === "image" ? "Pictures" : "Previews" },
+        CHANNELS.map((channel, place) => (channel.kind === kind ? h("option", { value: place }, channelLabel(channel)) : null)))));
+  const size = h("input", { type: "range", min: 160, max: 900, step: 20, value: 300, id: "size",
+    oninput: (event) => document.documentElement.style.setProperty("--cell", `${event.target.value}px`) });
+  return h("div", { class: "tools", role: "group", "aria-label": "How samples are shown" },
+    h("label", {}, "Show", channels), ...overlayTools(), h("label", { class: "push" }, "Size", size));
+}
+
+// Strength and outlines are the same for the sheet and for single samples.
+function overlayTools() {
+  const strength = h("input", { type: "range", min: 0, max: 100, step: 5, value: 100, class: "strength", oninput: (event) => setStrength(Number(event.target.value)) });
+  const lines = h("button", { type: "button", class: "outlines", "aria-pressed": "true", onclick: () => toggleOutlines() }, "Patch outline ", h("kbd", {}, "o"));
+  return [h("label", {}, "Overlay", strength), lines];
+}
+
+function setStrength(value) {
+  document.documentElement.style.setProperty("--strength", String(value / 100));
+  document.querySelectorAll(".strength").forEach((slider) => (slider.value = value));
+}
+
+function toggleOutlines() {
+  const off = document.body.classList.toggle("without-outlines");
+  document.querySelectorAll(".outlines").forEach((button) => button.setAttribute("aria-pressed", String(!off)));
+}
+
+function showChannel(place) {
+  if (!CHANNELS[place]) return;
+  look.place = place;
+  byId("channel").value = String(place);
+  SAMPLES.forEach((sample, number) => {
+    const old = cells[number].querySelector(".stack");
+    if (old) seen.unobserve(old);
+    old?.remove();
+    cells[number].prepend(stack(sample, place));
+  });
+}
+
+function showFiltered() {
+  const in_ = new Set(shown);
+  SAMPLES.forEach((sample, number) => (cells[number].parentElement.hidden = !in_.has(sample)));
+  byId("nothing").hidden = shown.length > 0;
+}
+
+function moveInGrid(event) {
+  const here = shown.findIndex((sample) => cells[sample.number] === document.activeElement);
+  if (here < 0) return;
+  const tops = shown.map((sample) => cells[sample.number].offsetTop);
+  const wide = Math.max(1, tops.filter((top) => top === tops[0]).length);
+  const steps = { ArrowLeft: -1, ArrowRight: 1, ArrowUp: -wide, ArrowDown: wide, Home: -shown.length, End: shown.length };
+  if (!(event.key in steps)) return;
+  event.preventDefault();
+  focusCell(shown[Math.min(shown.length - 1, Math.max(0, here + steps[event.key]))]);
+}
+
+function focusCell(sample) {
+  if (!sample) return;
+  cells[sample.number].focus();
+  cells[sample.number].scrollIntoView({ block: "nearest" });
+}

@@ -1,0 +1,105 @@
+"""The page's index: what it must know of every sample before one is opened, as JSON."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from gear.contracts.tasks import Sidecar
+from gear.values.geometry import RigidTransform
+from gear.values.scene import CameraRecord, SceneRecord, SurfaceRecord
+from gear.values.serial import Json, to_json
+from gear.values.truth import SurfaceTruth
+from gear.view.counts import count
+from gear.view.faces import hidden
+
+
+def row(sidecar: Sidecar) -> dict[str, Json]:
+    """One sample's line in the index: places from above, surfaces, what its facts count."""
+    record = sidecar.record
+    return {
+        "index": record.index,
+        "sequence": record.sequence,
+        "frame": record.frame,
+        "time_s": record.time_s,
+        "weather": record.weather.name,
+        "actors": [
+            [a.asset, a.role, a.id, *_from_above(a.world_from_actor.transform("world", "actor"))] for a in record.actors
+        ],
+        "cameras": [_camera(camera) for camera in record.cameras],
+        "boards": [_board(record, surface) for surface in record.surfaces],
+        "surfaces": [_surface(truth, record) for truth in sidecar.surfaces],
+        "counts": count(sidecar.facts),
+    }
+
+
+def detail(sidecar: Sidecar, links: dict[str, str]) -> dict[str, Json]:
+    """Everything else of a sample, read when its page is opened."""
+    return {
+        "record": to_json(sidecar.record),
+        "surfaces": to_json(sidecar.surfaces),
+        "facts": sidecar.facts,
+        "files": [[path, digest, links.get(path)] for path, digest in sidecar.files.items()],
+    }
+
+
+def finite(value: Any) -> Json:
+    """The same JSON with None for what JSON has no number for."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {str(key): finite(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [finite(item) for item in value]
+    return value
+
+
+def _from_above(world_from_thing: RigidTransform) -> list[float]:
+    """East and north in metres, heading in radians counter-clockwise from east."""
+    x, y, _ = world_from_thing.translation_m
+    return [round(float(x), 2), round(float(y), 2), round(world_from_thing.yaw_rad, 3)]
+
+
+def _camera(camera: CameraRecord) -> dict[str, Json]:
+    world_from_camera = camera.world_from_camera_transform
+    forward = world_from_camera.rotation[:, 2]
+    x, y, _ = world_from_camera.translation_m
+    return {
+        "name": camera.name,
+        "width": camera.width_px,
+        "height": camera.height_px,
+        "x": round(float(x), 2),
+        "y": round(float(y), 2),
+        "heading": round(math.atan2(forward[1], forward[0]), 3),
+        "hfov": round(camera.intrinsics.hfov_rad, 3),
+    }
+
+
+def _board(record: SceneRecord, surface: SurfaceRecord) -> dict[str, Json]:
+    """Both ends of the face seen from above, and where its viewers stand."""
+    world_from_surface = record.world_from_surface(surface)
+    right = world_from_surface.rotation[:, 0] * surface.width_m / 2
+    outward = -world_from_surface.rotation[:, 2]
+    middle = world_from_surface.translation_m
+    return {
+        "name": surface.name,
+        "asset": surface.asset,
+        "ends": [[round(float(v), 2) for v in end[:2]] for end in (middle - right, middle + right)],
+        "outward": [round(float(v), 3) for v in outward[:2]],
+    }
+
+
+def _surface(truth: SurfaceTruth, record: SceneRecord) -> dict[str, Json]:
+    camera = next((camera for camera in record.cameras if camera.name == truth.camera), None)
+    covered = hidden(truth, camera) if camera else None
+    return {
+        "name": truth.name,
+        "camera": truth.camera,
+        "corners": [[round(x, 1), round(y, 1)] for x, y in truth.corners_px] if truth.corners_px else None,
+        "visible": round(truth.visible_fraction, 4),
+        "occluded": None if covered is None else covered.occluded_fraction,
+        "truncated": None if covered is None else covered.truncated_fraction,
+        "distance": round(truth.distance_m, 2),
+        "incidence": round(truth.incidence_deg, 1),
+        "pixels": truth.visible_px,
+    }

@@ -1,0 +1,146 @@
+"""`gear view`: a dataset's page, written in one go."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from gear.dataset.files import explained
+from gear.dataset.reading import Dataset
+from gear.values.serial import Json
+from gear.verbs.opening import open_dataset
+from gear.view.build import Builder, Progress, fitting_scale
+from gear.view.document import document
+from gear.view.rows import finite
+
+MEGABYTE = 1_000_000
+BASE64 = 4 / 3
+"""Characters that a byte becomes inside the page."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ViewReport:
+    """What was written.
+
+    Attributes:
+        path: the page.
+        samples: how many it shows.
+        size_bytes: of the page.
+        scale: side of the embedded pictures as a share of the originals'.
+        problems: (index, what) of samples that could not be shown in full.
+    """
+
+    path: Path
+    samples: int
+    size_bytes: int
+    scale: float
+    problems: tuple[tuple[int, str], ...]
+
+    def summary(self) -> str:
+        """One line for a person, and one for the first problem if there are any."""
+        size = f"{self.size_bytes / MEGABYTE:.1f} MB"
+        scaled = "" if self.scale == 1 else f", pictures at {self.scale:.0%} of their width"
+        text = f"{self.path}: {self.samples} samples, {size}{scaled}"
+        if self.problems:
+            index, what = self.problems[0]
+            text += f"\n{len(self.problems)} not shown in full; first, sample {index}: {what}"
+        return text
+
+
+def write_view(
+    path: str | Path,
+    out: str | Path = "view.html",
+    *,
+    split: str | None = None,
+    samples: int | None = None,
+    max_mb: float = 48.0,
+    progress: Progress | None = None,
+) -> ViewReport:
+    """Writes one self-contained HTML page of a dataset; it opens from disk, without a server or a network.
+
+    Pictures and previews are embedded, at full size if they fit `max_mb`, else all at the same smaller scale; a
+    sample's own page then shows the dataset's files themselves as long as they lie where they did when it was written.
+
+    Args:
+        path: root of a dataset of any task.
+        out: HTML file to write.
+        split: the split to show; may be left out where there is only one.
+        samples: only the first so many.
+        max_mb: about how large the page may get, in megabytes.
+        progress: told after every sample, with (done, total).
+
+    Raises:
+        DatasetError: there is no finished split to show, or `out` cannot be written.
+        UnknownNameError: its task's plugin is not installed.
+    """
+    return write_page(open_dataset(path, split), out, samples=samples, max_mb=max_mb, progress=progress)
+
+
+def write_page(
+    dataset: Dataset[Any],
+    out: str | Path,
+    *,
+    samples: int | None = None,
+    max_mb: float = 48.0,
+    progress: Progress | None = None,
+) -> ViewReport:
+    """`write_view` of a dataset that is open already."""
+    target = Path(out)
+    with explained(target):
+        target.parent.mkdir(parents=True, exist_ok=True)
+    total = len(dataset)
+    count = total if samples is None else min(samples, total)
+    builder = Builder(dataset=dataset, base_url=base_url(dataset.root, target))
+    scale = fitting_scale(builder, count, max_mb * MEGABYTE / BASE64) if count else 1.0
+    builder = Builder(dataset=dataset, base_url=builder.base_url, scale=scale)
+    entries = list(builder.entries(count, progress))
+    info = dataset.plan.info
+    title = f"{dataset.plan.task['name']} · {info.scene} · {info.split}"
+    size = _write(target, document(title, entries, about(dataset, scale)))
+    problems = tuple((entry.row["index"], entry.problem) for entry in entries if entry.problem)
+    return ViewReport(path=target, samples=count, size_bytes=size, scale=scale, problems=problems)
+
+
+def about(dataset: Dataset[Any], scale: float) -> dict[str, Json]:
+    """What the page says of the whole split."""
+    plan = dataset.plan
+    known = {key: value for key, value in dataset.manifest.items() if key not in ("samples", "indexes")}
+    named = {"task": plan.task, "options": plan.options, "content": plan.content, "patch": plan.patch}
+    info = plan.info
+    return {
+        "name": dataset.root.resolve().name,
+        "task": plan.task["name"],
+        "town": info.town,
+        "scene": info.scene,
+        "split": info.split,
+        "seed": info.seed,
+        "patch": info.patch_label,
+        "total": len(dataset),
+        "scale": scale,
+        "facts": finite(known | named),
+    }
+
+
+def base_url(root: Path, page: Path) -> str:
+    """Where a dataset's root lies, seen from the page."""
+    return "./" + quote(Path(os.path.relpath(root.resolve(), page.resolve().parent)).as_posix()) + "/"
+
+
+def _write(target: Path, pieces: Iterable[str]) -> int:
+    """Writes the file whole or not at all; returns its size."""
+    with explained(target):
+        temporary = target.with_name(f".{target.name}.part")
+        try:
+            with temporary.open("w", encoding="utf-8", errors="replace", newline="\n") as stream:
+                for piece in pieces:
+                    stream.write(piece)
+            size = temporary.stat().st_size
+            temporary.replace(target)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+    return size
