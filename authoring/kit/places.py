@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 
 from authoring.kit.parts import Part, Sink
-from authoring.kit.shapes import cylinder, disc, dome, tube
+from authoring.kit.shapes import cylinder, disc, dome, tube, turned
 from authoring.kit.signs import OUTLINES
 from authoring.materials.atlas import ironwork_rect, poster_rect, traffic_sign_rect
 
@@ -63,9 +63,9 @@ def advertising_pillar(rng: np.random.Generator) -> list[Part]:
             (0.64 * np.cos(a), 0.64 * np.sin(a), 2.7),
         ]
         sink.polygon("signs", corners, [(u0, rect[1]), (u1, rect[1]), (u1, rect[3]), (u0, rect[3])])
-    for z, h in ((0.35, 0.06), (2.7, 0.1)):
-        cylinder(sink, "dark_green", (0, 0, z), 0.68, h, segments=24)
-    cylinder(sink, "dark_green", (0, 0, 2.8), 0.62, 0.2, top_radius_m=0.74, segments=24)
+    turned(sink, "dark_green", [(0.68, 0.35), (0.68, 0.41), (0.64, 0.41)], segments=24)
+    crown = [(0.64, 2.7), (0.68, 2.7), (0.68, 2.8), (0.62, 2.82), (0.74, 3.0), (0.0, 3.0)]
+    turned(sink, "dark_green", crown, segments=24)
     dome(sink, "copper_green", (0, 0, 3.0), 0.74, 0.45, segments=24)
     cylinder(sink, "dark_green", (0, 0, 3.44), 0.05, 0.2, segments=8)
     return sink.parts()
