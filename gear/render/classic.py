@@ -17,7 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.contracts.rendering import Quality, RawView, RendererInfo, Stage
-from gear.render.display import displayed_model, encode_srgb
+from gear.render.culling import Mask, bounding_spheres, in_beam, in_frustum
+from gear.render.display import SHADOW_REACH_M, displayed_model, encode_srgb
 from gear.render.faces import checked_faces
 from gear.render.glcontext import choose_backend, driver_and_device, open_context
 from gear.render.pinhole import FAR_M, NEAR_M, Frustum, depth_from_reversed
@@ -25,12 +26,14 @@ from gear.render.samples import four_times, ids_from_rgb, smooth_edges
 from gear.render.visible import geoms_only
 from gear.values.errors import BackendError
 from gear.values.frames import FloatImage, IdImage, UInt8Image
+from gear.values.geometry import Array
 from gear.values.scene import CameraRecord
 
 _SAMPLES = {"film": 4, "fast": 0}
 _EXTRA_GEOMS = 100
 _SHADOW_AHEAD_M = 50.0
 _SHADOW_HEIGHT_M = 300.0
+_HIDDEN_GROUP = 5
 _FLAGS = mujoco.mjtRndFlag
 
 
@@ -83,11 +86,8 @@ class ClassicRenderer:
         if stage.model is not self._shared_model:
             raise ValueError("the stage was compiled as another model than the renderer was opened for")
         self._gl.make_current()
-        mujoco.mjv_updateScene(
-            self._model, stage.data, self._option, None, mujoco.MjvCamera(), mujoco.mjtCatBit.mjCAT_ALL, self._scene
-        )
-        self._dress(stage)
-        return tuple(self._view(camera, colour=colour, truth=truth) for camera in cameras)
+        self._wear(dict(checked_faces(self._shared_model, stage.faces).values()))
+        return tuple(self._view(stage, camera, colour=colour, truth=truth) for camera in cameras)
 
     def close(self) -> None:
         """Frees the context; safe to call twice."""
@@ -98,17 +98,10 @@ class ClassicRenderer:
         self._context.free()
         self._gl.free()
 
-    def _dress(self, stage: Stage) -> None:
-        """Puts on paint, into geoms that the scene makes anew each time, and faces, which it puts back."""
-        faces = dict(checked_faces(self._shared_model, stage.faces).values())
+    def _wear(self, faces: dict[int, UInt8Image]) -> None:
+        """Puts faces on by texture, and takes off those that the last stage left."""
         for texture in sorted(self._worn.keys() | faces.keys()):
             self._upload(texture, faces.get(texture))
-        coloured = stage.paint_rgb.keys() | stage.faces.keys()
-        for geom in self._scene.geoms[: self._scene.ngeom] if coloured else ():
-            if geom.objtype != mujoco.mjtObj.mjOBJ_GEOM or geom.objid not in coloured:
-                continue
-            paint = stage.paint_rgb.get(geom.objid)
-            geom.rgba[:3] = 1.0 if paint is None else encode_srgb(np.array(paint))
 
     def _upload(self, texture: int, srgb: UInt8Image | None) -> None:
         """Gives a texture of the model's copy new texels, or its own ones back where there are none."""
@@ -125,19 +118,33 @@ class ClassicRenderer:
             texels[:] = content
             mujoco.mjr_uploadTexture(model, self._context, texture)
 
-    def _view(self, camera: CameraRecord, *, colour: bool, truth: bool) -> RawView:
-        self._aim(camera)
+    def _view(self, stage: Stage, camera: CameraRecord, *, colour: bool, truth: bool) -> RawView:
+        size = (camera.width_px, camera.height_px)
+        if self._size != size:
+            self._size = size
+            mujoco.mjr_resizeOffscreen(*size, self._context)
+        frustum = Frustum.of(camera)
+        spheres = bounding_spheres(self._shared_model, stage.data)
+        seen = in_frustum(frustum, *spheres)
         geom_id, depth_m, linear_rgb = None, None, None
         if truth or (colour and self._quality == "fast"):
+            self._fill_scene(stage, frustum, seen)
             geom_id, depth_m = self._truth(camera)
         if colour:
+            casts = self._casters(stage, frustum, *spheres)
+            self._fill_scene(stage, frustum, seen | casts)
+            self._dress(stage, casts)
             linear_rgb = four_times(self._colour(camera))
             if geom_id is not None and depth_m is not None and self._quality == "fast":
                 linear_rgb = smooth_edges(linear_rgb, geom_id, depth_m)
         return RawView(linear_rgb=linear_rgb, depth_m=depth_m if truth else None, geom_id=geom_id if truth else None)
 
-    def _aim(self, camera: CameraRecord) -> None:
-        frustum = Frustum.of(camera)
+    def _fill_scene(self, stage: Stage, frustum: Frustum, needed: Mask) -> None:
+        """The scene anew, with the geoms that are needed, seen through the frustum."""
+        self._model.geom_group[:] = np.where(needed, self._shared_model.geom_group, _HIDDEN_GROUP)
+        mujoco.mjv_updateScene(
+            self._model, stage.data, self._option, None, mujoco.MjvCamera(), mujoco.mjtCatBit.mjCAT_ALL, self._scene
+        )
         for gl_camera in self._scene.camera:
             gl_camera.pos[:] = frustum.position_world_m
             gl_camera.forward[:] = frustum.forward_world
@@ -150,12 +157,32 @@ class ClassicRenderer:
             gl_camera.frustum_far = FAR_M
         for light in self._scene.lights[: self._scene.nlight]:
             if light.type == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL:
-                # Shadows are cast from here, on a square about the line of the light.
-                centre = frustum.position_world_m + _SHADOW_AHEAD_M * frustum.forward_world
-                light.pos[:] = centre - _SHADOW_HEIGHT_M * light.dir
-        if self._size != (camera.width_px, camera.height_px):
-            self._size = (camera.width_px, camera.height_px)
-            mujoco.mjr_resizeOffscreen(*self._size, self._context)
+                # OpenGL's sun casts shadows on a square about the line through this point.
+                light.pos[:] = _shadow_centre(frustum) - _SHADOW_HEIGHT_M * light.dir
+
+    def _casters(self, stage: Stage, frustum: Frustum, centres_m: Array, radii_m: Array) -> Mask:
+        """Geoms that may cast a shadow on the squares of the suns; all of them where another light casts shadows."""
+        casts = np.zeros(len(radii_m), np.bool_)
+        model = self._model
+        for light in np.flatnonzero(model.light_castshadow & model.light_active):
+            if model.light_type[light] != mujoco.mjtLightType.mjLIGHT_DIRECTIONAL:
+                return np.ones_like(casts)
+            direction = stage.data.light_xdir[light]
+            casts |= in_beam(_shadow_centre(frustum), direction, SHADOW_REACH_M, centres_m, radii_m)
+        return casts
+
+    def _dress(self, stage: Stage, casts: Mask) -> None:
+        """Paint, and a mark on what is too far for its shadow to be seen. Scenes are filled anew: nothing to undo."""
+        for geom in self._scene.geoms[: self._scene.ngeom]:
+            if geom.objtype != mujoco.mjtObj.mjOBJ_GEOM:
+                continue
+            index = geom.objid
+            if not casts[index]:
+                geom.category = mujoco.mjtCatBit.mjCAT_DECOR
+            if index in stage.paint_rgb:
+                geom.rgba[:3] = encode_srgb(stage.paint_rgb[index])
+            elif index in stage.faces:
+                geom.rgba[:3] = 1.0
 
     def _colour(self, camera: CameraRecord) -> UInt8Image:
         pixels = np.empty((camera.height_px, camera.width_px, 3), np.uint8)
@@ -196,3 +223,8 @@ class ClassicRenderer:
 def _is_software(device: str) -> bool:
     """Mesa's CPU drivers by the names they give themselves."""
     return any(word in device.casefold() for word in ("llvmpipe", "softpipe", "swrast", "software"))
+
+
+def _shadow_centre(frustum: Frustum) -> Array:
+    """(3,) in the middle of where shadows can be told apart."""
+    return np.asarray(frustum.position_world_m + _SHADOW_AHEAD_M * frustum.forward_world)

@@ -120,6 +120,7 @@ def test_colour_lies_where_its_geom_is(renderer: Renderer, stage: Stage) -> None
     def overlap(mask: np.ndarray) -> float:
         return float((mask & seen).sum() / (mask | seen).sum())
 
-    assert overlap(changed) > 0.98
-    assert all(overlap(np.roll(changed, shift, axis)) < 0.975 for shift in (-1, 1) for axis in (0, 1))
+    assert overlap(changed) > 0.97
+    shifted = [overlap(np.roll(changed, shift, axis)) for shift in (-1, 1) for axis in (0, 1)]
+    assert max(shifted) < overlap(changed) - 0.005
     assert overlap(np.fliplr(changed)) < 0.8 and overlap(np.flipud(changed)) < 0.3
