@@ -5,7 +5,7 @@ the model holds colours as they are to be displayed: textures marked sRGB are no
 and geoms are encoded. Its frames are linear in a face's 8-bit values (Filament's are linear in the albedo that these
 encode).
 
-How a face's texture reaches the screen: OpenGL's trilinear filtering of box-filtered mip levels with repeating borders.
+How a face's texture reaches the screen: as in `gear.render.filament`, but filtered as bytes, without decoding.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from gear.values.scene import CameraRecord
 
 _SAMPLES = {"film": 4, "fast": 0}
 _EXTRA_GEOMS = 100
-_SHADOW_AHEAD_M = 50.0
+_SHADOW_AHEAD_M = 40.0
 _SHADOW_HEIGHT_M = 300.0
 _HIDDEN_GROUP = 5
 _FLAGS = mujoco.mjtRndFlag

@@ -3,6 +3,11 @@
 Pictures are taken without Filament's post-processing: it dithers by frame number and finds edges by contrast, so a
 frame would depend on what was rendered before it and a patch could change pixels that it does not reach. Without it
 every frame is linear and the same each time; supersampling and gear's own camera take its place.
+
+How a face's texture reaches the screen (measured): texels are decoded from sRGB, then filtered trilinearly over a
+chain of 2 x 2 averaged mip levels, in linear light, with borders that repeat. The level is isotropic, log2 of the
+longer of a pixel's two edges in texels, so a slanted face is softer than its shorter direction needs. Classic does
+the same on raw bytes.
 """
 
 from __future__ import annotations
