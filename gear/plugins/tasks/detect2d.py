@@ -169,7 +169,7 @@ class Detect2dTask:
         return CocoEvaluator(lambda sample: self._as_picture(sample.record, sample.objects))
 
     def preview(self, sample: Detect2dSample) -> Mapping[str, UInt8Image]:
-        """Masks and boxes over the picture; ignored objects dashed in grey."""
+        """Masks and boxes over the picture; ignored objects dashed in grey, without a word."""
         picture = sample.images[VIEW].copy()
         height, width = picture.shape[:2]
         for thing in sample.objects:
@@ -177,7 +177,8 @@ class Detect2dTask:
             inside = rle.decode(thing.rle, height, width)
             picture[inside] = (picture[inside] * 0.6 + np.array(colour) * 0.4).astype(np.uint8)
             left, top, right, bottom = thing.box_px
-            text = f"{coco.CATEGORY_NAMES[thing.category_id]} {thing.visible_fraction:.0%}"
+            name = coco.CATEGORY_NAMES[thing.category_id]
+            text = "" if thing.is_ignored else f"{name} {thing.visible_fraction:.0%}"
             draw_box(picture, (left, top, right - 1, bottom - 1), colour, text, dashed=thing.is_ignored)
         draw_surfaces(picture, sample, VIEW)
         return {"boxes": picture}
