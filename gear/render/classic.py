@@ -16,9 +16,10 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from gear.camera.response import encode_srgb
 from gear.contracts.rendering import Quality, RawView, RendererInfo, Stage
 from gear.render.culling import Mask, bounding_spheres, in_beam, in_frustum
-from gear.render.display import SHADOW_REACH_M, displayed_model, encode_srgb
+from gear.render.display import SHADOW_REACH_M, displayed_model
 from gear.render.faces import checked_faces
 from gear.render.glcontext import choose_backend, driver_and_device, open_context
 from gear.render.pinhole import FAR_M, NEAR_M, Frustum, depth_from_reversed

@@ -6,7 +6,8 @@ import copy
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
+
+from gear.camera.response import encode_srgb
 
 SHADOW_REACH_M = 50.0
 """Half the side of the square on which classic's sun casts shadows; the renderer lays it before the camera."""
@@ -15,12 +16,6 @@ SHADOW_MAP_PX = 2048
 """Side of its shadow map: five centimetres a texel. Twice as many cost a tenth of a frame."""
 
 _DEFAULT_RGBA = np.array([0.5, 0.5, 0.5, 1.0], np.float32)
-
-
-def encode_srgb(linear: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Linear light (...) in 0..1 to sRGB values in 0..1."""
-    light = np.clip(np.asarray(linear, dtype=np.float64), 0.0, 1.0)
-    return np.where(light <= 0.0031308, light * 12.92, 1.055 * np.maximum(light, 0.0031308) ** (1 / 2.4) - 0.055)
 
 
 def has_linear_colours(model: mujoco.MjModel) -> bool:

@@ -23,8 +23,9 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from gear.camera.response import encode_srgb
 from gear.contracts.rendering import Quality, RawView, RendererInfo, Stage
-from gear.render.display import encode_srgb, has_linear_colours
+from gear.render.display import has_linear_colours
 from gear.render.faces import checked_faces
 from gear.render.pinhole import FAR_M, NEAR_M, Frustum, depth_from_reversed
 from gear.render.quiet import native_output
