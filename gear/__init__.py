@@ -15,20 +15,20 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from gear.opening import Dataset, Twins, open_dataset, open_twins
     from gear.values.errors import GearError
     from gear.verbs.collect.run import CollectReport, collect
-    from gear.verbs.opening import Dataset, Twins, open_dataset, open_twins
 
 __all__ = ["CollectReport", "Dataset", "GearError", "Twins", "collect", "open_dataset", "open_twins"]
 
 _HOME = {
     "CollectReport": "gear.verbs.collect.run",
-    "Dataset": "gear.verbs.opening",
+    "Dataset": "gear.opening",
     "GearError": "gear.values.errors",
-    "Twins": "gear.verbs.opening",
+    "Twins": "gear.opening",
     "collect": "gear.verbs.collect.run",
-    "open_dataset": "gear.verbs.opening",
-    "open_twins": "gear.verbs.opening",
+    "open_dataset": "gear.opening",
+    "open_twins": "gear.opening",
 }
 
 

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 
 from gear.dataset.files import explained
+from gear.opening import open_dataset
 from gear.values.frames import UInt8Image
-from gear.verbs.opening import open_dataset
 
 CELL_WIDTH_PX = 640
 CAPTION_PX = 22

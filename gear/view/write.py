@@ -11,8 +11,8 @@ from urllib.parse import quote
 
 from gear.dataset.files import explained
 from gear.dataset.reading import Dataset
+from gear.opening import open_dataset
 from gear.values.serial import Json
-from gear.verbs.opening import open_dataset
 from gear.view.build import Builder, Progress, fitting_scale
 from gear.view.document import document
 from gear.view.rows import finite

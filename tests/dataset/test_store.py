@@ -12,11 +12,11 @@ from gear.config.nodes import parse_text
 from gear.contracts.tasks import SplitInfo
 from gear.dataset.plan import Plan
 from gear.dataset.store import Store, remove_split
+from gear.opening import open_dataset, open_twins
 from gear.plugins.build import build_task
 from gear.testing.synthetic import synthetic_frame
 from gear.values.errors import DatasetError
 from gear.verbs.export import export
-from gear.verbs.opening import open_dataset, open_twins
 from gear.verbs.sheet import contact_sheet
 
 OPTIONS = {"width_px": 160, "height_px": 80}

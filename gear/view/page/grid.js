@@ -84,7 +84,7 @@ function showFiltered() {
 function moveInGrid(event) {
   const here = shown.findIndex((sample) => cells[sample.number] === document.activeElement);
   if (here < 0) return;
-  const tops = shown.map((sample) => cells[sample.number].offsetTop);
+  const tops = shown.map((sample) => cells[sample.number].parentElement.offsetTop);
   const wide = Math.max(1, tops.filter((top) => top === tops[0]).length);
   const steps = { ArrowLeft: -1, ArrowRight: 1, ArrowUp: -wide, ArrowDown: wide, Home: -shown.length, End: shown.length };
   if (!(event.key in steps)) return;
