@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 from shapely.geometry import LineString, Polygon  # type: ignore[import-untyped]
+from shapely.geometry.base import BaseGeometry  # type: ignore[import-untyped]
 from shapely.ops import unary_union  # type: ignore[import-untyped]
 
 from authoring.kit.parts import Sink
@@ -20,7 +21,7 @@ from authoring.towns.document import Document, Geom, bay_rows
 from authoring.towns.furniture import Furnisher
 from authoring.towns.ground import lay_ground, tactile_paving
 from authoring.towns.lanes import Lane, lane_graph, turns_of
-from authoring.towns.lots import build_lots, plan_lots
+from authoring.towns.lots import Lot, build_lots, plan_lots
 from authoring.towns.markings import paint_streets
 from authoring.towns.props import Ground, Props
 from authoring.towns.regions import Regions, canal_polygon
@@ -49,7 +50,7 @@ def write_town10(folder: Path) -> None:
         folder: where the file goes; meshes go to `town10/` in it.
     """
     regions, lanes = town10_regions(), town10_lanes()
-    sites = unary_union([site.ground(regions) for site in town10.SITES])
+    sites = _sites(regions)
     sink = Sink("static")
     lay_ground(sink, regions, sites)
     paint_streets(sink, regions, lambda lane: turns_of(lanes, lane))
@@ -60,7 +61,7 @@ def write_town10(folder: Path) -> None:
     build_lots(sink, lots, seed=SEED)
     build_skyline(sink, regions, lots, rng=np.random.default_rng([SEED, 2]))
 
-    props, lot_bays = _furnish(sink, regions)
+    props, lot_bays = _furnish(sink, regions, lots)
 
     document = Document("town10", town10.BOUNDS)
     meshes = folder / "town10"
@@ -83,7 +84,9 @@ def write_town10(folder: Path) -> None:
     (folder / "town10.xml").write_text(document.text(), encoding="utf-8", newline="\n")
 
 
-def _furnish(sink: Sink, regions: Regions) -> tuple[Props, list[tuple[str, float, float, npt.NDArray[np.float64]]]]:
+def _furnish(
+    sink: Sink, regions: Regions, lots: list[Lot]
+) -> tuple[Props, list[tuple[str, float, float, npt.NDArray[np.float64]]]]:
     props = Props(sink)
     views = unary_union([LineString([view[:2], view[2:]]).buffer(3.0).union(_fan(view)) for view in town10.VIEWS])
     ground = Ground(regions.sidewalks.buffer(-0.25), tactile_paving(regions), views)
@@ -97,7 +100,15 @@ def _furnish(sink: Sink, regions: Regions) -> tuple[Props, list[tuple[str, float
     builder = SiteBuilder(props, regions, furnisher, town10.HILL, rng=np.random.default_rng([SEED, 4]))
     for site in town10.SITES:
         builder.build(site)
+    taken = unary_union([*(lot.footprint.buffer(1.2) for lot in lots), regions.corridors.buffer(1.5), _sites(regions)])
+    furnisher.quay(
+        np.asarray(town10.CANAL_LINE), town10.CANAL_HALF_WIDTH_M + 3.0, unary_union(regions.interiors).difference(taken)
+    )
     return props, builder.lot_bays
+
+
+def _sites(regions: Regions) -> BaseGeometry:
+    return unary_union([site.ground(regions) for site in town10.SITES])
 
 
 def _fan(view: tuple[float, float, float, float]) -> Polygon:

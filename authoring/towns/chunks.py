@@ -14,7 +14,7 @@ from authoring.mesh import Mesh
 REACH = 2
 LETTERS = "abcdef"
 # How coarse a part's cells are by its triangles: few large chunks are cheaper than many small ones.
-LEVELS = ((25000, 1), (8000, 2), (0, 4))
+LEVELS = ((25000, 1), (9000, 2), (0, 4))
 # A cell with fewer triangles joins the fullest one.
 CRUMBS = 24
 

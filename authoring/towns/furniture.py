@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 from shapely.geometry import LineString, Point  # type: ignore[import-untyped]
+from shapely.geometry.base import BaseGeometry  # type: ignore[import-untyped]
 from shapely.ops import unary_union  # type: ignore[import-untyped]
 
 from authoring import kit
@@ -16,13 +17,15 @@ from authoring.towns.regions import KERB_M, Regions
 
 Array = npt.NDArray[np.float64]
 LAMP_M = 25.0
-MEDIAN_TREE_M = 13.0
+MEDIAN_TREE_M = 14.5
+# Trees on the quays that are farther from every bridge are simple ones.
+SEEN_FROM_BRIDGE_M = 34.0
 # How far lamps go on along a street out of town.
 OUTSIDE_M = 80.0
 FROM_KERB_M = 0.65
 FAR_M = 236.0
 TREES = (("street", 7.5), ("broad", 8.5), ("linden", 8.0), ("street", 6.5), ("columnar", 9.0), ("linden", 7.0))
-EXTRAS = ("bin", "bench", "cable_box", "planter") + ("bench",) + ("none",) * 10
+EXTRAS = ("bin", "bench", "cable_box", "planter") + ("none",) * 11
 
 
 class Furnisher:
@@ -87,9 +90,32 @@ class Furnisher:
                 x, y = self._at_mouth(street, starts, mouth + 14.0, FROM_KERB_M, left=True)
                 sign = str(self.rng.choice(["speed_30", "no_parking", "crossing", "speed_50", "parking"]))
                 self._stand(f"sign_{sign}", kit.traffic_sign(sign), x, y, yaw + np.pi, 0.08, high=2.8)
+            if street.profile.one_way and not starts:
+                for left in (False, True):
+                    x, y = self._at_mouth(street, starts, mouth + 1.6, FROM_KERB_M, left=left)
+                    self._stand("no_entry", kit.traffic_sign("no_entry"), x, y, yaw + np.pi, 0.08, high=2.8)
+        self._one_way(name)
         self._corner(name)
 
-    def plant(self, x: float, y: float, z: float, *, kind: int, always: bool = False) -> None:
+    def quay(self, line: Array, from_middle_m: float, land: BaseGeometry) -> None:
+        """Trees, lamps and benches on both banks of a canal, wherever `land` is free for them."""
+        for side in (1, -1):
+            bank = paths.offset(line, side * from_middle_m)
+            for index, station in enumerate(np.arange(0.0, paths.length(bank), 6.5)):
+                point, along = paths.at(bank, float(station))
+                x, y = (float(v) for v in point)
+                if max(abs(x), abs(y)) > FAR_M or not land.contains(Point(x, y).buffer(1.0)):
+                    continue
+                yaw = float(np.arctan2(along[1], along[0]) + (np.pi if side > 0 else 0.0))
+                if index % 2 == 0:
+                    simple = self.regions.corridors.distance(Point(x, y)) > SEEN_FROM_BRIDGE_M
+                    self.plant(x, y, KERB_M, kind=1 + (index // 2) % 4, always=True, simple=simple)
+                elif index % 4 == 1:
+                    self.props.put("lamp", kit.street_lamp(style="heritage"), x, y, KERB_M, yaw, radius_m=0.2, high_m=4)
+                elif index % 16 == 3:
+                    self.props.put("bench", kit.bench(style="stone"), x, y, KERB_M, yaw, radius_m=0.9, high_m=0.6)
+
+    def plant(self, x: float, y: float, z: float, *, kind: int, always: bool = False, simple: bool = False) -> None:
         """A tree, if there is room: near ones in detail, far ones simple."""
         index = kind % len(self.trees)
         if not always and not (self.ground.takes(x, y, tall=True) and self.props.is_free(x, y, 1.2)):
@@ -97,7 +123,7 @@ class Furnisher:
         if always and self.ground.views.contains(Point(x, y)):
             return
         yaw = float(self.rng.uniform(0, 2 * np.pi))
-        if max(abs(x), abs(y)) > FAR_M:
+        if simple or max(abs(x), abs(y)) > FAR_M:
             self.props.put(f"tree_far{index}", self.far_trees[index], x, y, z, yaw, radius_m=0.35, high_m=4.0)
         else:
             self.props.instance(f"tree{index}", self.trees[index], x, y, z, yaw, radius_m=0.3, high_m=4.0)
@@ -186,6 +212,15 @@ class Furnisher:
                 self.props.sink.extend(
                     kit.place(kit.road_cover("drain"), x_m=float(x), y_m=float(y), z_m=0.003, yaw_rad=yaw)
                 )
+
+    def _one_way(self, name: str) -> None:
+        """Signs where a one-way street starts."""
+        for arm, starts, away in self.network.arms(name):
+            street = self.network.streets[arm]
+            if street.profile.one_way and starts:
+                x, y = self._at_mouth(street, starts, self.network.mouths[arm, starts] + 3.0, FROM_KERB_M, left=True)
+                yaw = float(np.arctan2(away[1], away[0]) - np.pi / 2)
+                self._stand("one_way", kit.traffic_sign("one_way"), x, y, yaw, 0.08, high=2.8)
 
     def _corner(self, name: str) -> None:
         arm, starts, away = self.network.arms(name)[0]

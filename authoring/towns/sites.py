@@ -26,6 +26,8 @@ Kind = Literal["plaza", "park", "parking_lot", "vacant", "construction"]
 LOT_BAY_M = (5.0, 2.5)
 HILL_STEP_M = 1.5
 PATH_M = 2.6
+# Trees farther from every road are simple ones.
+NEAR_ROAD_M = 12.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,10 +133,10 @@ class SiteBuilder:
             )
         )
         inner = ground.buffer(-2.0)
-        for _ in range(70):
+        for _ in range(160):
             x, y = float(self.rng.uniform(x0, x1)), float(self.rng.uniform(y0, y1))
             if inner.contains(Point(x, y)) and not tracks.buffer(1.2).contains(Point(x, y)):
-                if self.rng.random() < 0.7:
+                if self.rng.random() < 0.8:
                     self._tree(x, y, int(self.rng.integers(6)), z=float(self.hill.height(x, y)), room_m=2.6)
                 else:
                     shrub = kit.shrub(float(self.rng.uniform(0.8, 1.6)), self.rng)
@@ -144,8 +146,8 @@ class SiteBuilder:
             if ground.contains(Point(x, y)) and not mound.buffer(5).contains(Point(x, y)):
                 self._put("bench", kit.bench(style="wood"), float(x), y, 0.9, 0.8, yaw=0.0)
                 self._put("lamp_heritage", kit.street_lamp(style="heritage"), float(x) + 2.5, y, 0.2, 4.0)
-        hedge = kit.hedge(6.6, 0.9, 0.7, self.rng)
-        for x in np.arange(x0 + 9, x1 - 9, 8.0):
+        hedge = kit.hedge(12.6, 0.9, 0.7, self.rng)
+        for x in np.arange(x0 + 9, x1 - 9, 14.5):
             y = y0 + 1.0 + self._slack(ground, float(x), y0)
             if self.props.is_free(float(x), y, 0.5):
                 self.props.instance("hedge", hedge, float(x), y, KERB_M, 0.0, radius_m=0.5, high_m=0.9)
@@ -265,7 +267,8 @@ class SiteBuilder:
 
     def _tree(self, x: float, y: float, kind: int, *, z: float = KERB_M, room_m: float = 1.5) -> None:
         if self.props.is_free(x, y, room_m):
-            self.furnisher.plant(x, y, z, kind=kind, always=True)
+            simple = self.regions.carriageways.distance(Point(x, y)) > NEAR_ROAD_M
+            self.furnisher.plant(x, y, z, kind=kind, always=True, simple=simple)
 
     def _put(
         self,

@@ -18,6 +18,7 @@ CITY_M = 640.0
 HILLS_M = (520.0, 1150.0)
 HILL_TOP_M = 105.0
 FIELD_Z_M = -0.12
+HILL_TILE_M = {"grass": 57.0, "foliage_dark": 23.0}
 
 
 def build_skyline(sink: Sink, regions: Regions, lots: list[Lot], *, rng: np.random.Generator) -> None:
@@ -60,8 +61,8 @@ def build_skyline(sink: Sink, regions: Regions, lots: list[Lot], *, rng: np.rand
 
 def _hills(sink: Sink) -> None:
     """A ring of hills, heights summed from a few waves so that no two ridges are alike."""
-    angles = np.linspace(0, 2 * np.pi, 145)
-    radii = np.concatenate([np.linspace(*HILLS_M, 13)])
+    angles = np.linspace(0, 2 * np.pi, 163)
+    radii = np.concatenate([np.linspace(*HILLS_M, 15)])
     theta, r = np.meshgrid(angles, radii, indexing="ij")
     rise = np.clip((r - HILLS_M[0]) / (HILLS_M[1] - HILLS_M[0]), 0, 1)
     waves = [(3, 0.4, 0.30), (5, 2.1, 0.25), (8, 4.0, 0.18), (13, 1.2, 0.12), (21, 5.5, 0.07)]
@@ -77,7 +78,17 @@ def _hills(sink: Sink) -> None:
     index = np.arange(rows * columns).reshape(rows, columns)
     a, b, c, d = (part.ravel() for part in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]))
     faces = np.concatenate([np.stack([a, d, c], 1), np.stack([a, c, b], 1)])
-    vertices = grid.reshape(-1, 3)
-    sink.triangles(
-        "grass", vertices, faces, uvs=vertices[:, :2] / 40.0, normals=normals.reshape(-1, 3), label="terrain"
+    wooded = (
+        np.sin(7 * theta + 3 * np.sin(9 * rise)) + np.sin(23 * theta + 1.7) + 0.8 * np.sin(31 * rise + theta) > 0.35
     )
+    woods = np.repeat((wooded & (rise > 0.12))[:-1, :-1].ravel()[None], 2, 0).ravel()
+    vertices = grid.reshape(-1, 3)
+    for chosen, material, label in ((~woods, "grass", "terrain"), (woods, "foliage_dark", "vegetation")):
+        sink.triangles(
+            material,
+            vertices,
+            faces[chosen],
+            uvs=vertices[:, :2] / HILL_TILE_M[material],
+            normals=normals.reshape(-1, 3),
+            label=label,
+        )
