@@ -21,6 +21,7 @@ from gear.world.classes import GeomClasses
 from gear.world.compose import PARKED_DEPTH_M, Composition, Slot, compose
 from gear.world.faces import SurfaceAlbedo, SurfaceAlbedos
 from gear.world.lanes import LaneGraph
+from gear.world.memory import keep_no_assets, release_memory
 from gear.world.models import placement_model, render_model
 from gear.world.pool import plan_pool
 from gear.world.scene_spec import SceneSpec
@@ -103,6 +104,7 @@ class World:
             UnknownNameError: there is no such town, board or truck.
             TownError: a file breaks the conventions.
         """
+        keep_no_assets()
         library = AssetLibrary.for_town(town)
         carrier = None
         if scene.truck is not None:
@@ -110,7 +112,10 @@ class World:
             carrier = library.vehicles[scene.truck.asset]
         composition = compose(library, scene.boards, plan_pool(scene, library), carrier, weather)
         model, classes = render_model(composition)
-        return _assemble(library, scene_name, scene, weather, composition, model, classes)
+        world = _assemble(library, scene_name, scene, weather, composition, model, classes)
+        del composition
+        release_memory()
+        return world
 
     @property
     def town_name(self) -> str:
