@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from view_datasets import OPTIONS, store_samples
 
 from gear.dataset.reading import Dataset
 from gear.opening import open_dataset
 from gear.plugins.build import find
 from gear.values.serial import to_json
+
+from .view_datasets import OPTIONS, store_samples
 
 Write = Callable[..., Path]
 
