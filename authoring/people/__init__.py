@@ -1,0 +1,1 @@
+"""People, made in code: `python -m authoring.people` writes mjcf/pedestrians/."""

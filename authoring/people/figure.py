@@ -1,0 +1,120 @@
+"""A person in a pose: skeleton, clothes and skin become at most six meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from authoring.mesh import Mesh
+from authoring.people.body import bare_arms, bare_legs
+from authoring.people.garments import Garment
+from authoring.people.head import head_piece
+from authoring.people.piece import Piece, Skin, combine, mesh_pieces
+from authoring.people.skeleton import ANKLE_M, SIDES, Build, Pose, Skeleton, pose_skeleton
+from authoring.people.texture import Colour, Face, atlas_uv, skin_uv
+
+GROUPS = ("paint", "cloth", "skin", "hair", "shoes", "extra")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Person:
+    """Somebody to model.
+
+    Attributes:
+        name: of the files.
+        build: proportions.
+        face: what is painted on it; its hair colour is the hair's.
+        wear: garments, hair, shoes and bags.
+        palette: (r, g, b, weight) rows, linear albedo, of what a sample may colour.
+        colours: linear albedo of the rest by the names that the garments use.
+        poses: the poses to make.
+        bare: which limbs show skin: `arms`, `legs`.
+    """
+
+    name: str
+    build: Build
+    face: Face
+    wear: tuple[Garment, ...]
+    palette: tuple[tuple[float, float, float, float], ...]
+    colours: dict[str, Colour]
+    poses: tuple[Pose, ...]
+    bare: tuple[str, ...] = ()
+
+    @property
+    def atlas(self) -> dict[str, Colour]:
+        """All colours of the cloth atlas by name; `paint` is white and takes the geom's colour."""
+        fixed: dict[str, Colour] = {
+            "paint": (1.0, 1.0, 1.0),
+            "hair": self.face.hair,
+            "white": (0.62, 0.62, 0.60),
+            "black": (0.015, 0.015, 0.016),
+            "sole": (0.045, 0.042, 0.04),
+            "shoe": (0.03, 0.028, 0.027),
+        }
+        return fixed | self.colours
+
+
+def _lowest(skeleton: Skeleton, side: str) -> float:
+    s = skeleton.build.scale
+    foot, toes = skeleton[f"foot_{side}"], skeleton[f"toes_{side}"]
+    heel = foot.at(-0.075 * s, 0.0, -ANKLE_M * s)[2]
+    return float(min(heel, toes.origin[2], toes.at(0.085 * s, 0.0, 0.0)[2]))
+
+
+def stand_on_both_feet(build: Build, pose: Pose) -> Pose:
+    """Bend the knee of the longer-reaching leg until both soles touch one ground."""
+    if not pose.grounded:
+        return pose
+    heights = {side: _lowest(pose_skeleton(build, pose), side) for side in SIDES}
+    low = min(heights, key=lambda side: heights[side])
+    target = max(heights.values())
+    bend_low, bend_high = 0.0, 60.0
+    for _ in range(40):
+        bend = 0.5 * (bend_low + bend_high)
+        if _lowest(pose_skeleton(build, _bent(pose, low, bend)), low) < target:
+            bend_low = bend
+        else:
+            bend_high = bend
+    return _bent(pose, low, bend_high)
+
+
+def _bent(pose: Pose, side: str, bend: float) -> Pose:
+    leg = pose.legs[side]
+    return replace(pose, legs=pose.legs | {side: replace(leg, knee=leg.knee + bend, flex=leg.flex + 0.45 * bend)})
+
+
+def pieces_of(person: Person, skeleton: Skeleton) -> list[Piece]:
+    """Every piece of a posed person."""
+    pieces = [head_piece(skeleton), *bare_arms(skeleton, arms="arms" in person.bare)]
+    if "legs" in person.bare:
+        pieces += bare_legs(skeleton)
+    for garment in person.wear:
+        pieces += garment(skeleton)
+    return pieces
+
+
+def model_person(person: Person, pose: Pose) -> dict[str, Mesh]:
+    """The meshes of a person in a pose by group, standing on z = 0 with the pelvis over the origin."""
+    skeleton = pose_skeleton(person.build, stand_on_both_feet(person.build, pose))
+    return meshes_of(pieces_of(person, skeleton), person, skeleton, on_ground=True)
+
+
+def meshes_of(pieces: Sequence[Piece], person: Person, skeleton: Skeleton, *, on_ground: bool) -> dict[str, Mesh]:
+    """Triangles of posed pieces by group."""
+    skins = mesh_pieces(pieces)
+    drop = min(float(skin.vertices[np.unique(skin.faces), 2].min()) for skin in skins) if on_ground else 0.0
+    head = skeleton["head"]
+
+    def uv_of(skin: Skin) -> np.ndarray:
+        if skin.piece.group == "skin":
+            return skin_uv(skin, head, person.build.head)
+        return atlas_uv(skin, person.atlas)
+
+    meshes = {}
+    for group in GROUPS:
+        members = [skin for skin in skins if skin.piece.group == group and len(skin.faces)]
+        if members:
+            meshes[group] = combine(members, uv_of).translated(z=-drop)
+    return meshes
