@@ -22,6 +22,7 @@ from gear.render.culling import Mask, bounding_spheres, in_beam, in_frustum
 from gear.render.display import SHADOW_REACH_M, displayed_model
 from gear.render.faces import checked_faces
 from gear.render.glcontext import choose_backend, driver_and_device, open_context
+from gear.render.occlusion import openness, shade
 from gear.render.pinhole import FAR_M, NEAR_M, Frustum, depth_from_reversed
 from gear.render.samples import four_times, ids_from_rgb, smooth_edges
 from gear.render.visible import geoms_only
@@ -127,16 +128,15 @@ class ClassicRenderer:
         frustum = Frustum.of(camera)
         spheres = bounding_spheres(self._shared_model, stage.data)
         seen = in_frustum(frustum, *spheres)
-        geom_id, depth_m, linear_rgb = None, None, None
-        if truth or (colour and self._quality == "fast"):
-            self._fill_scene(stage, frustum, seen)
-            geom_id, depth_m = self._truth(camera)
+        self._fill_scene(stage, frustum, seen)
+        geom_id, depth_m = self._truth(camera)
+        linear_rgb = None
         if colour:
             casts = self._casters(stage, frustum, *spheres)
             self._fill_scene(stage, frustum, seen | casts)
             self._dress(stage, casts)
-            linear_rgb = four_times(self._colour(camera))
-            if geom_id is not None and depth_m is not None and self._quality == "fast":
+            linear_rgb = shade(four_times(self._colour(camera)), openness(depth_m, camera.focal_px))
+            if self._quality == "fast":
                 linear_rgb = smooth_edges(linear_rgb, geom_id, depth_m)
         return RawView(linear_rgb=linear_rgb, depth_m=depth_m if truth else None, geom_id=geom_id if truth else None)
 

@@ -27,6 +27,7 @@ from gear.camera.response import encode_srgb
 from gear.contracts.rendering import Quality, RawView, RendererInfo, Stage
 from gear.render.display import has_linear_colours
 from gear.render.faces import checked_faces
+from gear.render.occlusion import openness, shade
 from gear.render.pinhole import FAR_M, NEAR_M, Frustum, depth_from_reversed
 from gear.render.quiet import native_output
 from gear.render.samples import four_times, ids_from_rgb, smooth_edges, sum_2x2
@@ -155,17 +156,20 @@ class FilamentRenderer:
         return texture
 
     def _view(self, camera: CameraRecord, *, colour: bool, truth: bool) -> RawView:
-        geom_id, depth_m, linear_rgb = None, None, None
-        if truth or (colour and self._quality == "fast"):
-            geom_id, depth_m = self._geom_id(camera), self._depth_m(camera)
+        smooths = colour and self._quality == "fast"
+        depth_m = self._depth_m(camera)
+        geom_id = self._geom_id(camera) if truth or smooths else None
+        linear_rgb = None
         if colour:
-            linear_rgb = self._linear_rgb(camera, geom_id, depth_m)
+            linear_rgb = shade(self._samples(camera), openness(depth_m, camera.focal_px))
+            if smooths and geom_id is not None:
+                linear_rgb = smooth_edges(linear_rgb, geom_id, depth_m)
         return RawView(linear_rgb=linear_rgb, depth_m=depth_m if truth else None, geom_id=geom_id if truth else None)
 
-    def _linear_rgb(self, camera: CameraRecord, geom_id: IdImage | None, depth_m: FloatImage | None) -> UInt16Image:
-        if geom_id is None or depth_m is None or self._quality == "film":
+    def _samples(self, camera: CameraRecord) -> UInt16Image:
+        if self._quality == "film":
             return sum_2x2(self._pixels(camera, "DEFAULT", "RGB8", scale=2))
-        return smooth_edges(four_times(self._pixels(camera, "DEFAULT", "RGB8")), geom_id, depth_m)
+        return four_times(self._pixels(camera, "DEFAULT", "RGB8"))
 
     def _depth_m(self, camera: CameraRecord) -> FloatImage:
         return depth_from_reversed(self._pixels(camera, "DEPTH", "R32F").copy())

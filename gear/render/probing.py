@@ -17,6 +17,7 @@ from gear.values.scene import CameraRecord, Pose
 
 _REFERENCE_MJCF = """
 <mujoco model="reference">
+  <custom><numeric name="filament.ao.enabled" data="0"/></custom>
   <asset>
     <texture name="grid" type="2d" builtin="checker" width="64" height="32" rgb1="0.8 0.2 0.1" rgb2="0.1 0.3 0.7"
              colorspace="sRGB"/>

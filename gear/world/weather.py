@@ -58,6 +58,8 @@ def apply_weather(root: mjcf.RootElement, weather: Weather) -> None:
     _add_haze(root, weather, lighting)
     _wet(root, wetness(weather))
     root.custom.add("text", name="filament.material.base_color_type", data="linear")
+    # Gear's renderers have their own, which costs less and loses no memory.
+    root.custom.add("numeric", name="filament.ao.enabled", data=[0])
 
 
 def wetness(weather: Weather) -> float:

@@ -16,7 +16,10 @@ from gear.values.scene import CameraRecord, Pose
 
 STREET = """
 <mujoco>
-  <custom><text name="filament.material.base_color_type" data="linear"/></custom>
+  <custom>
+    <text name="filament.material.base_color_type" data="linear"/>
+    <numeric name="filament.ao.enabled" data="0"/>
+  </custom>
   <visual><headlight ambient="0.4 0.4 0.4"/></visual>
   <asset>
     <texture name="face" type="2d" builtin="flat" rgb1="0.5 0.5 0.5" width="64" height="32" colorspace="sRGB"/>
