@@ -1,0 +1,172 @@
+"""What every attack promises. Subclass in your plugin's tests and set `spec`:
+
+class TestMyAttack(AttackContract):
+    spec = my_attack
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from gear.contracts.attacks import Attack, Budget, Patch
+from gear.contracts.specs import AttackSpec, ModelSpec, TaskSpec
+from gear.plugins.manager import catalogue
+from gear.testing.compare import difference, freeze
+from gear.testing.model_state import changes, state_of
+from gear.testing.spec_checks import check_spec
+from gear.testing.synthetic import synthetic_frame
+from gear.testing.things import Thing, board, box_part
+from gear.testing.tiny_compositor import TinyCompositor
+from gear.testing.tiny_networks import TinyConfig, tiny_depth, tiny_segmenter
+from gear.values.rng import derive_rng
+
+SEED = 11
+TINY: Mapping[str, ModelSpec[TinyConfig]] = {"semseg": tiny_segmenter, "depth": tiny_depth}
+ROOM = Thing(parts=(box_part("building", 2.0, 60.0, 14.0),), position_m=(40.0, 0.0, 0.0))
+
+
+class Counted:
+    """A model that counts the forward passes through it."""
+
+    def __init__(self, model: Any) -> None:
+        self.network = model
+        self.passes = 0
+
+    def predict(self, views: Mapping[str, Any]) -> Any:
+        """The model's, counted."""
+        self.passes += 1
+        return self.network.predict(views)
+
+    def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
+        """The model's, counted."""
+        self.passes += 1
+        outputs: Mapping[str, Tensor] = self.network(views, targets)
+        return outputs
+
+    def taps(self) -> Mapping[str, torch.nn.Module]:
+        """The model's."""
+        taps: Mapping[str, torch.nn.Module] = self.network.taps()
+        return taps
+
+
+class AttackContract:
+    """Attributes:
+    spec: the attack.
+    options: of its config, small enough for quick tests.
+    task: one that it can attack, of which gear has a tiny network: `semseg` or `depth`.
+    task_options: of the task's config: the pictures' size.
+    steps: enough for the attack to do some harm.
+    passes_per_step: how many forward passes a step may take.
+    """
+
+    spec: ClassVar[AttackSpec[Any]]
+    options: ClassVar[Mapping[str, Any]] = {}
+    task: ClassVar[str] = "semseg"
+    task_options: ClassVar[Mapping[str, Any]] = {"width_px": 96, "height_px": 48}
+    steps: ClassVar[int] = 12
+    passes_per_step: ClassVar[int] = 4
+
+    def make(self) -> Attack:
+        """A fresh one."""
+        return self.spec.build(self.spec.config(**self.options))
+
+    def model(self) -> Counted:
+        """A tiny network for the task."""
+        return Counted(TINY[self.task].build(TinyConfig()))
+
+    def dataset(self, boards: int = 1) -> list[Any]:
+        """Two samples with so many boards."""
+        found = catalogue().get("task", self.task).spec
+        assert isinstance(found, TaskSpec)
+        task = found.build(found.config(**self.task_options))
+        frames = []
+        for index in range(2):
+            things = [board(11.0 + index, 9.0 * n, surface=n) for n in range(boards)]
+            frames.append(synthetic_frame(task.rig(), [*things, ROOM], index=index))
+        return [freeze(task.ground_truth(*frame)) for frame in frames]
+
+    def budget(self, steps: int) -> Budget:
+        """So many steps; for attacks without gradients as many queries as they may take."""
+        return Budget(steps=steps, queries=None if self.spec.needs_gradients else steps * self.passes_per_step)
+
+    def attack(self, model: Counted, dataset: Sequence[Any], *, steps: int = 2, seed: int = SEED) -> tuple[Patch, ...]:
+        """A fresh attack, run once."""
+        compositor = TinyCompositor(dataset)
+        rng = derive_rng(seed, "attack")
+        return self.make().optimise(model, dataset, compositor, budget=self.budget(steps), rng=rng)
+
+    def harm(self, model: Counted, dataset: Sequence[Any], patches: Sequence[Patch]) -> float:
+        """What the attack wants to be large; override for attacks that want something else than a large loss."""
+        tensors = [torch.from_numpy(patch.rgb.copy()).permute(2, 0, 1) for patch in patches]
+        (view,) = TINY[self.task].views
+        with torch.no_grad():
+            pictures = TinyCompositor(dataset).compose(tensors, range(len(dataset)), view)
+            return float(sum(model.forward({view: pictures}, dataset).values()))
+
+    def test_the_spec_can_be_used(self) -> None:
+        """Name, protocol, config and build are sound; it can attack the task that it is tested on."""
+        check_spec("attack", self.spec, self.options)
+        assert not self.spec.tasks or self.task in self.spec.tasks
+        assert self.spec.max_surfaces >= 1
+
+    def test_patches_are_pictures(self) -> None:
+        """One a surface, `patch_0`, `patch_1`…; (H, W, 3) float32 in 0..1."""
+        for boards in range(1, min(2, self.spec.max_surfaces) + 1):
+            patches = self.attack(self.model(), self.dataset(boards))
+            assert isinstance(patches, tuple)
+            assert [patch.name for patch in patches] == [f"patch_{n}" for n in range(boards)]
+            for patch in patches:
+                assert patch.rgb.dtype == np.float32 and patch.rgb.ndim == 3 and patch.rgb.shape[2] == 3
+                assert np.isfinite(patch.rgb).all(), "a patch has no NaN and no infinity"
+                assert 0 <= float(patch.rgb.min()) <= float(patch.rgb.max()) <= 1
+
+    def test_the_model_is_left_as_it_was(self) -> None:
+        """Parameters, buffers, gradients, what wants a gradient, and every module's mode."""
+        model = self.model()
+        before = state_of(model.network)
+        self.attack(model, self.dataset())
+        assert changes(before, state_of(model.network)) == []
+
+    def test_the_dataset_is_left_as_it_was(self) -> None:
+        """Frozen samples are enough, and stay as they are."""
+        dataset = self.dataset()
+        self.attack(self.model(), dataset)
+        assert not difference(dataset, self.dataset(), "dataset")
+
+    def test_the_same_generator_gives_the_same_patch(self) -> None:
+        """All chance comes from `rng`, and running before leaves no trace."""
+        first = self.attack(self.model(), self.dataset())
+        torch.rand(3)
+        second = self.attack(self.model(), self.dataset())
+        assert not difference(first, second, "patches")
+
+    def test_it_stays_within_its_budget(self) -> None:
+        """Forward passes are limited by steps, or by queries where there are no gradients."""
+        for steps in (1, 3):
+            model = self.model()
+            self.attack(model, self.dataset(), steps=steps)
+            assert 0 < model.passes <= steps * self.passes_per_step
+
+    def test_it_does_harm(self) -> None:
+        """More than a grey board of the same size does."""
+        model, dataset = self.model(), self.dataset()
+        patches = self.attack(model, dataset, steps=self.steps)
+        grey = [Patch(name=patch.name, rgb=np.full_like(patch.rgb, 0.5)) for patch in patches]
+        assert self.harm(model, dataset, patches) > self.harm(model, dataset, grey)
+
+    def test_gradients_are_needed_where_declared(self) -> None:
+        """An attack that declares no need of gradients works on a model that gives none."""
+        if self.spec.needs_gradients:
+            return
+
+        class Opaque(Counted):
+            def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
+                with torch.no_grad():
+                    return super().forward(views, targets)
+
+        assert self.attack(Opaque(self.model().network), self.dataset())

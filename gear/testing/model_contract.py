@@ -1,0 +1,155 @@
+"""What every model promises. Subclass in your plugin's tests and set `spec`:
+
+class TestMyNet(ModelContract):
+    spec = my_net
+    options = {"pretrained": False}
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from gear.contracts.models import Model
+from gear.contracts.specs import ModelSpec, TaskSpec
+from gear.plugins.manager import catalogue
+from gear.testing.compare import difference, freeze
+from gear.testing.model_state import changes, state_of
+from gear.testing.spec_checks import check_spec
+from gear.testing.synthetic import synthetic_frame
+from gear.testing.tiny_networks import as_batch
+from gear.values.frames import UInt8Image
+
+
+class ModelContract:
+    """Attributes:
+    spec: the model.
+    options: of its config, such that no weights are needed.
+    task_options: of the tasks' configs: the pictures' size.
+    tolerance: how far the outputs of one picture may lie from those of the same picture in a batch, relative to the
+        largest output.
+    """
+
+    spec: ClassVar[ModelSpec[Any]]
+    options: ClassVar[Mapping[str, Any]] = {}
+    task_options: ClassVar[Mapping[str, Any]] = {"width_px": 128, "height_px": 64}
+    tolerance: ClassVar[float] = 1e-4
+
+    def make(self) -> Model:
+        """A fresh one; override where the options cannot be said in advance."""
+        return self.spec.build(self.spec.config(**self.options))
+
+    def samples(self, task: str) -> list[Any]:
+        """Two samples of a synthetic street, as the task sees it."""
+        found = catalogue().get("task", task).spec
+        assert isinstance(found, TaskSpec)
+        builder = found.build(found.config(**self.task_options))
+        return [builder.ground_truth(*synthetic_frame(builder.rig(), index=i, seed=5)) for i in range(2)]
+
+    def views(self, sample: Any) -> dict[str, UInt8Image]:
+        """What the model sees of a sample."""
+        return {name: sample.images[name] for name in self.spec.views}
+
+    def batch(self, samples: Sequence[Any]) -> dict[str, Tensor]:
+        """The same in torch, asking for gradients."""
+        tensors = as_batch([self.views(sample) for sample in samples])
+        return {name: tensor.requires_grad_(self.spec.has_gradients) for name, tensor in tensors.items()}
+
+    def test_the_spec_can_be_used(self) -> None:
+        """Name, protocol, config and build are sound; it says what it can do and what it looks at."""
+        check_spec("model", self.spec, self.options)
+        assert self.spec.tasks and self.spec.views
+
+    def test_the_tasks_show_what_it_looks_at(self) -> None:
+        """Its tasks are installed and have its cameras."""
+        for task in self.spec.tasks:
+            assert set(self.spec.views) <= set(self.samples(task)[0].images)
+
+    def test_predict_sees_pictures_alone(self) -> None:
+        """`predict` takes the views and nothing else: no way for ground truth to get in."""
+        parameters = inspect.signature(self.make().predict).parameters
+        assert list(parameters) == ["views"]
+
+    def test_predictions_suit_the_evaluators(self) -> None:
+        """Every task's evaluator takes its prediction and gives numbers that are no infinities."""
+        model = self.make()
+        for name in self.spec.tasks:
+            found = catalogue().get("task", name).spec
+            evaluator = found.build(found.config(**self.task_options)).evaluator()
+            for sample in self.samples(name):
+                evaluator.update(sample, model.predict(self.views(sample)))
+            assert not any(np.isinf(value) for value in evaluator.result().values())
+
+    def test_predict_repeats_and_leaves_everything_alone(self) -> None:
+        """Same pictures, same prediction; neither pictures nor weights change; other samples leave no trace."""
+        model = self.make()
+        one, two = (self.views(sample) for sample in self.samples(self.spec.tasks[0]))
+        before = state_of(model)
+        first = model.predict(freeze(one))
+        model.predict(freeze(two))
+        assert not difference(first, model.predict(one), "prediction")
+        assert not changes(before, state_of(model))
+
+    def test_two_of_the_same_options_are_alike(self) -> None:
+        """Weights follow from the options, not from chance."""
+        pictures = self.views(self.samples(self.spec.tasks[0])[0])
+        assert not difference(self.make().predict(pictures), self.make().predict(pictures), "prediction")
+
+    def test_forward_takes_batches(self) -> None:
+        """A tensor a name with the batch in front; a picture's outputs do not depend on its neighbours."""
+        model, samples = self.make(), self.samples(self.spec.tasks[0])
+        with torch.no_grad():
+            both, one = model.forward(self.batch(samples)), model.forward(self.batch(samples[:1]))
+        assert both and set(both) == set(one)
+        for name, tensor in both.items():
+            assert tensor.shape[0] == 2 and one[name].shape == (1, *tensor.shape[1:]), name
+            assert bool(torch.isfinite(tensor).all()), name
+            scale = float(tensor[0].abs().max()) + 1e-6
+            assert float((tensor[:1] - one[name]).abs().max()) <= self.tolerance * scale, f"{name} depends on the batch"
+
+    def test_forward_looks_at_the_picture(self) -> None:
+        """Different pictures, different outputs."""
+        outputs = self.make().forward(self.batch(self.samples(self.spec.tasks[0])))
+        assert any(not torch.equal(tensor[0], tensor[1]) for tensor in outputs.values())
+
+    def test_losses_are_numbers(self) -> None:
+        """With the batch's samples as targets it gives finite losses without dimensions."""
+        for task in self.spec.tasks:
+            samples = self.samples(task)
+            for name, loss in self.make().forward(self.batch(samples), samples).items():
+                assert loss.shape == () and bool(torch.isfinite(loss)), name
+
+    def test_gradients_flow_where_declared(self) -> None:
+        """Outputs and losses have finite gradients, not all zero, to the pixels of every view."""
+        if not self.spec.has_gradients:
+            return
+        model, samples = self.make(), self.samples(self.spec.tasks[0])
+        for targets in (None, samples):
+            pictures = self.batch(samples)
+            total = torch.stack(
+                [tensor.double().square().sum() for tensor in model.forward(pictures, targets).values()]
+            )
+            gradients = torch.autograd.grad(total.sum(), list(pictures.values()))
+            for name, gradient in zip(pictures, gradients, strict=True):
+                assert bool(torch.isfinite(gradient).all()), name
+                assert float(gradient.abs().sum()) > 0, f"no gradient reaches the view {name!r}"
+
+    def test_taps_are_there(self) -> None:
+        """The declared feature maps and no others; each runs in `forward` and gives a tensor."""
+        model = self.make()
+        taps = model.taps()
+        assert set(taps) == set(self.spec.taps)
+        seen: dict[str, bool] = {}
+        handles = [
+            tap.register_forward_hook(lambda _module, _in, out, name=name: seen.update({name: torch.is_tensor(out)}))
+            for name, tap in taps.items()
+        ]
+        model.forward(self.batch(self.samples(self.spec.tasks[0])[:1]))
+        for handle in handles:
+            handle.remove()
+        assert seen == dict.fromkeys(taps, True)

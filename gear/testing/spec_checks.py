@@ -1,0 +1,24 @@
+"""What every spec promises, whatever its kind."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from gear.config.dump import to_yaml
+from gear.config.nodes import parse_text
+from gear.config.reader import read_node
+from gear.contracts.specs import AnySpec, Kind
+from gear.plugins.manager import spec_problem
+
+
+def check_spec(kind: Kind, spec: AnySpec, options: Mapping[str, Any]) -> None:
+    """Asserts that a spec can be used and that its config, default or not, survives YAML.
+
+    Raises:
+        AssertionError: it does not.
+    """
+    assert spec_problem(kind, spec) is None, spec_problem(kind, spec)
+    assert spec.summary and "\n" not in spec.summary, "the summary is one line"
+    for config in (spec.config(), spec.config(**options)):
+        assert read_node(spec.config, parse_text(to_yaml(config), "config")) == config

@@ -1,0 +1,64 @@
+"""A tiny compositor for tests: it pastes patches by homography where the ground truth sees their surfaces.
+
+It knows nothing of light. Renderers' probes make gear's real compositors exact; this one is for testing attacks without
+a renderer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from gear.contracts.tasks import Sample
+from gear.formats import rle
+from gear.values.truth import SurfaceTruth
+
+
+class TinyCompositor:
+    """Implements `gear.contracts.attacks.Compositor` for the samples of a task."""
+
+    def __init__(self, dataset: Sequence[Sample]) -> None:
+        self._dataset = dataset
+        self.calls = 0
+        """How often it was asked for a batch."""
+
+    @property
+    def surfaces(self) -> int:
+        """How many patches it takes."""
+        return len(self._dataset[0].record.surfaces)
+
+    def compose(self, patches: Sequence[Tensor], samples: Sequence[int], view: str) -> Tensor:
+        """(B, 3, H, W) pictures in 0..1 with the (3, h, w) patches on their surfaces.
+
+        Raises:
+            ValueError: the number of patches is not that of the surfaces.
+        """
+        if len(patches) != self.surfaces:
+            raise ValueError(f"there are {self.surfaces} surfaces, got {len(patches)} patches")
+        self.calls += 1
+        return torch.stack([self._one(patches, self._dataset[index], view) for index in samples])
+
+    def _one(self, patches: Sequence[Tensor], sample: Sample, view: str) -> Tensor:
+        picture = torch.from_numpy(sample.images[view].copy()).permute(2, 0, 1).float() / 255
+        names = [surface.name for surface in sample.record.surfaces]
+        for truth in sample.surfaces:
+            if truth.camera == view and truth.image_from_unit is not None and truth.visible_px:
+                picture = _pasted(picture, patches[names.index(truth.name)], truth)
+        return picture
+
+
+def _pasted(picture: Tensor, patch: Tensor, truth: SurfaceTruth) -> Tensor:
+    height, width = picture.shape[1], picture.shape[2]
+    unit_from_image = np.linalg.inv(np.array(truth.image_from_unit).reshape(3, 3))
+    x, y = np.meshgrid(np.arange(width), np.arange(height))
+    unit = np.stack([x, y, np.ones_like(x)], axis=-1) @ unit_from_image.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        grid = np.nan_to_num(unit[..., :2] / unit[..., 2:] * 2 - 1, nan=9.0, posinf=9.0, neginf=-9.0)
+    where = torch.from_numpy(rle.decode(truth.mask_rle, height, width))
+    points = torch.from_numpy(grid.astype(np.float32))[None]
+    warped = functional.grid_sample(patch[None], points, padding_mode="border", align_corners=False)[0]
+    return torch.where(where, warped, picture)

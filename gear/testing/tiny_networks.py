@@ -1,0 +1,164 @@
+"""Tiny real networks: a few convolutions behind the `Model` protocol, quick enough to be attacked in a test.
+
+They have what makes real networks awkward: batch normalisation with buffers, a stride, feature taps, losses. Their
+weights follow from a seed. They have learnt nothing.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from gear.contracts.specs import ModelSpec
+from gear.values.frames import FloatImage, UInt8Image
+
+LABEL_COUNT = 34
+"""Cityscapes label ids 0..33."""
+
+VIEW = "left"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TinyConfig:
+    """Options of a tiny network.
+
+    Attributes:
+        seed: of its weights.
+        width: channels of its hidden layers.
+    """
+
+    seed: int = 0
+    width: int = 8
+
+
+def as_batch(views: Sequence[Mapping[str, UInt8Image]]) -> dict[str, Tensor]:
+    """Pictures of several samples as `Model.forward` takes them: (B, 3, H, W) float32 in 0..1 by camera name."""
+    return {
+        name: torch.from_numpy(np.stack([sample[name] for sample in views])).permute(0, 3, 1, 2).float() / 255
+        for name in views[0]
+    }
+
+
+class TinyNetwork(nn.Module, ABC):
+    """A stem, a strided trunk with batch normalisation, a head, and bilinear interpolation back to the picture."""
+
+    def __init__(self, config: TinyConfig, channels: int) -> None:
+        super().__init__()
+        self.stem = nn.Conv2d(3, config.width, 3, padding=1)
+        self.trunk = nn.Conv2d(config.width, config.width, 3, stride=2, padding=1)
+        self.norm = nn.BatchNorm2d(config.width)
+        self.head = nn.Conv2d(config.width, channels, 1)
+        generator = torch.Generator().manual_seed(config.seed)
+        with torch.no_grad():
+            for layer in (self.stem, self.trunk, self.head):
+                fan_in = layer.weight[0].numel()
+                layer.weight.normal_(0.0, (2.0 / fan_in) ** 0.5, generator=generator)
+                if layer.bias is not None:
+                    layer.bias.normal_(0.0, 0.1, generator=generator)
+        self.eval()
+
+    def forward(self, views: Mapping[str, Tensor], targets: Sequence[Any] | None = None) -> Mapping[str, Tensor]:
+        """Outputs of a batch, or its loss where `targets`, the batch's samples of the task, are given."""
+        pictures = views[VIEW]
+        hidden = functional.relu(self.stem((pictures - 0.5) * 4))
+        hidden = functional.relu(self.norm(self.trunk(hidden)))
+        size = (pictures.shape[2], pictures.shape[3])
+        raw = functional.interpolate(self.head(hidden), size=size, mode="bilinear", align_corners=False)
+        return self.outputs(raw) if targets is None else {"loss": self.loss(raw, targets)}
+
+    def taps(self) -> Mapping[str, nn.Module]:
+        """`stem` and `trunk`."""
+        return {"stem": self.stem, "trunk": self.trunk}
+
+    def predict(self, views: Mapping[str, UInt8Image]) -> Any:
+        """One sample's prediction."""
+        with torch.no_grad():
+            return self.answer(self(as_batch([{VIEW: views[VIEW]}])))
+
+    @abstractmethod
+    def outputs(self, raw: Tensor) -> Mapping[str, Tensor]:
+        """Named outputs from the (B, C, H, W) head."""
+
+    @abstractmethod
+    def loss(self, raw: Tensor, targets: Sequence[Any]) -> Tensor:
+        """A number without dimensions, to be minimised in training."""
+
+    @abstractmethod
+    def answer(self, outputs: Mapping[str, Tensor]) -> Any:
+        """The task's prediction from the outputs of a batch of one."""
+
+
+class TinySegmenter(TinyNetwork):
+    """Semantic segmentation: `logits` (B, 34, H, W) over Cityscapes label ids."""
+
+    def __init__(self, config: TinyConfig) -> None:
+        super().__init__(config, LABEL_COUNT)
+
+    def outputs(self, raw: Tensor) -> Mapping[str, Tensor]:
+        """The logits."""
+        return {"logits": raw}
+
+    def loss(self, raw: Tensor, targets: Sequence[Any]) -> Tensor:
+        """Cross-entropy with each sample's `label_ids`."""
+        labels = torch.from_numpy(np.stack([sample.label_ids for sample in targets])).long()
+        return functional.cross_entropy(raw, labels)
+
+    def answer(self, outputs: Mapping[str, Tensor]) -> npt.NDArray[np.uint8]:
+        """(H, W) uint8 label ids."""
+        labels: npt.NDArray[np.uint8] = outputs["logits"][0].argmax(0).to(torch.uint8).numpy()
+        return labels
+
+
+class TinyDepth(TinyNetwork):
+    """Monocular depth: `depth_m` (B, H, W), above 0."""
+
+    LEAST_M: ClassVar[float] = 0.1
+
+    def __init__(self, config: TinyConfig) -> None:
+        super().__init__(config, 1)
+
+    def outputs(self, raw: Tensor) -> Mapping[str, Tensor]:
+        """The depth in metres."""
+        return {"depth_m": 10 * functional.softplus(raw[:, 0]) + self.LEAST_M}
+
+    def loss(self, raw: Tensor, targets: Sequence[Any]) -> Tensor:
+        """Mean absolute difference of logarithms where each sample's `depth_m` is known."""
+        depth_m = torch.from_numpy(np.stack([sample.depth_m for sample in targets]))
+        is_known = torch.isfinite(depth_m)
+        known_m = torch.where(is_known, depth_m, torch.ones_like(depth_m))
+        error = (self.outputs(raw)["depth_m"].log() - known_m.log()).abs()
+        return (error * is_known).sum() / is_known.sum().clamp_min(1)
+
+    def answer(self, outputs: Mapping[str, Tensor]) -> FloatImage:
+        """(H, W) float32 metres."""
+        depth_m: FloatImage = outputs["depth_m"][0].numpy()
+        return depth_m
+
+
+tiny_segmenter = ModelSpec(
+    name="tiny_segmenter",
+    summary="Three convolutions with random weights, for tests.",
+    config=TinyConfig,
+    build=TinySegmenter,
+    tasks=("semseg",),
+    views=(VIEW,),
+    taps=("stem", "trunk"),
+)
+
+tiny_depth = ModelSpec(
+    name="tiny_depth",
+    summary="Three convolutions with random weights, for tests.",
+    config=TinyConfig,
+    build=TinyDepth,
+    tasks=("depth",),
+    views=(VIEW,),
+    taps=("stem", "trunk"),
+)
