@@ -28,7 +28,7 @@ os.execv(sys.argv[3], sys.argv[3:])
 """
 """Chromium reads its commands from descriptor 3 and answers on 4."""
 
-PATIENCE_S = 120.0
+PATIENCE_S = 60.0
 KEYS = {"Escape": 27, "Enter": 13, "ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40, "Tab": 9}
 
 

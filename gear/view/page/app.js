@@ -13,6 +13,7 @@ const KEYS = [
 ];
 let view = "samples";
 let splitPlan = null;
+let routed = null;
 
 function address(name, sample) {
   const params = filtersToParams();
@@ -20,9 +21,8 @@ function address(name, sample) {
 }
 
 function go(name, sample = null) {
-  const hash = address(name, sample);
-  if (location.hash === hash) route();
-  else location.hash = hash;
+  location.hash = address(name, sample);
+  route(); // at once, not when the browser says so: the next key may come before that
 }
 
 const openSample = (sample) => go("sample", sample);
@@ -34,6 +34,7 @@ function closeSample() {
 }
 
 function route() {
+  routed = location.hash;
   const [path, query] = location.hash.slice(1).split("?");
   const [, name, index] = path.split("/");
   const sample = SAMPLES.find((one) => String(one.index) === index);
@@ -126,7 +127,7 @@ function start() {
   byId("help-button").addEventListener("click", toggleHelp);
   buildFilters();
   buildGrid();
-  addEventListener("hashchange", route);
+  addEventListener("hashchange", () => { if (location.hash !== routed) route(); });
   document.addEventListener("keydown", press);
   refilter();
   route();

@@ -130,7 +130,8 @@ class Plan {
   drawActor(pen, sample, [asset, role, id, x, y, heading]) {
     const [px, py] = this.toPixels(x, y);
     if (px < -40 || py < -40 || px > this.canvas.clientWidth + 40 || py > this.canvas.clientHeight + 40) return;
-    this.spots.push([px, py, sample, this.isSingle ? `${asset} · ${role} ${id}` : `${sampleName(sample)} · ${asset} · ${role}`]);
+    const label = this.isSingle ? `${asset} · ${role} ${id}` : `${sampleName(sample)} · ${asset} · ${role}`;
+    this.spots.push([px, py, sample, label, ((LENGTH_M[role] ?? 4.5) * this.view.scale) / 2]);
     if (role !== "ego" && this.samples.length > MANY) return void pen.fillRect(px - 1.5, py - 1.5, 3, 3);
     const long = Math.max((LENGTH_M[role] ?? 4.5) * this.view.scale, role === "ego" ? 7 : 3);
     const wide = Math.max((WIDTH_M[role] ?? 1.9) * this.view.scale, role === "ego" ? 5 : 2.5);
@@ -174,13 +175,13 @@ class Plan {
     pen.moveTo(mx, my);
     pen.lineTo(mx + board.outward[0] * 10, my - board.outward[1] * 10);
     pen.stroke();
-    this.spots.push([mx, my, this.isSingle ? sample : null, `${board.name} · ${board.asset}`]);
+    this.spots.push([mx, my, this.isSingle ? sample : null, `${board.name} · ${board.asset}`, 0]);
   }
 
   nearest(event) {
-    let [found, least] = [null, 14 ** 2];
+    let [found, least] = [null, 1];
     for (const spot of this.spots) {
-      const distance = (spot[0] - event.offsetX) ** 2 + (spot[1] - event.offsetY) ** 2;
+      const distance = Math.hypot(spot[0] - event.offsetX, spot[1] - event.offsetY) / Math.max(12, spot[4]);
       if (distance <= least) [found, least] = [spot, distance];
     }
     return found;
