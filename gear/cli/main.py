@@ -15,6 +15,7 @@ COMMANDS: dict[str, str] = {
     "sheet": "a contact sheet of a dataset, as one picture",
     "view": "one self-contained HTML page of a dataset",
     "export": "write a dataset in another layout",
+    "towns": "list towns and their scenes, or draw a map and a picture of every scene",
     "plugins": "list the installed tasks, models, attacks and defenses",
     "doctor": "render a reference frame with each renderer and say who renders",
     "show-config": "print a config with every default filled in",

@@ -1,0 +1,88 @@
+"""`gear towns`."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from gear.verbs.towns.facts import Town
+
+EXAMPLE = """examples:
+  gear towns                                    the towns that come with gear, and their scenes
+  gear towns town10 --out maps/                 a map, and a picture of every scene
+  gear towns my/towns/port.xml --scenes port.yml --out maps/ --renderer filament
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the command's flags."""
+    parser.epilog = EXAMPLE
+    parser.add_argument("town", nargs="?", help="name of a town, or path of its MJCF (all of gear's towns)")
+    parser.add_argument("--scenes", metavar="FILE", help="scene library of the town, instead of gear's own")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.add_argument("--out", metavar="DIR", help="write a map and a sheet of thumbnails there")
+    parser.add_argument("--renderer", default="classic", help="of the thumbnails: filament or classic (classic)")
+    parser.add_argument("--quality", default="fast", help="of the thumbnails: film or fast (fast)")
+    parser.add_argument("--weather", default="ClearNoon", help="of the thumbnails: a weather preset (ClearNoon)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the places they look from (0)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Lists towns, or draws one."""
+    from gear.values.errors import GearError
+    from gear.verbs.towns.facts import read_town, town_names
+
+    if args.town is None and (args.out or args.scenes):
+        raise GearError("gear towns needs a town for --out and --scenes, such as: gear towns town10 --out maps/")
+    if args.out is not None:
+        return draw(args)
+    names = [args.town] if args.town else town_names()
+    found = [read_town(name, args.scenes) for name in names]
+    if args.json:
+        print(json.dumps({"towns": [town.to_json() for town in found]}, indent=1))
+        return 0
+    for town in found:
+        show(town)
+    return 0
+
+
+def draw(args: argparse.Namespace) -> int:
+    """Writes the map and the sheet and says where."""
+    from gear.cli.progress import ProgressBar
+    from gear.verbs.towns.write import write_town
+
+    with ProgressBar("scene") as progress:
+        report = write_town(
+            args.town,
+            args.out,
+            scenes=args.scenes,
+            renderer=args.renderer,
+            quality=args.quality,
+            weather=args.weather,
+            seed=args.seed,
+            progress=progress,
+        )
+    print(json.dumps({"map": str(report.map), "sheet": report.sheet and str(report.sheet)}) if args.json
+          else report.summary())  # fmt: skip
+    return 0
+
+
+def show(town: Town) -> None:
+    """Prints a town with its scenes."""
+    from gear.verbs.towns.legend import scene_note
+
+    width_m, height_m = town.size_m
+    print(
+        f"{town.name}: {width_m:.0f} m x {height_m:.0f} m, {len(town.lanes.lanes)} lanes, {town.lane_km:.1f} km of"
+        f" lanes, {len(town.lanes.bays)} parking bays"
+    )
+    if town.scenes is None:
+        print("  no scenes; give a scene library with --scenes FILE.yml")
+        return
+    for name, scene in town.scenes.scenes.items():
+        print(f"  {name:14} {scene_note(scene)}")
+        for board in scene.boards:
+            x_m, y_m, _ = board.position_m
+            print(f"  {'':14}   {board.asset} at ({x_m:g}, {y_m:g}), facing {board.facing_deg:g} deg")

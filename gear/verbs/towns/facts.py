@@ -1,0 +1,114 @@
+"""What a town and its scenes say of themselves, read without compiling a mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+
+from gear.config.nodes import parse_file
+from gear.config.reader import read_node
+from gear.values.errors import ConfigError, TownError, UnknownNameError
+from gear.values.resources import data_dir
+from gear.values.serial import Json, to_json
+from gear.world.assets import AssetLibrary
+from gear.world.lanes import LaneGraph
+from gear.world.scene_spec import SceneLibrary
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Town:
+    """A town with its scenes.
+
+    Attributes:
+        library: its MJCF and the assets that go with it.
+        lanes: where road users may be.
+        scenes: its scene library; None where it has none.
+    """
+
+    library: AssetLibrary
+    lanes: LaneGraph
+    scenes: SceneLibrary | None
+
+    @property
+    def name(self) -> str:
+        """Its file's stem."""
+        return self.library.town_name
+
+    @property
+    def size_m(self) -> tuple[float, float]:
+        """West to east and south to north of what it says it covers."""
+        xmin, ymin, xmax, ymax = self.lanes.bounds_m
+        return xmax - xmin, ymax - ymin
+
+    @property
+    def lane_km(self) -> float:
+        """Length of all lanes together, those in junctions too."""
+        return sum(lane.line.length_m for lane in self.lanes.lanes.values()) / 1000
+
+    def to_json(self) -> Json:
+        """Everything that a list shows, and the scenes in full."""
+        scenes = {} if self.scenes is None else self.scenes.scenes
+        return {
+            "name": self.name,
+            "path": str(self.library.town),
+            "bounds_m": list(self.lanes.bounds_m),
+            "lanes": len(self.lanes.lanes),
+            "junction_lanes": sum(lane.is_junction for lane in self.lanes.lanes.values()),
+            "lane_km": round(self.lane_km, 3),
+            "walks": len(self.lanes.walks),
+            "parking_bays": len(self.lanes.bays),
+            "scenes": {name: to_json(scene) for name, scene in scenes.items()},
+        }
+
+
+def town_names() -> list[str]:
+    """Names of gear's own towns."""
+    return sorted(path.stem for path in (data_dir("mjcf") / "towns").glob("*.xml"))
+
+
+def read_town(town: str | Path, scenes: str | Path | None = None) -> Town:
+    """Reads a town's lanes and its scenes.
+
+    Args:
+        town: its name, or the path of its MJCF.
+        scenes: path of its scene library; gear's own for that town if left out.
+
+    Raises:
+        UnknownNameError: there is no such town or file.
+        TownError: the town breaks the conventions.
+        ConfigError: the scene library cannot be read, or is another town's.
+    """
+    library = AssetLibrary.for_town(town)
+    return Town(library=library, lanes=read_lanes(library.town), scenes=_scenes(library, scenes))
+
+
+def read_lanes(path: Path) -> LaneGraph:
+    """The lane graph of a town's file. Its custom fields are compiled by themselves: meshes would take seconds.
+
+    Raises:
+        TownError: MuJoCo cannot read it, or a lane is malformed.
+    """
+    try:
+        whole, custom = mujoco.MjSpec.from_file(str(path)), mujoco.MjSpec()
+        for numeric in whole.numerics:
+            custom.add_numeric(name=numeric.name, size=numeric.size, data=numeric.data)
+        for text in whole.texts:
+            custom.add_text(name=text.name, data=text.data)
+        model = custom.compile()
+    except ValueError as error:
+        raise TownError(path, f"MuJoCo cannot read it: {' '.join(str(error).split())}") from error
+    return LaneGraph.from_model(model, path)
+
+
+def _scenes(library: AssetLibrary, given: str | Path | None) -> SceneLibrary | None:
+    path = Path(given) if given is not None else data_dir("configs") / "scenes" / f"{library.town_name}.yml"
+    if not path.is_file():
+        if given is None:
+            return None
+        raise UnknownNameError("scene library", str(given), hint="(that file does not exist)")
+    found = read_node(SceneLibrary, parse_file(path))
+    if given is not None and found.town != library.town_name:
+        raise ConfigError(path, 0, 0, "town", f"its boards stand in {found.town}, not in {library.town_name}")
+    return found

@@ -1,0 +1,158 @@
+"""The ground of a map: what the town's geoms cover, seen from above."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import cv2
+import mujoco
+import numpy as np
+
+from gear.values.errors import TownError
+from gear.values.geometry import Array
+from gear.values.labels import LABEL_BY_NAME
+from gear.verbs.towns.canvas import Canvas, Colour
+from gear.world.classes import FIRST_HIDDEN_GROUP, GeomClasses, classify
+from gear.world.models import GROUND_PREFIX
+from gear.world.shapes import geom_triangles
+
+COVERS: tuple[tuple[str, tuple[str, ...], Colour], ...] = (
+    ("terrain", ("terrain",), (219, 229, 205)),
+    ("paved ground", ("ground",), (233, 227, 214)),
+    ("road", ("road", "bridge"), (200, 202, 206)),
+    ("parking", ("parking",), (186, 192, 204)),
+    ("sidewalk", ("sidewalk",), (240, 234, 226)),
+    ("road marking", ("road_marking",), (250, 250, 250)),
+)
+"""What the legend calls it, its labels, its colour; the later ones lie above the earlier."""
+
+VEGETATION: Colour = (122, 164, 104)
+BUILDING: Colour = (176, 160, 148)
+BUILDING_EDGE: Colour = (120, 104, 94)
+FENCE: Colour = (132, 122, 114)
+SHADOW: Colour = (70, 66, 74)
+
+LEAST_BUILDING_M = 2.5
+"""Obstacles at least so high and so wide both ways are drawn as buildings."""
+
+LEAST_FENCE_M = 3.0
+"""Obstacles at least so long that are no buildings are drawn as fences."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Relief:
+    """A compiled town, as far as a map needs it.
+
+    Attributes:
+        model: compiled from its file alone.
+        data: with its geoms in place.
+        classes: labels of what is seen.
+    """
+
+    model: mujoco.MjModel
+    data: mujoco.MjData
+    classes: GeomClasses
+
+    @staticmethod
+    def of(path: Path) -> Relief:
+        """Compiles a town.
+
+        Raises:
+            TownError: MuJoCo refuses it, or a visible geom has no label.
+        """
+        try:
+            spec = mujoco.MjSpec.from_file(str(path))
+            model = spec.compile()
+        except ValueError as error:
+            raise TownError(path, f"MuJoCo cannot compile it: {' '.join(str(error).split())}") from error
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        return Relief(model=model, data=data, classes=classify(spec, path))
+
+    def corners_m(self, geom: int) -> Array:
+        """(N, 3, 3) triangles of a geom in the world; a plane reaches as far as it is rendered."""
+        if self.model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE:
+            half = np.where(self.model.geom_size[geom, :2] > 0, self.model.geom_size[geom, :2], 1e4)
+            square = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * [*half, 0.0]
+            local = square[[[0, 1, 2], [0, 2, 3]]]
+        else:
+            vertices, faces = geom_triangles(self.model, geom)
+            local = vertices[faces]
+        return np.asarray(local @ self.data.geom_xmat[geom].reshape(3, 3).T + self.data.geom_xpos[geom])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Obstacle:
+    """What stands in the way, from above.
+
+    Attributes:
+        outline_m: (N, 2) convex outline.
+        height_m: of its top above its foot.
+        size_m: longer and shorter side.
+    """
+
+    outline_m: Array
+    height_m: float
+    size_m: tuple[float, float]
+
+    @property
+    def is_building(self) -> bool:
+        """Whether it is large and high."""
+        return min(self.height_m, *self.size_m) >= LEAST_BUILDING_M
+
+    @property
+    def is_fence(self) -> bool:
+        """Whether it is long and no building: a fence, a wall, a hedge, a fountain."""
+        return not self.is_building and self.size_m[0] >= LEAST_FENCE_M
+
+
+def obstacles(relief: Relief) -> list[Obstacle]:
+    """Every collision geom on which nobody stands."""
+    found = []
+    for geom in np.flatnonzero(relief.model.geom_group >= FIRST_HIDDEN_GROUP):
+        is_plane = relief.model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE
+        if is_plane or relief.model.geom(int(geom)).name.startswith(GROUND_PREFIX):
+            continue
+        corners = relief.corners_m(int(geom)).reshape(-1, 3)
+        flat = corners[:, :2].astype(np.float32)
+        sides = sorted(cv2.minAreaRect(flat)[1], reverse=True)
+        outline = np.asarray(cv2.convexHull(flat), dtype=np.float64).reshape(-1, 2)
+        found.append(Obstacle(outline, float(np.ptp(corners[:, 2])), (float(sides[0]), float(sides[1]))))
+    return found
+
+
+def draw_ground(canvas: Canvas, relief: Relief) -> None:
+    """Draws ground covers, plants, fences and buildings."""
+    for _, labels, colour in COVERS:
+        mask = canvas.mask()
+        for geom in _labelled(relief, labels):
+            canvas.fill_triangles(mask, _from_above(relief.corners_m(geom)))
+        canvas.blend(mask, colour)
+    plants = canvas.mask()
+    for geom in _labelled(relief, ("vegetation",)):
+        canvas.fill_triangles(plants, _from_above(relief.corners_m(geom)))
+    canvas.blend(plants, VEGETATION, 0.55)
+    blocks = obstacles(relief)
+    for fence in (block for block in blocks if block.is_fence):
+        canvas.line(canvas.to_px(fence.outline_m), FENCE, 0.8, closed=True)
+    buildings = canvas.mask()
+    for building in (block for block in blocks if block.is_building):
+        first, *others = building.outline_m
+        canvas.fill_triangles(buildings, np.array([(first, a, b) for a, b in pairwise(others)]))
+    canvas.blend(canvas.shift_down_right(buildings, 0.8 * canvas.px_per_m), SHADOW, 0.25)
+    canvas.blend(buildings, BUILDING)
+    canvas.outline(buildings, BUILDING_EDGE, 0.8)
+
+
+def _labelled(relief: Relief, names: tuple[str, ...]) -> list[int]:
+    codes = [LABEL_BY_NAME[name].code for name in names]
+    return [int(geom) for geom in np.flatnonzero(np.isin(relief.classes.label_code, codes))]
+
+
+def _from_above(corners_m: Array) -> Array:
+    """The triangles that have an area from above, without their heights."""
+    flat = corners_m[:, :, :2]
+    first, second = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
+    return flat[np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) > 1e-3]

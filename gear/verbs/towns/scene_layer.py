@@ -1,0 +1,147 @@
+"""Boards and limits of scenes on a map."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import mujoco
+import numpy as np
+
+from gear.values.errors import TownError
+from gear.values.geometry import Array
+from gear.verbs.towns.canvas import Canvas, Colour
+from gear.world.assets import AssetLibrary
+from gear.world.classes import own_class
+from gear.world.scene_spec import BoardSpec, NpcLimits, Range, SceneSpec
+from gear.world.shapes import geom_triangles
+
+PALETTE: tuple[Colour, ...] = (
+    (200, 30, 60), (20, 110, 190), (20, 140, 70), (150, 60, 170), (225, 110, 0), (0, 140, 150), (165, 85, 30),
+    (215, 60, 150), (95, 100, 20), (70, 70, 190),
+)  # fmt: skip
+INK: Colour = (34, 34, 40)
+WHITE: Colour = (255, 255, 255)
+
+WEDGE_M = 26.0
+WEDGE_HALF_DEG = 30.0
+BOARD_PX = 4.0
+EGO_PX, VEHICLES_PX, PEOPLE_PX = 1.8, 1.1, 1.0
+NAME_PX = 10.0
+BEHIND_NUMBER_PX = 12.0
+
+Box = tuple[float, float, float, float]
+"""Middle, half width and half height, in pixels."""
+
+
+def scene_colours(scenes: Mapping[str, SceneSpec]) -> dict[str, Colour]:
+    """A colour for every scene with boards, in their order."""
+    with_boards = [name for name, scene in scenes.items() if scene.boards]
+    return {name: PALETTE[number % len(PALETTE)] for number, name in enumerate(with_boards)}
+
+
+def draw_limits(canvas: Canvas, scene: SceneSpec, colour: Colour) -> None:
+    """Outlines where the ego car, vehicles and people of a scene may be."""
+    board = scene.boards[0]
+    outline = limits_outline_m(board, scene.npc_vehicles)
+    if outline is not None:
+        canvas.dashes(canvas.to_px(outline), colour, VEHICLES_PX, dash_px=9.0, gap_px=5.0, closed=True)
+    outline = limits_outline_m(board, scene.pedestrians)
+    if outline is not None:
+        canvas.dashes(canvas.to_px(outline), colour, PEOPLE_PX, dash_px=1.5, gap_px=3.5, closed=True)
+    if scene.ego is not None:
+        ego = canvas.to_px(board_rectangle_m(board, scene.ego.ahead_m, scene.ego.lateral_m))
+        canvas.fill(ego, colour, 0.22)
+        canvas.line(ego, colour, EGO_PX, closed=True)
+
+
+def draw_boards(canvas: Canvas, library: AssetLibrary, scene: SceneSpec, colour: Colour) -> None:
+    """Draws each board of a scene with a wedge to where it faces, numbered where there are several."""
+    for number, board in enumerate(scene.boards):
+        centre = canvas.to_px(board.position_m)[0]
+        facing = math.radians(board.facing_deg)
+        turns = facing + np.radians(np.linspace(-WEDGE_HALF_DEG, WEDGE_HALF_DEG, 13))
+        rim = centre + WEDGE_M * canvas.px_per_m * np.stack([np.cos(turns), -np.sin(turns)], axis=1)
+        canvas.fill(np.concatenate([centre[None], rim]), colour, 0.35)
+        half = face_width_m(library, board.asset) / 2 * np.array([-math.sin(facing), math.cos(facing)])
+        ends = canvas.to_px(np.array(board.position_m[:2]) + np.stack([half, -half]))
+        canvas.line(ends, INK, BOARD_PX + 2.0)
+        canvas.line(ends, colour, BOARD_PX)
+        if len(scene.boards) > 1:
+            x, y = centre - BEHIND_NUMBER_PX * np.array([math.cos(facing), -math.sin(facing)])
+            canvas.text((x, y + 4.0), str(number), 8.0, colour, anchor="middle", bold=True, halo=WHITE)
+
+
+def draw_names(canvas: Canvas, scenes: Mapping[str, SceneSpec], colours: Mapping[str, Colour]) -> None:
+    """Writes each scene's name near its first board, clear of boards and of other names."""
+    taken = [(*canvas.to_px(board.position_m)[0], 12.0, 12.0) for name in colours for board in scenes[name].boards]
+    for name, colour in colours.items():
+        board = scenes[name].boards[0]
+        half_px = (canvas.text_width_px(name, NAME_PX, bold=True) / 2 + 5.0, 9.0)
+        spot = min(_spots(canvas, board, half_px), key=lambda spot: sum(_overlap_px2(spot, other) for other in taken))
+        taken.append(spot)
+        x, y = spot[:2]
+        tag = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * half_px + (x, y)
+        canvas.fill(tag, WHITE)
+        canvas.line(tag, colour, 1.2, closed=True)
+        canvas.text((x, y + NAME_PX / 2), name, NAME_PX, colour, anchor="middle", bold=True)
+
+
+def _spots(canvas: Canvas, board: BoardSpec, half_px: tuple[float, float]) -> list[Box]:
+    """Places for a name inside of the map, best first: behind its board, then around it, then further away."""
+    x, y = canvas.to_px(board.position_m)[0]
+    left, top, right, bottom = canvas.box_px
+    spots = []
+    for away_px in (18.0, 30.0, 46.0, 70.0):
+        for turn_deg in (180, 135, 225, 90, 270, 45, 315, 0):
+            turn = math.radians(board.facing_deg + turn_deg)
+            reach = np.array([math.cos(turn) * (half_px[0] + away_px), -math.sin(turn) * (half_px[1] + away_px)])
+            spot_x = min(max(x + reach[0], left + half_px[0] + 4), right - half_px[0] - 4)
+            spot_y = min(max(y + reach[1], top + half_px[1] + 4), bottom - half_px[1] - 4)
+            spots.append((spot_x, spot_y, *half_px))
+    return spots
+
+
+def _overlap_px2(first: Box, second: Box) -> float:
+    width, height = (
+        min(first[i] + first[i + 2], second[i] + second[i + 2])
+        - max(first[i] - first[i + 2], second[i] - second[i + 2])
+        for i in (0, 1)
+    )
+    return max(0.0, width) * max(0.0, height)
+
+
+def limits_outline_m(board: BoardSpec, limits: NpcLimits) -> Array | None:
+    """Corners of limits in a board's frame; None where they only speak of a distance from the ego car."""
+    if not limits.needs_board:
+        return None
+    return board_rectangle_m(board, limits.ahead_m or (-1e4, 1e4), limits.lateral_m or (-1e4, 1e4))
+
+
+def board_rectangle_m(board: BoardSpec, ahead_m: Range, lateral_m: Range) -> Array:
+    """(4, 2) corners in the world of a rectangle in the frame of a board."""
+    facing = math.radians(board.facing_deg)
+    along, left = np.array([math.cos(facing), math.sin(facing)]), np.array([-math.sin(facing), math.cos(facing)])
+    corners = [(a, b) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    return np.array([np.array(board.position_m[:2]) + ahead_m[a] * along + lateral_m[b] * left for a, b in corners])
+
+
+def face_width_m(library: AssetLibrary, asset: str) -> float:
+    """How wide the face of a board is.
+
+    Raises:
+        TownError: the board's file cannot be compiled or has no face.
+    """
+    path = library.path("surface", asset)
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+        model = spec.compile()
+    except ValueError as error:
+        raise TownError(path, f"MuJoCo cannot compile it: {' '.join(str(error).split())}") from error
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    for geom in spec.geoms:
+        if own_class(geom.classname.name).endswith(".face"):
+            vertices = geom_triangles(model, geom.id)[0] @ data.geom_xmat[geom.id].reshape(3, 3).T
+            return float(np.ptp(vertices[:, 1]))
+    raise TownError(path, "has no geom of a class ending in `.face`")

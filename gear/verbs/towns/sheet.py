@@ -1,0 +1,107 @@
+"""A sheet of thumbnails: every scene of a town as its ego car sees it in one sample."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gear.camera.response import response_for
+from gear.config.collection import SplitConfig
+from gear.contracts.rendering import Quality
+from gear.render.opening import open_renderer
+from gear.values.frames import UInt8Image
+from gear.values.rig import CameraMount, Rig
+from gear.values.scene import Weather
+from gear.verbs.collect.run import Progress
+from gear.verbs.towns.canvas import Canvas
+from gear.verbs.towns.facts import Town
+from gear.world.planner import ScenePlanner
+from gear.world.scene_spec import SceneSpec
+from gear.world.world import World
+
+COLUMNS = 3
+CAPTION_PX, GAP_PX = 44, 12
+PAPER, INK, MUTED = (255, 255, 255), (30, 30, 36), (110, 110, 118)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SheetOptions:
+    """How thumbnails are made.
+
+    Attributes:
+        renderer, quality: who renders, and how well.
+        weather: light and air.
+        seed: of the sampled places.
+        width_px, height_px: of one thumbnail.
+    """
+
+    renderer: str
+    quality: Quality
+    weather: Weather
+    seed: int
+    width_px: int = 640
+    height_px: int = 320
+
+
+def draw_sheet(town: Town, options: SheetOptions, progress: Progress | None = None) -> UInt8Image:
+    """Renders one sample of every scene and puts them side by side.
+
+    Returns:
+        (H, W, 3) uint8 RGB.
+
+    Raises:
+        PlacementError: a scene cannot be planned.
+        BackendError: the renderer cannot start.
+    """
+    assert town.scenes is not None  # the caller has made sure
+    cells = []
+    for number, (name, scene) in enumerate(town.scenes.scenes.items()):
+        if progress is not None:
+            progress(number, len(town.scenes.scenes))
+        picture, note = thumbnail(town, name, scene, options)
+        cells.append(_cell(picture, name, note))
+    if progress is not None:
+        progress(len(cells), len(cells))
+    return _grid(cells)
+
+
+def thumbnail(town: Town, name: str, scene: SceneSpec, options: SheetOptions) -> tuple[UInt8Image, str]:
+    """One sample of a scene: its picture, and how its faces are seen in it."""
+    world = World.build(town=town.library.town, scene_name=name, scene=scene, weather=options.weather)
+    rig = Rig(cameras=(CameraMount(name="rgb", width_px=options.width_px, height_px=options.height_px),))
+    record = ScenePlanner(world, rig, SplitConfig(seed=options.seed, samples=1), split_name="debug").plan(0)
+    placed = world.place(record)
+    renderer = open_renderer(options.renderer, world.model, quality=options.quality)
+    try:
+        (view,) = renderer.render(placed.stage, record.cameras)
+    finally:
+        renderer.close()
+    assert view.linear_rgb is not None and view.geom_id is not None and view.depth_m is not None
+    seen = []
+    for face in world.faces:
+        pixels = view.geom_id == face.geom_id
+        where = f"{np.nanmean(view.depth_m[pixels]):.0f} m ahead, " if pixels.any() else ""
+        seen.append(f"{face.asset} {where}{pixels.mean():.1%} of the picture")
+    others = len(record.actors) - 1
+    return response_for(options.renderer, options.weather).apply(view.linear_rgb), "; ".join(
+        [*seen, f"{others} other road users"]
+    )
+
+
+def _cell(picture: UInt8Image, name: str, note: str) -> UInt8Image:
+    canvas = Canvas((picture.shape[1], CAPTION_PX), PAPER)
+    canvas.text((1, 16), name, 11, INK, bold=True)
+    canvas.text((1, 35), note, 9, MUTED)
+    return np.concatenate([picture, canvas.picture()])
+
+
+def _grid(cells: list[UInt8Image]) -> UInt8Image:
+    height, width = cells[0].shape[:2]
+    columns = min(COLUMNS, len(cells))
+    rows = -(-len(cells) // columns)
+    sheet = np.full((rows * height + 2 * GAP_PX, columns * (width + GAP_PX) + GAP_PX, 3), PAPER, np.uint8)
+    for number, cell in enumerate(cells):
+        y, x = GAP_PX + number // columns * height, GAP_PX + number % columns * (width + GAP_PX)
+        sheet[y : y + height, x : x + width] = cell
+    return sheet

@@ -1,0 +1,100 @@
+"""Writes what `gear towns NAME` writes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+
+from gear.contracts.rendering import Quality
+from gear.dataset.files import explained
+from gear.render.opening import describe
+from gear.values.errors import GearError, UnknownNameError
+from gear.values.frames import UInt8Image
+from gear.verbs.collect.run import Progress
+from gear.verbs.towns.facts import Town, read_town
+from gear.verbs.towns.ground_layer import Relief
+from gear.verbs.towns.sheet import SheetOptions, draw_sheet
+from gear.verbs.towns.town_map import draw_map
+from gear.world.weather import PRESETS
+
+QUALITIES: tuple[Quality, ...] = ("film", "fast")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TownReport:
+    """What was written.
+
+    Attributes:
+        town: of which town.
+        map: path of the map.
+        sheet: path of the thumbnails; None where the town has no scenes.
+    """
+
+    town: Town
+    map: Path
+    sheet: Path | None
+
+    def summary(self) -> str:
+        """One line."""
+        files = [str(path) for path in (self.map, self.sheet) if path is not None]
+        count = 0 if self.town.scenes is None else len(self.town.scenes.scenes)
+        return f"{' and '.join(files)}: {self.town.name} with {count} scenes"
+
+
+def write_town(
+    town: str | Path,
+    out: str | Path,
+    *,
+    scenes: str | Path | None = None,
+    renderer: str = "classic",
+    quality: str = "fast",
+    weather: str = "ClearNoon",
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> TownReport:
+    """Writes `<town>_map.png`, and `<town>_scenes.png` with a thumbnail of every scene.
+
+    Args:
+        town: a town's name, or the path of its MJCF.
+        out: folder; made if it is not there.
+        scenes: path of a scene library, instead of gear's own for that town.
+        renderer, quality: who renders the thumbnails, and how well.
+        weather: a preset.
+        seed: of the places from which the thumbnails look.
+        progress: is told how many pictures are finished.
+
+    Raises:
+        UnknownNameError: there is no such town, file, renderer or weather.
+        TownError: the town breaks the conventions.
+        PlacementError: a scene cannot be planned.
+        DatasetError: `out` cannot be written.
+    """
+    describe(renderer)
+    if weather not in PRESETS:
+        raise UnknownNameError("weather", weather, PRESETS)
+    if quality not in QUALITIES:
+        raise UnknownNameError("quality", quality, QUALITIES)
+    if seed < 0:
+        raise GearError(f"--seed must not be negative, got {seed}")
+    found = read_town(town, scenes)
+    folder = Path(out)
+    map_path = _write(folder / f"{found.name}_map.png", draw_map(found, Relief.of(found.library.town)))
+    sheet_path = None
+    if found.scenes is not None:
+        options = SheetOptions(
+            renderer=renderer, quality="film" if quality == "film" else "fast", weather=PRESETS[weather], seed=seed
+        )
+        sheet_path = _write(folder / f"{found.name}_scenes.png", draw_sheet(found, options, progress))
+    return TownReport(town=found, map=map_path, sheet=sheet_path)
+
+
+def _write(target: Path, picture: UInt8Image) -> Path:
+    data = cv2.imencode(".png", picture[..., ::-1])[1].tobytes()
+    with explained(target):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        temporary = target.with_name(f".{target.name}.part")
+        temporary.write_bytes(data)
+        temporary.replace(target)
+    return target
