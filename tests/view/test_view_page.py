@@ -213,3 +213,17 @@ def test_the_command_writes_a_page_and_says_where(
     assert main(["view", str(tmp_path / "nothing")]) == 2
     with pytest.raises(SystemExit):
         main(["view", str(root), "--max-mb", "0"])
+
+
+def luminance(colour: str) -> float:
+    parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    linear = [v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+@pytest.mark.parametrize("ink", ["ink", "dim", "accent", "patch", "pedestrian", "parked", "warn"])
+@pytest.mark.parametrize("paper", ["ground", "panel", "raised"])
+def test_words_can_be_read_on_what_they_stand(ink: str, paper: str) -> None:
+    colours = dict(re.findall(r"--(\w+): (#[0-9a-f]{6});", asset("style.css")))
+    bright, dark = sorted((luminance(colours[ink]), luminance(colours[paper])), reverse=True)
+    assert (bright + 0.05) / (dark + 0.05) >= 4.5

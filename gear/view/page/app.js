@@ -14,6 +14,7 @@ const KEYS = [
 let view = "samples";
 let splitPlan = null;
 let routed = null;
+let scrolled = 0; // of the sheet, while something else is shown
 
 function address(name, sample) {
   const params = filtersToParams();
@@ -47,6 +48,7 @@ function route() {
     refilter();
   }
   const isNew = byId(view).hidden;
+  if (!byId("samples").hidden) scrolled = byId("main").scrollTop;
   for (const one of VIEWS) byId(one).hidden = one !== view;
   for (const one of ["samples", "map", "statistics"]) {
     const tab = byId(`tab-${one}`);
@@ -55,17 +57,15 @@ function route() {
     tab.setAttribute("href", address(one));
   }
   document.title = view === "sample" ? `${sampleName(sample)} · ${ABOUT.task}` : `${ABOUT.task} · ${ABOUT.scene} · ${ABOUT.split}`;
+  if (isNew && view !== "samples") byId("main").focus({ preventScroll: true });
   if (view === "sample") {
-    if (isNew) scroll.samples = byId("main").scrollTop;
     showSample(sample);
     byId("main").scrollTop = 0;
   }
-  if (view === "samples" && isNew) byId("main").scrollTop = scroll.samples;
+  if (view === "samples" && isNew) byId("main").scrollTop = scrolled;
   if (view === "map") showMap();
   if (view === "statistics") showStatistics();
 }
-
-const scroll = { samples: 0 };
 
 function showMap() {
   if (!splitPlan) {

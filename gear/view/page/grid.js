@@ -82,6 +82,7 @@ function showFiltered() {
 }
 
 function moveInGrid(event) {
+  if (view !== "samples") return;
   const here = shown.findIndex((sample) => cells[sample.number] === document.activeElement);
   if (here < 0) return;
   const tops = shown.map((sample) => cells[sample.number].parentElement.offsetTop);
