@@ -37,6 +37,7 @@ MATERIALS: dict[str, Material] = {
     "plaster_white": Material(rgb="plaster", normal="plaster_n", tile_m=4.0, tint=(0.92, 0.90, 0.85)),
     "plaster_ochre": Material(rgb="plaster", normal="plaster_n", tile_m=4.0, tint=(0.70, 0.56, 0.36)),
     "plaster_rose": Material(rgb="plaster", normal="plaster_n", tile_m=4.0, tint=(0.58, 0.38, 0.30)),
+    "plaster_cream": Material(rgb="plaster", normal="plaster_n", tile_m=4.0, tint=(0.86, 0.77, 0.58)),
     "plaster_grey": Material(rgb="plaster", normal="plaster_n", tile_m=4.0, tint=(0.47, 0.50, 0.50)),
     "ashlar": Material(rgb="ashlar", normal="ashlar_n", tile_m=3.0),
     "concrete": Material(rgb="concrete", normal="concrete_n", tile_m=4.0),
@@ -45,6 +46,12 @@ MATERIALS: dict[str, Material] = {
     "roof_gravel": Material(rgb="roof_gravel", normal="roof_gravel_n", tile_m=2.0, roughness=0.95),
     "slate_roof": Material(rgb="slate_roof", normal="slate_roof_n", tile_m=3.0, roughness=0.6),
     "tile_roof": Material(rgb="tile_roof", normal="tile_roof_n", tile_m=3.0, roughness=0.8),
+    "tile_roof_brown": Material(
+        rgb="tile_roof", normal="tile_roof_n", tile_m=3.0, tint=(0.50, 0.55, 0.60), roughness=0.85
+    ),
+    "tile_roof_grey": Material(
+        rgb="tile_roof", normal="tile_roof_n", tile_m=3.0, tint=(0.40, 0.80, 1.0), roughness=0.85
+    ),
     # openings
     "windows": Material(rgb="windows", orm="windows_orm", tile_m=0, roughness=1.0),
     "curtain_wall": Material(
