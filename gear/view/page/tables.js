@@ -1,10 +1,10 @@
 // Tables of whatever JSON a record and a task's facts hold.
 const isObject = (value) => value !== null && typeof value === "object" && !Array.isArray(value);
 const isRows = (value) => Array.isArray(value) && value.length > 0 && value.every(isObject);
-const LONGEST_TEXT = 48;
+const LONGEST_TEXT = 32;
 
 function words(value) {
-  if (isNumber(value)) return Number.isInteger(value) ? String(value) : String(Number(value.toPrecision(6)));
+  if (isNumber(value)) return String(Math.abs(value) < 1e-3 ? Number(value.toPrecision(3)) : Number(value.toFixed(4)));
   if (value === null || value === undefined) return "–";
   if (Array.isArray(value)) return value.length <= 4 && !value.some((item) => item instanceof Object) ? value.map((item) => (isNumber(item) ? rounded(item, 3) : words(item))).join(", ") : `${value.length} values`;
   if (isObject(value)) return `${Object.keys(value).length} values`;
