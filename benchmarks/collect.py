@@ -96,7 +96,8 @@ def main() -> None:
                 worker.join()
         bare_s, whole_s, peak_mb = (sum(values) / processes for values in zip(*results, strict=True))
         print(
-            f"{task:10}{renderer:10}{quality:9}{processes:9}{bare_s:9.3f}{whole_s:9.3f}{bare_s / whole_s:7.2f}{peak_mb:9.0f}",
+            f"{task:10}{renderer:10}{quality:9}{processes:9}{bare_s:9.3f}{whole_s:9.3f}"
+            f"{bare_s / whole_s:7.2f}{peak_mb:9.0f}",
             flush=True,
         )
 

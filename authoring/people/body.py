@@ -92,7 +92,12 @@ def torso(skeleton: Skeleton, *, ease: Sequence[float], folds: Sequence[Fold] = 
     upper = _widened(
         CHEST,
         build,
-        [(0.0, build.waist, waist), (0.16, build.chest, chest), (0.26, build.chest, chest), (0.34, build.shoulders, shoulders)],
+        [
+            (0.0, build.waist, waist),
+            (0.16, build.chest, chest),
+            (0.26, build.chest, chest),
+            (0.34, build.shoulders, shoulders),
+        ],
     )
     fields = [
         loft(skeleton["pelvis"], pelvis, cap=0.02, power=2.3, folds=folds),
@@ -102,16 +107,16 @@ def torso(skeleton: Skeleton, *, ease: Sequence[float], folds: Sequence[Fold] = 
     if build.bust_m:
         for side in (1.0, -1.0):
             centre = (0.075 * s, side * 0.068 * s, 0.19 * s)
-            fields.append(ellipsoid(skeleton["chest"], centre, (build.bust_m + chest + 0.035, 0.062 + chest, 0.065 + chest)))
+            fields.append(
+                ellipsoid(skeleton["chest"], centre, (build.bust_m + chest + 0.035, 0.062 + chest, 0.065 + chest))
+            )
     if build.belly_m:
         radii = (0.09 + build.belly_m + waist, 0.13 * build.waist + waist, 0.14)
         fields.append(ellipsoid(skeleton["chest"], (0.03, 0.0, 0.0), radii))
     return blend(fields, 0.07)
 
 
-def _widened(
-    stations: Sequence[Station], build: Build, marks: Sequence[tuple[float, float, float]]
-) -> list[Station]:
+def _widened(stations: Sequence[Station], build: Build, marks: Sequence[tuple[float, float, float]]) -> list[Station]:
     heights = [mark[0] for mark in marks]
     s, result = build.scale, []
     for z, x, y, depth, width in stations:
@@ -127,9 +132,14 @@ def arm_field(skeleton: Skeleton, side: str, *, ease: Sequence[float] = (0.0, 0.
     build = skeleton.build
     shoulder, elbow, wrist = ease
     upper = sized(UPPER_ARM, build, girth=build.limbs)
-    upper = [(*row[:3], row[3] + e, row[4] + e) for row, e in zip(upper, np.linspace(shoulder, elbow, len(upper)), strict=True)]
+    upper = [
+        (*row[:3], row[3] + e, row[4] + e)
+        for row, e in zip(upper, np.linspace(shoulder, elbow, len(upper)), strict=True)
+    ]
     fore = sized(FOREARM, build, girth=build.limbs)
-    fore = [(*row[:3], row[3] + e, row[4] + e) for row, e in zip(fore, np.linspace(elbow, wrist, len(fore)), strict=True)]
+    fore = [
+        (*row[:3], row[3] + e, row[4] + e) for row, e in zip(fore, np.linspace(elbow, wrist, len(fore)), strict=True)
+    ]
     bunch = (Fold(-0.27, 0.08, 0.005, 0.05, 0.4),) if folds else ()
     sleeve = (Fold(-0.02, 0.07, 0.005, 0.045, 1.4), Fold(-0.22, 0.06, 0.004, 0.04, 2.4)) if folds else ()
     return blend(
@@ -142,7 +152,12 @@ def arm_field(skeleton: Skeleton, side: str, *, ease: Sequence[float] = (0.0, 0.
 
 
 def leg_field(
-    skeleton: Skeleton, side: str, *, ease: Sequence[float] = (0.0, 0.0, 0.0), folds: float = 0.0, past_ankle_m: float = 0.0
+    skeleton: Skeleton,
+    side: str,
+    *,
+    ease: Sequence[float] = (0.0, 0.0, 0.0),
+    folds: float = 0.0,
+    past_ankle_m: float = 0.0,
 ) -> Field:
     """Thigh and shin with `ease` at hip, knee and ankle; `folds` metres of wrinkles; cloth may reach past the ankle."""
     build = skeleton.build
@@ -150,9 +165,13 @@ def leg_field(
     girth = build.limbs
     length = build.leg
     thigh = sized(THIGH, build, girth=girth * (0.5 + 0.5 * build.hips), length=length)
-    thigh = [(*row[:3], row[3] + e, row[4] + e) for row, e in zip(thigh, np.linspace(hip, knee, len(thigh)), strict=True)]
+    thigh = [
+        (*row[:3], row[3] + e, row[4] + e) for row, e in zip(thigh, np.linspace(hip, knee, len(thigh)), strict=True)
+    ]
     shin = sized(SHIN, build, girth=girth, length=length)
-    shin = [(*row[:3], row[3] + e, row[4] + e) for row, e in zip(shin, np.linspace(knee, ankle, len(shin)), strict=True)]
+    shin = [
+        (*row[:3], row[3] + e, row[4] + e) for row, e in zip(shin, np.linspace(knee, ankle, len(shin)), strict=True)
+    ]
     if past_ankle_m:
         last = shin[-1]
         shin.append((last[0] - past_ankle_m, *last[1:]))
@@ -181,9 +200,19 @@ def hand_field(skeleton: Skeleton, side: str) -> Field:
         reach = (0.060, 0.074, 0.078, 0.070)[number]
         knuckle, joint = (x, 0.0, -0.094), (x, 0.010 * inwards, -0.096 - 0.5 * reach)
         tip = (x, 0.036 * inwards, -0.096 - 0.88 * reach)
-        fingers.append(blend([capsule(frame, knuckle, joint, 0.0096 * k), capsule(frame, joint, tip, 0.009 * k, 0.0075 * k)], 0.004))
-    base, knob, end = (0.028, 0.004 * inwards, -0.02), (0.052, 0.014 * inwards, -0.058), (0.052, 0.024 * inwards, -0.092)
-    thumb = blend([capsule(frame, base, knob, 0.016 * k, 0.0115 * k), capsule(frame, knob, end, 0.0115 * k, 0.009 * k)], 0.008)
+        fingers.append(
+            blend(
+                [capsule(frame, knuckle, joint, 0.0096 * k), capsule(frame, joint, tip, 0.009 * k, 0.0075 * k)], 0.004
+            )
+        )
+    base, knob, end = (
+        (0.028, 0.004 * inwards, -0.02),
+        (0.052, 0.014 * inwards, -0.058),
+        (0.052, 0.024 * inwards, -0.092),
+    )
+    thumb = blend(
+        [capsule(frame, base, knob, 0.016 * k, 0.0115 * k), capsule(frame, knob, end, 0.0115 * k, 0.009 * k)], 0.008
+    )
     return blend([palm, wrist, thumb, *fingers], 0.007)
 
 
@@ -194,7 +223,9 @@ def bare_arms(skeleton: Skeleton, *, arms: bool) -> list[Piece]:
         hand = hand_field(skeleton, side)
         if arms:
             limb = arm_field(skeleton, side)
-            shoulder = skeleton[f"upper_arm_{side}"].child((0.0, 0.0, -0.05), np.diag([1.0, -1.0, -1.0]))
+            shoulder = skeleton[f"upper_arm_{side}"].child(
+                (0.0, 0.0, -0.07 * skeleton.build.scale), np.diag([1.0, -1.0, -1.0])
+            )
             limb = cut(limb, below(shoulder, 0.0))
             field = attach(limb, hand, skeleton[f"hand_{side}"].origin, radius=0.03, reach=0.05)
             pieces.append(Piece(group="skin", field=field, faces=420, cell_m=0.0085, tint="skin"))
@@ -205,6 +236,4 @@ def bare_arms(skeleton: Skeleton, *, arms: bool) -> list[Piece]:
 
 def bare_legs(skeleton: Skeleton, *, tint: str = "skin", group: str = "skin") -> list[Piece]:
     """Legs without trousers."""
-    return [
-        Piece(group=group, field=leg_field(skeleton, side), faces=260, cell_m=0.013, tint=tint) for side in SIDES
-    ]
+    return [Piece(group=group, field=leg_field(skeleton, side), faces=260, cell_m=0.013, tint=tint) for side in SIDES]

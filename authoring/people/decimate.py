@@ -114,9 +114,7 @@ def _keeps_the_surface(vertices: Array, faces: Faces, edges: Faces, chosen: Face
     dies = (owned >= 0).sum(axis=1) >= 2
     affected = (belongs >= 0) & ~dies
     corners = vertices[faces[affected]]
-    moved = np.where(
-        (owned[affected] >= 0)[:, :, None], place[chosen][belongs[affected]][:, None, :], corners
-    )
+    moved = np.where((owned[affected] >= 0)[:, :, None], place[chosen][belongs[affected]][:, None, :], corners)
     old, new = (np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]) for t in (corners, moved))
     lengths = np.linalg.norm(old, axis=1) * np.linalg.norm(new, axis=1)
     turned = (old * new).sum(axis=1) < _MIN_TURN_COS * lengths

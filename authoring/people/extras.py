@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from authoring.people.field import Array, Field, Frame, below, blend, capsule, cut, loft, rounded_box, union
@@ -49,14 +51,24 @@ def _shoe(skeleton: Skeleton, side: str, high: float, sole_m: float) -> Piece:
 
     front = loft(
         _along(toes),
-        [toe_row(-0.020, 0.034, 0.049, 0.003), toe_row(0.030, 0.030, 0.049, 0.005), toe_row(0.066, 0.025, 0.041, 0.008)],
+        [
+            toe_row(-0.020, 0.034, 0.049, 0.003),
+            toe_row(0.030, 0.030, 0.049, 0.005),
+            toe_row(0.066, 0.025, 0.041, 0.008),
+        ],
         cap=0.022,
         power=2.5,
     )
     front = cut(front, below(toes, 0.0), 0.003)
     shaft = loft(
         skeleton[f"shin_{side}"],
-        [(z, 0.0, 0.0, 0.042 * s, 0.038 * s) for z in (-0.432 * skeleton.build.scale * skeleton.build.leg, -0.432 * skeleton.build.scale * skeleton.build.leg + 0.02 + high)],
+        [
+            (z, 0.0, 0.0, 0.042 * s, 0.038 * s)
+            for z in (
+                -0.432 * skeleton.build.scale * skeleton.build.leg,
+                -0.432 * skeleton.build.scale * skeleton.build.leg + 0.02 + high,
+            )
+        ],
         cap=0.005,
     )
 
@@ -79,9 +91,17 @@ def backpack(skeleton: Skeleton) -> list[Piece]:
     straps: list[Field] = []
     for side in (1.0, -1.0):
         y = side * 0.098 * s
-        path = [(-0.14, y * 0.85, 0.335), (-0.05, y, 0.392), (0.045, y * 1.05, 0.36), (0.118, y * 1.12, 0.25), (0.105, y * 1.35, 0.12), (0.0, y * 1.78, 0.04), (-0.13, y * 1.4, 0.0)]
+        path = [
+            (-0.14, y * 0.85, 0.335),
+            (-0.05, y, 0.378),
+            (0.045, y * 1.05, 0.348),
+            (0.118, y * 1.12, 0.25),
+            (0.105, y * 1.35, 0.12),
+            (0.0, y * 1.78, 0.04),
+            (-0.13, y * 1.4, 0.0),
+        ]
         scaled = [(x * s, yy, z * s) for x, yy, z in path]
-        straps += [capsule(chest, a, b, 0.026) for a, b in zip(scaled, scaled[1:], strict=False)]
+        straps += [capsule(chest, a, b, 0.026) for a, b in itertools.pairwise(scaled)]
     strap = Piece(group="extra", field=blend(straps, 0.01), faces=260, cell_m=0.012, tint="bag_dark")
     return [Piece(group="extra", field=blend([bag, pocket], 0.015), faces=260, cell_m=0.014, tint="bag"), strap]
 
@@ -90,7 +110,7 @@ def shoulder_bag(skeleton: Skeleton) -> list[Piece]:
     """A handbag at the left hip with a strap over the shoulder."""
     chest, s = skeleton["chest"], skeleton.build.scale
     bag = rounded_box(chest, (-0.02, 0.235 * s, -0.12 * s), (0.135, 0.045, 0.105), 0.028)
-    top = (-0.012 * s, 0.135 * s, 0.385 * s)
+    top = (-0.012 * s, 0.128 * s, 0.368 * s)
     strap = union(
         [
             capsule(chest, top, (0.11 * s, 0.185 * s, 0.15 * s), 0.011),
@@ -114,5 +134,11 @@ def briefcase(skeleton: Skeleton) -> list[Piece]:
     hand = skeleton["hand_right"]
     frame = Frame(hand.at(0.0, 0.0, -0.11), np.eye(3))
     case = rounded_box(frame, (0.0, 0.0, -0.19), (0.205, 0.045, 0.145), 0.012)
-    grip = union([capsule(frame, (-0.06, 0.0, -0.045), (-0.05, 0.0, 0.0), 0.009), capsule(frame, (0.06, 0.0, -0.045), (0.05, 0.0, 0.0), 0.009), capsule(frame, (-0.05, 0.0, 0.0), (0.05, 0.0, 0.0), 0.011)])
+    grip = union(
+        [
+            capsule(frame, (-0.06, 0.0, -0.045), (-0.05, 0.0, 0.0), 0.009),
+            capsule(frame, (0.06, 0.0, -0.045), (0.05, 0.0, 0.0), 0.009),
+            capsule(frame, (-0.05, 0.0, 0.0), (0.05, 0.0, 0.0), 0.011),
+        ]
+    )
     return [Piece(group="extra", field=union([case, grip]), faces=220, cell_m=0.010, tint="bag")]

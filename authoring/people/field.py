@@ -106,7 +106,9 @@ def ellipsoid(frame: Frame, centre: Sequence[float], radii: Sequence[float]) -> 
     return distance
 
 
-def capsule(frame: Frame, start: Sequence[float], end: Sequence[float], radius: float, end_radius: float = 0.0) -> Field:
+def capsule(
+    frame: Frame, start: Sequence[float], end: Sequence[float], radius: float, end_radius: float = 0.0
+) -> Field:
     """A rod with round ends; `end_radius` (if not 0) tapers it."""
     a, b = frame.at(*start), frame.at(*end)
     last = end_radius or radius
@@ -161,7 +163,7 @@ def attach(body: Field, limb: Field, joint: Array, *, radius: float, reach: floa
 
     def distance(points: Array) -> Array:
         a, b = body(points), limb(points)
-        near = np.exp(-(np.linalg.norm(points - joint, axis=1) / reach) ** 2)
+        near = np.exp(-((np.linalg.norm(points - joint, axis=1) / reach) ** 2))
         width = radius * near + 0.003
         overlap = np.maximum(width - np.abs(a - b), 0.0)
         return np.minimum(a, b) - overlap**2 / (4.0 * width)

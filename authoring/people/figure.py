@@ -9,6 +9,7 @@ import numpy as np
 
 from authoring.mesh import Mesh
 from authoring.people.body import bare_arms, bare_legs
+from authoring.people.extras import phone
 from authoring.people.garments import Garment
 from authoring.people.head import head_piece
 from authoring.people.piece import Piece, Skin, combine, mesh_pieces
@@ -98,7 +99,10 @@ def pieces_of(person: Person, skeleton: Skeleton) -> list[Piece]:
 def model_person(person: Person, pose: Pose) -> dict[str, Mesh]:
     """The meshes of a person in a pose by group, standing on z = 0 with the pelvis over the origin."""
     skeleton = pose_skeleton(person.build, stand_on_both_feet(person.build, pose))
-    return meshes_of(pieces_of(person, skeleton), person, skeleton, on_ground=True)
+    pieces = pieces_of(person, skeleton)
+    if pose.telephone:
+        pieces += phone(skeleton)
+    return meshes_of(pieces, person, skeleton, on_ground=True)
 
 
 def meshes_of(pieces: Sequence[Piece], person: Person, skeleton: Skeleton, *, on_ground: bool) -> dict[str, Mesh]:

@@ -1,152 +1,50 @@
-"""Clothes: each garment is a function from a posed skeleton to pieces; parameters are bound with `functools.partial`."""
+"""Clothes: each garment turns a posed skeleton into pieces; its parameters are bound with `functools.partial`."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-import numpy as np
-
-from authoring.people.body import arm_field, leg_field, torso
-from authoring.people.field import (
-    Array,
-    Field,
-    Fold,
-    Frame,
-    attach,
-    below,
-    blend,
-    cut,
-    ellipsoid,
-    loft,
-    rounded_box,
-    union,
-)
+from authoring.people.body import leg_field, torso
+from authoring.people.field import attach, below, blend, cut, ellipsoid, loft, rounded_box, union
 from authoring.people.piece import Piece, Tint
 from authoring.people.skeleton import SIDES, Skeleton
-
-Garment = Callable[[Skeleton], list[Piece]]
-
-_TORSO_FOLDS = (
-    Fold(0.02, 0.10, 0.004, 0.07, 0.6),
-    Fold(0.26, 0.10, 0.0025, 0.09, 2.2),
+from authoring.people.tailoring import (
+    TORSO_FOLDS,
+    above,
+    band,
+    collar_ring,
+    dear_neck,
+    neckline,
+    sheet,
+    skirt_field,
+    sleeved,
+    to_hem,
 )
 
-
-def sleeved(skeleton: Skeleton, body: Field, *, ease: Sequence[float], sleeve: float, folds: bool) -> Field:
-    """`body` with sleeves that end at a share of the arm: 0.5 at the elbow, 1 at the wrist; 0 for none."""
-    for side in SIDES:
-        arm = arm_field(skeleton, side, ease=ease, folds=folds)
-        upper, fore = skeleton[f"upper_arm_{side}"], skeleton[f"forearm_{side}"]
-        elbow = -fore.to_local(upper.origin[None])[0]
-        length = float(np.linalg.norm(elbow))
-        if sleeve <= 0.55:
-            arm = cut(arm, below(upper, -2.0 * sleeve * length))
-            arm = cut(arm, below(fore, -0.35 * length)) if sleeve < 0.5 else arm
-        else:
-            arm = cut(arm, below(fore, -(2.0 * sleeve - 1.0) * 0.86 * length))
-        body = attach(body, arm, upper.at(0.0, 0.0, -0.02), radius=0.05, reach=0.10)
-    return body
-
-
-def neckline(skeleton: Skeleton, *, deep_m: float, wide_m: float) -> Field:
-    """The hole for the neck; `deep_m` below its root in front."""
-    s = skeleton.build.scale
-    neck = skeleton["neck"]
-    hole = loft(
-        neck,
-        [(-0.06 * s, 0.01, 0.0, wide_m * 0.9, wide_m * 0.9), (0.12 * s, 0.0, 0.0, wide_m * 1.1, wide_m * 1.15)],
-        cap=0.02,
-    )
-    if deep_m <= 0.0:
-        return hole
-    chest = skeleton["chest"]
-    vee = loft(
-        chest,
-        [(0.35 * s - deep_m, 0.13, 0.0, 0.08, 0.006), (0.38 * s, 0.10, 0.0, 0.10, wide_m * 0.95)],
-        cap=0.004,
-    )
-    return union([hole, vee])
-
-
-def collar_ring(skeleton: Skeleton, *, radius_m: float, height_m: float, open_m: float) -> Field:
-    """A standing collar, open in front by `open_m`."""
-    s = skeleton.build.scale
-    neck = skeleton["neck"]
-    k = 0.5 + 0.5 * s
-    ring = [
-        (-0.02 * s, -0.002, 0.0, radius_m * 1.12 * k, radius_m * 1.2 * k),
-        (height_m, 0.004, 0.0, radius_m * k, radius_m * k),
-    ]
-    inner = [(z, x, y, d - 0.011, w - 0.011) for z, x, y, d, w in ring]
-    collar = cut(loft(neck, ring, cap=0.004), loft(neck, inner, cap=0.02), 0.003)
-    if open_m:
-        collar = cut(collar, rounded_box(neck, (0.1, 0.0, 0.03), (0.08, open_m / 2, 0.08), 0.01), 0.006)
-    return collar
+Garment = Callable[[Skeleton], list[Piece]]
 
 
 def work_jacket(skeleton: Skeleton) -> list[Piece]:
     """A high-visibility jacket: a loose shirt with two bright bands around it."""
     pieces = shirt(skeleton)
     pelvis, s = skeleton["pelvis"], skeleton.build.scale
-    trunk = torso(skeleton, ease=(0.022, 0.022, 0.016, 0.011), folds=_TORSO_FOLDS, low=-0.075)
+    trunk = torso(skeleton, ease=(0.022, 0.022, 0.016, 0.011), folds=TORSO_FOLDS, low=-0.075)
     trunk = to_hem(skeleton, trunk, -0.055)
     for height in (0.10, 0.28):
-        band = _band(trunk, pelvis, height * s, half_m=0.026, thick_m=0.009)
-        pieces.append(Piece(group="extra", field=band, faces=150, cell_m=0.010, tint="band"))
+        strip = band(trunk, pelvis, height * s, half_m=0.026, thick_m=0.009)
+        pieces.append(Piece(group="extra", field=strip, faces=150, cell_m=0.010, tint="band"))
     return pieces
-
-
-def _band(base: Field, frame: Frame, z: float, *, half_m: float, thick_m: float) -> Field:
-    def distance(points: Array) -> Array:
-        skin = base(points)
-        level = np.abs(frame.to_local(points)[:, 2] - z) - half_m
-        return np.maximum.reduce([skin - thick_m, -skin - thick_m, level])
-
-    return distance
-
-
-def _sheet(frame: Frame, base: Field, rows: Sequence[tuple[float, float, float]], *, thick_m: float) -> Field:
-    """Cloth that lies on the front of `base`: rows of (z, distance from the middle, half-width), on both sides."""
-    table = np.array(sorted(rows))
-
-    def distance(points: Array) -> Array:
-        x, y, z = frame.to_local(points).T
-        middle, half = (np.interp(z, table[:, 0], table[:, k]) for k in (1, 2))
-        edge = np.maximum(np.abs(np.abs(y) - middle) - half, np.maximum(table[0, 0] - z, z - table[-1, 0]))
-        skin = base(points)
-        return np.maximum.reduce([skin - thick_m, -skin - thick_m, edge, 0.02 - x])
-
-    return distance
-
-
-def _dear_neck(skeleton: Skeleton) -> Callable[[Array], Array]:
-    """Detail for necklines, collars and lapels."""
-    chest = skeleton["chest"]
-    high = 0.25 * skeleton.build.scale
-
-    def dear(points: Array) -> Array:
-        local = chest.to_local(points)
-        near = (local[:, 2] > high) & (np.abs(local[:, 1]) < 0.1)
-        return np.where(near, 6.0, 1.0)
-
-    return dear
-
-
-def to_hem(skeleton: Skeleton, body: Field, low: float) -> Field:
-    """`body` widened over the trousers' hips and cut at `low` (over the hip joints, of an adult)."""
-    legs = [leg_field(skeleton, side, ease=(0.036, 0.04, 0.04)) for side in SIDES]
-    return cut(blend([body, *legs], 0.05), below(skeleton["pelvis"], low * skeleton.build.scale))
 
 
 def t_shirt(skeleton: Skeleton, *, tint: Tint = "paint", loose: float = 0.016, sleeve: float = 0.27) -> list[Piece]:
     """A T-shirt over the trousers."""
-    body = torso(skeleton, ease=(loose + 0.014, loose + 0.012, loose, 0.010), folds=_TORSO_FOLDS, low=-0.07)
+    body = torso(skeleton, ease=(loose + 0.014, loose + 0.012, loose, 0.010), folds=TORSO_FOLDS, low=-0.07)
     body = to_hem(skeleton, body, -0.035)
     body = sleeved(skeleton, body, ease=(0.012, 0.02, 0.02), sleeve=sleeve, folds=False)
     body = cut(body, neckline(skeleton, deep_m=0.0, wide_m=0.066 * (0.5 + 0.5 * skeleton.build.scale)))
     rib = collar_ring(skeleton, radius_m=0.069, height_m=0.012, open_m=0.0)
     return [
-        Piece(group="paint", field=body, faces=860, cell_m=0.0125, tint=tint, dear=_dear_neck(skeleton)),
+        Piece(group="paint", field=body, faces=860, cell_m=0.0125, tint=tint, dear=dear_neck(skeleton)),
         Piece(group="paint", field=rib, faces=110, cell_m=0.008, tint=tint),
     ]
 
@@ -154,40 +52,47 @@ def t_shirt(skeleton: Skeleton, *, tint: Tint = "paint", loose: float = 0.016, s
 def shirt(skeleton: Skeleton, *, tint: Tint = "paint", tucked: bool = False, sleeve: float = 0.97) -> list[Piece]:
     """A shirt with collar and long sleeves (or rolled to `sleeve`)."""
     low = 0.055 if tucked else -0.055
-    body = torso(skeleton, ease=(0.022, 0.022, 0.016, 0.011), folds=_TORSO_FOLDS, low=-0.075)
+    body = torso(skeleton, ease=(0.022, 0.022, 0.016, 0.011), folds=TORSO_FOLDS, low=-0.075)
     body = to_hem(skeleton, body, low)
     body = sleeved(skeleton, body, ease=(0.012, 0.013, 0.012), sleeve=sleeve, folds=True)
     body = cut(body, neckline(skeleton, deep_m=0.05, wide_m=0.06))
     collar = collar_ring(skeleton, radius_m=0.066, height_m=0.042, open_m=0.04)
     return [
-        Piece(group="paint", field=body, faces=980, cell_m=0.0135, tint=tint, dear=_dear_neck(skeleton)),
+        Piece(group="paint", field=body, faces=980, cell_m=0.0135, tint=tint, dear=dear_neck(skeleton)),
         Piece(group="paint", field=collar, faces=150, cell_m=0.007, tint=tint),
     ]
 
 
 def hoodie(skeleton: Skeleton, *, tint: Tint = "paint") -> list[Piece]:
     """A thick jumper with its hood on the shoulders and ribbed hems."""
-    body = torso(skeleton, ease=(0.030, 0.040, 0.026, 0.016), folds=_TORSO_FOLDS, low=-0.06)
+    body = torso(skeleton, ease=(0.030, 0.040, 0.026, 0.016), folds=TORSO_FOLDS, low=-0.06)
     body = cut(body, below(skeleton["pelvis"], -0.02 * skeleton.build.scale), 0.03)
     body = sleeved(skeleton, body, ease=(0.020, 0.024, 0.018), sleeve=0.98, folds=True)
     body = cut(body, neckline(skeleton, deep_m=0.0, wide_m=0.064))
     neck = skeleton["neck"]
     hood = ellipsoid(neck, (-0.075, 0.0, -0.01), (0.062, 0.115, 0.075))
-    rim = cut(ellipsoid(neck, (-0.02, 0.0, 0.015), (0.092, 0.098, 0.04)), ellipsoid(neck, (0.01, 0.0, 0.04), (0.085, 0.072, 0.07)))
+    rim = cut(
+        ellipsoid(neck, (-0.02, 0.0, 0.015), (0.092, 0.098, 0.04)),
+        ellipsoid(neck, (0.01, 0.0, 0.04), (0.085, 0.072, 0.07)),
+    )
     rim = cut(rim, rounded_box(neck, (0.12, 0.0, 0.0), (0.09, 0.03, 0.1), 0.02), 0.02)
-    pouch = loft(skeleton["chest"], [(-0.14, 0.085, 0.0, 0.055, 0.13), (0.0, 0.085, 0.0, 0.05, 0.09)], cap=0.01, power=3.0)
+    pouch = loft(
+        skeleton["chest"], [(-0.14, 0.085, 0.0, 0.055, 0.13), (0.0, 0.085, 0.0, 0.05, 0.09)], cap=0.01, power=3.0
+    )
     body = blend([body, pouch], 0.015)
     return [
-        Piece(group="paint", field=body, faces=980, cell_m=0.0135, tint=tint, dear=_dear_neck(skeleton)),
+        Piece(group="paint", field=body, faces=980, cell_m=0.0135, tint=tint, dear=dear_neck(skeleton)),
         Piece(group="paint", field=blend([hood, rim], 0.02), faces=240, cell_m=0.010, tint=tint),
     ]
 
 
-def jacket(skeleton: Skeleton, *, tint: Tint = "paint", inner: Tint = "white", long_m: float = 0.0, tie: bool = False) -> list[Piece]:
+def jacket(
+    skeleton: Skeleton, *, tint: Tint = "paint", inner: Tint = "white", long_m: float = 0.0, tie: bool = False
+) -> list[Piece]:
     """An open-necked jacket over a shirt; `long_m` below the hips makes it a coat; `tie` makes it business."""
     s = skeleton.build.scale
     vee = 0.20 if tie else 0.13
-    body = torso(skeleton, ease=(0.034, 0.034, 0.028, 0.020), folds=_TORSO_FOLDS, low=-0.085)
+    body = torso(skeleton, ease=(0.034, 0.034, 0.028, 0.020), folds=TORSO_FOLDS, low=-0.085)
     if long_m > 0.0:
         body = blend([body, skirt_field(skeleton, hem_m=long_m, ease=0.035, flare=0.03)], 0.05)
     else:
@@ -197,82 +102,78 @@ def jacket(skeleton: Skeleton, *, tint: Tint = "paint", inner: Tint = "white", l
     slit = rounded_box(skeleton["chest"], (0.2, 0.0, -0.3), (0.085, 0.0045, 0.5), 0.003)
     body = cut(cut(body, opening, 0.006), slit, 0.004)
     chest = skeleton["chest"]
-    lapels = _sheet(
+    lapels = sheet(
         chest,
         torso(skeleton, ease=(0.034, 0.034, 0.028, 0.020)),
-        [(0.385 * s - 1.12 * vee * s, 0.012, 0.004), (0.355 * s - 0.35 * vee * s, 0.056 * s, 0.030 * s), (0.385 * s, 0.068 * s, 0.016 * s)],
+        [
+            (0.385 * s - 1.12 * vee * s, 0.012, 0.004),
+            (0.355 * s - 0.35 * vee * s, 0.056 * s, 0.030 * s),
+            (0.385 * s, 0.068 * s, 0.016 * s),
+        ],
         thick_m=0.007,
     )
     collar = collar_ring(skeleton, radius_m=0.078, height_m=0.035, open_m=0.09)
     under = torso(skeleton, ease=(0.0, 0.004, 0.008, 0.006), low=-0.02)
     under = cut(under, below(chest, 0.02 * s))
     pieces = [
-        Piece(group="paint", field=union([body, lapels]), faces=1150, cell_m=0.0125, tint=tint, dear=_dear_neck(skeleton)),
+        Piece(
+            group="paint", field=union([body, lapels]), faces=1150, cell_m=0.0125, tint=tint, dear=dear_neck(skeleton)
+        ),
         Piece(group="paint", field=collar, faces=130, cell_m=0.008, tint=tint),
-        Piece(group="cloth", field=cut(under, neckline(skeleton, deep_m=0.04, wide_m=0.058)), faces=220, cell_m=0.014, tint=inner),
-        Piece(group="cloth", field=collar_ring(skeleton, radius_m=0.064, height_m=0.042, open_m=0.02), faces=130, cell_m=0.007, tint=inner),
+        Piece(
+            group="cloth",
+            field=cut(under, neckline(skeleton, deep_m=0.04, wide_m=0.058)),
+            faces=220,
+            cell_m=0.014,
+            tint=inner,
+        ),
+        Piece(
+            group="cloth",
+            field=collar_ring(skeleton, radius_m=0.064, height_m=0.042, open_m=0.02),
+            faces=130,
+            cell_m=0.007,
+            tint=inner,
+        ),
     ]
     if tie:
-        rows = [(0.10 * s, 0.0, 0.034), (0.25 * s, 0.0, 0.026), (0.335 * s, 0.0, 0.016), (0.34 * s, 0.0, 0.024), (0.372 * s, 0.0, 0.026)]
-        blade = _sheet(chest, under, rows, thick_m=0.008)
+        rows = [
+            (0.10 * s, 0.0, 0.034),
+            (0.25 * s, 0.0, 0.026),
+            (0.335 * s, 0.0, 0.016),
+            (0.34 * s, 0.0, 0.024),
+            (0.372 * s, 0.0, 0.026),
+        ]
+        blade = sheet(chest, under, rows, thick_m=0.008)
         pieces.append(Piece(group="extra", field=blade, faces=110, cell_m=0.008, tint="tie"))
     return pieces
 
 
-def skirt_field(skeleton: Skeleton, *, hem_m: float, ease: float, flare: float, top_m: float = 0.1) -> Field:
-    """Cloth around both legs from `top_m` over the hip joints down to `hem_m` below them, wide enough for the stride."""
-    s = skeleton.build.scale
-    chains = [np.stack([skeleton[f"{bone}_{side}"].origin for bone in ("thigh", "shin", "foot")]) for side in SIDES]
-    hips = skeleton["pelvis"].origin[2]
-    heights = np.array([hips - hem_m, hips - 0.25 * hem_m, hips, hips + top_m])
-    radii = np.array([0.062, 0.084, 0.088, 0.088]) * s + ease + np.array([flare, 0.25 * flare, 0.0, -0.02])
-
-    def distance(points: Array) -> Array:
-        z = np.clip(points[:, 2], heights[0], heights[-1])
-        ends = []
-        for chain in chains:
-            down = chain[::-1]
-            ends.append(np.stack([np.interp(z, down[:, 2], down[:, k]) for k in (0, 1)], axis=1))
-        a, b = ends
-        axis = b - a
-        flat = points[:, :2]
-        share = np.clip(((flat - a) * axis).sum(axis=1) / np.maximum((axis**2).sum(axis=1), 1e-9), 0.0, 1.0)
-        offset = flat - a - share[:, None] * axis
-        angle = np.arctan2(flat[:, 1] - 0.5 * (a + b)[:, 1], flat[:, 0] - 0.5 * (a + b)[:, 0])
-        depth = np.interp(z, heights, [0.010, 0.006, 0.001, 0.0]) * min(1.0, 0.3 + 12.0 * flare)
-        pleats = depth * np.sin(7.0 * angle + 1.2 * np.sin(2.0 * angle + 1.0))
-        wall = np.linalg.norm(offset, axis=1) - np.interp(z, heights, radii) - pleats
-        return np.maximum(wall, np.abs(points[:, 2] - z) - 0.002 + 0.0 * wall)
-
-    return distance
-
-
-def dress(skeleton: Skeleton, *, tint: Tint = "paint", hem_m: float = 0.46, flare: float = 0.07, sleeve: float = 0.22) -> list[Piece]:
+def dress(
+    skeleton: Skeleton, *, tint: Tint = "paint", hem_m: float = 0.46, flare: float = 0.07, sleeve: float = 0.22
+) -> list[Piece]:
     """A dress to the knees."""
-    body = torso(skeleton, ease=(0.018, 0.010, 0.010, 0.008), folds=_TORSO_FOLDS[:1])
+    body = torso(skeleton, ease=(0.018, 0.010, 0.010, 0.008), folds=TORSO_FOLDS[:1])
     body = blend([body, skirt_field(skeleton, hem_m=hem_m * skeleton.build.scale, ease=0.02, flare=flare)], 0.04)
-    body = sleeved(skeleton, body, ease=(0.008, 0.012, 0.012), sleeve=sleeve, folds=sleeve > 0.6)
+    body = sleeved(skeleton, body, ease=(0.012, 0.018, 0.016), sleeve=sleeve, folds=sleeve > 0.6)
     body = cut(body, neckline(skeleton, deep_m=0.07, wide_m=0.072))
-    return [Piece(group="paint", field=body, faces=1300, cell_m=0.013, tint=tint, dear=_dear_neck(skeleton))]
+    return [Piece(group="paint", field=body, faces=1300, cell_m=0.013, tint=tint, dear=dear_neck(skeleton))]
 
 
 def skirt(skeleton: Skeleton, *, tint: Tint = "skirt", hem_m: float = 0.40, flare: float = 0.04) -> list[Piece]:
     """A skirt from the waist to the knees."""
     waist = cut(torso(skeleton, ease=(0.014, 0.008, 0.0, 0.0)), below(skeleton["pelvis"], -0.06))
-    waist = cut(waist, _above(skeleton["pelvis"], 0.13 * skeleton.build.scale))
+    waist = cut(waist, above(skeleton["pelvis"], 0.13 * skeleton.build.scale))
     field = blend([waist, skirt_field(skeleton, hem_m=hem_m * skeleton.build.scale, ease=0.016, flare=flare)], 0.03)
     return [Piece(group="cloth", field=field, faces=620, cell_m=0.0135, tint=tint)]
 
 
-def _above(frame: Frame, z: float) -> Field:
-    return lambda points: -below(frame, z)(points)
-
-
-def trousers(skeleton: Skeleton, *, tint: Tint = "trousers", ease: Sequence[float] = (0.014, 0.018, 0.034), faces: int = 900) -> list[Piece]:
+def trousers(
+    skeleton: Skeleton, *, tint: Tint = "trousers", ease: Sequence[float] = (0.014, 0.018, 0.034), faces: int = 900
+) -> list[Piece]:
     """Long trousers; `ease` at hip, knee and ankle makes them slim or wide."""
     s = skeleton.build.scale
     seat = torso(skeleton, ease=(0.012, 0.010, 0.0, 0.0))
-    seat = cut(seat, _above(skeleton["pelvis"], 0.125 * s))
+    seat = cut(seat, above(skeleton["pelvis"], 0.125 * s))
     for side in SIDES:
         leg = leg_field(skeleton, side, ease=ease, folds=0.0065, past_ankle_m=0.042 * s)
         seat = attach(seat, leg, skeleton[f"thigh_{side}"].at(0.0, 0.0, -0.02), radius=0.07, reach=0.12)
@@ -283,7 +184,7 @@ def shorts(skeleton: Skeleton, *, tint: Tint = "trousers", leg_m: float = 0.34) 
     """Shorts to above the knees."""
     s = skeleton.build.scale
     seat = torso(skeleton, ease=(0.014, 0.012, 0.0, 0.0))
-    seat = cut(seat, _above(skeleton["pelvis"], 0.125 * s))
+    seat = cut(seat, above(skeleton["pelvis"], 0.125 * s))
     for side in SIDES:
         thigh = skeleton[f"thigh_{side}"]
         leg = cut(leg_field(skeleton, side, ease=(0.016, 0.040, 0.040)), below(thigh, -leg_m * s * skeleton.build.leg))

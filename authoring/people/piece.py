@@ -15,7 +15,7 @@ from authoring.people.polygonise import Faces, normals, polygonise, project
 Tint = str | Callable[[Array], list[str]]
 """A colour's name, or a function from (F, 3) places to F names."""
 
-MAX_FACES = 4200
+MAX_FACES = 4150
 """Of all pieces together; what others cover is taken off later, a tenth at least."""
 
 _SCOUT_CELL_M = 0.09
@@ -70,7 +70,9 @@ def mesh_pieces(pieces: Sequence[Piece]) -> list[Skin]:
                 covered |= cover.field(vertices) < -0.007
         faces = faces[~covered[faces].all(axis=1)]
         corner_normals = _corner_normals(piece.field, vertices, faces)
-        skins.append(Skin(piece, vertices, faces, corner_normals, _light(pieces, vertices, normals(piece.field, vertices))))
+        skins.append(
+            Skin(piece, vertices, faces, corner_normals, _light(pieces, vertices, normals(piece.field, vertices)))
+        )
     return skins
 
 

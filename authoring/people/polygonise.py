@@ -31,7 +31,7 @@ def polygonise(field: Field, low: Array, high: Array, cell_m: float) -> tuple[Ar
 
 def _sample(field: Field, axes: list[Array], cell_m: float) -> Array:
     """Values on the grid: exact near the surface, far from it only of the right sign."""
-    coarse = [axis[:: _STRIDE] for axis in axes]
+    coarse = [axis[::_STRIDE] for axis in axes]
     points = np.stack(np.meshgrid(*coarse, indexing="ij"), axis=-1)
     far = field(points.reshape(-1, 3)).reshape(points.shape[:3])
     blocks = [np.arange(len(axis)) // _STRIDE for axis in axes]

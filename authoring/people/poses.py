@@ -41,6 +41,7 @@ WALK_C = Pose(
 )
 PHONE = Pose(
     name="phone",
+    telephone=True,
     kind="stand",
     lean=3.0,
     head_pitch=24.0,
@@ -61,10 +62,11 @@ TALK = Pose(
 )
 CALL = Pose(
     name="call",
+    telephone=True,
     kind="walk",
     lean=2.0,
     head_yaw=6.0,
-    arms={"right": Arm(flex=34.0, abduct=24.0, turn=20.0, elbow=138.0, wrist=-8.0, roll=20.0), "left": _SWING_REAR},
+    arms={"right": Arm(flex=71.0, abduct=14.0, turn=4.0, elbow=144.0, wrist=0.0), "left": _SWING_REAR},
     legs={"left": _FRONT, "right": _REAR},
 )
 

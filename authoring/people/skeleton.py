@@ -72,7 +72,18 @@ class Leg:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pose:
-    """A whole pose, degrees. `lean` and `twist` are the chest's against the pelvis; `grounded` poses stand on both feet."""
+    """A whole pose, degrees.
+
+    Attributes:
+        name: of the files.
+        kind: `walk` or `stand`.
+        lean, twist: of the chest against the pelvis.
+        pelvis: how far the pelvis leans forward.
+        head_pitch, head_yaw: of the head, down and to the left.
+        grounded: whether both feet stand on the ground.
+        telephone: whether the right hand holds one.
+        arms, legs: by side.
+    """
 
     name: str
     kind: str
@@ -80,6 +91,7 @@ class Pose:
     twist: float = 0.0
     pelvis: float = 0.0
     grounded: bool = True
+    telephone: bool = False
     head_pitch: float = 0.0
     head_yaw: float = 0.0
     arms: dict[str, Arm] = field(default_factory=lambda: {side: Arm() for side in SIDES})
@@ -133,7 +145,7 @@ def pose_skeleton(build: Build, pose: Pose) -> Skeleton:
     frames["chest"] = chest
     frames["neck"] = chest.child((-0.012 * s, 0.0, 0.385 * s), turn_y(14.0 + 0.4 * build.stoop_deg))
     upright = turn_z(pose.twist + pose.head_yaw) @ turn_y(pose.head_pitch + 0.25 * build.stoop_deg)
-    skull = frames["neck"].at(0.0, 0.0, 0.076 * s + 0.012)
+    skull = frames["neck"].at(0.0, 0.0, (0.068 if build.female else 0.076) * s + 0.012)
     frames["head"] = Frame(skull + upright @ np.array([0.022, 0.0, 0.078 * build.head]), upright)
     for side, sign in (("left", 1.0), ("right", -1.0)):
         frames |= _arm(side, sign, chest, build, pose.arms[side])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +15,8 @@ from authoring.people.piece import Skin
 
 Colour = tuple[float, float, float]
 """Linear albedo."""
+Tone = Callable[[Array, Array], None]
+"""Mixes a colour into a picture by an amount a pixel."""
 
 _ATLAS_PX, _SWATCH_PX, _ROW = 64, 16, 4
 _SKIN_PX = 256
@@ -133,7 +135,10 @@ def write_skin(path: Path, face: Face) -> None:
     tone(0.35 * _blob(side, z, (0.045, -0.028), (0.022, 0.018)), red)
     tone(0.30 * _blob(y, z, (0.0, -0.036), (0.014, 0.012)), red)
     jaw = np.clip((-0.045 - z) / 0.03, 0.0, 1.0)
-    tone(0.6 * face.beard * jaw * (1.0 - _blob(side, z, (0.045, -0.025), (0.02, 0.03))), np.array(face.hair) * 0.7 + skin * 0.15)
+    tone(
+        0.6 * face.beard * jaw * (1.0 - _blob(side, z, (0.045, -0.025), (0.02, 0.03))),
+        np.array(face.hair) * 0.7 + skin * 0.15,
+    )
     tone(0.38 * _blob(side, z, (0.031, 0.009), (0.019, 0.006)), dark)
     tone(0.25 * _blob(side, z, (0.030, -0.013), (0.016, 0.006)), dark)
     tone(0.35 * _blob(side, z, (0.014, -0.002), (0.005, 0.014)), dark)
@@ -150,7 +155,7 @@ def write_skin(path: Path, face: Face) -> None:
     _write(path, np.concatenate([image, np.tile(ramp, (_SKIN_PX, 1, 1))], axis=1))
 
 
-def _eyes(face: Face, side: Array, z: Array, tone) -> None:  # noqa: ANN001
+def _eyes(face: Face, side: Array, z: Array, tone: Tone) -> None:
     white = _blob(side, z, (0.0325, -0.0005), (0.0142, 0.0050), 4.0)
     tone(white, np.array([0.42, 0.39, 0.37]))
     tone(white * _blob(side, z, (0.0325, 0.0), (0.0062, 0.0062), 4.0), np.array(face.iris))
@@ -161,7 +166,9 @@ def _eyes(face: Face, side: Array, z: Array, tone) -> None:  # noqa: ANN001
     tone(0.8 * brow, np.array(face.hair) * 0.6)
 
 
-def _mouth(face: Face, y: Array, z: Array, tone) -> None:  # noqa: ANN001
-    pink = np.array(face.skin) * np.array([0.85, 0.42, 0.42]) * (1.0 - face.lips) + face.lips * np.array([0.30, 0.04, 0.05])
+def _mouth(face: Face, y: Array, z: Array, tone: Tone) -> None:
+    pink = np.array(face.skin) * np.array([0.85, 0.42, 0.42]) * (1.0 - face.lips) + face.lips * np.array(
+        [0.30, 0.04, 0.05]
+    )
     tone(0.75 * _blob(y, z, (0.0, -0.0705), (0.0235, 0.0085), 2.5), pink)
     tone(0.8 * _blob(y, z, (0.0, -0.0705), (0.0245, 0.0014), 2.0), np.array(face.skin) * 0.10)

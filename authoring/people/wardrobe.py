@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
-from authoring.people import extras, garments, head, poses
+from authoring.people import extras, garments, hair, hats, poses
 from authoring.people.figure import Person
 from authoring.people.skeleton import Build
 from authoring.people.texture import Face
@@ -55,9 +55,7 @@ _DRESSES = (
     (0.55, 0.55, 0.55, 1.0),
     (0.06, 0.25, 0.16, 1.0),
 )
-_WOMAN = Build(
-    height_m=1.68, shoulders=0.9, chest=0.93, waist=0.86, hips=1.02, limbs=0.87, bust_m=0.022, female=True
-)
+_WOMAN = Build(height_m=1.68, shoulders=0.9, chest=0.93, waist=0.86, hips=1.02, limbs=0.87, bust_m=0.022, female=True)
 
 PEOPLE: tuple[Person, ...] = (
     Person(
@@ -65,7 +63,7 @@ PEOPLE: tuple[Person, ...] = (
         build=Build(height_m=1.81, shoulders=1.04),
         face=Face(skin=_FAIR, hair=_DARK_HAIR, beard=0.35, iris=(0.06, 0.09, 0.12)),
         wear=(
-            head.short_hair,
+            hair.short_hair,
             partial(garments.jacket, tie=True),
             partial(garments.trousers, tint="paint_dark", ease=(0.016, 0.022, 0.036)),
             partial(extras.shoes, sole_m=0.012),
@@ -80,7 +78,7 @@ PEOPLE: tuple[Person, ...] = (
         build=Build(height_m=1.78, chest=1.03, belly_m=0.012),
         face=Face(skin=_OLIVE, hair=_BLACK_HAIR, beard=0.7),
         wear=(
-            head.short_hair,
+            hair.short_hair,
             garments.t_shirt,
             garments.trousers,
             extras.shoes,
@@ -95,7 +93,7 @@ PEOPLE: tuple[Person, ...] = (
         build=Build(height_m=1.76, shoulders=0.98, limbs=0.96),
         face=Face(skin=_DEEP, hair=_BLACK_HAIR, beard=0.3, age=0.1),
         wear=(
-            head.beanie,
+            hats.beanie,
             garments.hoodie,
             partial(garments.trousers, ease=(0.020, 0.030, 0.036)),
             extras.shoes,
@@ -116,7 +114,7 @@ PEOPLE: tuple[Person, ...] = (
         name="man_shorts",
         build=Build(height_m=1.74, belly_m=0.035, waist=1.12, chest=1.06, hips=1.05, limbs=1.05),
         face=Face(skin=_FAIR, hair=_BROWN_HAIR, beard=0.5, iris=(0.07, 0.11, 0.10)),
-        wear=(head.baseball_cap, garments.t_shirt, garments.shorts, extras.shoes),
+        wear=(hats.baseball_cap, garments.t_shirt, garments.shorts, extras.shoes),
         palette=_BRIGHTS,
         colours={
             "trousers": (0.33, 0.27, 0.18),
@@ -132,7 +130,7 @@ PEOPLE: tuple[Person, ...] = (
         build=Build(height_m=1.70, waist=1.12, chest=1.0, limbs=0.95, belly_m=0.03, stoop_deg=9.0),
         face=Face(skin=_FAIR, hair=_GREY_HAIR, beard=0.25, age=1.0),
         wear=(
-            head.thinning,
+            hair.thinning,
             partial(garments.jacket, inner="shirt"),
             partial(garments.trousers, ease=(0.022, 0.030, 0.040)),
             extras.shoes,
@@ -146,7 +144,7 @@ PEOPLE: tuple[Person, ...] = (
         build=Build(height_m=1.79, waist=1.05),
         face=Face(skin=_BROWN, hair=_BLACK_HAIR, beard=0.8, age=0.5),
         wear=(
-            head.brimmed_hat,
+            hats.brimmed_hat,
             partial(garments.jacket, long_m=0.44, inner="shirt"),
             partial(garments.trousers, ease=(0.016, 0.022, 0.034)),
             extras.shoes,
@@ -165,7 +163,7 @@ PEOPLE: tuple[Person, ...] = (
         build=Build(height_m=1.77, shoulders=1.06, chest=1.05, limbs=1.05),
         face=Face(skin=_OLIVE, hair=_DARK_HAIR, beard=0.6, age=0.5),
         wear=(
-            head.crop,
+            hair.crop,
             garments.work_jacket,
             partial(garments.trousers, ease=(0.024, 0.034, 0.044)),
             partial(extras.shoes, high=0.06),
@@ -178,7 +176,7 @@ PEOPLE: tuple[Person, ...] = (
         name="woman_dress",
         build=_WOMAN,
         face=Face(skin=_FAIR, hair=_BLOND_HAIR, lips=0.7, iris=(0.08, 0.13, 0.20), age=0.15),
-        wear=(head.long_hair, garments.dress, extras.shoes, extras.shoulder_bag),
+        wear=(hair.long_hair, garments.dress, extras.shoes, extras.shoulder_bag),
         palette=_DRESSES,
         colours={"bag": (0.16, 0.07, 0.03), "shoe": (0.10, 0.05, 0.03)},
         poses=(*_WALKS, poses.TALK),
@@ -189,7 +187,7 @@ PEOPLE: tuple[Person, ...] = (
         build=replace(_WOMAN, height_m=1.70),
         face=Face(skin=_EAST, hair=_BLACK_HAIR, lips=0.6, age=0.1),
         wear=(
-            head.bob,
+            hair.bob,
             partial(garments.jacket, long_m=0.50, inner="scarf"),
             partial(garments.trousers, ease=(0.006, 0.008, 0.010)),
             partial(extras.shoes, high=0.12),
@@ -203,7 +201,7 @@ PEOPLE: tuple[Person, ...] = (
         build=replace(_WOMAN, height_m=1.66, waist=0.9, hips=1.06),
         face=Face(skin=_BROWN, hair=_BLACK_HAIR, lips=0.8, age=0.3),
         wear=(
-            head.bun,
+            hair.bun,
             garments.jacket,
             partial(garments.skirt, hem_m=0.42, flare=-0.012),
             extras.shoes,
@@ -219,7 +217,7 @@ PEOPLE: tuple[Person, ...] = (
         build=replace(_WOMAN, height_m=1.72, waist=0.88),
         face=Face(skin=_OLIVE, hair=_BROWN_HAIR, lips=0.5, age=0.1),
         wear=(
-            head.ponytail,
+            hair.ponytail,
             partial(garments.t_shirt, loose=0.010),
             partial(garments.trousers, ease=(0.006, 0.009, 0.014)),
             extras.shoes,
@@ -234,7 +232,7 @@ PEOPLE: tuple[Person, ...] = (
         build=replace(_WOMAN, height_m=1.65, hips=1.08, limbs=0.92),
         face=Face(skin=_DEEP, hair=_BLACK_HAIR, lips=0.5, age=0.0),
         wear=(
-            head.curls,
+            hair.curls,
             garments.hoodie,
             partial(garments.trousers, ease=(0.005, 0.007, 0.010)),
             extras.shoes,
@@ -255,7 +253,7 @@ PEOPLE: tuple[Person, ...] = (
         build=replace(_WOMAN, height_m=1.58, waist=1.08, chest=1.02, hips=1.12, limbs=0.95, stoop_deg=10.0),
         face=Face(skin=_FAIR, hair=(0.5, 0.49, 0.47), lips=0.4, age=1.0, iris=(0.08, 0.12, 0.16)),
         wear=(
-            head.curls,
+            hair.curls,
             partial(garments.shirt, tint="paint"),
             partial(garments.skirt, hem_m=0.58, flare=0.03),
             extras.shoes,
@@ -270,7 +268,7 @@ PEOPLE: tuple[Person, ...] = (
         name="boy",
         build=Build(height_m=1.28, head=0.91, shoulders=0.95, chest=0.97, limbs=0.92, leg=0.95),
         face=Face(skin=_FAIR, hair=_BROWN_HAIR, age=0.0),
-        wear=(head.short_hair, garments.t_shirt, garments.shorts, extras.shoes, extras.backpack),
+        wear=(hair.short_hair, garments.t_shirt, garments.shorts, extras.shoes, extras.backpack),
         palette=_BRIGHTS,
         colours={
             "trousers": (0.05, 0.07, 0.13),
@@ -288,7 +286,7 @@ PEOPLE: tuple[Person, ...] = (
             height_m=1.15, head=0.89, shoulders=0.90, chest=0.95, waist=0.97, limbs=0.88, leg=0.93, female=True
         ),
         face=Face(skin=_EAST, hair=_DARK_HAIR, lips=0.4, age=0.0),
-        wear=(head.ponytail, partial(garments.dress, hem_m=0.44, flare=0.05), extras.shoes),
+        wear=(hair.ponytail, partial(garments.dress, hem_m=0.44, flare=0.05), extras.shoes),
         palette=_DRESSES,
         colours={"shoe": (0.45, 0.08, 0.12)},
         poses=_WALKS,

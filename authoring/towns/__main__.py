@@ -9,6 +9,7 @@ from pathlib import Path
 # Where the function is that writes each town.
 TOWNS = {
     "town10": "authoring.towns.assemble:write_town10",
+    "harbour": "authoring.towns.harbour_build:write_harbour",
     "suburb": "authoring.towns.suburb_build:write_suburb",
 }
 

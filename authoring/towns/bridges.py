@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from authoring.kit.parts import Sink
 from authoring.towns import paths, solids
-from authoring.towns.network import BRIDGE_HALF_M, RAMP_M, Network, Street
+from authoring.towns.network import Network, Street
 from authoring.towns.regions import BRIDGE_SIDEWALK_M, KERB_M
 
 Array = npt.NDArray[np.float64]
@@ -48,7 +48,7 @@ def build_bridge(sink: Sink, network: Network, street: Street) -> None:
             (parapet, "concrete", "bridge"),
         ):
             solids.sweep(sink, line, z, section if sign > 0 else section[::-1], material, label)
-        _side(sink, line, z, sign, edge)
+        _side(sink, street, line, z, sign, edge)
         solids.railing(sink, paths.offset(line, sign * (edge - 0.15)), z + 0.35, "dark_green", "fence", top_m=0.85)
         _guard_rail(sink, line, z, sign, half + 0.45)
     if street.profile.median_m:
@@ -92,10 +92,10 @@ def _profile(network: Network, street: Street) -> tuple[Array, Array]:
     return line, network.height_m(street.name, paths.stations(line) + start)
 
 
-def _side(sink: Sink, line: Array, z: Array, sign: int, edge: float) -> None:
+def _side(sink: Sink, street: Street, line: Array, z: Array, sign: int, edge: float) -> None:
     """Walls of the ramps down to the ground, girders over the water."""
     along = paths.stations(line)
-    over = (along > RAMP_M - 1.5) & (along < RAMP_M + 2 * BRIDGE_HALF_M + 1.5)
+    over = (along > street.ramp_m - 1.5) & (along < street.ramp_m + 2 * street.deck_half_m + 1.5)
     foot = np.where(over, z + 0.35 - DECK_M - 0.35, -0.05)
     rim = paths.offset(line, sign * edge)
     if sign > 0:

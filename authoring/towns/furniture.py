@@ -217,7 +217,7 @@ class Furnisher:
         """Signs where a one-way street starts."""
         for arm, starts, away in self.network.arms(name):
             street = self.network.streets[arm]
-            if street.profile.one_way and starts:
+            if street.profile.one_way and street.profile.forward and starts:
                 x, y = self._at_mouth(street, starts, self.network.mouths[arm, starts] + 3.0, FROM_KERB_M, left=True)
                 yaw = float(np.arctan2(away[1], away[0]) - np.pi / 2)
                 self._stand("one_way", kit.traffic_sign("one_way"), x, y, yaw, 0.08, high=2.8)

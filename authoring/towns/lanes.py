@@ -100,7 +100,7 @@ def turns_of(lanes: Mapping[str, Lane], name: str) -> set[str]:
 def _street_lanes(network: Network) -> dict[str, Lane]:
     lanes: dict[str, Lane] = {}
     for street in network.streets.values():
-        if street.end is None:
+        if street.end is None and not street.joins:
             continue
         start_m, end_m = network.span(street.name)
         line = paths.cut(network.lines[street.name], start_m, end_m)
@@ -129,7 +129,7 @@ def _approaches(network: Network, node: str) -> list[Approach]:
     result = []
     for name, starts, away in network.arms(node):
         street = network.streets[name]
-        if street.end is None:
+        if street.end is None and not street.joins:
             continue
         forward = tuple(f"{name}_f{index}" for index in range(street.profile.forward))
         backward = tuple(f"{name}_b{index}" for index in range(street.profile.backward))

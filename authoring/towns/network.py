@@ -42,18 +42,18 @@ class Profile:
 
     @property
     def one_way(self) -> bool:
-        """Whether all lanes run along the street."""
-        return self.backward == 0
+        """Whether all lanes run the same way, along the street or against it."""
+        return not (self.forward and self.backward)
 
     @property
     def axis_m(self) -> float:
         """How far left of the street's line the two directions meet."""
-        return 0.0 if not self.one_way else self.forward * self.lane_m / 2
+        return 0.0 if not self.one_way else (self.forward - self.backward) * self.lane_m / 2
 
     @property
     def half_width_m(self) -> float:
         """From the street's line to either kerb, without parking bays."""
-        lanes = self.forward if self.one_way else 2 * max(self.forward, self.backward)
+        lanes = self.forward + self.backward if self.one_way else 2 * max(self.forward, self.backward)
         return lanes * self.lane_m / 2 + self.median_m / 2 + GUTTER_M
 
     def lane_offset_m(self, index: int, *, forward: bool) -> float:
@@ -80,7 +80,9 @@ class Street:
         corners: inner corners of its line with the radius of each curve.
         leaves_to: where a street without an end junction ends.
         bays_left, bays_right: whether there are parking bays along it.
+        joins: whether a street without an end junction has lanes, which others continue where it ends.
         hump_m: height of its bridge, 0 for a level street.
+        ramp_m, deck_half_m: length of the bridge's ramps, and half the length of what lies between them.
         trees_m: spacing of street trees, 0 for none.
     """
 
@@ -92,7 +94,10 @@ class Street:
     leaves_to: tuple[float, float] | None = None
     bays_left: bool = False
     bays_right: bool = False
+    joins: bool = False
     hump_m: float = 0.0
+    ramp_m: float = 26.0
+    deck_half_m: float = 11.0
     trees_m: float = 0.0
 
 
@@ -164,14 +169,11 @@ class Network:
         hump = self.streets[street].hump_m
         start, end = self.ramp(street)
         half = (end - start) / 2
-        share = np.clip((half - np.abs(along - start - half)) / RAMP_M, 0, 1)
+        share = np.clip((half - np.abs(along - start - half)) / self.streets[street].ramp_m, 0, 1)
         return np.asarray(hump * share * share * (3 - 2 * share))
 
     def ramp(self, street: str) -> tuple[float, float]:
         """The distances along a bridge's street between which it is not level."""
         middle = paths.length(self.lines[street]) / 2
-        return middle - BRIDGE_HALF_M - RAMP_M, middle + BRIDGE_HALF_M + RAMP_M
-
-
-RAMP_M = 26.0
-BRIDGE_HALF_M = 11.0
+        reach = self.streets[street].deck_half_m + self.streets[street].ramp_m
+        return middle - reach, middle + reach

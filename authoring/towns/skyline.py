@@ -31,7 +31,7 @@ def build_skyline(sink: Sink, regions: Regions, lots: list[Lot], *, rng: np.rand
         "terrain",
         cell_m=720.0,
     )
-    _hills(sink)
+    build_hills(sink)
     taken = unary_union([regions.carriageways.buffer(9.0), regions.canal.buffer(9.0), *[lot.footprint for lot in lots]])
     shapely.prepare(taken)
     count = int(CITY_M / PITCH_M)
@@ -59,7 +59,7 @@ def build_skyline(sink: Sink, regions: Regions, lots: list[Lot], *, rng: np.rand
             sink.extend(place(parts, x_m=float(x), y_m=float(y), z_m=-0.1, yaw_rad=yaw))
 
 
-def _hills(sink: Sink) -> None:
+def build_hills(sink: Sink) -> None:
     """A ring of hills, heights summed from a few waves so that no two ridges are alike."""
     angles = np.linspace(0, 2 * np.pi, 163)
     radii = np.concatenate([np.linspace(*HILLS_M, 15)])

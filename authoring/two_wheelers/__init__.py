@@ -1,1 +1,1 @@
-"""Motorcycles and bicycles with their riders, made in code: `python -m authoring.two_wheelers` writes mjcf/vehicles/."""
+"""Motorcycles and bicycles with their riders, in code: `python -m authoring.two_wheelers` writes mjcf/vehicles/."""

@@ -26,19 +26,33 @@ def _wheels(hard: Hard, width: float) -> None:
         hard.add("trim", "rubber", tyre(centre, RADIUS_M, width, RADIUS_M - 0.036, 40), crease_deg=50.0)
         hard.add("metal", "silver", rim_ring(centre, RADIUS_M - 0.034, 0.024, 0.018, 40))
         hard.add("metal", "silver", wire_spokes(centre, RADIUS_M - 0.05, 0.02, 0.03, 28))
-        hard.add("metal", "grey", disc(centre, [(0.0, -0.06), (0.009, -0.06), (0.02, -0.034), (0.014, 0.0), (0.02, 0.034), (0.009, 0.06), (0.0, 0.06)], 12))
+        hard.add(
+            "metal",
+            "grey",
+            disc(
+                centre,
+                [(0.0, -0.06), (0.009, -0.06), (0.02, -0.034), (0.014, 0.0), (0.02, 0.034), (0.009, 0.06), (0.0, 0.06)],
+                12,
+            ),
+        )
 
 
 def _drive(hard: Hard, crank_deg: float) -> None:
     x, _, z = BRACKET
     ring = [(0.070, -0.003), (0.095, -0.003), (0.095, 0.003), (0.070, 0.003), (0.070, -0.003)]
     hard.add("metal", "grey", disc((x, -0.05, z), ring, 28))
-    hard.add("metal", "grey", disc((_REAR[0], -0.05, RADIUS_M), [(0.0, -0.012), (0.038, -0.012), (0.038, 0.012), (0.0, 0.012)], 18))
+    hard.add(
+        "metal",
+        "grey",
+        disc((_REAR[0], -0.05, RADIUS_M), [(0.0, -0.012), (0.038, -0.012), (0.038, 0.012), (0.0, 0.012)], 18),
+    )
     hard.add("metal", "grey", tube([(x, -0.065, z), (x, 0.065, z)], 0.02, 10))
     for side in (1.0, -1.0):
         px, py, pz = pedal(side, crank_deg)
         hard.add("metal", "silver", tube([(x, 0.066 * side, z), (px, 0.072 * side, pz)], [0.015, 0.010], 6))
-        hard.add("trim", "black", block((px - 0.05, py - 0.048, pz - 0.012), (px + 0.05, py + 0.048, pz + 0.012), 0.004))
+        hard.add(
+            "trim", "black", block((px - 0.05, py - 0.048, pz - 0.012), (px + 0.05, py + 0.048, pz + 0.012), 0.004)
+        )
     for sprocket, ring_z in ((0.037, 0.094), (-0.037, -0.094)):
         ends = [(x, -0.05, z + ring_z), (_REAR[0], -0.05, RADIUS_M + sprocket)]
         hard.add("trim", "chain", tube(ends, 0.005, 4))
@@ -46,23 +60,42 @@ def _drive(hard: Hard, crank_deg: float) -> None:
 
 def _rear_triangle(hard: Hard, seat_joint: Array) -> None:
     for side in (1.0, -1.0):
-        hard.add("paint", "paint", tube([(BRACKET[0], 0.03 * side, BRACKET[2]), (_REAR[0], 0.065 * side, RADIUS_M)], 0.010, 8))
-        hard.add("paint", "paint", tube([seat_joint + [0.0, 0.02 * side, 0.0], (_REAR[0], 0.065 * side, RADIUS_M)], 0.009, 8))
+        hard.add(
+            "paint",
+            "paint",
+            tube([(BRACKET[0], 0.03 * side, BRACKET[2]), (_REAR[0], 0.065 * side, RADIUS_M)], 0.010, 8),
+        )
+        hard.add(
+            "paint",
+            "paint",
+            tube([seat_joint + np.array([0.0, 0.02 * side, 0.0]), (_REAR[0], 0.065 * side, RADIUS_M)], 0.009, 8),
+        )
 
 
 def _fork(hard: Hard, low: Array, high: Array, *, group: str = "paint", tint: str = "paint") -> None:
     hard.add(group, tint, tube([low, high], 0.019, 10))
     for side in (1.0, -1.0):
-        blade = curve([low + [0.0, 0.035 * side, 0.0], (0.485, 0.055 * side, 0.45), (_FRONT[0], 0.058 * side, RADIUS_M)], 7)
+        blade = curve(
+            [
+                low + np.array([0.0, 0.035 * side, 0.0]),
+                (0.485, 0.055 * side, 0.45),
+                (_FRONT[0], 0.058 * side, RADIUS_M),
+            ],
+            7,
+        )
         hard.add(group, tint, tube(blade, [0.015, 0.015, 0.014, 0.013, 0.012, 0.010, 0.009], 8))
-    hard.add(group, tint, tube([low + [0.0, 0.04, 0.0], low - [0.0, 0.04, 0.0]], 0.016, 8))
+    hard.add(group, tint, tube([low + np.array([0.0, 0.04, 0.0]), low - np.array([0.0, 0.04, 0.0])], 0.016, 8))
 
 
 def _saddle(hard: Hard, top: Array, joint: Array, tint: str) -> None:
     hard.add("metal", "silver", tube([joint, top - [0.0, 0.0, 0.03]], 0.0135, 8))
     x, _, z = top
     nose = curve([(x + 0.155, 0.0, z - 0.005), (x + 0.05, 0.0, z), (x - 0.04, 0.0, z), (x - 0.11, 0.0, z + 0.008)], 9)
-    flat = tube(nose, [0.018, 0.024, 0.03, 0.042, 0.056, 0.068, 0.076, 0.078, 0.060], 12).translated(z=-z).scaled(1.0, 1.0, 0.45)
+    flat = (
+        tube(nose, [0.018, 0.024, 0.03, 0.042, 0.056, 0.068, 0.076, 0.078, 0.060], 12)
+        .translated(z=-z)
+        .scaled(1.0, 1.0, 0.45)
+    )
     hard.add("trim", tint, flat.translated(z=z), crease_deg=70.0)
 
 
@@ -71,16 +104,24 @@ def trekking(crank_deg: float) -> Hard:
     hard = Hard(list(COLOURS))
     _wheels(hard, 0.042)
     _drive(hard, crank_deg)
-    joint, head_low, head_high = np.array([-0.255, 0.0, 0.80]), np.array([0.395, 0.0, 0.685]), np.array([0.345, 0.0, 0.845])
+    joint, head_low, head_high = (
+        np.array([-0.255, 0.0, 0.80]),
+        np.array([0.395, 0.0, 0.685]),
+        np.array([0.345, 0.0, 0.845]),
+    )
     bracket = np.array(BRACKET)
     hard.add("paint", "paint", tube([bracket, joint], 0.018, 10))
-    hard.add("paint", "paint", tube([bracket, head_low + [-0.008, 0.0, 0.03]], 0.024, 10))
-    hard.add("paint", "paint", tube([joint - [0.0, 0.0, 0.02], head_high - [-0.008, 0.0, 0.03]], 0.019, 10))
+    hard.add("paint", "paint", tube([bracket, head_low + np.array([-0.008, 0.0, 0.03])], 0.024, 10))
+    hard.add(
+        "paint",
+        "paint",
+        tube([joint - np.array([0.0, 0.0, 0.02]), head_high - np.array([-0.008, 0.0, 0.03])], 0.019, 10),
+    )
     hard.add("paint", "paint", tube([head_low, head_high], 0.025, 10))
     _rear_triangle(hard, joint - np.array([0.0, 0.0, 0.03]))
     _fork(hard, head_low - np.array([-0.008, 0.0, 0.03]), head_low)
     stem = np.array([0.325, 0.0, 0.92])
-    hard.add("metal", "black", tube([head_high, stem, stem + [0.075, 0.0, 0.05]], 0.016, 8))
+    hard.add("metal", "black", tube([head_high, stem, stem + np.array([0.075, 0.0, 0.05])], 0.016, 8))
     bar = curve([(0.40, 0.0, 0.97), (0.395, 0.12, 0.985), (0.345, 0.30, 0.99)], 7)
     hard.both("metal", "black", tube(bar, 0.0125))
     hard.both("trim", "rubber", tube([(0.377, 0.19, 0.987), (0.343, 0.315, 0.99)], 0.017, 8))
@@ -103,12 +144,18 @@ def city(crank_deg: float) -> Hard:
     hard = Hard(list(COLOURS))
     _wheels(hard, 0.044)
     _drive(hard, crank_deg)
-    joint, head_low, head_high = np.array([-0.245, 0.0, 0.70]), np.array([0.405, 0.0, 0.66]), np.array([0.345, 0.0, 0.875])
+    joint, head_low, head_high = (
+        np.array([-0.245, 0.0, 0.70]),
+        np.array([0.405, 0.0, 0.66]),
+        np.array([0.345, 0.0, 0.875]),
+    )
     bracket = np.array(BRACKET)
     hard.add("paint", "paint", tube([bracket, joint], 0.017, 10))
-    low = curve([head_low + [-0.005, 0.0, 0.02], (0.22, 0.0, 0.42), (0.05, 0.0, 0.30), bracket], 10)
+    low = curve([head_low + np.array([-0.005, 0.0, 0.02]), (0.22, 0.0, 0.42), (0.05, 0.0, 0.30), bracket], 10)
     hard.add("paint", "paint", tube(low, 0.024, 10))
-    high = curve([head_high - [-0.01, 0.0, 0.06], (0.16, 0.0, 0.52), (-0.08, 0.0, 0.43), (-0.165, 0.0, 0.48)], 10)
+    high = curve(
+        [head_high - np.array([-0.01, 0.0, 0.06]), (0.16, 0.0, 0.52), (-0.08, 0.0, 0.43), (-0.165, 0.0, 0.48)], 10
+    )
     hard.add("paint", "paint", tube(high, 0.015, 10))
     hard.add("paint", "paint", tube([head_low, head_high], 0.024, 10))
     _rear_triangle(hard, joint - np.array([0.0, 0.0, 0.04]))

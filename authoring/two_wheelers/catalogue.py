@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
-from authoring.people import extras, garments, head
+from authoring.people import extras, garments, hair
 from authoring.people.figure import Person
 from authoring.people.skeleton import Build
 from authoring.people.texture import Face
@@ -45,25 +45,36 @@ _PERSON = Person(
 
 
 def _biker() -> Person:
-    wear = (rider.full_helmet, rider.riding_jacket, partial(garments.trousers, ease=_SLIM), partial(extras.shoes, high=0.12))
+    wear = (
+        rider.full_helmet,
+        rider.riding_jacket,
+        partial(garments.trousers, ease=_SLIM),
+        partial(extras.shoes, high=0.12),
+    )
     colours = {"trousers": (0.03, 0.035, 0.05), "helmet": (0.03, 0.03, 0.032), "visor": (0.012, 0.014, 0.018)}
     return replace(_PERSON, wear=wear, colours=colours, face=Face(skin=_OLIVE, hair=_DARK_HAIR, beard=0.3))
 
 
 def _courier() -> Person:
-    wear = (head.crop, rider.open_helmet, rider.riding_jacket, partial(garments.trousers, ease=(0.012, 0.018, 0.026)), extras.shoes)
+    wear = (
+        hair.crop,
+        rider.open_helmet,
+        rider.riding_jacket,
+        partial(garments.trousers, ease=(0.012, 0.018, 0.026)),
+        extras.shoes,
+    )
     colours = {"trousers": (0.05, 0.08, 0.14), "helmet": (0.55, 0.55, 0.54), "sole": (0.5, 0.5, 0.48)}
     return replace(_PERSON, wear=wear, colours=colours, face=Face(skin=_BROWN, hair=_DARK_HAIR, beard=0.5))
 
 
 def _cyclist() -> Person:
-    wear = (head.crop, rider.cycle_helmet, rider.riding_jacket, partial(garments.trousers, ease=_SLIM), extras.shoes)
+    wear = (hair.crop, rider.cycle_helmet, rider.riding_jacket, partial(garments.trousers, ease=_SLIM), extras.shoes)
     colours = {"trousers": (0.025, 0.025, 0.03), "helmet": (0.50, 0.50, 0.50), "shoe": (0.3, 0.3, 0.3)}
     return replace(_PERSON, wear=wear, colours=colours)
 
 
 def _city_rider() -> Person:
-    wear = (head.long_hair, rider.riding_jacket, partial(garments.trousers, ease=_SLIM), extras.shoes)
+    wear = (hair.long_hair, rider.riding_jacket, partial(garments.trousers, ease=_SLIM), extras.shoes)
     colours = {"trousers": (0.08, 0.12, 0.20), "shoe": (0.5, 0.5, 0.48)}
     return replace(_PERSON, build=_WOMAN, wear=wear, colours=colours, face=Face(skin=_FAIR, hair=_BLOND_HAIR, lips=0.6))
 

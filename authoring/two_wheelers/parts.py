@@ -91,7 +91,7 @@ def block(low: Sequence[float], high: Sequence[float], bevel: float = 0.006, *, 
 
 
 def disc(centre: Sequence[float], profile: ArrayLike, segments: int = 28) -> Mesh:
-    """A (P, 2) profile of (radius, y) turned about the y axis at `centre`, closed where it starts and ends on the axis."""
+    """A (P, 2) profile of (radius, y) turned about the y axis at `centre`."""
     return outward(revolve(profile, segments, axis="y")).translated(*centre)
 
 
@@ -107,7 +107,13 @@ def tyre(centre: Sequence[float], radius: float, width: float, rim: float, segme
 def rim_ring(centre: Sequence[float], rim: float, width: float, depth: float, segments: int = 32) -> Mesh:
     """A wheel's rim: a ring `depth` deep inside the tyre."""
     half = width / 2
-    profile = [(rim + 0.004, -half), (rim + 0.004, half), (rim - depth, half * 0.8), (rim - depth, -half * 0.8), (rim + 0.004, -half)]
+    profile = [
+        (rim + 0.004, -half),
+        (rim + 0.004, half),
+        (rim - depth, half * 0.8),
+        (rim - depth, -half * 0.8),
+        (rim + 0.004, -half),
+    ]
     return disc(centre, profile, segments)
 
 

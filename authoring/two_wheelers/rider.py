@@ -10,9 +10,20 @@ from authoring.mesh import Mesh
 from authoring.people.body import torso
 from authoring.people.field import Array, Frame, below, blend, cut, ellipsoid, loft, rounded_box
 from authoring.people.figure import Person, meshes_of, pieces_of
-from authoring.people.garments import collar_ring, neckline, sleeved
 from authoring.people.piece import Piece
-from authoring.people.skeleton import BALL_M, ANKLE_M, FOREARM_M, SIDES, UPPER_ARM_M, Pose, Skeleton, leg_lengths, pose_skeleton, turn_y
+from authoring.people.skeleton import (
+    ANKLE_M,
+    BALL_M,
+    FOREARM_M,
+    SIDES,
+    UPPER_ARM_M,
+    Pose,
+    Skeleton,
+    leg_lengths,
+    pose_skeleton,
+    turn_y,
+)
+from authoring.people.tailoring import collar_ring, neckline, sleeved
 
 _PALM_M = 0.075
 
@@ -116,7 +127,12 @@ def full_helmet(skeleton: Skeleton) -> list[Piece]:
     shell = blend(
         [
             ellipsoid(head, (-0.010, 0.0, 0.032), (0.138, 0.122, 0.122)),
-            loft(head, [(-0.125, 0.028, 0.0, 0.100, 0.092), (-0.04, 0.025, 0.0, 0.122, 0.110)], cap=(0.006, 0.02), power=2.3),
+            loft(
+                head,
+                [(-0.125, 0.028, 0.0, 0.100, 0.092), (-0.04, 0.025, 0.0, 0.122, 0.110)],
+                cap=(0.006, 0.02),
+                power=2.3,
+            ),
         ],
         0.03,
     )
@@ -153,4 +169,13 @@ def cycle_helmet(skeleton: Skeleton) -> list[Piece]:
     ]
 
 
-__all__ = ["SIDES", "Seat", "cycle_helmet", "full_helmet", "model_rider", "open_helmet", "riding_jacket", "seated_skeleton"]
+__all__ = [
+    "SIDES",
+    "Seat",
+    "cycle_helmet",
+    "full_helmet",
+    "model_rider",
+    "open_helmet",
+    "riding_jacket",
+    "seated_skeleton",
+]

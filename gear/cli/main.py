@@ -14,9 +14,11 @@ COMMANDS: dict[str, str] = {
     "collect": "collect a dataset split: pictures with exact ground truth",
     "sheet": "a contact sheet of a dataset, as one picture",
     "view": "one self-contained HTML page of a dataset",
+    "defend": "write a dataset's pictures as a defense cleans them",
     "export": "write a dataset in another layout",
     "towns": "list towns and their scenes, or draw a map and a picture of every scene",
     "plugins": "list the installed tasks, models, attacks and defenses",
+    "new": "write a complete small package for a task, model, attack or defense of your own",
     "doctor": "render a reference frame with each renderer and say who renders",
     "show-config": "print a config with every default filled in",
 }

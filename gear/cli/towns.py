@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -66,7 +67,9 @@ def draw(args: argparse.Namespace) -> int:
         )
     print(json.dumps({"map": str(report.map), "sheet": report.sheet and str(report.sheet)}) if args.json
           else report.summary())  # fmt: skip
-    return 0
+    for problem in report.problems:
+        print(f"gear: {problem}", file=sys.stderr)
+    return 2 if report.problems else 0
 
 
 def show(town: Town) -> None:

@@ -99,6 +99,7 @@ class DefenseSpec(Spec[ConfigT, Defense]):
         gradient: how gradients pass it.
         taps: feature maps that it needs of the model.
         needs_calibration: whether `fit` must be called before `apply`.
+        needs_model: whether `apply` must be given the model; so it is where `taps` are asked for.
     """
 
     tasks: tuple[str, ...] = ()
@@ -106,6 +107,7 @@ class DefenseSpec(Spec[ConfigT, Defense]):
     gradient: Gradient = "none"
     taps: tuple[str, ...] = ()
     needs_calibration: bool = False
+    needs_model: bool = False
 
 
 AnySpec = Spec[Any, Any]

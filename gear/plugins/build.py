@@ -32,7 +32,7 @@ def build(found: Found, options: Node = NO_OPTIONS) -> Any:
         return found.spec.build(config)
     except GearError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         owner = found.owner
         raise PluginError(
             f"{found.spec.name} ({owner.package} {owner.version})", "build", f"{type(error).__name__}: {error}"

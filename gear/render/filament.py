@@ -12,6 +12,7 @@ the same on raw bytes.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import re
 from collections import OrderedDict
@@ -68,16 +69,17 @@ class FilamentRenderer:
         with native_output() as lines:
             mjrf = self._mjrf
             self._context = mjrf.Context(mjrf.ContextConfig(graphics_api=mjrf.GraphicsApi.GRAPHICS_API_VULKAN))
+            self._resources = mjrf.ModelResources(self._context, model)
+            self._scene = self._context.create_scene(mjrf.SceneParams())
+            self._scene.configure_from_model(model)
+            self._lights = mjrf.ModelLights(self._scene, self._resources)
+            self._renderables = mjrf.ModelRenderables(self._scene, self._resources)
+            self._renderables.set_options(geoms_only())
         self._info = _info(chatter + lines, software_by_device)
-        self._resources = mjrf.ModelResources(self._context, model)
-        self._scene = self._context.create_scene(mjrf.SceneParams())
-        self._scene.configure_from_model(model)
-        self._lights = mjrf.ModelLights(self._scene, self._resources)
-        self._renderables = mjrf.ModelRenderables(self._scene, self._resources)
-        self._renderables.set_options(geoms_only())
         self._targets: dict[tuple[int, int, str], _Target] = {}
         self._face_textures: OrderedDict[bytes, Any] = OrderedDict()
         self._retired_textures: list[Any] = []
+        self._is_warm = False
         self._closed = False
 
     @property
@@ -98,7 +100,10 @@ class FilamentRenderer:
         self._lights.update(stage.data)
         self._renderables.update(stage.data)
         self._dress(stage)
-        return tuple(self._view(camera, colour=colour, truth=truth) for camera in cameras)
+        with contextlib.nullcontext() if self._is_warm else native_output():
+            views = tuple(self._view(camera, colour=colour, truth=truth) for camera in cameras)
+        self._is_warm = True
+        return views
 
     def close(self) -> None:
         """Frees the context; safe to call twice."""

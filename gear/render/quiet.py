@@ -11,6 +11,8 @@ from contextlib import ExitStack, contextmanager
 
 _CHATTER = re.compile(
     r"Using 'soft' CircularBuffer|FEngine |Backend feature level|Vulkan device driver|Selected physical device"
+    # A large world outgrows Filament's pool of handles; it says so with a stack trace and takes them from the heap.
+    r"|^PanicLog$|in allocateHandleSlow|HandleAllocator arena is full|^#\d+\s.*(_render_filament|libc|libstdc|unknown)"
 )
 
 
@@ -38,7 +40,7 @@ def native_output(descriptors: tuple[int, ...] = (1, 2)) -> Iterator[list[str]]:
                 file.seek(0)
                 for line in file.read().splitlines(keepends=True):
                     text = line.decode("utf-8", "replace")
-                    if _CHATTER.search(text):
+                    if _CHATTER.search(text.strip()):
                         chatter.append(text.strip())
                     elif text.strip():
                         os.write(fd, line)

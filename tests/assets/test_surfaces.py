@@ -12,10 +12,10 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 import pytest
-from gear.world.quiet_mjcf import mjcf
 
 from authoring.surfaces.billboard import write_billboard
 from authoring.surfaces.face import FACE_SIZE_PX
+from gear.world.quiet_mjcf import mjcf
 
 SURFACES = Path(__file__).parents[2] / "mjcf" / "surfaces"
 BILLBOARD = SURFACES / "billboard.xml"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ from gear.camera.response import response_for
 from gear.config.collection import SplitConfig
 from gear.contracts.rendering import Quality
 from gear.render.opening import open_renderer
+from gear.values.errors import PlacementError
 from gear.values.frames import UInt8Image
 from gear.values.rig import CameraMount, Rig
 from gear.values.scene import Weather
@@ -44,26 +46,31 @@ class SheetOptions:
     height_px: int = 320
 
 
-def draw_sheet(town: Town, options: SheetOptions, progress: Progress | None = None) -> UInt8Image:
+def draw_sheet(
+    town: Town, options: SheetOptions, progress: Progress | None = None
+) -> tuple[UInt8Image, list[PlacementError]]:
     """Renders one sample of every scene and puts them side by side.
 
     Returns:
-        (H, W, 3) uint8 RGB.
+        (H, W, 3) uint8 RGB, and what is wrong with scenes that cannot be planned; those show it instead of a picture.
 
     Raises:
-        PlacementError: a scene cannot be planned.
         BackendError: the renderer cannot start.
     """
     assert town.scenes is not None  # the caller has made sure
-    cells = []
+    cells: list[UInt8Image] = []
+    problems: list[PlacementError] = []
     for number, (name, scene) in enumerate(town.scenes.scenes.items()):
         if progress is not None:
             progress(number, len(town.scenes.scenes))
-        picture, note = thumbnail(town, name, scene, options)
-        cells.append(_cell(picture, name, note))
+        try:
+            cells.append(_cell(*thumbnail(town, name, scene, options), name))
+        except PlacementError as error:
+            problems.append(error)
+            cells.append(_cell(_complaint(error, options), "cannot be planned", name))
     if progress is not None:
         progress(len(cells), len(cells))
-    return _grid(cells)
+    return _grid(cells), problems
 
 
 def thumbnail(town: Town, name: str, scene: SceneSpec, options: SheetOptions) -> tuple[UInt8Image, str]:
@@ -89,7 +96,14 @@ def thumbnail(town: Town, name: str, scene: SceneSpec, options: SheetOptions) ->
     )
 
 
-def _cell(picture: UInt8Image, name: str, note: str) -> UInt8Image:
+def _complaint(error: PlacementError, options: SheetOptions) -> UInt8Image:
+    canvas = Canvas((options.width_px, options.height_px), (244, 240, 238))
+    for number, line in enumerate(textwrap.wrap(error.problem, options.width_px // 9)):
+        canvas.text((24, 48 + 24 * number), line, 11, (170, 40, 40))
+    return canvas.picture()
+
+
+def _cell(picture: UInt8Image, note: str, name: str) -> UInt8Image:
     canvas = Canvas((picture.shape[1], CAPTION_PX), PAPER)
     canvas.text((1, 16), name, 11, INK, bold=True)
     canvas.text((1, 35), note, 9, MUTED)

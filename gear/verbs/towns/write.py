@@ -10,7 +10,7 @@ import cv2
 from gear.contracts.rendering import Quality
 from gear.dataset.files import explained
 from gear.render.opening import describe
-from gear.values.errors import GearError, UnknownNameError
+from gear.values.errors import GearError, PlacementError, UnknownNameError
 from gear.values.frames import UInt8Image
 from gear.verbs.collect.run import Progress
 from gear.verbs.towns.facts import Town, read_town
@@ -30,11 +30,13 @@ class TownReport:
         town: of which town.
         map: path of the map.
         sheet: path of the thumbnails; None where the town has no scenes.
+        problems: scenes that cannot be planned.
     """
 
     town: Town
     map: Path
     sheet: Path | None
+    problems: tuple[PlacementError, ...] = ()
 
     def summary(self) -> str:
         """One line."""
@@ -68,7 +70,6 @@ def write_town(
     Raises:
         UnknownNameError: there is no such town, file, renderer or weather.
         TownError: the town breaks the conventions.
-        PlacementError: a scene cannot be planned.
         DatasetError: `out` cannot be written.
     """
     describe(renderer)
@@ -81,13 +82,14 @@ def write_town(
     found = read_town(town, scenes)
     folder = Path(out)
     map_path = _write(folder / f"{found.name}_map.png", draw_map(found, Relief.of(found.library.town)))
-    sheet_path = None
+    sheet_path, problems = None, []
     if found.scenes is not None:
         options = SheetOptions(
             renderer=renderer, quality="film" if quality == "film" else "fast", weather=PRESETS[weather], seed=seed
         )
-        sheet_path = _write(folder / f"{found.name}_scenes.png", draw_sheet(found, options, progress))
-    return TownReport(town=found, map=map_path, sheet=sheet_path)
+        picture, problems = draw_sheet(found, options, progress)
+        sheet_path = _write(folder / f"{found.name}_scenes.png", picture)
+    return TownReport(town=found, map=map_path, sheet=sheet_path, problems=tuple(problems))
 
 
 def _write(target: Path, picture: UInt8Image) -> Path:
