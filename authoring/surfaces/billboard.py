@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from authoring.mesh import write_obj
 from authoring.surfaces import structure
 from authoring.surfaces.face import write_neutral_face
-from authoring.surfaces.solids import obj_text
 
 _MESHES = {
     "posts": structure.posts,
@@ -74,7 +74,7 @@ def write_billboard(out: Path) -> None:
     folder = out / "billboard"
     folder.mkdir(parents=True, exist_ok=True)
     for name, build in _MESHES.items():
-        (folder / f"{name}.obj").write_text(obj_text(build()), encoding="utf-8")
+        write_obj(folder / f"{name}.obj", build())
     write_neutral_face(folder / "face.png")
     xml = _XML.format(width=structure.FACE_WIDTH_M, height=structure.FACE_HEIGHT_M, centre=structure.FACE_CENTRE_Z_M)
     (out / "billboard.xml").write_text(xml, encoding="utf-8")
