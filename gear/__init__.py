@@ -18,17 +18,33 @@ if TYPE_CHECKING:
     from gear.opening import Dataset, Twins, open_dataset, open_twins
     from gear.values.errors import GearError
     from gear.verbs.collect.run import CollectReport, collect
+    from gear.view.write import ViewReport, write_view
+    from gear.verbs.defend import DefendReport, defend
 
-__all__ = ["CollectReport", "Dataset", "GearError", "Twins", "collect", "open_dataset", "open_twins"]
+__all__ = [
+    "CollectReport",
+    "Dataset",
+    "DefendReport",
+    "GearError",
+    "Twins",
+    "collect",
+    "defend",
+    "open_dataset",
+    "open_twins",
+]
 
 _HOME = {
     "CollectReport": "gear.verbs.collect.run",
     "Dataset": "gear.opening",
+    "DefendReport": "gear.verbs.defend",
     "GearError": "gear.values.errors",
     "Twins": "gear.opening",
+    "ViewReport": "gear.view.write",
     "collect": "gear.verbs.collect.run",
+    "defend": "gear.verbs.defend",
     "open_dataset": "gear.opening",
     "open_twins": "gear.opening",
+    "write_view": "gear.view.write",
 }
 
 

@@ -12,12 +12,28 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
-from authoring.mesh import Mesh, bevelled_box, grid, merge, revolve, rotation, smooth_normals
+from authoring.mesh import Mesh, bevelled_box, merge, revolve, rotation, smooth_normals
 from authoring.people.field import Array, Frame
 from authoring.people.texture import swatch_uv
+from authoring.tubes import outward, skinned, tube
 
 ALONG_X = Frame(np.zeros(3), np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]]))
 """A frame for lofts whose stations run along x: rows are (x, z, -y, half-height, half-width)."""
+
+
+__all__ = [
+    "ALONG_X",
+    "Hard",
+    "arch",
+    "block",
+    "cast_spokes",
+    "curve",
+    "disc",
+    "rim_ring",
+    "tube",
+    "tyre",
+    "wire_spokes",
+]
 
 
 @dataclass(slots=True)
@@ -41,46 +57,6 @@ class Hard:
         """Gather a mesh and its mirror image on the other side."""
         self.add(group, tint, mesh, crease_deg=crease_deg)
         self.add(group, tint, mesh.scaled(1.0, -1.0, 1.0), crease_deg=crease_deg)
-
-
-def tube(path: ArrayLike, radius: float | Sequence[float], sides: int = 8) -> Mesh:
-    """A tube along (P, 3) points, with closed ends; one radius or one a point."""
-    points = np.asarray(path, dtype=np.float64)
-    radii = np.broadcast_to(np.asarray(radius, dtype=np.float64), (len(points),))
-    steps = np.diff(points, axis=0)
-    steps /= np.linalg.norm(steps, axis=1, keepdims=True)
-    tangents = np.concatenate([steps[:1], steps[:-1] + steps[1:], steps[-1:]])
-    tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
-    across = np.cross(tangents[0], [0.0, 0.0, 1.0] if abs(tangents[0, 2]) < 0.9 else [1.0, 0.0, 0.0])
-    angle = 2.0 * np.pi * np.arange(sides) / sides
-    rings = []
-    for point, tangent, r in zip(points, tangents, radii, strict=True):
-        across = across - tangent * (across @ tangent)
-        across /= np.linalg.norm(across)
-        up = np.cross(tangent, across)
-        rings.append(point + r * (np.outer(np.cos(angle), across) + np.outer(np.sin(angle), up)))
-    return _skinned(np.stack(rings))
-
-
-def _skinned(rings: Array) -> Mesh:
-    """A closed mesh through (R, C, 3) rings; the ends are fans, so they must be convex."""
-    columns = rings.shape[1]
-    fan = np.stack([np.zeros(columns - 2, dtype=np.int64), np.arange(1, columns - 1), np.arange(2, columns)], axis=1)
-    ends = [Mesh.of(rings[0], fan[:, ::-1]), Mesh.of(rings[-1], fan)]
-    wall = grid(rings, wrap=True)
-    aim = rings[1].mean(axis=0) - rings[0].mean(axis=0)
-    turn = np.cross(rings[0, 0] - rings[0].mean(axis=0), rings[0, 1] - rings[0].mean(axis=0)) @ aim
-    walls, caps = (wall, ends) if turn < 0 else (wall.flipped(), ends)
-    if turn < 0:
-        caps = [cap.flipped() for cap in caps]
-    return outward(merge([Mesh.of(part.vertices, part.faces) for part in (walls, *caps)]))
-
-
-def outward(mesh: Mesh) -> Mesh:
-    """The closed mesh with its faces turned outwards."""
-    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
-    volume = float((np.cross(a, b) * c).sum())
-    return mesh if volume >= 0.0 else mesh.flipped()
 
 
 def block(low: Sequence[float], high: Sequence[float], bevel: float = 0.006, *, pitch_deg: float = 0.0) -> Mesh:
@@ -152,7 +128,7 @@ def arch(centre: Sequence[float], radius: float, half_width: float, start_deg: f
         for y, r in ((-1.0, -0.014), (-0.55, 0.0), (0.55, 0.0), (1.0, -0.014), (0.55, -0.005), (-0.55, -0.005)):
             ring.append(np.array(centre) + (radius + r) * out + np.array([0.0, y * half_width, 0.0]))
         sections.append(np.stack(ring))
-    return _skinned(np.stack(sections))
+    return skinned(np.stack(sections))
 
 
 def curve(points: ArrayLike, count: int = 12) -> Array:

@@ -12,7 +12,6 @@ the same on raw bytes.
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import re
 from collections import OrderedDict
@@ -36,11 +35,14 @@ from gear.render.visible import geoms_only
 from gear.render.vulkan import VulkanUnavailableError, vulkan_devices
 from gear.values.errors import BackendError
 from gear.values.frames import FloatImage, IdImage, UInt8Image, UInt16Image
-from gear.values.scene import CameraRecord
+from gear.values.scene import CameraRecord, Pose
 
 _REMEDY = "apt-get install mesa-vulkan-drivers libvulkan1, or use --renderer classic"
 _FACE_TEXTURES_KEPT = 16
 _WHITE = np.ones(4, np.float32)
+_FIRST_LOOK = CameraRecord(
+    name="first", width_px=16, height_px=16, focal_px=8.0, world_from_camera=Pose(position_m=(0.0, 0.0, 0.0))
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,8 +81,9 @@ class FilamentRenderer:
         self._targets: dict[tuple[int, int, str], _Target] = {}
         self._face_textures: OrderedDict[bytes, Any] = OrderedDict()
         self._retired_textures: list[Any] = []
-        self._is_warm = False
         self._closed = False
+        with native_output():  # the driver's thread says what it has to say of the model before the first frame is done
+            self._geom_id(_FIRST_LOOK)
 
     @property
     def info(self) -> RendererInfo:
@@ -100,10 +103,7 @@ class FilamentRenderer:
         self._lights.update(stage.data)
         self._renderables.update(stage.data)
         self._dress(stage)
-        with contextlib.nullcontext() if self._is_warm else native_output():
-            views = tuple(self._view(camera, colour=colour, truth=truth) for camera in cameras)
-        self._is_warm = True
-        return views
+        return tuple(self._view(camera, colour=colour, truth=truth) for camera in cameras)
 
     def close(self) -> None:
         """Frees the context; safe to call twice."""

@@ -82,7 +82,8 @@ def write_town(
     found = read_town(town, scenes)
     folder = Path(out)
     map_path = _write(folder / f"{found.name}_map.png", draw_map(found, Relief.of(found.library.town)))
-    sheet_path, problems = None, []
+    sheet_path: Path | None = None
+    problems: list[PlacementError] = []
     if found.scenes is not None:
         options = SheetOptions(
             renderer=renderer, quality="film" if quality == "film" else "fast", weather=PRESETS[weather], seed=seed
