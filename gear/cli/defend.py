@@ -1,0 +1,49 @@
+"""`gear defend`."""
+
+from __future__ import annotations
+
+import argparse
+
+EXAMPLE = """examples:
+  gear defend data/semseg/town10-billboard01-ClearNoon/random --defense lgs --out cleaned/
+  gear defend data/twin --defense jpeg --set quality=30 --out cleaned/
+
+The cleaned pictures have the dataset's own relative paths; masks and scores lie under defense/<split>/.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the command's flags."""
+    parser.epilog = EXAMPLE
+    parser.add_argument("dataset", help="root of a dataset of any task")
+    parser.add_argument("--defense", required=True, metavar="NAME", help="defense plugin; gear plugins --kind defense")
+    parser.add_argument("--out", required=True, metavar="DIR", help="folder for the cleaned pictures")
+    parser.add_argument("--split", help="its split, where it has several")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the defense's own draws (0)")
+    parser.add_argument(
+        "--set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        dest="settings",
+        help="an option of the defense; repeatable",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Cleans and says where."""
+    from gear.cli.progress import ProgressBar
+    from gear.verbs.defend import defend
+
+    with ProgressBar() as progress:
+        report = defend(
+            args.dataset,
+            defense=args.defense,
+            out=args.out,
+            split=args.split,
+            settings=args.settings,
+            seed=args.seed,
+            progress=progress,
+        )
+    print(report.summary())
+    return 0

@@ -1,0 +1,29 @@
+"""`gear new`."""
+
+from __future__ import annotations
+
+import argparse
+
+from gear.contracts.specs import KINDS
+
+EXAMPLE = """examples:
+  gear new defense my_blur
+  gear new task lanes --out ~/code
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the command's flags."""
+    parser.epilog = EXAMPLE
+    parser.add_argument("kind", choices=KINDS, help="what to write")
+    parser.add_argument("name", help="the plugin's name: lower case letters, digits and underscores")
+    parser.add_argument("--out", default=".", metavar="DIR", help="folder to make the package's folder in (.)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Writes the package and says what to do next."""
+    from gear.verbs.scaffold.write import new_package
+
+    folder = new_package(args.kind, args.name, out=args.out)
+    print(f"{folder}: a {args.kind} that works; next: pip install -e '{folder}[dev]' && pytest {folder}")
+    return 0

@@ -1,0 +1,245 @@
+"""`gear.defend`: a dataset's pictures, cleaned by a defense."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.config.dump import to_plain
+from gear.config.overrides import with_overrides
+from gear.config.reader import read_node
+from gear.contracts.defenses import Defense, DefenseResult
+from gear.contracts.specs import DefenseSpec
+from gear.dataset.files import clear_scratch, explained, inside, write_whole
+from gear.dataset.layout import GEAR
+from gear.dataset.reading import Dataset
+from gear.dataset.sidecar import dump_json, load_json
+from gear.formats.png import encode_labels
+from gear.opening import open_dataset
+from gear.plugins.build import NO_OPTIONS, build, find
+from gear.plugins.catalogue import Found, one_line
+from gear.values.errors import DatasetError, GearError, PluginError
+from gear.values.frames import UInt8Image
+from gear.values.rng import derive_rng
+from gear.values.serial import Json
+
+Progress = Callable[[int, int], None]
+"""Called with (samples finished, samples of the split)."""
+
+FOLDER = "defense"
+"""Masks, scores and what the run was begun with lie under it, one folder a split."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DefendReport:
+    """What a run did.
+
+    Attributes:
+        root: folder of the cleaned pictures.
+        split: its name.
+        samples: how many of the split are cleaned now.
+        made: how many of them this run cleaned.
+    """
+
+    root: Path
+    split: str
+    samples: int
+    made: int
+
+    def summary(self) -> str:
+        """One line for a person."""
+        kept = self.samples - self.made
+        resumed = f" ({kept} were there already)" if kept else ""
+        return f"{self.root}: {self.samples} samples of split {self.split!r} cleaned{resumed}"
+
+
+def defend(
+    dataset: str | Path,
+    *,
+    defense: str,
+    out: str | Path,
+    split: str | None = None,
+    settings: Iterable[str] = (),
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> DefendReport:
+    """Writes a dataset's pictures as a defense cleans them; takes up again what was begun.
+
+    The cleaned pictures have the relative paths of the dataset's. Beside them lie, for each split,
+    `defense/<split>/masks/<index>_<camera>.png` (16 bits, 65535 is 1) and `defense/<split>/scores.json`, as far as the
+    defense gives masks and scores.
+
+    Args:
+        dataset: root of a dataset of any task.
+        defense: name of a defense plugin.
+        out: folder for the pictures; may hold other splits of the same.
+        split: of the dataset; may be left out where there is only one.
+        settings: `KEY=VALUE` texts for the defense's options.
+        seed: of the defense's own draws.
+        progress: told after every sample.
+
+    Raises:
+        GearError: anything that the user can put right; its text is one line.
+    """
+    found = find("defense", defense)
+    options = with_overrides(NO_OPTIONS, settings)
+    config = read_node(found.spec.config, options, "")
+    opened = open_dataset(dataset, split)
+    spec = suitable(found, opened.plan.task["name"])
+    root, name = Path(out), opened.plan.info.split
+    if root.resolve() == opened.root.resolve() or any(root.glob(f"{GEAR}/*/plan.json")):
+        raise DatasetError(root, "is a dataset; write the cleaned pictures into a folder of their own")
+    plan: Json = {
+        "defense": {"name": spec.name, "package": found.owner.package, "version": found.owner.version},
+        "options": to_plain(config),
+        "seed": seed,
+        "dataset": opened.plan.content_key,
+        "split": name,
+    }
+    begin(root, name, plan)
+    guard = Guard(found, build(found, options))
+    missing = [i for i in range(len(opened)) if not inside(root, _marker(name, i)).exists()]
+    finished = len(opened) - len(missing)
+    if progress is not None:
+        progress(finished, len(opened))
+    for index in missing:
+        sample = opened[index]
+        result = guard.apply(sample.images, derive_rng(seed, "defend", spec.name, index), index)
+        write_sample(root, opened, index, sample, spec, result)
+        finished += 1
+        if progress is not None:
+            progress(finished, len(opened))
+    if "score" in spec.outputs:
+        scores = [load_json(inside(root, _marker(name, i)))["score"] for i in range(len(opened))]
+        write_whole(root, f"{FOLDER}/{name}/scores.json", dump_json({"scores": scores}))
+    clear_scratch(root)
+    with contextlib.suppress(OSError):
+        (root / GEAR).rmdir()
+    return DefendReport(root=root, split=name, samples=len(opened), made=len(missing))
+
+
+def suitable(found: Found, task: str) -> DefenseSpec[Any]:
+    """The defense's spec, if it can do this job, which has pictures alone.
+
+    Raises:
+        GearError: it is not made for the task, or needs a model or samples to learn from.
+    """
+    spec = found.spec
+    assert isinstance(spec, DefenseSpec)
+    if spec.tasks and task not in spec.tasks:
+        raise GearError(f"defense {spec.name!r} is for {', '.join(spec.tasks)}; this is a {task} dataset")
+    if spec.taps or spec.needs_model:
+        raise GearError(f"defense {spec.name!r} looks into a model; cleaning pictures alone is not enough for it")
+    if spec.needs_calibration:
+        raise GearError(f"defense {spec.name!r} must learn from clean and patched samples first; gear defend has none")
+    return spec
+
+
+def begin(root: Path, split: str, plan: Json) -> None:
+    """Writes what the run is made of, or checks that what is there was made of the same.
+
+    Raises:
+        DatasetError: it was made otherwise, or the disk refuses.
+    """
+    relative = f"{FOLDER}/{split}/plan.json"
+    with explained(root):
+        root.mkdir(parents=True, exist_ok=True)
+    path = inside(root, relative)
+    if not path.exists():
+        write_whole(root, relative, dump_json(plan))
+        return
+    there = load_json(path)
+    if there != plan:
+        keys = there.keys() | plan.keys() if isinstance(there, dict) else {"plan"}
+        differs = sorted(key for key in keys if not isinstance(there, dict) or there.get(key) != plan.get(key))
+        raise DatasetError(
+            root, f"split {split!r} was cleaned in another way ({', '.join(differs)} differ); use another --out"
+        )
+
+
+class Guard:
+    """A third party's defense, whose failures say whose they are."""
+
+    def __init__(self, found: Found, defense: Defense) -> None:
+        self._found, self._defense = found, defense
+
+    def apply(self, views: Mapping[str, UInt8Image], rng: np.random.Generator, index: int) -> DefenseResult:
+        """Cleans one sample.
+
+        Raises:
+            PluginError: the defense fails, or returns something else than it promises.
+        """
+        for picture in views.values():
+            picture.setflags(write=False)
+        try:
+            with contextlib.redirect_stdout(sys.stderr):
+                result = self._defense.apply(views, None, None, rng)
+        except GearError:
+            raise
+        except (Exception, SystemExit) as error:
+            raise self._error(index, one_line(error)) from error
+        problem = self._problem(result, views)
+        if problem:
+            raise self._error(index, problem)
+        return result
+
+    def _problem(self, result: Any, views: Mapping[str, UInt8Image]) -> str:
+        """What is wrong with a result, or nothing."""
+        if not isinstance(result, DefenseResult):
+            return f"apply returns a DefenseResult, got {type(result).__name__}"
+        sizes = {name: picture.shape[:2] for name, picture in views.items()}
+        outputs = self._found.spec.outputs  # type: ignore[attr-defined]
+        for name, size in sizes.items():
+            if not _is_array(result.views.get(name), (*size, 3), np.uint8):
+                return f"views[{name!r}] must have shape {(*size, 3)} of uint8"
+            if "mask" in outputs and not _is_array((result.mask or {}).get(name), size, np.float32):
+                return f"mask[{name!r}] must have shape {size} of float32"
+        if "score" in outputs and not (isinstance(result.score, (int, float)) and 0 <= result.score <= 1):
+            return f"score must be in 0..1, got {result.score!r}"
+        return ""
+
+    def _error(self, index: int, problem: str) -> PluginError:
+        owner = self._found.owner
+        name = f"{self._found.spec.name} ({owner.package} {owner.version})"
+        return PluginError(name, f"apply on sample {index}", problem)
+
+
+def write_sample(
+    root: Path, dataset: Dataset[Any], index: int, sample: Any, spec: DefenseSpec[Any], result: DefenseResult
+) -> None:
+    """Writes what the defense gives of one sample, and last the marker that says it is whole."""
+    split = dataset.plan.info.split
+    if "images" in spec.outputs:
+        cleaned = dataset.task.encode(dataclasses.replace(sample, images=dict(result.views)), dataset.plan.info).files
+        for relative in picture_paths(dataset, sample):
+            write_whole(root, relative, cleaned[relative])
+    if "mask" in spec.outputs and result.mask is not None:
+        for camera, mask in result.mask.items():
+            levels = np.rint(np.clip(mask, 0, 1) * 65535).astype(np.uint16)
+            write_whole(root, f"{FOLDER}/{split}/masks/{index:06d}_{camera}.png", encode_labels(levels))
+    score = None if result.score is None else float(result.score)
+    write_whole(root, _marker(split, index), dump_json({"score": score}))
+
+
+def picture_paths(dataset: Dataset[Any], sample: Any) -> list[str]:
+    """The files of a sample that hold its pictures, whatever the task: those that change with them."""
+    info = dataset.plan.info
+    inverted = {name: np.subtract(255, picture, dtype=np.uint8) for name, picture in sample.images.items()}
+    other = dataset.task.encode(dataclasses.replace(sample, images=inverted), info).files
+    return [path for path, data in dataset.task.encode(sample, info).files.items() if other[path] != data]
+
+
+def _marker(split: str, index: int) -> str:
+    return f"{FOLDER}/{split}/samples/{index:06d}.json"
+
+
+def _is_array(value: object, shape: tuple[int, ...], dtype: npt.DTypeLike) -> bool:
+    return isinstance(value, np.ndarray) and value.shape == shape and value.dtype == dtype

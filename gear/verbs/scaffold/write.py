@@ -1,0 +1,114 @@
+"""Writes the package."""
+
+from __future__ import annotations
+
+import keyword
+import os
+import re
+import shutil
+import sys
+import tempfile
+from importlib.resources import files
+from pathlib import Path
+
+from gear.contracts.specs import KINDS, Kind
+from gear.dataset.files import explained
+from gear.values.errors import GearError, UnknownNameError
+
+NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
+TOKEN = re.compile(r"\{\{(\w+)\}\}")
+
+USE: dict[Kind, str] = {
+    "task": "Use it: `gear collect --task {{name}}`, then `gear view` or `gear sheet` on what it wrote.",
+    "model": 'Use it: `gear.plugins.build.build(find("model", "{{name}}"))` in Python, or wherever gear asks for a'
+    " model.",
+    "attack": 'Use it: `gear.plugins.build.build(find("attack", "{{name}}"))` in Python, or wherever gear asks for'
+    " an attack.",
+    "defense": "Use it: `gear defend DIR --defense {{name}} --out DIR2` cleans a dataset's pictures.",
+}
+
+
+def new_package(kind: str, name: str, *, out: str | Path = ".") -> Path:
+    """Writes a complete small package for a plugin: code, tests through the contracts, README, licence.
+
+    Args:
+        kind: `task`, `model`, `attack` or `defense`.
+        name: the plugin's, such as `my_blur`; hyphens are taken for underscores.
+        out: folder in which the package's own folder, `gear-<kind>-<name>`, is made.
+
+    Returns:
+        The package's folder, which appears whole or not at all.
+
+    Raises:
+        UnknownNameError: there is no such kind.
+        GearError: the name will not do, or the folder is there already.
+        DatasetError: the disk refuses.
+    """
+    if kind not in KINDS:
+        raise UnknownNameError("kind of plugin", kind, KINDS)
+    chosen = checked_name(name)
+    words = {
+        "kind": kind,
+        "name": chosen,
+        "dist": f"gear-{kind}-{chosen.replace('_', '-')}",
+        "module": f"gear_{kind}_{chosen}",
+        "Class": "".join(part.capitalize() for part in chosen.split("_")),
+    }
+    parent = Path(out)
+    target = parent / words["dist"]
+    if os.path.lexists(target):
+        raise GearError(f"{target} is there already; choose another name or another --out")
+    with explained(target):
+        parent.mkdir(parents=True, exist_ok=True)
+        scratch = Path(tempfile.mkdtemp(prefix=f".{words['dist']}-", dir=parent))
+        try:
+            package = scratch / words["dist"]
+            for relative, text in contents(kind, words).items():
+                path = package / relative
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_text(text, encoding="utf-8")
+            package.rename(target)
+        finally:
+            shutil.rmtree(scratch)
+    return target
+
+
+def contents(kind: Kind, words: dict[str, str]) -> dict[str, str]:
+    """The package's files by relative path."""
+    words = words | {"use": _filled(USE[kind], words)}
+    places = {
+        "pyproject.toml": "common/pyproject.toml",
+        "README.md": "common/README.md",
+        "LICENSE": "common/LICENSE",
+        ".gitignore": "common/gitignore",
+        f"src/{words['module']}/__init__.py": f"{kind}/init.py",
+        f"src/{words['module']}/{words['name']}.py": f"{kind}/impl.py",
+        f"tests/test_{words['name']}.py": f"{kind}/test.py",
+    }
+    templates = files("gear.verbs.scaffold") / "templates"
+    texts = {
+        place: _filled((templates / f"{template}.template").read_text(encoding="utf-8"), words)
+        for place, template in places.items()
+    }
+    return texts | {f"src/{words['module']}/py.typed": ""}
+
+
+def checked_name(name: str) -> str:
+    """The plugin's name.
+
+    Raises:
+        GearError: it will not do.
+    """
+    chosen = name.replace("-", "_")
+    if not NAME.fullmatch(chosen) or "__" in chosen or chosen.endswith("_"):
+        raise GearError(
+            f"{name!r} is not a plugin's name; use lower case letters, digits and single underscores, a letter first,"
+            " at most 40, such as my_blur"
+        )
+    if keyword.iskeyword(chosen) or chosen in sys.stdlib_module_names:
+        raise GearError(f"{name!r} is a word of Python's own; choose another, such as my_{chosen}")
+    return chosen
+
+
+def _filled(template: str, words: dict[str, str]) -> str:
+    return TOKEN.sub(lambda match: words[match[1]], template)

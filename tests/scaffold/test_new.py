@@ -1,0 +1,85 @@
+"""`gear new`: what it writes works as it is."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from gear.cli.main import main
+from gear.contracts.specs import KINDS
+from gear.values.errors import GearError, UnknownNameError
+from gear.verbs.scaffold.write import new_package
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_package_is_whole(kind: str, tmp_path: Path) -> None:
+    folder = new_package(kind, "my-thing", out=tmp_path)
+    assert folder == tmp_path / f"gear-{kind}-my-thing"
+    assert {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()} == {
+        "pyproject.toml",
+        "README.md",
+        "LICENSE",
+        ".gitignore",
+        f"src/gear_{kind}_my_thing/__init__.py",
+        f"src/gear_{kind}_my_thing/my_thing.py",
+        f"src/gear_{kind}_my_thing/py.typed",
+        "tests/test_my_thing.py",
+    }
+    assert [p.name for p in tmp_path.iterdir()] == [folder.name]
+    assert not [p for p in folder.rglob("*") if p.is_file() and "{{" in p.read_text()]
+    for path in folder.rglob("*.py"):
+        compile(path.read_text(), str(path), "exec")
+
+
+@pytest.mark.parametrize("name", ["Bad", "9lives", "a b", "", "a__b", "a_", "../up", "x" * 41, "class", "random", "é"])
+def test_bad_names_get_one_line_and_no_files(name: str, tmp_path: Path) -> None:
+    with pytest.raises(GearError) as caught:
+        new_package("defense", name, out=tmp_path)
+    assert "\n" not in str(caught.value) and repr(name) in str(caught.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_is_there_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    kept = tmp_path / "gear-task-lanes"
+    kept.mkdir()
+    assert main(["new", "task", "lanes", "--out", str(tmp_path)]) == 2
+    assert "is there already" in capsys.readouterr().err
+    assert list(kept.iterdir()) == []
+    assert [p.name for p in tmp_path.iterdir()] == [kept.name]
+
+
+def test_a_kind_that_is_none(tmp_path: Path) -> None:
+    with pytest.raises(UnknownNameError, match="did you mean defense"):
+        new_package("defence", "my_blur", out=tmp_path)
+
+
+def test_out_that_cannot_be_written(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(GearError, match="a file is where a folder should be"):
+        new_package("defense", "my_blur", out=tmp_path / "file")
+
+
+def call(*command: str, cwd: Path, env: dict[str, str] | None = None) -> str:
+    done = subprocess.run(command, cwd=cwd, env=env, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
+    return done.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_it_writes_installs_and_passes_everything(kind: str, tmp_path: Path) -> None:
+    folder = new_package(kind, "my_thing", out=tmp_path)
+    site = tmp_path / "site"
+    python = sys.executable
+    call(python, "-m", "pip", "install", "-q", "--no-deps", "--target", str(site), str(folder), cwd=tmp_path)
+    env = os.environ | {"PYTHONPATH": str(site)}
+    listed = call(python, "-m", "gear.cli.main", "plugins", "--kind", kind, "--strict-plugins", cwd=tmp_path, env=env)
+    assert f"gear-{kind}-my-thing 0.1.0" in listed
+    call(python, "-m", "pytest", "-q", "-p", "no:cacheprovider", cwd=folder, env=env)
+    call(python, "-m", "ruff", "check", ".", cwd=folder)
+    call(python, "-m", "ruff", "format", "--check", ".", cwd=folder)
+    call(python, "-m", "mypy", "src", "tests", cwd=folder, env=env)

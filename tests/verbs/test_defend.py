@@ -1,0 +1,182 @@
+"""`gear defend` on a tiny dataset: what it writes, what it refuses, and that it can be taken up again."""
+
+from __future__ import annotations
+
+import json
+import sys
+import types
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from importlib.metadata import EntryPoint
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+import gear
+from gear.cli.main import main
+from gear.contracts.defenses import DefenseResult
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.specs import DefenseSpec
+from gear.plugins import build as building
+from gear.plugins.defenses.jpeg import Jpeg, JpegConfig
+from gear.plugins.manager import discover
+from gear.values.errors import ConfigError, DatasetError, GearError, PluginError, UnknownNameError
+from gear.verbs.collect.run import CollectReport
+from gear.verbs.defend import defend
+
+Collect = Callable[..., CollectReport]
+
+
+def tree(root: Path) -> dict[str, bytes]:
+    return {p.relative_to(root).as_posix(): p.read_bytes() for p in sorted(root.rglob("*")) if p.is_file()}
+
+
+@pytest.fixture
+def stereo(tmp_path: Path, collect_small: Collect) -> Path:
+    collect_small("stereo3d", tmp_path / "data", patch="random")
+    return tmp_path / "data"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Config:
+    radius_px: int = 2
+
+
+class Odd:
+    """Its answer is whatever it was made with."""
+
+    def __init__(self, answer: Callable[..., Any]) -> None:
+        self.answer = answer
+
+    def apply(self, views: Any, model: Any, state: Any, rng: np.random.Generator) -> Any:
+        return self.answer(views)
+
+
+@pytest.fixture
+def stranger(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
+    def install(answer: Callable[..., Any], **facts: Any) -> None:
+        module = types.ModuleType("odd_package")
+        spec = DefenseSpec(name="odd", summary="Odd.", config=Config, build=lambda _: Odd(answer), **facts)  # type: ignore[arg-type]
+        module.gear_defenses = hookimpl(lambda: [spec], specname="gear_defenses")  # type: ignore[attr-defined]
+        sys.modules["odd_package"] = module
+        found = discover([EntryPoint(name="odd", value="odd_package", group="gear")])
+        monkeypatch.setattr(building, "catalogue", lambda: found)
+
+    yield install
+    sys.modules.pop("odd_package", None)
+
+
+def test_pictures_keep_their_paths_and_are_what_the_defense_makes(stereo: Path, tmp_path: Path) -> None:
+    report = defend(stereo, defense="jpeg", out=tmp_path / "clean", settings=["quality=20"])
+    assert (report.samples, report.made) == (2, 2)
+    dataset = gear.open_dataset(stereo)
+    written = [p for p in tree(tmp_path / "clean") if not p.startswith("defense/")]
+    assert sorted(written) == sorted(
+        p for i in range(2) for p in dataset.sidecar(i).files if "image_2" in p or "image_3" in p
+    )
+    assert len(written) == 4
+    jpeg = Jpeg(JpegConfig(quality=20))
+    for path in written:
+        before = cv2.imread(str(stereo / path))[..., ::-1]
+        after = cv2.imread(str(tmp_path / "clean" / path))[..., ::-1]
+        assert np.array_equal(after, jpeg.clean(np.ascontiguousarray(before))[0])
+        assert not np.array_equal(after, before)
+    assert not list((tmp_path / "clean").rglob("*mask*")) and not list((tmp_path / "clean").rglob("scores.json"))
+
+
+def test_masks_and_scores_are_written(tmp_path: Path, collect_small: Collect) -> None:
+    collect_small("semseg", tmp_path / "data", patch="random")
+    assert main(["defend", str(tmp_path / "data"), "--defense", "lgs", "--out", str(tmp_path / "clean")]) == 0
+    folder = tmp_path / "clean" / "defense" / "debug"
+    scores = json.loads((folder / "scores.json").read_text())["scores"]
+    assert len(scores) == 2 and all(0 <= score <= 1 for score in scores)
+    for index, score in enumerate(scores):
+        mask = cv2.imread(str(folder / f"masks/{index:06d}_left.png"), cv2.IMREAD_UNCHANGED)
+        assert mask.dtype == np.uint16 and mask.shape == (160, 320)
+        assert float(mask.mean()) / 65535 == pytest.approx(score, abs=1e-4)
+
+
+def test_it_is_taken_up_again_and_gives_the_same(stereo: Path, tmp_path: Path) -> None:
+    def stop(finished: int, total: int) -> None:
+        if finished == 1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        defend(stereo, defense="lgs", out=tmp_path / "clean", progress=stop)
+    assert not (tmp_path / "clean/defense/debug/scores.json").exists()
+    assert defend(stereo, defense="lgs", out=tmp_path / "clean").made == 1
+    defend(stereo, defense="lgs", out=tmp_path / "whole")
+    assert tree(tmp_path / "clean") == tree(tmp_path / "whole")
+    assert defend(stereo, defense="lgs", out=tmp_path / "clean").made == 0
+    with pytest.raises(DatasetError, match=r"cleaned in another way \(options differ\)"):
+        defend(stereo, defense="lgs", out=tmp_path / "clean", settings=["strength=1.5"])
+
+
+def test_bad_input_is_refused_before_anything_is_written(stereo: Path, tmp_path: Path) -> None:
+    before = tree(stereo)
+    with pytest.raises(UnknownNameError, match="did you mean median"):
+        defend(stereo, defense="medain", out=tmp_path / "x")
+    with pytest.raises(ConfigError, match="did you mean 'quality'"):
+        defend(stereo, defense="jpeg", out=tmp_path / "x", settings=["qualty=3"])
+    with pytest.raises(DatasetError, match="is a dataset"):
+        defend(stereo, defense="jpeg", out=stereo)
+    with pytest.raises(GearError):
+        defend(tmp_path / "nowhere", defense="jpeg", out=tmp_path / "x")
+    assert not (tmp_path / "x").exists() and tree(stereo) == before
+
+
+@pytest.mark.parametrize(
+    ("facts", "message"),
+    [
+        ({"tasks": ("depth",)}, "is for depth; this is a stereo3d dataset"),
+        ({"taps": ("layer1",)}, "looks into a model"),
+        ({"needs_model": True}, "looks into a model"),
+        ({"needs_calibration": True}, "must learn"),
+    ],
+)
+def test_capabilities_are_checked_first(
+    stereo: Path, tmp_path: Path, stranger: Callable[..., None], facts: dict[str, Any], message: str
+) -> None:
+    stranger(lambda views: DefenseResult(views=views), **facts)
+    with pytest.raises(GearError, match=message):
+        defend(stereo, defense="odd", out=tmp_path / "x")
+    assert not (tmp_path / "x").exists()
+
+
+def raises(views: Any) -> Any:
+    raise RuntimeError("boom")
+
+
+@pytest.mark.parametrize(
+    ("answer", "facts", "message"),
+    [
+        (raises, {}, "RuntimeError: boom"),
+        (lambda views: sys.exit(3), {}, "SystemExit: 3"),
+        (lambda views: views, {}, "returns a DefenseResult, got dict"),
+        (lambda views: DefenseResult(views={}), {}, r"views\['left'\] must have shape"),
+        (lambda views: DefenseResult(views={k: v / 2 for k, v in views.items()}), {}, "uint8"),
+        (lambda views: DefenseResult(views=views), {"outputs": frozenset({"images", "mask"})}, r"mask\['left'\]"),
+        (lambda views: DefenseResult(views=views, score=7.0), {"outputs": frozenset({"score"})}, r"score .* got 7\.0"),
+    ],
+)
+def test_a_defense_that_breaks_is_named(
+    stereo: Path, tmp_path: Path, stranger: Callable[..., None], answer: Any, facts: dict[str, Any], message: str
+) -> None:
+    stranger(answer, **facts)
+    with pytest.raises(PluginError, match=rf"plugin odd \(odd_package \?\) failed at apply on sample 0: .*{message}"):
+        defend(stereo, defense="odd", out=tmp_path / "x")
+
+
+def test_what_a_defense_prints_stays_off_stdout(
+    stereo: Path, tmp_path: Path, stranger: Callable[..., None], capsys: pytest.CaptureFixture[str]
+) -> None:
+    def talks(views: Any) -> DefenseResult:
+        print("hello")
+        return DefenseResult(views=views)
+
+    stranger(talks)
+    assert main(["defend", str(stereo), "--defense", "odd", "--out", str(tmp_path / "x")]) == 0
+    assert capsys.readouterr().out == f"{tmp_path / 'x'}: 2 samples of split 'debug' cleaned\n"
