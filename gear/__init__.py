@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from gear.opening import Dataset, Twins, open_dataset, open_twins
     from gear.values.errors import GearError
     from gear.verbs.collect.run import CollectReport, collect
-    from gear.view.write import ViewReport, write_view
     from gear.verbs.defend import DefendReport, defend
+    from gear.view.write import ViewReport, write_view
 
 __all__ = [
     "CollectReport",
@@ -27,10 +27,12 @@ __all__ = [
     "DefendReport",
     "GearError",
     "Twins",
+    "ViewReport",
     "collect",
     "defend",
     "open_dataset",
     "open_twins",
+    "write_view",
 ]
 
 _HOME = {
