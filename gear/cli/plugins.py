@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import json
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from gear.contracts.specs import KINDS, Kind
 
@@ -16,6 +15,7 @@ EXAMPLE = """examples:
   gear plugins
   gear plugins --kind task --json
   gear plugins show semseg
+  GEAR_DISABLE_PLUGINS='*' gear plugins        # gear's own alone; or names of plugins, joined by commas
 """
 
 
@@ -36,82 +36,89 @@ def run(args: argparse.Namespace) -> int:
     found = catalogue()
     if args.strict_plugins and found.broken:
         raise found.broken[0].error()
-    if args.action == "show":
-        return show(found, args)
     kinds: tuple[Kind, ...] = (args.kind,) if args.kind else KINDS
-    rows = [summary(f) for kind in kinds for f in found.of_kind(kind)]
-    broken = [
-        {"plugin": b.owner.plugin, "package": b.owner.package, "version": b.owner.version, "stage": b.stage,
-         "problem": b.problem} for b in found.broken
-    ]  # fmt: skip
-    if args.json:
-        print(json.dumps({"plugins": rows, "broken": broken}, indent=1))
+    if args.action == "show":
+        return show(found, kinds, args)
+    return show_all(found, kinds, args.json)
+
+
+def show_all(found: Catalogue, kinds: tuple[Kind, ...], as_json: bool) -> int:
+    """Lists what works, what is broken and what clashes."""
+    from gear.plugins.describe import summary
+
+    rows = [summary(plugin) for kind in kinds for plugin in found.of_kind(kind)]
+    clashes = [clash for clash in found.clashes() if clash[0] in kinds]
+    if as_json:
+        broken = [
+            {"plugin": b.owner.plugin, "package": b.owner.package, "version": b.owner.version, "stage": b.stage,
+             "problem": b.problem} for b in found.broken
+        ]  # fmt: skip
+        named = [{"kind": kind, "name": name, "choices": choices} for kind, name, choices in clashes]
+        print(json.dumps({"plugins": rows, "broken": broken, "clashes": named}, indent=1))
         return 0
     for row in rows:
         print(f"{row['kind']:8} {row['name']:20} {row['package']} {row['version']}  {row['summary']}")
-    for b in broken:
-        print(f"broken   {b['plugin']:20} {b['package']} {b['version']}  at {b['stage']}: {b['problem']}")
-    for kind, name, choices in found.clashes():
+        print(f"{'':29} {_inline(row['capabilities'])}")
+    for b in found.broken:
+        remedy = f"tell its author, uninstall {b.owner.package}, or set GEAR_DISABLE_PLUGINS={b.owner.plugin}"
+        print(f"broken   {b.owner.plugin:20} {b.owner.package} {b.owner.version}  at {b.stage}: {b.problem}; {remedy}")
+    for kind, name, choices in clashes:
         print(f"clash    {name:20} {kind}: say {' or '.join(choices)}")
     return 0
 
 
-def show(found: Catalogue, args: argparse.Namespace) -> int:
+def show(found: Catalogue, kinds: tuple[Kind, ...], args: argparse.Namespace) -> int:
     """Prints one plugin with its options."""
+    from gear.plugins.describe import options, source_of, summary
+
+    plugin = the_one(found, kinds, args.name)
+    facts = summary(plugin) | {"source": source_of(plugin.spec), "options": options(plugin.spec.config)}
+    if args.json:
+        print(json.dumps(facts, indent=1))
+        return 0
+    print(f"{facts['kind']} {facts['name']} ({facts['package']} {facts['version']}): {facts['summary']}")
+    print(f"  source: {facts['source']}")
+    for key, value in facts["capabilities"].items():
+        print(f"  {key}: {_text(value)}")
+    where = "--set options.KEY=VALUE, or in a config under `options:`" if plugin.kind == "task" else "--set KEY=VALUE"
+    print(f"options ({where}):" if facts["options"] else "no options")
+    for option in facts["options"]:
+        unit = f" [{option['unit']}]" if option["unit"] else ""
+        print(f"  {option['name']}: {option['type']} = {_text(option['default'])}{unit}")
+        if option["meaning"]:
+            print(f"      {option['meaning']}")
+    return 0
+
+
+def the_one(found: Catalogue, kinds: tuple[Kind, ...], name: str | None) -> Found:
+    """The plugin that answers to a name, whatever its kind.
+
+    Raises:
+        GearError: no name was given, or it is that of plugins of several kinds.
+        UnknownNameError: nothing answers to it.
+        DuplicateNameError: two packages claim it.
+    """
     from gear.values.errors import GearError, UnknownNameError
 
-    if not args.name:
+    if not name:
         raise GearError("gear plugins show needs a name, such as: gear plugins show semseg")
-    kinds: tuple[Kind, ...] = (args.kind,) if args.kind else KINDS
-    for kind in kinds:
-        try:
-            plugin = found.get(kind, args.name)
-        except UnknownNameError:
-            continue
-        facts = summary(plugin) | {"options": options(plugin.spec.config)}
-        if args.json:
-            print(json.dumps(facts, indent=1))
-        else:
-            print(f"{facts['kind']} {facts['name']} ({facts['package']} {facts['version']}): {facts['summary']}")
-            for key, value in facts["capabilities"].items():
-                print(f"  {key}: {value}")
-            print("options (in a config under `options:`, or --set options.KEY=VALUE):")
-            for key, (kind_text, default) in facts["options"].items():
-                print(f"  {key}: {kind_text} = {default}")
-            print((plugin.spec.config.__doc__ or "").rstrip())
-        return 0
-    known = [name for kind in kinds for name in found.names(kind)]
-    raise UnknownNameError("plugin", args.name, known)
+    hits = [kind for kind in kinds if any(name in (f.spec.name, f.full_name) for f in found.of_kind(kind))]
+    if len(hits) > 1:
+        raise GearError(f"{name!r} is the name of plugins of several kinds; add --kind {' or --kind '.join(hits)}")
+    if not hits:
+        known = [other for kind in kinds for other in found.names(kind)]
+        raise UnknownNameError(kinds[0] if len(kinds) == 1 else "plugin", name, known, found.broken_hint())
+    return found.get(hits[0], name)
 
 
-def summary(found: Found) -> dict[str, Any]:
-    """What a list shows of a plugin."""
-    common = {"name", "summary", "config", "build", "protocol"}
-    capabilities = {
-        field.name: sorted(value) if isinstance(value := getattr(found.spec, field.name), frozenset) else value
-        for field in dataclasses.fields(found.spec)
-        if field.name not in common
-    }
-    return {
-        "kind": found.kind,
-        "name": found.spec.name,
-        "package": found.owner.package,
-        "version": found.owner.version,
-        "summary": found.spec.summary,
-        "capabilities": capabilities,
-    }
+def _inline(capabilities: dict[str, object]) -> str:
+    """What is worth a line: capabilities that are not empty."""
+    return "; ".join(f"{key}: {_text(value)}" for key, value in capabilities.items() if value not in ("", (), []))
 
 
-def options(config: type[Any]) -> dict[str, tuple[str, Any]]:
-    """Type and default of each option, nested ones with dots."""
-    from gear.config.dump import to_plain
-
-    defaults = config()
-    result: dict[str, tuple[str, Any]] = {}
-    for field in dataclasses.fields(config):
-        default = getattr(defaults, field.name)
-        if dataclasses.is_dataclass(default) and not isinstance(default, type):
-            result.update({f"{field.name}.{key}": value for key, value in options(type(default)).items()})
-        else:
-            result[field.name] = (str(field.type), to_plain(default))
-    return result
+def _text(value: object) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, (list, tuple)):
+        return ", ".join(map(str, value)) or "-"
+    return str(value) if value != "" else "-"

@@ -88,11 +88,14 @@ class Catalogue:
             return hits[0]
         if hits:
             raise DuplicateNameError(kind, name, (f.full_name for f in hits))
-        hint = ""
-        if self.broken:
-            names = ", ".join(b.owner.plugin for b in self.broken)
-            hint = f"({len(self.broken)} plugin(s) failed to load: {names}; see `gear plugins`)"
-        raise UnknownNameError(kind, name, self.names(kind), hint)
+        raise UnknownNameError(kind, name, self.names(kind), self.broken_hint())
+
+    def broken_hint(self) -> str:
+        """What failed to load, for those who miss a name; "" if nothing did."""
+        if not self.broken:
+            return ""
+        names = ", ".join(dict.fromkeys(b.owner.plugin for b in self.broken))
+        return f"({len(self.broken)} plugin(s) failed to load: {names}; see `gear plugins`)"
 
     def clashes(self) -> tuple[tuple[Kind, str, tuple[str, ...]], ...]:
         """Short names that more than one package claims, with their full names."""

@@ -1,0 +1,90 @@
+"""What a plugin says of itself, for lists and pages: capabilities, options with meaning and unit, source."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import re
+import sys
+from typing import Any
+
+from gear.config.dump import to_plain
+from gear.contracts.specs import AnySpec, Spec
+from gear.plugins.catalogue import Found
+
+COMMON = {field.name for field in dataclasses.fields(Spec)}
+
+UNITS = {
+    "px": "pixels", "m": "metres", "mm": "millimetres", "deg": "degrees", "rad": "radians", "s": "seconds",
+    "levels": "levels of 0..255", "unit": "of 0..1", "hz": "hertz", "kmh": "km/h", "mps": "m/s", "mb": "megabytes",
+}  # fmt: skip
+"""By the last word of an option's name."""
+
+
+def summary(found: Found) -> dict[str, Any]:
+    """Kind, name, package, version, summary and capabilities; JSON."""
+    capabilities = {
+        field.name: sorted(value) if isinstance(value := getattr(found.spec, field.name), frozenset) else value
+        for field in dataclasses.fields(found.spec)
+        if field.name not in COMMON
+    }
+    return {
+        "kind": found.kind,
+        "name": found.spec.name,
+        "package": found.owner.package,
+        "version": found.owner.version,
+        "summary": found.spec.summary,
+        "capabilities": capabilities,
+    }
+
+
+def options(config: type[Any], prefix: str = "") -> list[dict[str, Any]]:
+    """Every option with its type, default, meaning and unit; nested ones with dots; JSON."""
+    defaults, meanings = config(), meanings_of(config)
+    result: list[dict[str, Any]] = []
+    for field in dataclasses.fields(config):
+        default, name = getattr(defaults, field.name), f"{prefix}{field.name}"
+        if dataclasses.is_dataclass(default) and not isinstance(default, type):
+            result += options(type(default), f"{name}.")
+            continue
+        kind = field.type if isinstance(field.type, str) else getattr(field.type, "__name__", str(field.type))
+        unit = UNITS.get(field.name.rsplit("_", 1)[-1], "") if "_" in field.name else ""
+        result.append(
+            {
+                "name": name,
+                "type": kind,
+                "default": to_plain(default),
+                "meaning": meanings.get(field.name, ""),
+                "unit": unit,
+            }
+        )
+    return result
+
+
+def meanings_of(config: type[Any]) -> dict[str, str]:
+    """What the docstrings of a config and its bases say under `Attributes:`, by field; one line each."""
+    result: dict[str, str] = {}
+    for owner in reversed(config.__mro__):
+        _, found, section = inspect.cleandoc(owner.__dict__.get("__doc__") or "").partition("Attributes:\n")
+        if not found:
+            continue
+        names: list[str] = []
+        for line in section.splitlines():
+            if line and not line.startswith(" "):
+                break
+            entry = re.match(r" {4}(\w+(?:, \w+)*): (.*)", line)
+            if entry:
+                names = entry[1].split(", ")
+                result.update(dict.fromkeys(names, entry[2].strip()))
+            elif line.strip():
+                result.update({name: f"{result[name]} {line.strip()}" for name in names})
+    return result
+
+
+def source_of(spec: AnySpec) -> str:
+    """The file that the plugin's `build` is written in, or "" where Python cannot say."""
+    try:
+        return inspect.getsourcefile(spec.build) or ""
+    except TypeError:
+        module = sys.modules.get(getattr(spec.config, "__module__", ""))
+        return getattr(module, "__file__", None) or ""
