@@ -1,0 +1,206 @@
+"""What every town promises. Subclass it in your own tests, and say where the town and its scenes are:
+
+    class TestMyTown(TownContract):
+        town = "my/towns/port.xml"
+        scenes = "my/scenes/port.yml"
+
+Everything of `docs/mjcf-conventions.md` is checked, then that gear composes the town, plans samples of every scene with
+the boards in view, and that rendered ids and depth are those of rays. Messages name the geom, the lane or the scene.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import ClassVar
+
+from gear.testing import town_scenes, town_streets
+from gear.testing.town_facts import TownUnderTest, town_under_test
+from gear.values.labels import LABEL_BY_NAME
+from gear.world.classes import FIRST_HIDDEN_GROUP, own_class
+from gear.world.models import COLLISION_CLASS
+
+MESSAGES_SHOWN = 12
+
+STREET = frozenset(
+    {"road", "road_marking", "sidewalk", "terrain", "building", "pole", "traffic_light", "traffic_sign", "vegetation"}
+)
+"""Labels without which a street is none; another label of the same Cityscapes class will do."""
+
+PRIMITIVES = ("mjGEOM_PLANE", "mjGEOM_SPHERE", "mjGEOM_CAPSULE", "mjGEOM_CYLINDER", "mjGEOM_BOX")
+
+
+class TownContract:
+    """Attributes:
+    town: name of a town, or path of its MJCF.
+    scenes: path of its scene library; empty for gear's own of that town.
+    expected: labels that must be there.
+    open_ends: lanes that may end, such as where a road leaves the town.
+    planned_scenes: scenes that are planned and rendered; None for all.
+    samples: planned of each scene.
+    join_m, max_turn_deg: how far and how sharply a lane may be from the one that continues it.
+    lane_width_m, speed_mps: least and most.
+    ground_m: how far lanes and walks may be from the height of their ground.
+    wheel_m: half the track of a car, which must stand on the road as well.
+    near_m, far_m: least and most distance of the near clipping plane, least of the far one.
+    min_visible: share of each board that must be seen in each sample.
+    min_agreement: share of pixels away from edges whose id and depth must be those of rays.
+    """
+
+    town: ClassVar[str | Path]
+    scenes: ClassVar[str | Path] = ""
+    expected: ClassVar[frozenset[str]] = STREET
+    open_ends: ClassVar[frozenset[str]] = frozenset()
+    planned_scenes: ClassVar[Sequence[str] | None] = None
+    samples: ClassVar[int] = 2
+    join_m: ClassVar[float] = 0.1
+    max_turn_deg: ClassVar[float] = 40.0
+    lane_width_m: ClassVar[tuple[float, float]] = (2.4, 6.0)
+    speed_mps: ClassVar[tuple[float, float]] = (1.0, 45.0)
+    ground_m: ClassVar[float] = 0.04
+    wheel_m: ClassVar[float] = 0.8
+    near_m: ClassVar[tuple[float, float]] = (0.005, 0.5)
+    far_m: ClassVar[float] = 500.0
+    min_visible: ClassVar[float] = 0.1
+    min_agreement: ClassVar[float] = 0.98
+
+    def under_test(self) -> TownUnderTest:
+        """The town, compiled once for all checks."""
+        return town_under_test(str(self.town), str(self.scenes))
+
+    def test_stock_mujoco_compiles_it(self, record_property: Callable[[str, object], None]) -> None:
+        """It is plain MJCF; how long it takes is put into the report."""
+        _, model, seconds = self.under_test().compiled
+        record_property("compile_s", round(seconds, 2))
+        record_property("triangles", int(model.nmeshface))
+
+    def test_gear_composes_it(self, record_property: Callable[[str, object], None]) -> None:
+        """The first scene becomes a world; how long it takes is put into the report."""
+        world, seconds = self.under_test().first_world
+        record_property("compose_s", round(seconds, 2))
+        assert world.model.ngeom > 0 and world.lanes.lanes
+
+    def test_what_is_seen_is_labelled(self) -> None:
+        """The first part of every visible geom's class is a label."""
+        tell("visible geoms have no label: their class must start with one, such as `building.brick`", [
+            f"geom {geom.name!r} of body {geom.parent.name!r} has class {own_class(geom.classname.name)!r}"
+            for geom in self.under_test().compiled[0].geoms
+            if geom.group < FIRST_HIDDEN_GROUP
+            and _label(geom.classname.name) not in (LABEL_BY_NAME.keys() - {"sky"})
+        ])  # fmt: skip
+
+    def test_what_is_seen_is_not_felt(self) -> None:
+        """Visible geoms touch nothing; collision geoms are hidden primitives."""
+        problems = []
+        for geom in self.under_test().compiled[0].geoms:
+            is_collision = _label(geom.classname.name) == COLLISION_CLASS
+            if is_collision and geom.group < FIRST_HIDDEN_GROUP:
+                problems.append(f"geom {geom.name!r} of class collision is in group {geom.group}, so it is seen")
+            elif is_collision and geom.type.name not in PRIMITIVES:
+                problems.append(
+                    f"geom {geom.name!r} of class collision is a {geom.type.name[7:].lower()}, no primitive"
+                )
+            elif not is_collision and geom.group < FIRST_HIDDEN_GROUP and (geom.contype or geom.conaffinity):
+                problems.append(f"geom {geom.name!r} is seen and has contype or conaffinity, so it is felt")
+        tell("geoms are seen and felt", problems)
+
+    def test_nothing_is_transparent(self) -> None:
+        """Ids and depth know every pixel, so nothing shines through."""
+        _, model, _ = self.under_test().compiled
+        problems = []
+        for geom in range(model.ngeom):
+            material = int(model.geom_matid[geom])
+            alpha = float(model.geom_rgba[geom, 3] if material < 0 else model.mat_rgba[material, 3])
+            if model.geom_group[geom] < FIRST_HIDDEN_GROUP and alpha < 1:
+                problems.append(f"geom {model.geom(geom).name!r} has an alpha of {alpha:g}")
+        tell("visible geoms are transparent", problems)
+
+    def test_every_class_of_a_street_is_there(self) -> None:
+        """No class that networks know from streets is missing."""
+        there = {
+            LABEL_BY_NAME[label].cityscapes_id
+            for geom in self.under_test().compiled[0].geoms
+            if geom.group < FIRST_HIDDEN_GROUP and (label := _label(geom.classname.name)) in LABEL_BY_NAME
+        }
+        missing = sorted(name for name in self.expected if LABEL_BY_NAME[name].cityscapes_id not in there)
+        tell("labels are missing from the town (if it needs none, take them out of `expected`)", missing)
+
+    def test_one_can_drive_for_ever(self) -> None:
+        """Every lane is continued, without a gap."""
+        tell("lanes end or tear", town_streets.dead_ends(self.under_test().graph, self.open_ends, self.join_m))
+
+    def test_headings_are_continuous(self) -> None:
+        """No lane turns on the spot."""
+        tell("lanes have kinks", town_streets.kinks(self.under_test().graph, self.max_turn_deg))
+
+    def test_widths_and_speeds_are_sane(self) -> None:
+        """As wide and as fast as roads are."""
+        graph = self.under_test().graph
+        tell("lanes have odd sizes", town_streets.odd_sizes(graph, self.lane_width_m, self.speed_mps))
+
+    def test_neighbours_run_side_by_side(self) -> None:
+        """`left` is left, `right` is right, and both go the same way."""
+        tell("neighbours are elsewhere", town_streets.lost_neighbours(self.under_test().graph))
+
+    def test_lanes_lie_on_the_road(self) -> None:
+        """Felt and seen, at the lane's height, all along and as wide as a car."""
+        tell("lanes are off the road", town_streets.lanes_off_the_road(self.under_test(), self.ground_m, self.wheel_m))
+
+    def test_lanes_are_clear(self) -> None:
+        """Nothing of the town stands on a lane."""
+        tell("lanes are blocked", town_streets.blocked_lanes(self.under_test()))
+
+    def test_people_can_walk(self) -> None:
+        """Sidewalks and crosswalks lie on the ground; crosswalks join sidewalks across lanes."""
+        tell("walks are in the air", town_streets.walks_off_the_ground(self.under_test(), self.ground_m))
+        tell("crosswalks lead nowhere", town_streets.idle_crosswalks(self.under_test().graph))
+
+    def test_cars_can_park(self) -> None:
+        """Bays are on the ground, empty and beside the lanes."""
+        tell("parking bays cannot be used", town_streets.bad_bays(self.under_test(), self.ground_m))
+
+    def test_bounds_hold_everything(self) -> None:
+        """Nothing that road users keep to leaves `town.bounds`."""
+        tell("things are out of bounds", town_streets.out_of_bounds(self.under_test().graph))
+
+    def test_depth_has_a_range(self) -> None:
+        """Clipping planes are where a car's camera needs them."""
+        model = self.under_test().compiled[1]
+        near_m, far_m = (float(v * model.stat.extent) for v in (model.vis.map.znear, model.vis.map.zfar))
+        problems = []
+        if not self.near_m[0] <= near_m <= self.near_m[1]:
+            problems.append(f"nearest is {near_m:.3g} m, not {self.near_m[0]:g} to {self.near_m[1]:g} m")
+        if far_m < self.far_m:
+            problems.append(f"furthest is {far_m:.3g} m, not at least {self.far_m:g} m")
+        tell("clipping planes are wrong; set <statistic extent> and <map znear zfar>, whose product counts", problems)
+
+    def test_scenes_belong_to_the_town(self) -> None:
+        """The library names the town, and its boards stand inside of it."""
+        tell("scenes are elsewhere", town_scenes.misplaced(self.under_test()))
+
+    def test_every_scene_can_be_planned_with_its_boards_in_view(self) -> None:
+        """Samples of every scene are drawn, and rays from the camera reach the faces."""
+        town = self.under_test()
+        names = tuple(town.scenes.scenes) if self.planned_scenes is None else tuple(self.planned_scenes)
+        tell("scenes cannot be used", town_scenes.unusable(town, names, self.samples, self.min_visible))
+
+    def test_ids_and_depth_are_those_of_rays(self) -> None:
+        """The classic renderer and MuJoCo's own rays agree on the first scene."""
+        tell("pixels and rays differ", town_scenes.disagreement(self.under_test(), self.min_agreement))
+
+
+def tell(what: str, problems: Sequence[str]) -> None:
+    """Fails with what was found, if anything was.
+
+    Raises:
+        AssertionError: there are problems.
+    """
+    shown = [
+        *problems[:MESSAGES_SHOWN],
+        *([f"and {len(problems) - MESSAGES_SHOWN} more"] * (len(problems) > MESSAGES_SHOWN)),
+    ]
+    assert not problems, f"{what}:\n  " + "\n  ".join(shown)
+
+
+def _label(classname: str) -> str:
+    return own_class(classname).partition(".")[0]

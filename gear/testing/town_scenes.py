@@ -1,0 +1,125 @@
+"""What can be wrong with the scenes of a town: each function returns what it finds, a line each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gear.config.collection import SplitConfig
+from gear.render.opening import open_renderer
+from gear.testing.town_facts import SEEN_GROUPS, Rays, TownUnderTest
+from gear.values.errors import GearError
+from gear.values.rig import CameraMount, Rig
+from gear.values.rng import derive_rng
+from gear.values.scene import SceneRecord
+from gear.world.planner import ScenePlanner
+from gear.world.world import PlacedStage, World
+
+RIG = Rig(cameras=(CameraMount(name="rgb", width_px=640, height_px=320),))
+FACE_GRID = (9, 5)
+PIXELS = 400
+DEPTH_TOLERANCE = 1e-3
+"""Relative; a depth buffer of classic is a float in front of a far plane."""
+
+
+def misplaced(town: TownUnderTest) -> list[str]:
+    """A library of another town, and boards outside of the bounds."""
+    problems = []
+    if town.scenes.town != town.library.town_name:
+        problems.append(f"the scene library is for {town.scenes.town!r}, the town is {town.library.town_name!r}")
+    xmin, ymin, xmax, ymax = town.graph.bounds_m
+    for name, scene in town.scenes.scenes.items():
+        for number, board in enumerate(scene.boards):
+            x_m, y_m, _ = board.position_m
+            if not (xmin <= x_m <= xmax and ymin <= y_m <= ymax):
+                problems.append(f"scene {name}: board {number} at ({x_m:g}, {y_m:g}) stands outside of town.bounds")
+    return problems
+
+
+def unusable(town: TownUnderTest, names: Sequence[str], samples: int, min_visible: float) -> list[str]:
+    """Scenes of which no sample can be planned, or whose boards are not in view of the planned ones."""
+    problems = []
+    for name in names:
+        try:
+            world = town.world(name)
+            planner = _planner(world, samples)
+            for index in range(samples):
+                record = planner.plan(index)
+                problems += _hidden_faces(world, record, min_visible)
+        except GearError as error:
+            problems.append(f"scene {name}: {error}")
+    return problems
+
+
+def disagreement(town: TownUnderTest, min_agreement: float) -> list[str]:
+    """Too many pixels, away from edges, whose id or depth is not that of a ray through their centre."""
+    world, _ = town.first_world
+    record = _planner(world, 1).plan(0)
+    placed = world.place(record)
+    renderer = open_renderer("classic", world.model, quality="fast")
+    try:
+        (view,) = renderer.render(placed.stage, record.cameras, colour=False)
+    finally:
+        renderer.close()
+    assert view.geom_id is not None and view.depth_m is not None
+    camera, rays = record.cameras[0], _rays(placed)
+    pose = camera.world_from_camera_transform
+    inner = np.ones(view.geom_id.shape, bool)
+    for axis in (0, 1):
+        for step in (-1, 1):
+            inner &= view.geom_id == np.roll(view.geom_id, step, axis=axis)
+    rows, columns = np.nonzero(inner[1:-1, 1:-1])
+    chosen = derive_rng(0, "town contract").permutation(len(rows))[:PIXELS]
+    wrong: dict[tuple[str, str], int] = {}
+    for row, column in zip(rows[chosen] + 1, columns[chosen] + 1, strict=True):
+        along = pose.rotation @ camera.intrinsics.unproject([column, row], 1.0)
+        distance_m, geom = rays.first(pose.translation_m, np.ascontiguousarray(along))
+        pixel_id, depth_m = int(view.geom_id[row, column]), float(view.depth_m[row, column])
+        if pixel_id != geom or (geom >= 0 and abs(depth_m / distance_m - 1) > DEPTH_TOLERANCE):
+            told = (
+                f"{_named(rays, pixel_id)} at {depth_m:.2f} m" if pixel_id >= 0 else "nothing",
+                f"{_named(rays, geom)} at {distance_m:.2f} m" if geom >= 0 else "nothing",
+            )
+            wrong[told] = wrong.get(told, 0) + 1
+    share = 1 - sum(wrong.values()) / max(1, len(chosen))
+    if share >= min_agreement:
+        return []
+    common = sorted(wrong, key=lambda told: -wrong[told])[:3]
+    examples = "; ".join(f"rendered {pixel}, hit {ray}" for pixel, ray in common)
+    return [f"scene {record.scene}: only {share:.1%} of {len(chosen)} pixels agree with rays ({examples})"]
+
+
+def _planner(world: World, samples: int) -> ScenePlanner:
+    return ScenePlanner(world, RIG, SplitConfig(seed=0, samples=samples), split_name="debug")
+
+
+def _hidden_faces(world: World, record: SceneRecord, min_visible: float) -> list[str]:
+    placed, camera = world.place(record), record.cameras[0]
+    rays, eye_m = _rays(placed), camera.world_from_camera_transform.translation_m
+    camera_from_world = camera.world_from_camera_transform.inverse()
+    u, v = np.meshgrid(*((np.arange(count) + 0.5) / count - 0.5 for count in FACE_GRID))
+    problems = []
+    for face, surface in zip(world.faces, record.surfaces, strict=True):
+        local_m = np.stack([u * face.width_m, v * face.height_m, np.zeros(u.shape)], axis=-1).reshape(-1, 3)
+        points_m = record.world_from_surface(surface).apply(local_m)
+        camera_m = camera_from_world.apply(points_m)
+        pixels = camera.intrinsics.project(camera_m)
+        inside = (camera_m[:, 2] > 0) & np.all(
+            (pixels > -0.5) & (pixels < (camera.width_px - 0.5, camera.height_px - 0.5)), axis=1
+        )
+        seen = sum(rays.first(eye_m, point_m - eye_m)[1] == face.geom_id for point_m in points_m[inside])
+        share = seen / len(points_m)
+        if share < min_visible:
+            problems.append(
+                f"scene {record.scene}: {face.name} shows only {share:.0%} of itself in sample {record.index}"
+            )
+    return problems
+
+
+def _rays(placed: PlacedStage) -> Rays:
+    return Rays(placed.stage.model, placed.stage.data, SEEN_GROUPS)
+
+
+def _named(rays: Rays, geom: int) -> str:
+    return repr(rays.name(geom))

@@ -1,0 +1,237 @@
+"""What can be wrong with the lanes, walks and bays of a town: each function returns what it finds, a line each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from gear.testing.town_facts import DOWN, Rays, TownUnderTest
+from gear.values.geometry import Array, wrap_angle_rad
+from gear.world.classes import own_class
+from gear.world.lanes import Lane, LaneGraph, ParkingBay
+from gear.world.polyline import Polyline
+
+STEP_M = 2.0
+LOOK_FROM_M = 0.6
+"""Ground is looked for from so far above where it should be: higher than kerbs, lower than whatever hangs above."""
+
+BUMPER_M = 0.6
+"""Obstacles on lanes are looked for at this height."""
+
+KERB_M = 0.2
+"""In a tight turn a wheel may go over the kerb; it may not elsewhere."""
+
+DRIVABLE = frozenset({"road", "road_marking", "parking", "ground", "bridge", "static"})
+"""What may be seen under a car; `static` for manholes and rails."""
+
+CROSSWALK_REACH_M = 3.0
+"""A crosswalk ends at most so far from the border of a sidewalk."""
+
+
+def dead_ends(graph: LaneGraph, open_ends: frozenset[str], join_m: float) -> list[str]:
+    """Lanes that nothing continues, and lanes whose followers start elsewhere."""
+    problems = [
+        f"{lane.name} is a dead end at {_place(lane.line.points_m[-1])}: nothing in its next="
+        for lane in graph.lanes.values()
+        if not lane.next and lane.name not in open_ends
+    ]
+    problems += [f"{name} is in open_ends, but is no lane without next=" for name in sorted(open_ends)
+                 if name not in graph.lanes or graph.lanes[name].next]  # fmt: skip
+    for lane in graph.lanes.values():
+        for name in lane.next:
+            gap_m = float(np.linalg.norm(graph.lanes[name].line.points_m[0] - lane.line.points_m[-1]))
+            if gap_m > join_m:
+                problems.append(f"{lane.name} ends {gap_m:.2f} m from where its follower {name} starts")
+    return problems
+
+
+def kinks(graph: LaneGraph, most_deg: float) -> list[str]:
+    """Places where the heading of a lane, or from a lane to its follower, jumps."""
+    problems = []
+    for lane in graph.lanes.values():
+        turns_deg = np.degrees(np.abs([wrap_angle_rad(float(t)) for t in np.diff(_headings(lane.line))]))
+        for index in np.flatnonzero(turns_deg > most_deg):
+            place = _place(lane.line.points_m[index + 1])
+            problems.append(f"{lane.name} turns by {turns_deg[index]:.0f} deg at one point, {place}")
+        for name in lane.next:
+            into = float(_headings(graph.lanes[name].line)[0] - _headings(lane.line)[-1])
+            turn_deg = math.degrees(abs(wrap_angle_rad(into)))
+            if turn_deg > most_deg:
+                problems.append(f"{lane.name} turns by {turn_deg:.0f} deg where {name} continues it")
+    return problems
+
+
+def odd_sizes(graph: LaneGraph, width_m: tuple[float, float], speed_mps: tuple[float, float]) -> list[str]:
+    """Lanes and walks too narrow or wide, lanes too slow or fast, lanes without length."""
+    problems = []
+    for lane in graph.lanes.values():
+        if not width_m[0] <= lane.width_m <= width_m[1]:
+            problems.append(f"{lane.name} is {lane.width_m:g} m wide, not {width_m[0]:g} to {width_m[1]:g}")
+        if not speed_mps[0] <= lane.speed_mps <= speed_mps[1]:
+            problems.append(f"{lane.name} is for {lane.speed_mps:g} m/s, not {speed_mps[0]:g} to {speed_mps[1]:g}")
+    for walk in graph.walks.values():
+        if not 0.8 <= walk.width_m <= 30:
+            problems.append(f"{walk.name} is {walk.width_m:g} m wide, not 0.8 to 30")
+    return problems
+
+
+def lost_neighbours(graph: LaneGraph) -> list[str]:
+    """Lanes whose `left` or `right` does not run beside them, on that side and the same way."""
+    problems = []
+    for lane in graph.lanes.values():
+        middle_m, heading_rad = lane.line.at(lane.line.length_m / 2)
+        for side, name, sign in (("left", lane.left, -1), ("right", lane.right, 1)):
+            if not name:
+                continue
+            other = graph.lanes[name]
+            s_m, lateral_m, distance_m = other.line.project(middle_m)
+            turn_deg = math.degrees(abs(wrap_angle_rad(other.line.at(s_m)[1] - heading_rad)))
+            if sign * lateral_m < 0 or not 0.5 <= distance_m / lane.width_m <= 2.5 or turn_deg > 45:
+                problems.append(
+                    f"{lane.name} has {name} as its {side} neighbour, which is not there at {_place(middle_m)}"
+                )
+    return problems
+
+
+def lanes_off_the_road(town: TownUnderTest, tolerance_m: float, wheel_m: float) -> list[str]:
+    """Lanes without ground at their height, or over something that is no road."""
+    label = {geom.id: own_class(geom.classname.name).partition(".")[0] for geom in town.compiled[0].geoms}
+    problems = []
+    for lane in town.graph.lanes.values():
+        for point_m, place in _along(lane.line):
+            if problem := _off_ground(town.ground, point_m, tolerance_m):
+                problems.append(f"{lane.name} {problem} at {place}")
+                break
+            distance_m, geom = town.seen.first(point_m - LOOK_FROM_M * DOWN, DOWN)
+            if geom < 0 or abs(distance_m - LOOK_FROM_M) > 2 * tolerance_m:
+                problems.append(f"{lane.name}: no surface is seen at its height at {place}")
+                break
+            if label[geom] not in DRIVABLE:
+                problems.append(f"{lane.name} leads over {label[geom]} ({town.seen.name(geom)!r}) at {place}")
+                break
+        else:
+            problems += _wheels_off(town, lane, tolerance_m, wheel_m)
+    return problems
+
+
+def _wheels_off(town: TownUnderTest, lane: Lane, tolerance_m: float, wheel_m: float) -> list[str]:
+    step_m = KERB_M if lane.is_junction else 2 * tolerance_m
+    for side, lateral_m in (("left", wheel_m), ("right", -wheel_m)):
+        for point_m, place in _along(lane.line, lateral_m):
+            if problem := _off_ground(town.ground, point_m, step_m):
+                return [f"{lane.name} {problem} below the {side} wheels of a car at {place}"]
+    return []
+
+
+def blocked_lanes(town: TownUnderTest) -> list[str]:
+    """Lanes on which something stands."""
+    problems = []
+    for lane in town.graph.lanes.values():
+        points = np.array([point for point, _ in _along(lane.line)]) - BUMPER_M * DOWN
+        for start_m, end_m in pairwise(points):
+            share, geom = town.obstacles.first(start_m, end_m - start_m)
+            if share <= 1:
+                problems.append(f"{lane.name} is blocked by {town.obstacles.name(geom)!r} at {_place(start_m)}")
+                break
+    return problems
+
+
+def walks_off_the_ground(town: TownUnderTest, tolerance_m: float) -> list[str]:
+    """Sidewalks and crosswalks without ground at their height."""
+    problems = []
+    for walk in town.graph.walks.values():
+        for point_m, place in _along(walk.line):
+            if problem := _off_ground(town.ground, point_m, tolerance_m):
+                problems.append(f"{walk.name} {problem} at {place}")
+                break
+    return problems
+
+
+def idle_crosswalks(graph: LaneGraph) -> list[str]:
+    """Crosswalks that cross no lane, or end far from any sidewalk."""
+    lanes = np.concatenate([np.array([p for p, _ in _along(lane.line)]) for lane in graph.lanes.values()])[:, :2]
+    pavements = [walk for walk in graph.walks.values() if not walk.is_crossing]
+    problems = []
+    for walk in (walk for walk in graph.walks.values() if walk.is_crossing):
+        places = np.array([point for point, _ in _along(walk.line, step_m=0.5)])[:, :2]
+        if np.linalg.norm(lanes[:, None] - places[None], axis=-1).min() > STEP_M:
+            problems.append(f"{walk.name} crosses no lane")
+        for end in (walk.line.points_m[0], walk.line.points_m[-1]):
+            reach_m = min((p.line.project(end)[2] - p.width_m / 2 for p in pavements), default=math.inf)
+            if reach_m > CROSSWALK_REACH_M:
+                problems.append(f"{walk.name} ends at {_place(end)}, {reach_m:.1f} m from the nearest sidewalk")
+    return problems
+
+
+def bad_bays(town: TownUnderTest, tolerance_m: float) -> list[str]:
+    """Parking bays without ground, with something in them, or on a lane."""
+    lanes = np.concatenate([np.array([p for p, _ in _along(lane.line)]) for lane in town.graph.lanes.values()])
+    problems = []
+    for bay in town.graph.bays:
+        corners = _bay_corners(bay)
+        off = [problem for corner in corners if (problem := _off_ground(town.ground, corner, 2 * tolerance_m))]
+        if off:
+            problems.append(f"{bay.name} {off[0]} in a corner")
+            continue
+        for start_m, end_m in ((corners[0], corners[2]), (corners[1], corners[3])):
+            share, geom = town.obstacles.first(start_m - BUMPER_M * DOWN, end_m - start_m)
+            if share <= 1:
+                problems.append(f"{bay.name} holds {town.obstacles.name(geom)!r}")
+                break
+        c, s = math.cos(bay.yaw_rad), math.sin(bay.yaw_rad)
+        offset = lanes - bay.position_m
+        along, left = offset[:, 0] * c + offset[:, 1] * s, -offset[:, 0] * s + offset[:, 1] * c
+        on_it = (np.abs(along) < bay.length_m / 2) & (np.abs(left) < bay.width_m / 2) & (np.abs(offset[:, 2]) < 2)
+        if on_it.any():
+            problems.append(f"{bay.name} lies on a lane at {_place(lanes[np.argmax(on_it)])}")
+    return problems
+
+
+def out_of_bounds(graph: LaneGraph) -> list[str]:
+    """Lanes, walks and bays that leave what the town says it covers."""
+    xmin, ymin, xmax, ymax = graph.bounds_m
+    lines = [(lane.name, lane.line.points_m) for lane in graph.lanes.values()]
+    lines += [(walk.name, walk.line.points_m) for walk in graph.walks.values()]
+    lines += [(bay.name, np.array([bay.position_m])) for bay in graph.bays]
+    problems = []
+    for name, points in lines:
+        outside = (points[:, :2] < (xmin, ymin)) | (points[:, :2] > (xmax, ymax))
+        if outside.any():
+            problems.append(f"{name} leaves town.bounds at {_place(points[np.argmax(outside.any(axis=1))])}")
+    return problems
+
+
+def _off_ground(ground: Rays, point_m: Array, tolerance_m: float) -> str:
+    height_m = ground.height_m(point_m, LOOK_FROM_M)
+    if math.isnan(height_m):
+        return "has no collision geom named ground.… below it"
+    if abs(height_m - point_m[2]) > tolerance_m:
+        return f"is {point_m[2] - height_m:+.2f} m above its ground"
+    return ""
+
+
+def _along(line: Polyline, lateral_m: float = 0.0, step_m: float = STEP_M) -> Iterator[tuple[Array, str]]:
+    """Places spread evenly over a line, its ends left out by a little so that they lie on it, and as messages say."""
+    count = max(2, math.ceil(line.length_m / step_m) + 1)
+    for s_m in np.linspace(min(0.05, line.length_m / 4), line.length_m - min(0.05, line.length_m / 4), count):
+        point = line.at(float(s_m), lateral_m)[0]
+        yield point, _place(point)
+
+
+def _bay_corners(bay: ParkingBay) -> Array:
+    """A little inside, as the wheels of a parked car are."""
+    along = np.array([math.cos(bay.yaw_rad), math.sin(bay.yaw_rad), 0.0]) * bay.length_m * 0.4
+    left = np.array([-math.sin(bay.yaw_rad), math.cos(bay.yaw_rad), 0.0]) * bay.width_m * 0.4
+    return np.asarray(np.array([along + left, along - left, -along - left, -along + left]) + bay.position_m)
+
+
+def _headings(line: Polyline) -> Array:
+    steps = np.diff(line.points_m[:, :2], axis=0)
+    return np.asarray(np.arctan2(steps[:, 1], steps[:, 0]))
+
+
+def _place(point_m: Array) -> str:
+    return f"({point_m[0]:.1f}, {point_m[1]:.1f})"
