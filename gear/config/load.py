@@ -57,7 +57,11 @@ def load_collection(
         if text is not None
     }
     node = merged(node, MappingNode(given, node.place))
-    return read_node(CollectionConfig, with_overrides(node, settings))
+    node = with_overrides(node, settings)
+    if isinstance(node, MappingNode) and "task" not in node.entries:
+        place = node.place
+        raise place.error("task", "missing; say what to collect, such as --task stereo3d (see: gear plugins --kind task)")
+    return read_node(CollectionConfig, node)
 
 
 def load_simulation(name: str) -> SimulationConfig:
