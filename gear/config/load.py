@@ -59,8 +59,8 @@ def load_collection(
     node = merged(node, MappingNode(given, node.place))
     node = with_overrides(node, settings)
     if isinstance(node, MappingNode) and "task" not in node.entries:
-        place = node.place
-        raise place.error("task", "missing; say what to collect, such as --task stereo3d (see: gear plugins --kind task)")
+        hint = "missing; say what to collect, such as --task stereo3d (see: gear plugins --kind task)"
+        raise node.place.error("task", hint)
     return read_node(CollectionConfig, node)
 
 
