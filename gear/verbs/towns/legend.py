@@ -41,6 +41,11 @@ def draw_legend(canvas: Canvas, town: Town, colours: Mapping[str, Colour]) -> No
     _scale_and_north(canvas, x, y + 10)
 
 
+def legend_height_px(scenes: int) -> int:
+    """Room enough for the legend of a town with so many scenes."""
+    return 760 + 68 * scenes
+
+
 def scene_note(scene: SceneSpec) -> str:
     """One line about what is in a scene."""
     if scene.truck is not None:

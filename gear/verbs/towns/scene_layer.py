@@ -29,6 +29,7 @@ BOARD_PX = 4.0
 EGO_PX, VEHICLES_PX, PEOPLE_PX = 1.8, 1.1, 1.0
 NAME_PX = 10.0
 BEHIND_NUMBER_PX = 12.0
+CLEAR_M = 3.0
 
 Box = tuple[float, float, float, float]
 """Middle, half width and half height, in pixels."""
@@ -74,7 +75,9 @@ def draw_boards(canvas: Canvas, library: AssetLibrary, scene: SceneSpec, colour:
 
 def draw_names(canvas: Canvas, scenes: Mapping[str, SceneSpec], colours: Mapping[str, Colour]) -> None:
     """Writes each scene's name near its first board, clear of boards and of other names."""
-    taken = [(*canvas.to_px(board.position_m)[0], 12.0, 12.0) for name in colours for board in scenes[name].boards]
+    clear_px = max(12.0, CLEAR_M * canvas.px_per_m)
+    boards = [board for name in colours for board in scenes[name].boards]
+    taken: list[Box] = [(*canvas.to_px(board.position_m)[0], clear_px, clear_px) for board in boards]
     for name, colour in colours.items():
         board = scenes[name].boards[0]
         half_px = (canvas.text_width_px(name, NAME_PX, bold=True) / 2 + 5.0, 9.0)

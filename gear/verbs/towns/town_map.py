@@ -11,13 +11,12 @@ from gear.values.frames import UInt8Image
 from gear.verbs.towns import ground_layer, traffic_layer
 from gear.verbs.towns.canvas import Canvas, round_step_m
 from gear.verbs.towns.facts import Town
-from gear.verbs.towns.legend import PANEL_PX, draw_legend
+from gear.verbs.towns.legend import PANEL_PX, draw_legend, legend_height_px
 from gear.verbs.towns.scene_layer import INK, draw_boards, draw_limits, draw_names, scene_colours
 from gear.world.scene_spec import SceneSpec
 
 LONG_SIDE_PX = 1800
 MARGIN_PX = 64
-LEAST_HEIGHT_PX = 1240
 PAPER = (255, 255, 255)
 GREY = (120, 120, 126)
 TICK_PX = 7.0
@@ -40,9 +39,10 @@ def draw_map(town: Town, relief: ground_layer.Relief) -> UInt8Image:
     xmin, _, _, ymax = town.lanes.bounds_m
     px_per_m = LONG_SIDE_PX / max(town.size_m)
     width_px, height_px = (round(side * px_per_m) for side in town.size_m)
-    top_px = MARGIN_PX + max(0, (LEAST_HEIGHT_PX - 2 * MARGIN_PX - height_px) // 2)
+    sheet_px = max(height_px + 2 * MARGIN_PX, legend_height_px(len(scenes)))
+    top_px = (sheet_px - height_px) // 2
     canvas = Canvas(
-        (width_px + 2 * MARGIN_PX + PANEL_PX, max(height_px + 2 * MARGIN_PX, LEAST_HEIGHT_PX)),
+        (width_px + 2 * MARGIN_PX + PANEL_PX, sheet_px),
         PAPER,
         px_per_m=px_per_m,
         origin_px=(MARGIN_PX - xmin * px_per_m, top_px + ymax * px_per_m),

@@ -42,7 +42,7 @@ class TownReport:
         """One line."""
         files = [str(path) for path in (self.map, self.sheet) if path is not None]
         count = 0 if self.town.scenes is None else len(self.town.scenes.scenes)
-        return f"{' and '.join(files)}: {self.town.name} with {count} scenes"
+        return f"{' and '.join(files)}: {self.town.name} with {count} scene{'' if count == 1 else 's'}"
 
 
 def write_town(
