@@ -56,6 +56,7 @@ class AssetParts:
     def __init__(self, root: mjcf.RootElement) -> None:
         self._root = root
         self._models: dict[Path, mjcf.RootElement] = {}
+        self._textures: dict[tuple[str, ...], Any] = {}
 
     def add_instance(self, path: Path, body: Any) -> None:
         """Fills `body` with an instance of the asset that shares everything."""
@@ -101,8 +102,27 @@ class AssetParts:
                 self._root.attach(model)
             except ValueError as error:
                 raise TownError(path, f"cannot be put into one world with the town: {error}") from error
+            self._share_textures(model)
             self._models[path] = model
         return self._models[path]
+
+    def _share_textures(self, model: mjcf.RootElement) -> None:
+        """Lets a file's materials wear the textures that another file has brought already, picture for picture."""
+        for texture in list(model.asset.texture):
+            if texture.file is None:
+                continue
+            attributes = texture.get_attributes()
+            picture = attributes.pop("file").get_vfs_filename()
+            attributes.pop("name")
+            key = (picture, *(f"{name}={value}" for name, value in sorted(attributes.items())))
+            known = self._textures.setdefault(key, texture)
+            if known is texture:
+                continue
+            for material in model.asset.material:
+                for wearer in (material, *material.all_children()):
+                    if getattr(wearer, "texture", None) is texture:
+                        wearer.texture = known
+            texture.remove()
 
     def _own_material(self, material: Any, name: str) -> Any:
         width, height = FACE_SIZE_PX

@@ -15,6 +15,7 @@ from gear.render.opening import open_renderer
 from gear.values.frames import Frame, View
 from gear.values.scene import CameraRecord, SceneRecord
 from gear.verbs.collect.job import Job
+from gear.world.memory import release_memory
 from gear.world.planner import ScenePlanner
 from gear.world.world import World
 
@@ -67,6 +68,7 @@ def open_session(job: Job) -> Iterator[Session]:
     _, task = build_task(job.config.task, job.config.options)
     world = World.build(town=job.config.town, scene_name=job.config.scene, scene=job.scene, weather=job.weather)
     renderer = open_renderer(job.config.renderer, world.model, quality=job.config.quality)
+    release_memory()
     try:
         planner = ScenePlanner(world, task.rig(), job.split, split_name=job.config.split)
         response = response_for(job.config.renderer, job.weather)
