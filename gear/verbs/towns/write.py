@@ -80,6 +80,8 @@ def write_town(
     if seed < 0:
         raise GearError(f"--seed must not be negative, got {seed}")
     found = read_town(town, scenes)
+    if progress is not None and found.scenes is not None:
+        progress(0, len(found.scenes.scenes))
     folder = Path(out)
     map_path = _write(folder / f"{found.name}_map.png", draw_map(found, Relief.of(found.library.town)))
     sheet_path: Path | None = None
