@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from authoring.materials import far, glazing, graphics, ground, masonry, traffic_art
+from authoring.materials import far, freight, glazing, graphics, ground, masonry, traffic_art
 from authoring.materials.image import Image, shrunk, write_png
 from authoring.materials.palette import palette_images
 from authoring.materials.registry import MATERIALS
@@ -42,6 +42,8 @@ PAINTERS: tuple[Painter, ...] = (
     graphics.lenses,
     graphics.ironwork,
     far.far_facades,
+    freight.containers,
+    freight.direction_signs,
 )
 # Noise has few shades: as a palette image it takes a third of the bytes.
 FEW_COLOURS = 256

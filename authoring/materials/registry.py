@@ -42,15 +42,25 @@ MATERIALS: dict[str, Material] = {
     "ashlar": Material(rgb="ashlar", normal="ashlar_n", tile_m=3.0),
     "concrete": Material(rgb="concrete", normal="concrete_n", tile_m=4.0),
     "metal_panel": Material(rgb="metal_panel", normal="metal_panel_n", orm="metal_panel_orm", tile_m=2.0),
+    "cladding_white": Material(
+        rgb="metal_panel", normal="metal_panel_n", orm="metal_panel_orm", tile_m=2.0, tint=(1.0, 0.99, 0.96)
+    ),
+    "cladding_blue": Material(
+        rgb="metal_panel", normal="metal_panel_n", orm="metal_panel_orm", tile_m=2.0, tint=(0.14, 0.27, 0.46)
+    ),
+    "cladding_green": Material(
+        rgb="metal_panel", normal="metal_panel_n", orm="metal_panel_orm", tile_m=2.0, tint=(0.30, 0.42, 0.32)
+    ),
+    "containers": Material(rgb="containers", tile_m=0, roughness=0.6),
     "wood": Material(rgb="wood", normal="wood_n", tile_m=2.0, roughness=0.75),
     "roof_gravel": Material(rgb="roof_gravel", normal="roof_gravel_n", tile_m=2.0, roughness=0.95),
     "slate_roof": Material(rgb="slate_roof", normal="slate_roof_n", tile_m=3.0, roughness=0.6),
     "tile_roof": Material(rgb="tile_roof", normal="tile_roof_n", tile_m=3.0, roughness=0.8),
     "tile_roof_brown": Material(
-        rgb="tile_roof", normal="tile_roof_n", tile_m=3.0, tint=(0.50, 0.55, 0.60), roughness=0.85
+        rgb="tile_roof", normal="tile_roof_n", tile_m=3.0, tint=(0.66, 0.66, 0.68), roughness=0.85
     ),
     "tile_roof_grey": Material(
-        rgb="tile_roof", normal="tile_roof_n", tile_m=3.0, tint=(0.40, 0.80, 1.0), roughness=0.85
+        rgb="tile_roof", normal="tile_roof_n", tile_m=3.0, tint=(0.62, 0.92, 1.0), roughness=0.85
     ),
     # openings
     "windows": Material(rgb="windows", orm="windows_orm", tile_m=0, roughness=1.0),
@@ -83,6 +93,7 @@ MATERIALS: dict[str, Material] = {
     "foliage_olive": Material(rgb="foliage", normal="foliage_n", tile_m=1.6, tint=(0.74, 0.70, 0.40), roughness=1.0),
     # street furniture
     "traffic_signs": Material(rgb="traffic_signs", tile_m=0, roughness=0.45),
+    "direction_signs": Material(rgb="direction_signs", tile_m=0, roughness=0.45),
     "lenses": Material(rgb="lenses", tile_m=0, roughness=0.3, emission=1.0),
 }
 

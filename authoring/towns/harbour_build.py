@@ -1,0 +1,117 @@
+"""Puts harbour together and writes it."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+from shapely.geometry import LineString  # type: ignore[import-untyped]
+from shapely.ops import unary_union  # type: ignore[import-untyped]
+
+from authoring.kit.parts import Sink
+from authoring.mesh import write_obj
+from authoring.towns import harbour, solids
+from authoring.towns.bridges import build_bridge
+from authoring.towns.chunks import chunked
+from authoring.towns.collision import town_solids
+from authoring.towns.document import Document, Geom, bay_rows
+from authoring.towns.furniture import Furnisher
+from authoring.towns.ground import tactile_paving
+from authoring.towns.harbour_far import QUAY, WATER, build_surroundings, plant_fields
+from authoring.towns.harbour_motorway import embankments, finish_bridge, lay_motorway, motorway_lanes, paved
+from authoring.towns.harbour_plots import Yards
+from authoring.towns.harbour_verges import furnish_motorway
+from authoring.towns.lanes import Lane, lane_graph, turns_of
+from authoring.towns.markings import paint_streets
+from authoring.towns.props import Ground, Props
+from authoring.towns.regions import KERB_M, Regions
+from authoring.towns.walks import crosswalks, sidewalks
+
+CELL_M = 110.0
+SEED = 12
+
+
+def harbour_regions() -> Regions:
+    """The plan of harbour as polygons; motorway and embankments are cut out of the blocks as a canal would be."""
+    return Regions(harbour.NETWORK, unary_union([paved(), embankments(harbour.NETWORK)]))
+
+
+def harbour_lanes() -> dict[str, Lane]:
+    """The lanes of harbour by name."""
+    return motorway_lanes(lane_graph(harbour.NETWORK))
+
+
+def write_harbour(folder: Path) -> None:
+    """Write harbour.xml and its meshes into a folder, replacing what is there.
+
+    Args:
+        folder: where the file goes; meshes go to `harbour/` in it.
+    """
+    regions, lanes = harbour_regions(), harbour_lanes()
+    sink = Sink("static")
+    props = Props(sink)
+    views = unary_union([LineString([view[:2], view[2:]]).buffer(6.0) for view in harbour.VIEWS])
+    ground = Ground(regions.sidewalks.buffer(-0.25), tactile_paving(regions), views)
+    yards = Yards(props, regions, rng=np.random.default_rng([SEED, 1]))
+    _lay_ground(sink, regions, yards)
+    lay_motorway(sink, regions.level_roads)
+    paint_streets(sink, regions, lambda lane: turns_of(lanes, lane))
+    build_bridge(sink, regions.network, regions.network.streets["bridge"])
+    finish_bridge(sink, regions.network)
+    yards.build()
+    furnisher = Furnisher(props, regions, ground, rng=np.random.default_rng([SEED, 3]))
+    for node in regions.network.nodes:
+        furnisher.node(node)
+    for name, side, share in (("dock_e", 1, 0.4), ("estate_w", -1, 0.5)):
+        furnisher.bus_stop(regions.network.streets[name], side, share)
+    for street in regions.network.streets.values():
+        furnisher.street(street)
+    furnish_motorway(props, regions, furnisher, rng=np.random.default_rng([SEED, 4]))
+    build_surroundings(sink, rng=np.random.default_rng([SEED, 5]))
+    taken = unary_union(
+        [yards.ground(), regions.carriageways, regions.sidewalks, regions.corridors, regions.canal, QUAY, WATER]
+    )
+    plant_fields(props, furnisher, taken, rng=np.random.default_rng([SEED, 6]))
+    _write(folder, sink, props, regions, lanes, yards)
+
+
+def _lay_ground(sink: Sink, regions: Regions, yards: Yards) -> None:
+    """Roads, kerbs and sidewalks of the estate, grass wherever no plot is."""
+    roads = regions.level_roads
+    solids.flat(sink, roads, 0.0, "asphalt", "road")
+    tactile, stones = tactile_paving(regions), regions.kerb_stones
+    solids.flat(sink, regions.sidewalks.difference(stones).difference(tactile), KERB_M, "pavement", "sidewalk")
+    solids.flat(sink, stones, KERB_M, "kerb", "sidewalk")
+    solids.flat(sink, tactile.difference(stones), KERB_M, "tactile", "sidewalk")
+    asphalt = unary_union([roads, paved()])
+    for land in regions.blocks:
+        for rim in solids.boundary_towards(land, asphalt):
+            solids.wall(sink, rim, 0.0, KERB_M, "kerb", "sidewalk")
+    bare = unary_union([yards.ground(), regions.sidewalks, stones, QUAY, WATER])
+    for land in regions.blocks:
+        solids.flat(sink, land.difference(bare), KERB_M, "grass", "terrain")
+
+
+def _write(
+    folder: Path, sink: Sink, props: Props, regions: Regions, lanes: dict[str, Lane], yards: Yards
+) -> None:
+    document = Document("harbour", harbour.BOUNDS)
+    meshes = folder / "harbour"
+    shutil.rmtree(meshes, ignore_errors=True)
+    meshes.mkdir(parents=True)
+    for chunk in chunked(sink.parts(), cell_m=CELL_M):
+        write_obj(meshes / f"{chunk.name}.obj", chunk.mesh)
+        document.meshes.append(chunk.name)
+        document.geoms.append(Geom(mesh=chunk.name, material=chunk.material, label=chunk.label))
+    for name, mesh in props.meshes.items():
+        write_obj(meshes / f"{name}.obj", mesh)
+        document.meshes.append(name)
+    document.geoms.extend(props.geoms)
+    document.bodies.extend(props.bodies)
+    document.solids.extend([*town_solids(regions, []), *props.solids])
+    document.lanes.extend(lanes.values())
+    document.sidewalks.extend(sidewalks(regions, harbour.BOUNDS))
+    document.crosswalks.extend(crosswalks(regions))
+    document.bays.extend([*bay_rows(regions.bay_groups), *yards.bays])
+    (folder / "harbour.xml").write_text(document.text(), encoding="utf-8", newline="\n")
