@@ -20,9 +20,9 @@ KIND_WEIGHTS: dict[ActorKind, float] = {
     "car": 1.0,
     "van": 0.7,
     "truck": 0.4,
-    "bus": 0.35,
-    "motorcycle": 0.5,
-    "bicycle": 0.7,
+    "bus": 0.8,
+    "motorcycle": 1.2,
+    "bicycle": 1.5,
     "person": 1.0,
 }
 """How common one asset of a kind is, before the asset's own `actor.weight`."""

@@ -33,6 +33,9 @@ from gear.world.assets import AssetLibrary
 from gear.world.scene_spec import SceneLibrary, SceneSpec
 from gear.world.weather import PRESETS
 
+ROOMY_FACTOR = 100
+"""Scenes without a board take so many times the vehicles, as in the original: they are not bound to one corner."""
+
 ASSET_SUFFIXES = (".xml", ".obj", ".msh", ".stl", ".png")
 
 
@@ -79,7 +82,9 @@ def resolve(config: CollectionConfig) -> Job:
     options = read_node(found.spec.config, config.options, "options")
     library = AssetLibrary.for_town(config.town)
     simulation = load_simulation(config.simulation)
-    scene = find_scene(config, library.town_name).capped(simulation.max_vehicles, simulation.max_pedestrians)
+    scene = find_scene(config, library.town_name)
+    roomy = 1 if scene.boards else ROOMY_FACTOR
+    scene = scene.capped(simulation.max_vehicles * roomy, simulation.max_pedestrians)
     split = split_of(simulation, config.split)
     split = dataclasses.replace(
         split,
