@@ -1,0 +1,3 @@
+"""Fails on import."""
+
+raise RuntimeError("this package was made for another machine")
