@@ -1,0 +1,118 @@
+"""Puts the suburb together and writes it."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+from shapely.geometry import LineString, Polygon, box  # type: ignore[import-untyped]
+from shapely.geometry.base import BaseGeometry  # type: ignore[import-untyped]
+from shapely.ops import unary_union  # type: ignore[import-untyped]
+
+from authoring.kit.parts import Sink
+from authoring.mesh import write_obj
+from authoring.towns import solids, suburb
+from authoring.towns.chunks import chunked
+from authoring.towns.collision import town_solids
+from authoring.towns.document import Document, Geom, bay_rows
+from authoring.towns.lanes import Lane, lane_graph
+from authoring.towns.props import Ground, Props
+from authoring.towns.regions import KERB_M, Regions
+from authoring.towns.suburb_furniture import SuburbFurnisher
+from authoring.towns.suburb_gardens import CAR_M, Gardener, shops
+from authoring.towns.suburb_park import board_solids, build_island, build_park, park_ground
+from authoring.towns.suburb_plots import plan_plots
+from authoring.towns.suburb_skyline import build_skyline
+from authoring.towns.suburb_streets import lay_streets, paint, tactile
+from authoring.towns.walks import crosswalks, sidewalks
+
+CELL_M = 165.0
+SEED = 20
+
+
+def suburb_regions() -> Regions:
+    """The plan of the suburb as polygons; it has no canal."""
+    return Regions(suburb.NETWORK, Polygon())
+
+
+def suburb_lanes() -> dict[str, Lane]:
+    """The lanes of the suburb by name."""
+    return lane_graph(suburb.NETWORK)
+
+
+def write_suburb(folder: Path) -> None:
+    """Write suburb.xml and its meshes into a folder, replacing what is there.
+
+    Args:
+        folder: where the file goes; meshes go to `suburb/` in it.
+    """
+    regions = suburb_regions()
+    views = unary_union([_fan(board, eye) for board, eye in zip(suburb.BOARDS, suburb.EYES, strict=True)])
+    park = park_ground(regions, suburb.PARK)
+    far = box(-430, -430, 430, 430).difference(box(-280, -280, 280, 280))
+    keep_off = unary_union([park, views, Polygon(suburb.SHOPS), far, box(-18, -18, 18, 18)])
+    plots = plan_plots(regions, keep_off, rng=np.random.default_rng([SEED, 1]))
+    crossovers = unary_union([plot.crossover(x) for plot in plots for x in plot.drives])
+
+    sink = Sink("static")
+    props = Props(sink)
+    walkable = Ground(regions.sidewalks.buffer(-0.25), unary_union([tactile(regions), crossovers.buffer(0.3)]), views)
+    furnisher = SuburbFurnisher(props, regions, walkable, rng=np.random.default_rng([SEED, 3]))
+    for node in regions.network.nodes:
+        furnisher.node(node)
+    for name, side, share in suburb.BUS_STOPS:
+        furnisher.bus_stop(regions.network.streets[name], side, share)
+    for street in regions.network.streets.values():
+        furnisher.street(street)
+    gardener = Gardener(props, regions, furnisher, views)
+    for plot in plots:
+        gardener.build(plot)
+    build_park(props, furnisher, park, views, np.random.default_rng([SEED, 4]))
+    build_island(props, furnisher, regions, views, np.random.default_rng([SEED, 5]))
+    forecourt = shops(props, suburb.SHOPS, np.random.default_rng([SEED, 6])).difference(regions.sidewalks)
+    paved = unary_union([*gardener.paved, park, forecourt])
+    lay_streets(sink, regions, crossovers, paved)
+    solids.flat(sink, forecourt, KERB_M, "cobbles", "sidewalk")
+    paint(sink, regions)
+    occupied = unary_union(
+        [
+            regions.carriageways.buffer(6.0),
+            park,
+            views,
+            box(-150, -150, 155, 150),
+            *[plot.rectangle(-plot.width_m / 2, 0, plot.width_m / 2, plot.depth_m) for plot in plots],
+        ]
+    )
+    build_skyline(sink, occupied, np.random.default_rng([SEED, 7]))
+    props.solids.extend(board_solids(suburb.BOARDS))
+
+    document = Document("suburb", suburb.BOUNDS)
+    meshes = folder / "suburb"
+    shutil.rmtree(meshes, ignore_errors=True)
+    meshes.mkdir(parents=True)
+    for chunk in chunked(sink.parts(), cell_m=CELL_M):
+        write_obj(meshes / f"{chunk.name}.obj", chunk.mesh)
+        document.meshes.append(chunk.name)
+        document.geoms.append(Geom(mesh=chunk.name, material=chunk.material, label=chunk.label))
+    for name, mesh in props.meshes.items():
+        write_obj(meshes / f"{name}.obj", mesh)
+        document.meshes.append(name)
+    document.geoms.extend(props.geoms)
+    document.bodies.extend(props.bodies)
+    document.solids.extend([*town_solids(regions, ()), *props.solids])
+    document.lanes.extend(suburb_lanes().values())
+    document.sidewalks.extend(sidewalks(regions, suburb.BOUNDS))
+    document.crosswalks.extend(crosswalks(regions))
+    document.bays.extend([*bay_rows(regions.bay_groups), ("drives", *CAR_M, np.asarray(gardener.drive_bays))])
+    (folder / "suburb.xml").write_text(document.text(), encoding="utf-8", newline="\n")
+
+
+def _fan(board: tuple[float, float, float], eye: tuple[float, float]) -> BaseGeometry:
+    """From a viewpoint to both ends of a board and a little beyond, and the ground that the board takes."""
+    at, start = np.array(board[:2]), np.array(eye, np.float64)
+    facing = np.array([np.cos(np.radians(board[2])), np.sin(np.radians(board[2]))])
+    across = np.array([-facing[1], facing[0]]) * 5.5
+    toward = (at - start) / np.linalg.norm(at - start)
+    fan = Polygon([start, at + across, at - facing * 2.5 + across, at - facing * 2.5 - across, at - across])
+    return fan.convex_hull.union(LineString([start, at + toward]).buffer(3.0))
