@@ -11,7 +11,7 @@ from authoring.materials.freight import LINERS, container_rect, panel_rect
 
 CONTAINER_M = (12.19, 2.44, 2.59)
 SHORT_M = 6.06
-NET_PITCH_M = 0.24
+NET_PITCH_M = 0.42
 
 
 def container(sink: Sink, liner: int, x: float, y: float, z: float, *, short: bool = False) -> None:
@@ -51,10 +51,38 @@ def container_stack(rows: int, columns: int, rng: np.random.Generator, *, highes
     return sink.parts()
 
 
+def pallets(rng: np.random.Generator) -> list[Part]:
+    """Goods left in a yard: stacks of pallets, crates under film, liquid containers in their cages, drums."""
+    sink = Sink("static")
+    for column in range(int(rng.integers(3, 6))):
+        x, y = column * 1.6 - 3.0, float(rng.uniform(-0.4, 0.4))
+        kind = int(rng.integers(4))
+        if kind == 0:
+            for level in range(int(rng.integers(3, 9))):
+                z = level * 0.145
+                sink.swatch_box("weathered_wood", (x - 0.6, y - 0.5, z + 0.1), (x + 0.6, y + 0.5, z + 0.14))
+                for v in (-0.45, 0.0, 0.35):
+                    sink.swatch_box("oak", (x - 0.6, y + v, z), (x + 0.6, y + v + 0.1, z + 0.1), skip="zZ")
+        elif kind == 1:
+            for level in range(int(rng.integers(1, 3))):
+                swatch = str(rng.choice(["canvas_sand", "plastic_white", "signal_blue", "teal_paint"]))
+                sink.swatch_box("weathered_wood", (x - 0.6, y - 0.5, level * 1.3), (x + 0.6, y + 0.5, level * 1.3 + 0.14))
+                sink.swatch_box(swatch, (x - 0.58, y - 0.48, level * 1.3 + 0.14), (x + 0.58, y + 0.48, level * 1.3 + 1.3), skip="z")
+        elif kind == 2:
+            sink.swatch_box("plastic_white", (x - 0.55, y - 0.45, 0.15), (x + 0.55, y + 0.45, 1.1))
+            for z in (0.0, 0.4, 0.75, 1.1):
+                sink.swatch_box("galvanised", (x - 0.6, y - 0.5, z), (x + 0.6, y + 0.5, z + 0.05), skip="")
+        else:
+            for u, v in ((-0.3, -0.3), (0.3, -0.3), (0.0, 0.25)):
+                swatch = str(rng.choice(["signal_blue", "dark_red", "mustard"]))
+                cylinder(sink, swatch, (x + u, y + v, 0), 0.29, 0.88, segments=12)
+    return sink.parts()
+
+
 def chain_link(length_m: float, *, height_m: float = 2.2) -> list[Part]:
     """Wire netting along x on posts with outriggers and barbed wire: wires thick enough to be seen."""
     sink = Sink("fence")
-    half, wire = length_m / 2, 0.005
+    half, wire = length_m / 2, 0.006
     count = max(1, round(length_m / 3.0))
     for x in np.linspace(-half + 0.05, half - 0.05, count + 1):
         cylinder(sink, "galvanised", (x, 0, 0), 0.035, height_m, segments=6, cap=False)

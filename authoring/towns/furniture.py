@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 from shapely.geometry import LineString, Point  # type: ignore[import-untyped]
@@ -31,8 +33,16 @@ EXTRAS = ("bin", "bench", "cable_box", "planter") + ("none",) * 11
 class Furnisher:
     """Furnishes a town's streets; the same generator gives the same town."""
 
-    def __init__(self, props: Props, regions: Regions, ground: Ground, *, rng: np.random.Generator) -> None:
-        self.props, self.regions, self.ground, self.rng = props, regions, ground, rng
+    def __init__(
+        self,
+        props: Props,
+        regions: Regions,
+        ground: Ground,
+        *,
+        rng: np.random.Generator,
+        extras: Sequence[str] = EXTRAS,
+    ) -> None:
+        self.props, self.regions, self.ground, self.rng, self.extras = props, regions, ground, rng, extras
         self.network = regions.network
         self.bays = unary_union([group.outline for group in regions.bay_groups]).buffer(0.3)
         tree_rng = np.random.default_rng([77, 1])
@@ -151,7 +161,7 @@ class Furnisher:
 
     def _extras(self, street: Street, side: int, start: float, end: float) -> None:
         for station in np.arange(start + float(self.rng.uniform(0, 5)), end, 7.5):
-            kind = str(self.rng.choice(EXTRAS))
+            kind = str(self.rng.choice(self.extras))
             if kind == "none":
                 continue
             x, y, toward = self._beside(street, side, float(station), 0.75)

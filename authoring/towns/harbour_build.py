@@ -30,6 +30,8 @@ from authoring.towns.walks import crosswalks, sidewalks
 
 CELL_M = 110.0
 SEED = 12
+# What stands along the estate's sidewalks now and then.
+EXTRAS = ("bin", "bench", "cable_box") + ("none",) * 17
 
 
 def harbour_regions() -> Regions:
@@ -60,7 +62,7 @@ def write_harbour(folder: Path) -> None:
     build_bridge(sink, regions.network, regions.network.streets["bridge"])
     finish_bridge(sink, regions.network)
     yards.build()
-    furnisher = Furnisher(props, regions, ground, rng=np.random.default_rng([SEED, 3]))
+    furnisher = Furnisher(props, regions, ground, rng=np.random.default_rng([SEED, 3]), extras=EXTRAS)
     for node in regions.network.nodes:
         furnisher.node(node)
     for name, side, share in (("dock_e", 1, 0.4), ("estate_w", -1, 0.5)):

@@ -32,7 +32,7 @@ def build_surroundings(sink: Sink, *, rng: np.random.Generator) -> None:
     for side in (1, -1):
         for x in ((OUTER_M, FAR_M), (-FAR_M, -OUTER_M)):
             low, high = sorted((side * MEDIAN_HALF_M, side * EDGE_M))
-            solids.flat(sink, box(x[0], low, x[1], high), -0.04, "asphalt_worn", "road", cell_m=FAR_M)
+            solids.flat(sink, box(x[0], low, x[1], high), -0.04, "asphalt", "road", cell_m=FAR_M)
     solids.flat(sink, QUAY, KERB_M, "concrete", "ground")
     solids.flat(sink, WATER, KERB_M - 0.05, "water", "ground", cell_m=FAR_M)
     build_hills(sink)

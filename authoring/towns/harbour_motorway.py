@@ -121,7 +121,7 @@ def ramp_profile(network: Network, street: Street) -> tuple[Array, Array]:
 
 def lay_motorway(sink: Sink, level_roads: BaseGeometry) -> None:
     """Asphalt, median, kerbs and paint of the motorway."""
-    solids.flat(sink, paved().difference(median()).difference(level_roads), 0.0, "asphalt_worn", "road")
+    solids.flat(sink, paved().difference(median()).difference(level_roads), 0.0, "asphalt", "road")
     solids.flat(sink, median(), KERB_M, "roof_gravel", "terrain", cell_m=110.0)
     for side in (1, -1):
         edge = np.array([(-OUTER_M, side * MEDIAN_HALF_M), (OUTER_M, side * MEDIAN_HALF_M)])

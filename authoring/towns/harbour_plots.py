@@ -96,6 +96,7 @@ class Yards:
         self._terminal()
         self._south_west()
         self._north()
+        self._goods()
 
     def _south(self) -> None:
         self._house("warehouse_1", industry.warehouse(92, 40, 11.0, self.rng), (-82, -62), 0.0, (92, 40, 11.0))
@@ -169,6 +170,20 @@ class Yards:
         self._house("store_2", industry.shed(46, 24, 7.5, self.rng, cladding="cladding_blue"), (-158, 190), 0.0, (46, 24, 9.0))
         for index, (x0, x1) in enumerate(((-200, -120), (-112, -20))):
             self._row(f"store_{index}", [(x, 157.5) for x in np.arange(x0, x1, 2.7)], -90.0, CAR_BAY_M)
+
+    def _goods(self) -> None:
+        """Pallets, boxes and skips about the yards, along walls and fences."""
+        spots = [(-134, y, np.pi / 2) for y in (-60.0, -72.0, -84.0)] + [(x, -36.5, 0.0) for x in (-120, -96, -70, -44)]
+        spots += [(64.5, y, np.pi / 2) for y in (-52.0, -64.0, -74.0)] + [(x, -38.0, 0.0) for x in (34, 52, 80, 98)]
+        spots += [(x, -226.0, 0.0) for x in (-110, -88, -60, -40)] + [(149.0, y, np.pi / 2) for y in (54.0, 66.0)]
+        spots += [(x, 38.0, 0.0) for x in (-200, -180, -158)] + [(x, 74.5, 0.0) for x in (122, 138, 160, 176)]
+        spots += [(-30.0, y, np.pi / 2) for y in (-90.0, -104.0)] + [(100.0, y, np.pi / 2) for y in (-96.0, -110.0)]
+        for x, y, yaw in spots:
+            if self.props.is_free(float(x), y, -2.0):
+                goods = industry_yard.pallets(self.rng)
+                self.props.put("goods", goods, float(x), y, KERB_M, yaw, radius_m=2.0, high_m=1.5)
+        for index, (x, y) in enumerate(((-34, -74), (-34, -122), (30, -95), (110, 70), (-128, -160), (-30, 58))):
+            self._stack(f"boxes_{index}", 1 + index % 2, 1, (float(x) + 4, float(y)), highest=2)
 
     def _house(
         self, name: str, parts: list[Part], middle: tuple[float, float], yaw: float, size: tuple[float, float, float]

@@ -76,26 +76,27 @@ def _chevrons(props: Props, regions: Regions) -> None:
 
 
 def _planting(props: Props, regions: Regions, furnisher: Furnisher, *, rng: np.random.Generator) -> None:
-    """Shrubs and hedges behind the rails, single trees on the slopes."""
+    """Clumps of trees, shrubs and hedges behind the rails, thicker behind the noise walls."""
     hedge = kit.hedge(14.0, 1.5, 1.3, rng)
     shrubs = [kit.shrub(float(h), rng, foliage=leaf) for h, leaf in
               ((1.2, "foliage_green"), (1.8, "foliage_olive"), (2.3, "foliage_dark"))]  # fmt: skip
     walls = [(side, x0 - 8, x1 + 8) for side, x0, x1 in NOISE_WALLS]
-    views = furnisher.ground.views
+    clear = furnisher.ground.views.buffer(2.5)
     for side in (1, -1):
-        for x in np.arange(-230.0, 231.0, 9.0):
+        for x in np.arange(-330.0, 331.0, 6.5):
             behind = any(side == s and x0 < x < x1 for s, x0, x1 in walls)
-            y = side * (EDGE_M + (8.0 if behind else 6.0) + float(rng.uniform(-0.8, 0.8)))
+            y = side * (EDGE_M + (8.2 if behind else 6.5) + float(rng.uniform(-1.2, 3.0)))
             spot = Point(x, y)
-            if abs(x) < 26 or regions.carriageways.distance(spot) < 4.0 or views.buffer(2.5).contains(spot):
+            draw, kind = rng.random(), int(rng.integers(6))
+            clump = np.sin(x / 19.0 + 2.0 * side) + np.sin(x / 41.0) > -0.3
+            if abs(x) < 26 or regions.carriageways.distance(spot) < 4.0 or clear.contains(spot):
                 continue
-            draw = rng.random()
-            if behind and draw < 0.55:
-                furnisher.plant(float(x), y, KERB_M, kind=int(rng.integers(6)), always=True, simple=True)
-            elif draw < 0.45:
-                parts: list[Part] = shrubs[int(rng.integers(3))]
-                props.put("shrub", parts, float(x), y, KERB_M, float(rng.uniform(0, 6)), radius_m=0.9, high_m=1.5)
-            elif draw < 0.6 and props.is_free(float(x), y, 3.0):
+            if (behind or clump) and draw < 0.6:
+                furnisher.plant(float(x), y, KERB_M, kind=kind, always=True, simple=draw < 0.45 or abs(x) > 200)
+            elif draw < 0.72 and abs(x) < 230:
+                parts: list[Part] = shrubs[kind % 3]
+                props.instance(f"verge_shrub{kind % 3}", parts, float(x), y, KERB_M, draw * 40, radius_m=0.9, high_m=1.5)
+            elif draw < 0.8 and abs(x) < 230 and props.is_free(float(x), y, 3.0):
                 props.instance("hedge", hedge, float(x), y, KERB_M, 0.0, radius_m=0.7, high_m=1.4)
 
 
