@@ -51,7 +51,8 @@ class Network(ABC):
 
     def labels(self) -> dict[int, str]:
         """Names of the network's own classes."""
-        return {int(key): name.casefold() for key, name in self.network.config.id2label.items()}  # type: ignore[union-attr]
+        config: Any = self.network.config
+        return {int(key): name.casefold() for key, name in config.id2label.items()}
 
     @abstractmethod
     def outputs(self, pixels: Tensor) -> Mapping[str, Tensor]:

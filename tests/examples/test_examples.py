@@ -1,0 +1,107 @@
+"""The example packages, from wheels, in one fresh environment, run from an empty folder as a user would."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = sorted(path.parent for path in (ROOT / "examples").glob("gear-*/pyproject.toml"))
+TOWN = ("--town", str(ROOT / "gear/testing/data/mjcf/towns/tiny.xml"), "--scene", "board")
+SCENES = f"scenes={ROOT / 'gear/testing/data/scenes/tiny.yml'}"
+
+pytestmark = pytest.mark.slow
+
+
+def call(*command: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
+    done = subprocess.run([str(word) for word in command], cwd=cwd, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
+    return done
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An environment with gear and all examples from wheels, and an empty folder beside it."""
+    home = tmp_path_factory.mktemp("examples")
+    wheels = home / "wheels"
+    call(sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", wheels, ROOT, *EXAMPLES, cwd=home)
+    venv.create(home / "env", with_pip=True)
+    constraints = ("-c", ROOT / "constraints.txt")
+    files = sorted(wheels.glob("*.whl"))
+    call(home / "env/bin/python", "-m", "pip", "install", "-q", *constraints, *files, "pytest", cwd=home)
+    (home / "empty").mkdir()
+    return home
+
+
+def gear(home: Path, *words: str) -> str:
+    return call(home / "env/bin/gear", *words, cwd=home / "empty").stdout
+
+
+def test_all_are_found_and_the_broken_ones_are_named(home: Path) -> None:
+    facts = json.loads(gear(home, "plugins", "--json"))
+    names = {(p["kind"], p["name"], p["package"]) for p in facts["plugins"]}
+    assert {
+        ("defense", "jpeg_tv", "gear-defense-jpeg-tv"),
+        ("defense", "jedi", "gear-defense-jedi"),
+        ("task", "panoptic", "gear-task-panoptic"),
+        ("model", "transformers_semseg", "gear-model-transformers"),
+        ("attack", "art", "gear-attack-art"),
+        ("task", "semseg", "mujoco-gear"),
+    } <= names
+    assert {b["package"] for b in facts["broken"]} == {"gear-broken"}
+    assert {b["plugin"]: b["stage"] for b in facts["broken"]} == {
+        "broken-import": "import",
+        "broken-missing": "import",
+        "broken-exit": "import",
+        "broken-misspelt": "register",
+        "broken-hook": "hook gear_defenses",
+        "broken-rubbish": "spec",
+        "broken-protocol": "spec",
+    }
+    assert facts["clashes"] == [
+        {"kind": "defense", "name": "median", "choices": ["gear-broken/median", "mujoco-gear/median"]}
+    ]
+
+
+def test_a_foreign_task_gets_everything(home: Path) -> None:
+    size = ("--set", "options.width_px=256", "--set", "options.height_px=128", "--set", SCENES)
+    common = ("--split", "debug", "--samples", "2", "--renderer", "classic", "--quality", "fast")
+    out = gear(home, "collect", "--task", "panoptic", *TOWN, *common, *size, "--patch", "random", "--out", "data")
+    assert out == "data: 2 samples in split 'debug'\n"
+    data = home / "empty/data"
+    table = json.loads((data / "annotations/panoptic_debug.json").read_text())
+    assert len(table["annotations"]) == 2 and all(a["segments_info"] for a in table["annotations"])
+    gear(home, "sheet", "data", "--out", "sheet.png")
+    gear(home, "view", "data", "--out", "view.html")
+    assert cv2.imread(str(home / "empty/sheet.png")).std() > 20
+    for defense in ("jpeg_tv", "jedi"):
+        gear(home, "defend", "data", "--defense", defense, "--out", defense)
+        for index in range(2):
+            name = f"images/debug/{index:06d}.png"
+            before, after = (cv2.imread(str(root / name)) for root in (data, home / "empty" / defense))
+            assert after.shape == before.shape and not np.array_equal(after, before)
+    assert len(json.loads((home / "empty/jedi/defense/debug/scores.json").read_text())["scores"]) == 2
+    assert len(list((home / "empty/jedi/defense/debug/masks").iterdir())) == 2
+
+
+@pytest.mark.parametrize(
+    "example", [path for path in EXAMPLES if (path / "tests").is_dir()], ids=lambda path: path.name
+)
+def test_each_passes_its_own_tests(home: Path, example: Path) -> None:
+    python = home / "env/bin/python"
+    call(python, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-c", example / "pyproject.toml", example / "tests",
+         cwd=home / "empty")  # fmt: skip
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.name)
+def test_each_is_typed_against_gears_published_types(home: Path, example: Path, tmp_path: Path) -> None:
+    call(sys.executable, "-m", "mypy", "--strict", "--python-executable", home / "env/bin/python", "--cache-dir",
+         tmp_path / "cache", "--config-file", example / "pyproject.toml", example / "src", cwd=tmp_path)  # fmt: skip
+    call(sys.executable, "-m", "ruff", "check", "--no-cache", example, cwd=tmp_path)
