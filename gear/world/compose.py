@@ -14,9 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gear.values.errors import TownError
 from gear.values.scene import Weather
 from gear.world.assets import ActorFacts, AssetLibrary
 from gear.world.instances import AssetParts, FaceName, load_mjcf
+from gear.world.quiet_mjcf import mjcf
 from gear.world.scene_spec import BoardSpec
 from gear.world.weather import apply_weather
 
@@ -83,16 +85,16 @@ def compose(
     faces: list[FaceName] = []
     for index, board in enumerate(boards):
         path = library.path("surface", board.asset)
-        body = root.worldbody.add("body", name=f"board_{index}", **_placed(board))
+        body = _new_body(root, library.town, f"board_{index}", **_placed(board))
         faces.append(parts.add_bearer(path, body, is_carried=False))
     slots: list[Slot] = []
     for actor, count in _merged(pool):
         for index in range(count):
-            body = root.worldbody.add("body", name=f"{actor.name}_{index}", mocap=True)
+            body = _new_body(root, library.town, f"{actor.name}_{index}", mocap=True)
             parts.add_instance(actor.path, body)
             slots.append(Slot(body=body.name, actor=actor))
     if carrier is not None:
-        body = root.worldbody.add("body", name="carrier", mocap=True)
+        body = _new_body(root, library.town, "carrier", mocap=True)
         faces.append(parts.add_bearer(carrier.path, body, is_carried=True))
         slots.append(Slot(body="carrier", actor=carrier, bears_surface=True))
     parts.drop_templates()
@@ -104,6 +106,13 @@ def compose(
         slots=tuple(slots),
         faces=tuple(faces),
     )
+
+
+def _new_body(root: mjcf.RootElement, town: Path, name: str, **attributes: Any) -> Any:
+    try:
+        return root.worldbody.add("body", name=name, **attributes)
+    except ValueError as error:
+        raise TownError(town, f"has a body named {name!r}, a name that gear gives to what it puts there") from error
 
 
 def _merged(pool: Sequence[tuple[ActorFacts, int]]) -> list[tuple[ActorFacts, int]]:
