@@ -16,7 +16,7 @@ from typing import Any
 import pluggy
 
 from gear.contracts import hookspecs
-from gear.contracts.specs import PROTOCOL_VERSION, SPEC_TYPES, Kind
+from gear.contracts.specs import PROTOCOL_VERSION, SPEC_TYPES, AnySpec, Kind
 from gear.plugins.builtins import BUILTINS
 from gear.plugins.catalogue import Broken, Catalogue, Found, Owner, as_iterable, one_line
 
@@ -26,6 +26,18 @@ HOOK_OF: dict[Kind, str] = {
     "model": "gear_models",
     "attack": "gear_attacks",
     "defense": "gear_defenses",
+}
+CAPABILITY_TYPES: dict[str, type] = {
+    "tasks": tuple,
+    "views": tuple,
+    "taps": tuple,
+    "outputs": frozenset,
+    "layout": str,
+    "gradient": str,
+    "has_gradients": bool,
+    "needs_gradients": bool,
+    "needs_calibration": bool,
+    "needs_model": bool,
 }
 NAME = re.compile(r"[a-z][a-z0-9_]*")
 DISTRIBUTION = "mujoco-gear"
@@ -127,7 +139,29 @@ def spec_problem(kind: Kind, spec: Any) -> str | None:
     ):
         return f"{spec.name!r}: every option needs a default"
     build: object = spec.build
-    return None if callable(build) else f"{spec.name!r}: its build cannot be called"
+    if not callable(build):
+        return f"{spec.name!r}: its build cannot be called"
+    return _capability_problem(spec)
+
+
+def _capability_problem(spec: AnySpec) -> str | None:
+    """What of a spec's data would trip whoever lists or checks it, or None."""
+    summary: object = spec.summary
+    if not isinstance(summary, str) or not summary.strip() or "\n" in summary:
+        return f"{spec.name!r}: its summary is not one line"
+    for name, kind in CAPABILITY_TYPES.items():
+        value = getattr(spec, name, None)
+        if value is None:
+            continue
+        if not isinstance(value, kind):
+            return f"{spec.name!r}: its {name} must be a {kind.__name__}, got {type(value).__name__}"
+        if isinstance(value, (tuple, frozenset)) and not all(isinstance(item, str) for item in value):
+            return f"{spec.name!r}: its {name} must hold names"
+    try:
+        spec.config()
+    except Exception as error:
+        return f"{spec.name!r}: its own defaults are refused: {one_line(error)}"
+    return None
 
 
 def _quietly(call: Callable[[], Any]) -> Any:

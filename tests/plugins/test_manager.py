@@ -148,6 +148,37 @@ def test_every_option_needs_a_default(package: Any) -> None:
     assert found.broken[0].problem == "'thirdparty': every option needs a default"
 
 
+@dataclass(frozen=True, kw_only=True)
+class Refused:
+    radius_px: int = 2
+
+    def __post_init__(self) -> None:
+        raise ValueError("never")
+
+
+@pytest.mark.parametrize(
+    ("facts", "problem"),
+    [
+        ({"tasks": {"depth"}}, "'thirdparty': its tasks must be a tuple, got set"),
+        ({"tasks": "depth"}, "'thirdparty': its tasks must be a tuple, got str"),
+        ({"taps": (1,)}, "'thirdparty': its taps must hold names"),
+        ({"outputs": {"mask"}}, "'thirdparty': its outputs must be a frozenset, got set"),
+        ({"summary": "one\ntwo"}, "'thirdparty': its summary is not one line"),
+        ({"config": Refused}, "'thirdparty': its own defaults are refused: ValueError: never"),
+    ],
+)
+def test_rubbish_in_a_spec_is_reported(package: Any, facts: dict[str, Any], problem: str) -> None:
+    found = discover([package("good_one", lambda: [spec("thirdparty", **facts)])])
+    assert [b.problem for b in found.broken] == [problem]
+    assert strangers(found) == []
+
+
+def test_a_build_that_leaves_says_whose_it_is(package: Any) -> None:
+    found = discover([package("good_one", lambda: [spec("thirdparty", build=lambda config: sys.exit(3))])])
+    with pytest.raises(PluginError, match=r"thirdparty \(good_one \?\) failed at build: SystemExit: 3"):
+        build(found.get("defense", "thirdparty"))
+
+
 def test_a_build_that_fails_says_whose_it_is(package: Any) -> None:
     def fails(config: Config) -> Same:
         raise RuntimeError("no such file")
