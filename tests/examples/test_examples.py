@@ -81,23 +81,19 @@ def test_a_foreign_task_gets_everything(home: Path) -> None:
     gear(home, "sheet", "data", "--out", "sheet.png")
     gear(home, "view", "data", "--out", "view.html")
     assert cv2.imread(str(home / "empty/sheet.png")).std() > 20
-    for defense in ("jpeg_tv", "jedi"):
-        gear(home, "defend", "data", "--defense", defense, "--out", defense)
-        for index in range(2):
-            name = f"images/debug/{index:06d}.png"
-            before, after = (cv2.imread(str(root / name)) for root in (data, home / "empty" / defense))
-            assert after.shape == before.shape and not np.array_equal(after, before)
-    assert len(json.loads((home / "empty/jedi/defense/debug/scores.json").read_text())["scores"]) == 2
-    assert len(list((home / "empty/jedi/defense/debug/masks").iterdir())) == 2
-
-
-@pytest.mark.parametrize(
-    "example", [path for path in EXAMPLES if (path / "tests").is_dir()], ids=lambda path: path.name
-)
-def test_each_passes_its_own_tests(home: Path, example: Path) -> None:
-    python = home / "env/bin/python"
-    call(python, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-c", example / "pyproject.toml", example / "tests",
-         cwd=home / "empty")  # fmt: skip
+    gear(home, "defend", "data", "--defense", "jpeg_tv", "--out", "jpeg_tv")
+    eager = ("--set", "patch_mean=[3.5, 4.0, 4.3]")  # a small rendered board is calmer than the paper's photographs
+    gear(home, "defend", "data", "--defense", "jedi", *eager, "--out", "jedi")
+    folder = home / "empty/jedi/defense/debug"
+    scores = json.loads((folder / "scores.json").read_text())["scores"]
+    for index in range(2):
+        name = f"images/debug/{index:06d}.png"
+        roots = (data, home / "empty/jpeg_tv", home / "empty/jedi")
+        before, smooth, filled = (cv2.imread(str(root / name)) for root in roots)
+        assert smooth.shape == before.shape and (smooth != before).mean() > 0.2
+        mask = cv2.imread(str(folder / f"masks/{index:06d}_left.png"), cv2.IMREAD_UNCHANGED) > 0
+        assert 0 < mask.mean() < 1 and mask.mean() == pytest.approx(scores[index], abs=1e-4)
+        assert np.array_equal(filled[~mask], before[~mask]) and not np.array_equal(filled[mask], before[mask])
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.name)
