@@ -25,5 +25,5 @@ def run(args: argparse.Namespace) -> int:
     from gear.verbs.scaffold.write import new_package
 
     folder = new_package(args.kind, args.name, out=args.out)
-    print(f"{folder}: a {args.kind} that works; next: pip install -e '{folder}[dev]' && pytest {folder}")
+    print(f"{folder}: a package that works as it is; next: pip install -e '{folder}[dev]' && pytest {folder}")
     return 0

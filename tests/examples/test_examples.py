@@ -101,3 +101,9 @@ def test_each_is_typed_against_gears_published_types(home: Path, example: Path, 
     call(sys.executable, "-m", "mypy", "--strict", "--python-executable", home / "env/bin/python", "--cache-dir",
          tmp_path / "cache", "--config-file", example / "pyproject.toml", example / "src", cwd=tmp_path)  # fmt: skip
     call(sys.executable, "-m", "ruff", "check", "--no-cache", example, cwd=tmp_path)
+
+
+def test_the_wheel_can_write_new_packages(home: Path) -> None:
+    for kind in ("task", "model", "attack", "defense"):
+        assert gear(home, "new", kind, "my_thing").startswith(f"gear-{kind}-my-thing: ")
+        assert (home / f"empty/gear-{kind}-my-thing/src/gear_{kind}_my_thing/my_thing.py").is_file()
