@@ -96,6 +96,15 @@ def test_a_foreign_task_gets_everything(home: Path) -> None:
         assert np.array_equal(filled[~mask], before[~mask]) and not np.array_equal(filled[mask], before[mask])
 
 
+TESTED = [path for path in EXAMPLES if path.name != "gear-broken"]
+
+
+@pytest.mark.parametrize("example", TESTED, ids=lambda path: path.name)
+def test_each_passes_its_own_tests(home: Path, example: Path) -> None:
+    config = ("-p", "no:cacheprovider", "-c", str(example / "pyproject.toml"), str(example / "tests"))
+    call(home / "env/bin/python", "-m", "pytest", "-q", *config, cwd=home / "empty")
+
+
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.name)
 def test_each_is_typed_against_gears_published_types(home: Path, example: Path, tmp_path: Path) -> None:
     call(sys.executable, "-m", "mypy", "--strict", "--python-executable", home / "env/bin/python", "--cache-dir",
