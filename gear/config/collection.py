@@ -9,6 +9,7 @@ from typing import ClassVar, Literal
 from gear.config.nodes import Mapping, Node, Place
 from gear.contracts.rendering import Quality
 from gear.values.errors import FieldError
+from gear.values.optics import CameraEffects
 
 SPLIT_NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 
@@ -127,13 +128,14 @@ class CollectionConfig:
         task: name of a task plugin.
         town: name of a town, or path of its MJCF.
         scenes: name of a scene library, or path of its YAML; empty for the town's own.
-        scene: name of a scene of that library.
+        scene: name of a scene of that library; or a library's file and a name in it, `my.yml:corner`.
         split: `train`, `val`, `test`, `debug`, `finetuning`, `video`, or one of those with `_anything` behind it.
         root: folder of the dataset; empty for `data/<task>/<town>-<scene>-<weather>/<patch>`.
         patch: `none`, `random`, a picture, a patch folder, or the name of an installed patch.
         weather: a preset, or a preset and what differs.
         renderer: `filament` (physically based) or `classic`.
         quality: `film` (2x2 supersampled) or `fast`.
+        camera: optional effects: `shot_noise`, `read_noise` (percent), `vignette`, `shutter_s`, `lens` (`k1`, `k2`).
         seed, samples: instead of the simulation config's.
         patch_seed: of random patches; not the split's, so that all splits show the same one.
         simulation: name or path of the simulation config.
@@ -150,6 +152,7 @@ class CollectionConfig:
     weather: WeatherConfig = field(default_factory=WeatherConfig)
     renderer: RendererName = "filament"
     quality: Quality = "film"
+    camera: CameraEffects = field(default_factory=CameraEffects)
     seed: int | None = None
     samples: int | None = None
     patch_seed: int = 0

@@ -25,32 +25,97 @@ FILAMENT_LUX = 38400.0
 """Filament's fixed exposure (f/16, 1/125 s, ISO 100) shows a radiance of so many cd/m² as 1.0."""
 
 SKY_FACE_PX = 512
+STREET_FACE_PX = 128
+STREET_ALBEDO = np.array([0.30, 0.27, 0.23])
+STREET_TOP = 0.42
+"""Sine of the height to which houses stand about a street."""
+
+STREET_SHARE = 0.65
+"""How much of the sky below that height they hide."""
+
+STREET_SUNLIT = 0.45
+"""Share of what a street shows that the sun reaches."""
+
+BOUNCE_GAIN = 1.25
+"""Light that streets and houses throw back and forth, which no renderer of ours follows."""
+
 FACE_ORDER = "RLUDFB"
 _INTEGRATION_PX = 16
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Lighting:
-    """Sun, sky and haze in units of the frame: radiance 1.0 is full scale.
+    """Sun and sky in units of the frame: radiance 1.0 is full scale.
 
     Attributes:
         towards_sun: (3,) unit vector.
         sun: (3,) what a surface of albedo pi that faces the sun would radiate.
         ambient: (3,) radiance of the sky, averaged over what a roof sees.
-        haze: (3,) radiance of distant air.
         sky_faces: (6 * size, size, 3) uint8 sRGB, a strip of the faces in `FACE_ORDER`.
+        street_faces: as `sky_faces`, smaller: the light that falls into a street, from the sky and from its houses.
     """
 
     towards_sun: Floats
     sun: Floats
     ambient: Floats
-    haze: Floats
     sky_faces: UInt8Image
+    street_faces: UInt8Image
+
+
+HORIZON_AZIMUTHS = 64
+"""Directions for which the light of distant air is known."""
 
 
 def lighting_of(weather: Weather, *, sky_face_px: int = SKY_FACE_PX) -> Lighting:
     """Light of a weather."""
     sky = Sky.of(weather)
+    exposure, from_above = _exposure(sky)
+    faces = encode_srgb(exposure * sky.radiance(face_directions(sky_face_px)))
+    return Lighting(
+        towards_sun=sky.towards_sun,
+        sun=exposure * sky.sun_klx,
+        ambient=exposure * from_above / math.pi,
+        sky_faces=faces.reshape(6 * sky_face_px, sky_face_px, 3),
+        street_faces=encode_srgb(BOUNCE_GAIN * exposure * _in_street(sky, face_directions(STREET_FACE_PX))).reshape(
+            6 * STREET_FACE_PX, STREET_FACE_PX, 3
+        ),
+    )
+
+
+def mirrored_light(weather: Weather, rows: int, columns: int) -> Floats:
+    """(rows, columns, 3) what still water in a street mirrors, in units of the frame.
+
+    Row 0 is level and the last one overhead; column 0 is east, counter-clockwise.
+    """
+    sky = Sky.of(weather)
+    elevation, azimuth = np.meshgrid(
+        np.linspace(0, math.pi / 2, rows), np.arange(columns) / columns * 2 * math.pi, indexing="ij"
+    )
+    level = np.cos(elevation)
+    directions = np.stack([np.cos(azimuth) * level, np.sin(azimuth) * level, np.sin(elevation)], axis=-1)
+    return np.minimum(_exposure(sky)[0] * _in_street(sky, directions), 1.0)
+
+
+def _in_street(sky: Sky, directions: Floats) -> Floats:
+    """(..., 3) kcd/m² between houses: they hide the lower sky and throw back their share of sun and sky."""
+    radiance = sky.radiance(directions)
+    _, from_above = _exposure(sky)
+    sunlit = STREET_SUNLIT * sky.sun_klx * max(float(np.hypot(*sky.towards_sun[:2])), 0.3)
+    houses = STREET_ALBEDO / math.pi * (sunlit + 0.5 * from_above)
+    height = directions[..., 2]
+    t = np.clip((height / STREET_TOP - 0.35) / 0.65, 0.0, 1.0)
+    share = np.where(height > -0.02, STREET_SHARE * (1 - t * t * (3 - 2 * t)), 0.0)[..., None]
+    return np.asarray(radiance + share * (houses - radiance))
+
+
+def horizon_light(weather: Weather) -> Floats:
+    """(`HORIZON_AZIMUTHS`, 3) light of distant air by azimuth, counter-clockwise from east, in units of the frame."""
+    sky = Sky.of(weather)
+    return np.minimum(_exposure(sky)[0] * sky.horizon_radiance(HORIZON_AZIMUTHS), 1.0)
+
+
+def _exposure(sky: Sky) -> tuple[float, Floats]:
+    """The frame's share by kcd/m², and (3,) klx that a roof gets from the sky."""
     coarse = face_directions(_INTEGRATION_PX)
     radiance, solid_angle = sky.radiance(coarse), _solid_angles(_INTEGRATION_PX)
     flat_sun = np.array([*sky.towards_sun[:2], 0.0])
@@ -61,15 +126,7 @@ def lighting_of(weather: Weather, *, sky_face_px: int = SKY_FACE_PX) -> Lighting
         for klx, normal in zip(from_sky, walls, strict=True)
     )
     bright_sky = float(np.quantile(radiance[coarse[..., 2] > 0].max(axis=-1), 0.9))
-    exposure = min(WHITE_LEVEL / (WHITE_ALBEDO / math.pi * brightest), SKY_LEVEL / bright_sky)
-    faces = encode_srgb(exposure * sky.radiance(face_directions(sky_face_px)))
-    return Lighting(
-        towards_sun=sky.towards_sun,
-        sun=exposure * sky.sun_klx,
-        ambient=exposure * from_sky[1] / math.pi,
-        haze=np.minimum(exposure * sky.horizon_radiance(), 1.0),
-        sky_faces=faces.reshape(6 * sky_face_px, sky_face_px, 3),
-    )
+    return min(WHITE_LEVEL / (WHITE_ALBEDO / math.pi * brightest), SKY_LEVEL / bright_sky), from_sky[1]
 
 
 def face_directions(size: int) -> Floats:

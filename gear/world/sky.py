@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
+from gear.camera.noise import TILE_PX, periodic_noise, sampled
 from gear.values.rng import derive_rng
 from gear.values.scene import Weather
 
@@ -93,7 +94,7 @@ class Sky:
             sun_klx=_beam_klx(shown_altitude, turbidity) * through_clouds * max(daylight, 0.01),
             cloud_cover=cover,
             turbidity=turbidity,
-            blueness=float(np.clip(0.85 * weather.rayleigh_scattering_scale / 0.0331, 0.0, 1.5)),
+            blueness=float(np.clip(weather.rayleigh_scattering_scale / 0.0331, 0.0, 1.5)),
         )
 
     def radiance(self, directions: Floats) -> Floats:
@@ -107,13 +108,18 @@ class Sky:
         result[seen] = share * self._above(rays) + (1 - share) * ground
         return result.reshape(directions.shape)
 
-    def horizon_radiance(self) -> Floats:
-        """(3,) kcd/m², averaged around the horizon: the colour of distant haze."""
-        angles = np.linspace(0, 2 * math.pi, 72, endpoint=False)
-        ring = np.column_stack([np.cos(angles), np.sin(angles), np.full_like(angles, 0.03)])
+    def horizon_radiance(self, azimuths: int) -> Floats:
+        """(azimuths, 3) kcd/m² around the horizon, counter-clockwise from east: the colour of distant air.
+
+        Light is scattered more than once before it comes from there, so it is half the direction's and half that of
+        all; glare about the sun is bounded.
+        """
+        angles = np.linspace(0, 2 * math.pi, azimuths, endpoint=False)
+        ring = np.column_stack([np.cos(angles), np.sin(angles), np.full_like(angles, 0.04)])
         clear = self._clear(ring / np.linalg.norm(ring, axis=1, keepdims=True))
-        haze = np.minimum(clear, 4 * np.median(clear, axis=0)).mean(axis=0)
-        return np.asarray((1 - self.cloud_cover) * haze + self.cloud_cover * self._cloud_base())
+        clear = np.minimum(clear, 2.5 * np.median(clear, axis=0))
+        mixed = 0.5 * clear + 0.5 * clear.mean(axis=0)
+        return np.asarray((1 - self.cloud_cover) * mixed + self.cloud_cover * self._cloud_base())
 
     def _ground(self) -> Floats:
         zenith = self._above(np.array([[0.0, 0.0, 1.0]]))[0]
@@ -152,7 +158,8 @@ class Sky:
         """(3,) mean radiance of clouds: bright when they are few, a third as bright when they cover everything."""
         beam = _beam_klx(math.asin(self.towards_sun[2]), self.turbidity)
         global_klx = beam * self.towards_sun[2] + 0.18 * beam.mean()
-        grey = 0.6 * global_klx.mean() + 0.4 * global_klx
+        tint = 0.4 - 0.3 * self.cloud_cover
+        grey = (1 - tint) * global_klx.mean() + tint * global_klx
         return np.asarray((0.72 - 0.36 * self.cloud_cover) * grey / math.pi)
 
     def _clouds(self, noise: Floats, height: Floats, towards_sun: Floats) -> Floats:
@@ -210,36 +217,16 @@ def _perez_zenith(name: str, turbidity: float, sun_zenith_rad: float) -> float:
     return float(_perez(name, turbidity, np.array(1.0), np.array(math.cos(sun_zenith_rad))))
 
 
-_TILE = 1024
 _OCTAVES = (4, 8, 16, 32, 64, 128, 256)
-_tile_cache: list[npt.NDArray[np.float32]] = []
 
 
+@cache
 def _cloud_tile() -> npt.NDArray[np.float32]:
-    """(1024, 1024) periodic fractal noise whose values are spread evenly over 0..1; the same in every process."""
-    if not _tile_cache:
-        rng = derive_rng(0, "sky", "clouds")
-        total = np.zeros((_TILE, _TILE), np.float32)
-        for octave in _OCTAVES:
-            grid = rng.random((octave, octave)).astype(np.float32)
-            # Two cells more on each side make the interpolation meet itself at the borders.
-            cell = _TILE // octave
-            padded = np.pad(grid, 2, mode="wrap")
-            fine = cv2.resize(padded, None, fx=cell, fy=cell, interpolation=cv2.INTER_CUBIC)
-            total += fine[2 * cell : 2 * cell + _TILE, 2 * cell : 2 * cell + _TILE] * np.float32(octave**-0.85)
-        ranks = np.empty(total.size, np.float32)
-        ranks[np.argsort(total, axis=None, kind="stable")] = np.linspace(0, 1, total.size, dtype=np.float32)
-        _tile_cache.append(ranks.reshape(total.shape))
-    return _tile_cache[0]
+    """(`TILE_PX`, `TILE_PX`) noise, the same in every process."""
+    return periodic_noise(derive_rng(0, "sky", "clouds"), _OCTAVES, 0.85)
 
 
 def _cloud_noise(directions: Floats) -> Floats:
     """(N, 3) directions to (N,) noise on a layer of clouds that the Earth's curve brings down at the horizon."""
-    reach = 0.16 * _TILE / (np.maximum(directions[:, 2], 0.0) + 0.1)
-    x, y = ((directions[:, axis] * reach % _TILE).astype(np.float32) for axis in (0, 1))
-    # OpenCV's remap takes at most 32767 columns: the list is folded into rows.
-    width = 4096
-    rows = -(-len(directions) // width)
-    folded = [np.resize(values, (rows, width)) for values in (x, y)]
-    sampled = cv2.remap(_cloud_tile(), folded[0], folded[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
-    return np.asarray(sampled.reshape(-1)[: len(directions)], dtype=np.float64)
+    reach = 0.16 * TILE_PX / (np.maximum(directions[:, 2], 0.0) + 0.1)
+    return sampled(_cloud_tile(), directions[:, 0] * reach, directions[:, 1] * reach).astype(np.float64)

@@ -9,6 +9,7 @@ import numpy as np
 
 from gear.config.nodes import Mapping, Scalar, parse_file
 from gear.config.reader import read_node
+from gear.values.frames import UInt8Image
 from gear.values.resources import data_dir
 from gear.values.scene import Weather
 from gear.world.light import FACE_ORDER, FILAMENT_LUX, Floats, Lighting, encode_srgb, lighting_of
@@ -19,7 +20,6 @@ WET_LABELS = frozenset({"road", "road_marking", "sidewalk", "parking", "ground"}
 
 _WET_DARKENING = 0.45
 _WET_SMOOTHING = 0.7
-_DENSEST_FOG_PER_M = 0.05
 _CLASSIC_WHITE = 1.1
 _CLASSIC_SKY_SHARE = (0.4, 0.95)
 _CLASSIC_TINT = 0.2
@@ -46,7 +46,6 @@ def apply_weather(root: mjcf.RootElement, weather: Weather) -> None:
     """Puts a weather into a composed world, in place of the light that its town came with.
 
     - a light `sun`, a texture `sky` as the sky's picture, and the same picture as a light for Filament;
-    - haze, for Filament;
     - wet materials: what lies open to the rain is darker and smoother;
     - colours of materials and geoms are read as linear albedo by both renderers.
 
@@ -55,7 +54,6 @@ def apply_weather(root: mjcf.RootElement, weather: Weather) -> None:
     _remove_old_light(root)
     _add_sky(root, lighting)
     _add_sun(root, lighting)
-    _add_haze(root, weather, lighting)
     _wet(root, wetness(weather))
     root.custom.add("text", name="filament.material.base_color_type", data="linear")
     # Gear's renderers have their own, which costs less and loses no memory.
@@ -65,12 +63,6 @@ def apply_weather(root: mjcf.RootElement, weather: Weather) -> None:
 def wetness(weather: Weather) -> float:
     """How wet open ground is, 0..1: by itself, by its puddles or by the rain that falls."""
     return float(min(1.0, max(weather.wetness, 1.4 * weather.precipitation_deposits, weather.precipitation) / 100))
-
-
-def fog_per_m(weather: Weather) -> float:
-    """Extinction of the air. CARLA's percent run from clear air to a thick fog; rain adds its own veil."""
-    fog = _DENSEST_FOG_PER_M * (weather.fog_density / 100) ** 1.5
-    return float(weather.scattering_intensity * (fog + 0.0008 * (weather.precipitation / 100) ** 2))
 
 
 def _remove_old_light(root: mjcf.RootElement) -> None:
@@ -85,17 +77,23 @@ def _remove_old_light(root: mjcf.RootElement) -> None:
 
 
 def _add_sky(root: mjcf.RootElement, lighting: Lighting) -> None:
-    strip = cv2.imencode(".png", lighting.sky_faces[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 1])[1].tobytes()
-    sky = root.asset.add(
+    """The sky as a picture, and as light what a street gets of it."""
+    _add_cube(root, "sky", "skybox", lighting.sky_faces)
+    street = _add_cube(root, "street_light", "cube", lighting.street_faces)
+    root.worldbody.add("light", name="sky", type="image", texture=street, intensity=FILAMENT_LUX, diffuse=(0, 0, 0))
+
+
+def _add_cube(root: mjcf.RootElement, name: str, kind: str, faces: UInt8Image) -> Any:
+    strip = cv2.imencode(".png", faces[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 1])[1].tobytes()
+    return root.asset.add(
         "texture",
-        name="sky",
-        type="skybox",
+        name=name,
+        type=kind,
         file=mjcf.Asset(strip, ".png"),
         gridsize=(6, 1),
         gridlayout=FACE_ORDER,
         colorspace="sRGB",
     )
-    root.worldbody.add("light", name="sky", type="image", texture=sky, intensity=FILAMENT_LUX, diffuse=(0, 0, 0))
 
 
 def _add_sun(root: mjcf.RootElement, lighting: Lighting) -> None:
@@ -128,22 +126,6 @@ def _add_sun(root: mjcf.RootElement, lighting: Lighting) -> None:
 
 def _display(light: Floats) -> Floats:
     return encode_srgb(light).astype(np.float64) / 255
-
-
-def _add_haze(root: mjcf.RootElement, weather: Weather, lighting: Lighting) -> None:
-    density = fog_per_m(weather)
-    if density <= 0:
-        return
-    for key, value in (
-        ("enabled", [1]),
-        ("color", list(lighting.haze)),
-        ("density", [density]),
-        ("distance", [weather.fog_distance_m]),
-        ("height_falloff", [0]),
-        ("maximum_opacity", [1]),
-        ("cut_off_distance", [1900]),
-    ):
-        root.custom.add("numeric", name=f"filament.fog.{key}", data=value)
 
 
 def _wet(root: mjcf.RootElement, amount: float) -> None:

@@ -78,10 +78,10 @@ def test_every_weather_has_a_fixed_setting() -> None:
     assert settings["ClearSunset"].exposure > settings["ClearNoon"].exposure > settings["CloudyNoon"].exposure
     for setting in settings.values():
         # A sunlit asphalt road (about a tenth of full scale) is mid-grey, a white wall is not blown out.
-        assert 85 < 255 * setting.curve(0.1) < 140
+        assert 75 < 255 * setting.curve(0.1) < 140
         assert 225 < 255 * setting.curve(0.85) < 252
     assert all(response_for("classic", weather) == IDENTITY for weather in PRESETS.values())
-    assert response_for("filament", Weather(name="x", sun_altitude_deg=-5)).exposure < 4
+    assert response_for("filament", Weather(name="x", sun_altitude_deg=-5)).exposure < 5
 
 
 def test_settings_out_of_range_are_refused() -> None:

@@ -13,10 +13,11 @@ from gear.contracts.rendering import Stage
 from gear.render import RENDERERS, open_renderer
 from gear.values.geometry import Intrinsics, RigidTransform
 from gear.values.scene import CameraRecord, Pose, Weather
-from gear.world.light import FACE_ORDER, WHITE_ALBEDO, face_directions, lighting_of
+from gear.world.air import air_of, darkroom_of, fog_per_m
+from gear.world.light import FACE_ORDER, WHITE_ALBEDO, face_directions, horizon_light, lighting_of, mirrored_light
 from gear.world.quiet_mjcf import mjcf
 from gear.world.sky import Sky
-from gear.world.weather import PRESETS, apply_weather, fog_per_m, wetness
+from gear.world.weather import PRESETS, apply_weather, wetness
 
 TOWN = """
 <mujoco model="town">
@@ -171,7 +172,8 @@ def test_white_walls_do_not_clip_and_shadows_keep_their_levels(name: str) -> Non
     sunlit = WHITE_ALBEDO * (light.sun / math.pi + light.ambient)
     assert 0.3 < sunlit.max() < 1.0
     assert WHITE_ALBEDO * light.ambient.min() * 255 > 10
-    assert (light.haze > 0.1).all() and (light.haze <= 1).all()
+    ring = horizon_light(PRESETS[name])
+    assert (ring > 0.1).all() and (ring <= 1).all()
 
 
 def test_a_weather_replaces_the_light_of_its_town() -> None:
@@ -183,8 +185,8 @@ def test_a_weather_replaces_the_light_of_its_town() -> None:
     level = math.cos(altitude)
     towards = (math.cos(azimuth) * level, math.sin(azimuth) * level, math.sin(altitude))
     np.testing.assert_allclose(-model.light("sun").dir, towards, atol=1e-6)
-    density = model.numeric("filament.fog.density").data[0]
-    assert density == pytest.approx(fog_per_m(PRESETS["ClearNoon"]))
+    numerics = {mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_NUMERIC, i) for i in range(model.nnumeric)}
+    assert "filament.fog.enabled" not in numerics, "fog is gear's own"
 
 
 def test_water_darkens_and_smooths_open_ground_only() -> None:
@@ -205,18 +207,45 @@ def test_wetness_and_fog_follow_their_parameters() -> None:
     assert fog_per_m(Weather(name="x", fog_density=50, scattering_intensity=0)) == 0
 
 
-def test_fog_hides_what_is_far() -> None:
-    contrasts = []
-    for density in (0.0, 60.0):
-        model = world(Weather(name="x", fog_density=density))
-        renderer = open_renderer("filament", model, quality="fast")
-        try:
-            rotation = np.array([[0, 0, 1.0], [-1.0, 0, 0], [0, -1.0, 0]])
-            (view,) = renderer.render(stage_of(model), (looking(rotation, (-28.0, 0, 2.0)),))
-        finally:
-            renderer.close()
-        assert view.linear_rgb is not None and view.geom_id is not None
-        pillar = view.linear_rgb[view.geom_id == 1].mean()
-        beside = view.linear_rgb[40:46, 20:30].mean()
-        contrasts.append(abs(pillar - beside))
+@pytest.mark.parametrize("name", RENDERERS)
+def test_fog_hides_what_is_far(name: str) -> None:
+    rotation = np.array([[0, 0, 1.0], [-1.0, 0, 0], [0, -1.0, 0]])
+    record = looking(rotation, (-28.0, 0, 2.0))
+    weathers = [Weather(name="x", fog_density=density, fog_falloff=0.0) for density in (0.0, 60.0)]
+    model = world(weathers[0])
+    renderer = open_renderer(name, model, quality="fast")
+    try:
+        (raw,) = renderer.render(stage_of(model), (record,))
+    finally:
+        renderer.close()
+    assert raw.linear_rgb is not None and raw.geom_id is not None and raw.depth_m is not None
+    veiled = [air_of(weather, name).veil(raw.linear_rgb, raw.depth_m, record).astype(float) for weather in weathers]
+    pillar = raw.geom_id == 1
+    contrasts = [np.abs(v[pillar].mean(axis=0) - v[raw.geom_id < 0].mean(axis=0)).mean() for v in veiled]
     assert contrasts[1] < 0.7 * contrasts[0]
+    expected = math.exp(-fog_per_m(weathers[1]) * (28 - 0.75))
+    through = air_of(weathers[1], name).transmittance(raw.depth_m, record)[pillar].mean()
+    assert through == pytest.approx(expected, rel=0.03)
+
+
+def test_distant_air_has_the_colour_of_the_horizon_behind_it() -> None:
+    weather = Weather(name="x", sun_azimuth_deg=0, sun_altitude_deg=15)
+    ring = horizon_light(weather)
+    assert ring[0].sum() > 1.3 * ring[32].sum(), "brighter towards the sun"
+    assert air_of(weather, "classic").ring[32].sum() > ring[32].sum(), "classic shows display values"
+
+
+def test_water_mirrors_houses_below_and_the_sky_above() -> None:
+    light = mirrored_light(Weather(name="x", sun_azimuth_deg=90, sun_altitude_deg=40), 32, 64)
+    assert light.shape == (32, 64, 3)
+    brightest = np.unravel_index(np.argmax(light.sum(axis=-1)), light.shape[:2])
+    assert abs(brightest[0] / 31 * 90 - 40) < 5 and abs(brightest[1] / 64 * 360 - 90) < 10
+    assert light[20, 48, 2] > 1.3 * light[20, 48, 0] and light[0, 48, 2] < 1.3 * light[0, 48, 0]
+
+
+def test_a_weather_says_what_the_camera_adds() -> None:
+    dry, wet = (darkroom_of(PRESETS[name], "filament", "t") for name in ("ClearNoon", "HardRainNoon"))
+    assert dry.puddles.share == 0 == dry.rain.intensity and wet.puddles.share > 0.2 and wet.rain.intensity == 1
+    assert wet.air.fog_per_m > 5 * dry.air.fog_per_m
+    still = darkroom_of(Weather(name="x", scattering_intensity=0, fog_density=50), "filament", "t").air
+    assert still.fog_per_m == 0 and not still.clear_per_m.any()

@@ -78,6 +78,7 @@ def resolve(config: CollectionConfig) -> Job:
         PatchError: the patch cannot be used.
         BackendError: the renderer cannot start here.
     """
+    config = with_scene_file(config)
     found = find("task", config.task)
     options = read_node(found.spec.config, config.options, "options")
     library = AssetLibrary.for_town(config.town)
@@ -109,6 +110,7 @@ def resolve(config: CollectionConfig) -> Job:
         "weather": to_json(weather),
         "renderer": to_json(renderer),
         "quality": config.quality,
+        "camera": to_json(config.camera),
         "assets": assets_digest(library),
         "versions": versions(),
     }
@@ -130,6 +132,21 @@ def resolve(config: CollectionConfig) -> Job:
         plan=plan,
         renderer=renderer,
     )
+
+
+def with_scene_file(config: CollectionConfig) -> CollectionConfig:
+    """Takes a scene given as a file apart: `my.yml:corner`, or `my.yml` where it holds only one.
+
+    Raises:
+        UnknownNameError: the file holds several scenes and none was named.
+    """
+    path, _, name = config.scene.rpartition(":") if ":" in config.scene else (config.scene, "", "")
+    if not path.endswith((".yml", ".yaml")):
+        return config
+    scenes = scene_library(path).scenes
+    if not name and len(scenes) > 1:
+        raise UnknownNameError("scene", config.scene, scenes, f"(say which: --scene {path}:{next(iter(scenes))})")
+    return dataclasses.replace(config, scenes=path, scene=name or next(iter(scenes)))
 
 
 def find_scene(config: CollectionConfig, town: str) -> SceneSpec:

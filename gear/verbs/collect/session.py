@@ -7,14 +7,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from gear.camera.response import Response, response_for
-from gear.contracts.rendering import RawView, Renderer
+from gear.camera.develop import Darkroom
+from gear.contracts.rendering import Renderer
 from gear.contracts.tasks import Encoded, Sample, Task
 from gear.plugins.build import build_task
 from gear.render.opening import open_renderer
-from gear.values.frames import Frame, View
-from gear.values.scene import CameraRecord, SceneRecord
+from gear.values.frames import Frame
+from gear.values.scene import SceneRecord
 from gear.verbs.collect.job import Job
+from gear.world.air import darkroom_of
 from gear.world.memory import release_memory
 from gear.world.planner import ScenePlanner
 from gear.world.world import World
@@ -29,7 +30,7 @@ class Session:
     world: World
     planner: ScenePlanner
     renderer: Renderer
-    response: Response
+    darkroom: Darkroom
 
     def record(self, index: int) -> SceneRecord:
         """The scene of one sample: a pure function of the job and the index."""
@@ -41,7 +42,8 @@ class Session:
         placed = self.world.place(record, self.job.patch.by_surface(names))
         raw = self.renderer.render(placed.stage, record.cameras)
         views = {
-            camera.name: _view(camera, view, self.response) for camera, view in zip(record.cameras, raw, strict=True)
+            camera.name: self.darkroom.view(view, camera, record, placed.geoms)
+            for camera, view in zip(record.cameras, raw, strict=True)
         }
         return Frame(views=views, geoms=placed.geoms, objects=placed.objects)
 
@@ -49,17 +51,6 @@ class Session:
         """Measures the frame and turns it into files; needs neither world nor renderer, so it can run beside them."""
         sample = self.task.ground_truth(frame, record)
         return sample, self.task.encode(sample, self.job.plan.info)
-
-
-def _view(camera: CameraRecord, raw: RawView, response: Response) -> View:
-    assert raw.linear_rgb is not None and raw.depth_m is not None and raw.geom_id is not None
-    return View(
-        camera=camera,
-        linear_rgb=raw.linear_rgb,
-        rgb=response.apply(raw.linear_rgb),
-        depth_m=raw.depth_m,
-        geom_id=raw.geom_id,
-    )
 
 
 @contextlib.contextmanager
@@ -71,7 +62,7 @@ def open_session(job: Job) -> Iterator[Session]:
     release_memory()
     try:
         planner = ScenePlanner(world, task.rig(), job.split, split_name=job.config.split)
-        response = response_for(job.config.renderer, job.weather)
-        yield Session(job=job, task=task, world=world, planner=planner, renderer=renderer, response=response)
+        darkroom = darkroom_of(job.weather, job.config.renderer, world.town_name, job.config.camera)
+        yield Session(job=job, task=task, world=world, planner=planner, renderer=renderer, darkroom=darkroom)
     finally:
         renderer.close()

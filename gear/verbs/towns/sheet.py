@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gear.camera.response import response_for
 from gear.config.collection import SplitConfig
 from gear.contracts.rendering import Quality
 from gear.render.opening import open_renderer
@@ -18,6 +17,7 @@ from gear.values.scene import Weather
 from gear.verbs.collect.run import Progress
 from gear.verbs.towns.canvas import Canvas
 from gear.verbs.towns.facts import Town
+from gear.world.air import darkroom_of
 from gear.world.planner import ScenePlanner
 from gear.world.scene_spec import SceneSpec
 from gear.world.world import World
@@ -84,16 +84,17 @@ def thumbnail(town: Town, name: str, scene: SceneSpec, options: SheetOptions) ->
         (view,) = renderer.render(placed.stage, record.cameras)
     finally:
         renderer.close()
-    assert view.linear_rgb is not None and view.geom_id is not None and view.depth_m is not None
+    assert view.geom_id is not None and view.depth_m is not None
     seen = []
     for face in world.faces:
         pixels = view.geom_id == face.geom_id
         where = f"{np.nanmean(view.depth_m[pixels]):.0f} m ahead, " if pixels.any() else ""
         seen.append(f"{face.asset} {where}{pixels.mean():.1%} of the picture")
     others = len(record.actors) - 1
-    return response_for(options.renderer, options.weather).apply(view.linear_rgb), "; ".join(
-        [*seen, f"{others} other road users"]
+    shown = darkroom_of(options.weather, options.renderer, world.town_name).view(
+        view, record.cameras[0], record, placed.geoms
     )
+    return shown.rgb, "; ".join([*seen, f"{others} other road users"])
 
 
 def _complaint(error: PlacementError, options: SheetOptions) -> UInt8Image:

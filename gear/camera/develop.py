@@ -1,0 +1,87 @@
+"""From what a renderer returns to a view: air, water, the camera's effects and its response, each in its turn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gear.camera.air import Air
+from gear.camera.optics import motion_blurred, noisy, through_lens, vignetted
+from gear.camera.puddles import Puddles
+from gear.camera.rain import Rain
+from gear.camera.response import Response
+from gear.contracts.rendering import RawView
+from gear.values.frames import GeomTable, UInt16Image, View
+from gear.values.labels import LABEL_BY_NAME
+from gear.values.optics import CameraEffects
+from gear.values.rng import derive_rng
+from gear.values.scene import CameraRecord, SceneRecord
+
+PUDDLE_CODES = [LABEL_BY_NAME[name].code for name in ("road", "road_marking", "parking", "ground")]
+"""Level ground on which water stands."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Darkroom:
+    """Develops the frames of one renderer in one weather. All but noise and the last step is linear in every albedo.
+
+    Attributes:
+        response: exposure and tone curve.
+        air: fog and haze.
+        puddles: standing water.
+        rain: falling water.
+        effects: of the camera.
+    """
+
+    response: Response
+    air: Air
+    puddles: Puddles
+    rain: Rain
+    effects: CameraEffects
+
+    def view(self, raw: RawView, camera: CameraRecord, record: SceneRecord, geoms: GeomTable) -> View:
+        """One view: colour with everything that the weather and the camera add, and truth aligned with it.
+
+        Args:
+            raw: colour and truth of a renderer.
+            camera: who looks.
+            record: the scene, for its seed and the ego car's motion.
+            geoms: what each geom is.
+        """
+        assert raw.linear_rgb is not None and raw.depth_m is not None and raw.geom_id is not None
+        seen = replace(raw, linear_rgb=self._weathered(raw, camera, record, geoms))
+        assert seen.linear_rgb is not None and seen.depth_m is not None and seen.geom_id is not None
+        if self.effects.shutter_s > 0:
+            speed = record.ego.velocity_world_mps
+            blurred = motion_blurred(seen.linear_rgb, seen.depth_m, camera, speed, self.effects.shutter_s)
+            seen = replace(seen, linear_rgb=blurred)
+        if self.effects.lens.bends:
+            seen = through_lens(seen, camera, self.effects.lens)
+        assert seen.linear_rgb is not None and seen.depth_m is not None and seen.geom_id is not None
+        linear_rgb = seen.linear_rgb
+        if self.effects.vignette > 0:
+            linear_rgb = vignetted(linear_rgb, self.effects.vignette)
+        if self.effects.shot_noise > 0 or self.effects.read_noise > 0:
+            rng = derive_rng(record.seed, "camera", record.index, camera.name)
+            linear_rgb = noisy(linear_rgb, self.effects.shot_noise, self.effects.read_noise, rng)
+        return View(
+            camera=camera,
+            linear_rgb=linear_rgb,
+            rgb=self.response.apply(linear_rgb),
+            depth_m=seen.depth_m,
+            geom_id=seen.geom_id,
+        )
+
+    def _weathered(self, raw: RawView, camera: CameraRecord, record: SceneRecord, geoms: GeomTable) -> UInt16Image:
+        assert raw.linear_rgb is not None and raw.depth_m is not None and raw.geom_id is not None
+        linear_rgb = raw.linear_rgb
+        if self.puddles.share > 0:
+            # The last entry is what id -1, nothing, finds.
+            holds_water = np.append(np.isin(geoms.label_code, PUDDLE_CODES), False)
+            linear_rgb = self.puddles.lay(linear_rgb, raw.depth_m, holds_water[raw.geom_id], camera)
+        linear_rgb = self.air.veil(linear_rgb, raw.depth_m, camera)
+        if self.rain.intensity > 0:
+            rng = derive_rng(record.seed, "rain", record.index, camera.name)
+            linear_rgb = self.rain.fall(linear_rgb, raw.depth_m, camera, record.ego.velocity_world_mps, rng)
+        return linear_rgb

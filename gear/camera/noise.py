@@ -1,0 +1,45 @@
+"""Periodic fractal noise: one tile that meets itself at its borders."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from gear.values.geometry import Array
+
+TILE_PX = 1024
+_FOLD = 4096
+
+
+def periodic_noise(rng: np.random.Generator, octaves: Sequence[int], slope: float) -> npt.NDArray[np.float32]:
+    """(`TILE_PX`, `TILE_PX`) noise whose values are spread evenly over 0..1.
+
+    Args:
+        rng: draws the cells.
+        octaves: cells to a side, each a divisor of `TILE_PX`.
+        slope: an octave of n cells weighs n to the minus this power.
+    """
+    total = np.zeros((TILE_PX, TILE_PX), np.float32)
+    for octave in octaves:
+        grid = rng.random((octave, octave)).astype(np.float32)
+        # Two cells more on each side make the interpolation meet itself at the borders.
+        cell = TILE_PX // octave
+        padded = np.pad(grid, 2, mode="wrap")
+        fine = cv2.resize(padded, None, fx=cell, fy=cell, interpolation=cv2.INTER_CUBIC)
+        total += fine[2 * cell : 2 * cell + TILE_PX, 2 * cell : 2 * cell + TILE_PX] * np.float32(octave**-slope)
+    ranks = np.empty(total.size, np.float32)
+    ranks[np.argsort(total, axis=None, kind="stable")] = np.linspace(0, 1, total.size, dtype=np.float32)
+    return ranks.reshape(total.shape)
+
+
+def sampled(picture: npt.NDArray[np.float32], x: Array, y: Array) -> npt.NDArray[np.float32]:
+    """A periodic picture at (N,) places in its pixels, bilinear: (N,) or (N, channels)."""
+    # OpenCV's remap takes at most 32767 columns: the list is folded into rows.
+    rows = -(-len(x) // _FOLD)
+    height, width = picture.shape[:2]
+    folded = [np.resize((v % side).astype(np.float32), (rows, _FOLD)) for v, side in ((x, width), (y, height))]
+    found = cv2.remap(picture, folded[0], folded[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
+    return np.asarray(found.reshape(-1, *picture.shape[2:])[: len(x)], dtype=np.float32)

@@ -1,0 +1,140 @@
+"""Falling rain: streaks of drops in the air, before or behind what the depth says.
+
+    L' = L (1 - a) + D a
+
+a, what drops cover, comes from a generator of the sample's own and from depth; D is the light in a drop, the sky's.
+Neither knows of any albedo, so frames stay linear and twins see the same drops.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from gear.values.frames import LINEAR_FULL_SCALE, FloatImage, UInt16Image
+from gear.values.geometry import Array
+from gear.values.scene import CameraRecord, Vec3
+
+SHUTTER_S = 1 / 120
+"""How long a streak is drawn out."""
+
+FALL_MPS = 7.5
+DROPS_PER_M3 = 16.0
+"""Drops that can be told apart, in the hardest rain."""
+
+DROP_M = 0.0022
+_LAYERS_M = (0.8, 2.0, 4.0, 8.0, 14.0)
+_WIND_MPS = 6.0
+_OPACITY = 0.8
+_SHIFT = 4
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Rain:
+    """The rain of one weather.
+
+    Attributes:
+        intensity: 0..1.
+        wind_world_mps: drops drift so fast.
+        light: (3,) of the sky in a drop; 1.0 is the frame's full scale.
+    """
+
+    intensity: float
+    wind_world_mps: Vec3
+    light: Array
+
+    @staticmethod
+    def of(precipitation: float, wind_intensity: float, light: Array) -> Rain:
+        """From CARLA's percent; the wind blows from the west."""
+        wind = (_WIND_MPS * wind_intensity / 100, 0.25 * _WIND_MPS * wind_intensity / 100, 0.0)
+        return Rain(intensity=precipitation / 100, wind_world_mps=wind, light=light)
+
+    def fall(
+        self,
+        linear_rgb: UInt16Image,
+        depth_m: FloatImage,
+        camera: CameraRecord,
+        velocity_world_mps: Vec3,
+        rng: np.random.Generator,
+    ) -> UInt16Image:
+        """The frame with rain before it.
+
+        Args:
+            linear_rgb: (H, W, 3) uint16, 0..`LINEAR_FULL_SCALE`.
+            depth_m: (H, W) float32 planar z, NaN where nothing is.
+            camera: who looks.
+            velocity_world_mps: of the camera.
+            rng: of this sample and camera.
+
+        Returns:
+            (H, W, 3) uint16, a new array, rounded.
+        """
+        if self.intensity <= 0:
+            return linear_rgb.copy()
+        cover = self.cover(depth_m, camera, velocity_world_mps, rng)[..., None]
+        drop = (np.asarray(self.light) * LINEAR_FULL_SCALE).astype(np.float32)
+        return np.asarray(linear_rgb + cover * (drop - linear_rgb) + np.float32(0.5), dtype=np.uint16)
+
+    def cover(
+        self, depth_m: FloatImage, camera: CameraRecord, velocity_world_mps: Vec3, rng: np.random.Generator
+    ) -> FloatImage:
+        """(H, W) float32 in 0..1, how much of each pixel drops cover."""
+        falling = np.array([*self.wind_world_mps[:2], -FALL_MPS]) - np.asarray(velocity_world_mps)
+        motion = camera.world_from_camera_transform.rotation.T @ falling * SHUTTER_S
+        clear = np.ones(depth_m.shape, np.float32)
+        for near_m, far_m in pairwise(_LAYERS_M):
+            layer = self._layer(camera, near_m, far_m, motion, rng)
+            # What is nearer than the layer's middle hides it.
+            hidden = depth_m < math.sqrt(near_m * far_m)
+            layer[hidden] = 0
+            clear *= 1 - layer.astype(np.float32) * np.float32(1 / 255)
+        return 1 - clear
+
+    def _layer(
+        self, camera: CameraRecord, near_m: float, far_m: float, motion: Array, rng: np.random.Generator
+    ) -> npt.NDArray[np.uint8]:
+        """(H, W) uint8 cover of the drops between two depths."""
+        half_x, half_y = camera.width_px / (2 * camera.focal_px), camera.height_px / (2 * camera.focal_px)
+        volume = 4 * half_x * half_y * (far_m**3 - near_m**3) / 3
+        count = int(rng.poisson(min(volume * DROPS_PER_M3 * self.intensity, 6000)))
+        # Evenly in the volume of the pyramid between the two depths.
+        depth = np.cbrt(near_m**3 + rng.random(count) * (far_m**3 - near_m**3))
+        start = np.column_stack(
+            [depth * half_x * rng.uniform(-1.1, 1.1, count), depth * half_y * rng.uniform(-1.3, 1.1, count), depth]
+        )
+        strength = rng.uniform(0.35, 1.0, count)
+        end = start + motion
+        end[:, 2] = np.maximum(end[:, 2], 0.3)
+        ends = [self._pixels(points, camera) for points in (start, end)]
+        width_px = camera.focal_px * DROP_M / depth
+        length_px = np.linalg.norm(ends[1] - ends[0], axis=1)
+        # A drop is smeared over its streak: the longer, the fainter; thinner than a pixel, fainter again.
+        smear = np.minimum(1.0, 6 * np.maximum(width_px, 0.5) / np.maximum(length_px, 1.0)) ** 0.5
+        opacity = 255 * _OPACITY * strength * np.minimum(width_px, 1.0) * smear
+        canvas = np.zeros((camera.height_px, camera.width_px), np.uint8)
+        scaled = [np.round(points * (1 << _SHIFT)).astype(np.int32) for points in ends]
+        order = np.argsort(opacity, kind="stable")
+        for i in order:
+            cv2.line(
+                canvas,
+                (int(scaled[0][i, 0]), int(scaled[0][i, 1])),
+                (int(scaled[1][i, 0]), int(scaled[1][i, 1])),
+                float(opacity[i]),
+                max(1, round(float(width_px[i]))),
+                cv2.LINE_AA,
+                _SHIFT,
+            )
+        blur = min(2.0, 0.35 * camera.focal_px * DROP_M / near_m)
+        return np.asarray(cv2.GaussianBlur(canvas, (0, 0), blur) if blur > 0.4 else canvas, dtype=np.uint8)
+
+    @staticmethod
+    def _pixels(points_m: Array, camera: CameraRecord) -> Array:
+        pixels = camera.focal_px * points_m[:, :2] / points_m[:, 2:]
+        return np.asarray(
+            np.clip(pixels + np.array([(camera.width_px - 1) / 2, (camera.height_px - 1) / 2]), -3e4, 3e4)
+        )

@@ -1,0 +1,93 @@
+"""A weather as the camera needs it: CARLA's fog, what clear air scatters, rain and puddles."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gear.camera.air import Air
+from gear.camera.develop import Darkroom
+from gear.camera.puddles import Puddles
+from gear.camera.rain import Rain
+from gear.camera.response import encode_srgb, response_for
+from gear.values.optics import CameraEffects
+from gear.values.scene import Weather
+from gear.world.light import Floats, horizon_light, mirrored_light
+
+DENSEST_FOG_PER_M = 0.05
+"""Extinction of CARLA's 100 percent: what is 60 m away can no longer be told."""
+
+RAIN_PER_M = 0.0035
+"""Extinction of the hardest rain."""
+
+AEROSOL_PER_M = 1.6e-4
+"""Extinction of a town's clear air by dust and vapour: 24 km of sight, as on a good day."""
+
+MOLECULES_PER_M = (7.6e-6, 1.16e-5, 2.3e-5)
+"""Rayleigh's extinction at 610, 550 and 465 nm, at sea level."""
+
+FALLOFF_PER_M = 0.0693
+"""A falloff of 1 halves the fog every ten metres, as the engine below CARLA does."""
+
+
+FULL_PUDDLES = 0.32
+"""Share of open ground under water at 100 percent of deposits."""
+
+DROP_LIGHT = 1.25
+"""A drop shows a wide piece of the sky, brighter than the horizon."""
+
+_MIRROR_ROWS, _MIRROR_COLUMNS = 128, 512
+
+
+def darkroom_of(weather: Weather, renderer_name: str, town: str, effects: CameraEffects | None = None) -> Darkroom:
+    """What develops a renderer's frames of a weather in a town.
+
+    Args:
+        weather: light and air.
+        renderer_name: who renders.
+        town: its puddles lie where they always lie.
+        effects: of the camera; none unless given.
+    """
+    air = air_of(weather, renderer_name)
+    mirrored = _shown(mirrored_light(weather, _MIRROR_ROWS, _MIRROR_COLUMNS), renderer_name)
+    return Darkroom(
+        response=response_for(renderer_name, weather),
+        air=air,
+        puddles=Puddles(
+            town=town,
+            share=FULL_PUDDLES * weather.precipitation_deposits / 100,
+            ripples=min(1.0, 1.5 * weather.precipitation / 100),
+            mirrored=mirrored.astype(np.float32),
+        ),
+        rain=Rain.of(
+            weather.precipitation,
+            weather.wind_intensity,
+            np.minimum(_shown(DROP_LIGHT * horizon_light(weather).mean(axis=0), renderer_name), 1.0),
+        ),
+        effects=effects or CameraEffects(),
+    )
+
+
+def _shown(light: Floats, renderer_name: str) -> Floats:
+    """Light in units of a renderer's frames: classic's hold display values."""
+    return encode_srgb(light) if renderer_name == "classic" else light
+
+
+def air_of(weather: Weather, renderer_name: str) -> Air:
+    """The air of a weather, in the units of a renderer's frames."""
+    aerosol = AEROSOL_PER_M * weather.mie_scattering_scale / 0.03
+    molecules = np.array(MOLECULES_PER_M) * weather.rayleigh_scattering_scale / 0.0331
+    return Air(
+        fog_per_m=fog_per_m(weather),
+        fog_from_m=weather.fog_distance_m,
+        fog_thinning_per_m=FALLOFF_PER_M * weather.fog_falloff,
+        clear_per_m=weather.scattering_intensity * (aerosol + molecules),
+        ring=_shown(horizon_light(weather), renderer_name),
+    )
+
+
+def fog_per_m(weather: Weather) -> float:
+    """Extinction of the fog on the ground. CARLA's percent run from clear air to a thick fog; rain adds its veil."""
+    fog = DENSEST_FOG_PER_M * (weather.fog_density / 100) ** 1.5
+    return float(weather.scattering_intensity * (fog + RAIN_PER_M * math.pow(weather.precipitation / 100, 1.5)))
