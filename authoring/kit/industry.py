@@ -111,15 +111,21 @@ def petrol_station(rng: np.random.Generator) -> list[Part]:
         for u in (-7.5, 7.5):
             sink.swatch_box("galvanised", (u - 0.2, v - 0.2, 0), (u + 0.2, v + 0.2, low), skip="zZ", label="pole")
         for u in (-4.0, 0.0, 4.0):
-            sink.tiled_box("concrete", (u - 1.5, v - 0.55, 0), (u + 1.5, v + 0.55, 0.14), tile_m=4, skip="z", label="static")
-            sink.swatch_box("plastic_white", (u - 0.5, v - 0.3, 0.14), (u + 0.5, v + 0.3, 1.55), skip="z", label="static")
+            sink.tiled_box(
+                "concrete", (u - 1.5, v - 0.55, 0), (u + 1.5, v + 0.55, 0.14), tile_m=4, skip="z", label="static"
+            )
+            sink.swatch_box(
+                "plastic_white", (u - 0.5, v - 0.3, 0.14), (u + 0.5, v + 0.3, 1.55), skip="z", label="static"
+            )
             sink.swatch_box("signal_green", (u - 0.52, v - 0.32, 1.55), (u + 0.52, v + 0.32, 2.0), label="static")
             for face in (-1.0, 1.0):
                 near = sorted((v + face * 0.3, v + face * 0.33))
                 sink.swatch_box("dark_glass", (u - 0.35, near[0], 1.0), (u + 0.35, near[1], 1.4), label="static")
                 for side in (-0.3, 0.3):
                     near = sorted((v + face * 0.3, v + face * 0.42))
-                    sink.swatch_box("rubber", (u + side - 0.05, near[0], 0.6), (u + side + 0.05, near[1], 0.95), label="static")
+                    sink.swatch_box(
+                        "rubber", (u + side - 0.05, near[0], 0.6), (u + side + 0.05, near[1], 0.95), label="static"
+                    )
     return sink.parts()
 
 
@@ -168,7 +174,9 @@ def _docks(sink: Sink, x0: float, x1: float, front: float) -> None:
         sink.swatch_box("signal_yellow", (u - 0.4, front - 0.05, high + 0.6), (u + 0.4, front, high + 1.2), skip="Y")
     sink.swatch_box("zinc_roof", (x0, front - 2.2, DOCK_FLOOR_M + 4.55), (x1, front, DOCK_FLOOR_M + 4.75), skip="Y")
     for u in np.linspace(x0 + 0.2, x1 - 0.2, count + 1):
-        sink.swatch_box("galvanised", (u - 0.05, front - 2.1, DOCK_FLOOR_M + 4.75), (u + 0.05, front, DOCK_FLOOR_M + 4.85))
+        sink.swatch_box(
+            "galvanised", (u - 0.05, front - 2.1, DOCK_FLOOR_M + 4.75), (u + 0.05, front, DOCK_FLOOR_M + 4.85)
+        )
 
 
 def _office(sink: Sink, x0: float, x1: float, front: float, top: float) -> None:
@@ -184,7 +192,9 @@ def _office(sink: Sink, x0: float, x1: float, front: float, top: float) -> None:
                 _picture(sink, "shop_fronts", door_rect("glass_double"), u - 0.9, u + 0.9, 0.0, 2.4, face)
                 sink.swatch_box("anthracite", (u - 1.5, face - 1.3, 2.6), (u + 1.5, face + 0.03, 2.8))
                 continue
-            sink.swatch_box("white_paint", (u - 0.98, face - 0.02, low - 0.08), (u + 0.98, face + 0.03, low + 1.58), skip="Y")
+            sink.swatch_box(
+                "white_paint", (u - 0.98, face - 0.02, low - 0.08), (u + 0.98, face + 0.03, low + 1.58), skip="Y"
+            )
             sink.swatch_quad("grey_glass", [(u - 0.9, face - 0.03, low), (u + 0.9, face - 0.03, low),
                                             (u + 0.9, face - 0.03, low + 1.5), (u - 0.9, face - 0.03, low + 1.5)])  # fmt: skip
 

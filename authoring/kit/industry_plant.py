@@ -130,7 +130,8 @@ def quay_crane(height_m: float = 62.0, *, swatch: str = "signal_blue", raised: b
         strut(sink, np.array([0.0, -12.0, height_m]), np.array([x, 30.0, deck + 3.0]), 0.3, swatch)
     for share in np.linspace(0.1, 1, 7):
         middle = hinge + (tip - hinge) * share
-        strut(sink, middle - (2.5, 0, 0), middle + (2.5, 0, 0), 0.5, swatch)
+        side = np.array([2.5, 0.0, 0.0])
+        strut(sink, middle - side, middle + side, 0.5, swatch)
     sink.swatch_box("white_paint", (-3.5, 12.0, deck + 3.6), (3.5, 24.0, deck + 9.0))
     sink.swatch_box("dark_glass", (3.2, -20.0, deck - 2.5), (5.6, -17.0, deck + 0.5))
     return sink.parts()

@@ -11,7 +11,7 @@ from authoring.materials.freight import LINERS, container_rect, panel_rect
 
 CONTAINER_M = (12.19, 2.44, 2.59)
 SHORT_M = 6.06
-NET_PITCH_M = 0.42
+NET_PITCH_M = 0.5
 
 
 def container(sink: Sink, liner: int, x: float, y: float, z: float, *, short: bool = False) -> None:
@@ -66,8 +66,12 @@ def pallets(rng: np.random.Generator) -> list[Part]:
         elif kind == 1:
             for level in range(int(rng.integers(1, 3))):
                 swatch = str(rng.choice(["canvas_sand", "plastic_white", "signal_blue", "teal_paint"]))
-                sink.swatch_box("weathered_wood", (x - 0.6, y - 0.5, level * 1.3), (x + 0.6, y + 0.5, level * 1.3 + 0.14))
-                sink.swatch_box(swatch, (x - 0.58, y - 0.48, level * 1.3 + 0.14), (x + 0.58, y + 0.48, level * 1.3 + 1.3), skip="z")
+                sink.swatch_box(
+                    "weathered_wood", (x - 0.6, y - 0.5, level * 1.3), (x + 0.6, y + 0.5, level * 1.3 + 0.14)
+                )
+                sink.swatch_box(
+                    swatch, (x - 0.58, y - 0.48, level * 1.3 + 0.14), (x + 0.58, y + 0.48, level * 1.3 + 1.3), skip="z"
+                )
         elif kind == 2:
             sink.swatch_box("plastic_white", (x - 0.55, y - 0.45, 0.15), (x + 0.55, y + 0.45, 1.1))
             for z in (0.0, 0.4, 0.75, 1.1):
@@ -153,7 +157,9 @@ def direction_sign(panel: int, *, width_m: float = 5.0) -> list[Part]:
 
 def _panel(sink: Sink, panel: int, y: float, z: float, width_m: float, *, front: float = -0.72) -> None:
     half, high = width_m / 2, width_m / 2
-    sink.swatch_box("galvanised", (front + 0.005, y - half, z), (front + 0.07, y + half, z + high), label="traffic_sign")
+    sink.swatch_box(
+        "galvanised", (front + 0.005, y - half, z), (front + 0.07, y + half, z + high), label="traffic_sign"
+    )
     u0, v0, u1, v1 = panel_rect(panel)
     corners = [(front, y + half, z), (front, y - half, z), (front, y - half, z + high), (front, y + half, z + high)]
     sink.polygon("direction_signs", corners, [(u0, v0), (u1, v0), (u1, v1), (u0, v1)], label="traffic_sign")

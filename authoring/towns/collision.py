@@ -31,12 +31,12 @@ class Solid:
     quaternion: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
 
 
-def town_solids(regions: Regions, lots: Iterable[Lot]) -> Iterator[Solid]:
-    """All collision geoms of streets, blocks, bridges and buildings."""
+def town_solids(regions: Regions, lots: Iterable[Lot], *, reach_m: float = REACH_M) -> Iterator[Solid]:
+    """All collision geoms of streets, blocks, bridges and buildings, sidewalks as far out as `reach_m`."""
     yield Solid("ground.road", "plane", (0.0, 0.0, 0.0), (500.0, 500.0, 1.0))
     for index, land in enumerate(regions.blocks):
         for rim in solids.boundary_towards(land, regions.level_roads):
-            yield from _strips(f"ground.sidewalk_{index}", rim)
+            yield from _strips(f"ground.sidewalk_{index}", rim, reach_m)
     for name, median in regions.medians.items():
         yield from _around(f"ground.median_{name}", median)
     for street in regions.network.streets.values():
@@ -60,7 +60,7 @@ def level_box(name: str, footprint: Polygon, top_m: float) -> Solid:
     return Solid(name, "box", (float(centre[0]), float(centre[1]), top_m - BASE_M / 2), half, _turned(yaw))
 
 
-def _strips(name: str, rim: Array) -> Iterator[Solid]:
+def _strips(name: str, rim: Array, reach_m: float) -> Iterator[Solid]:
     """Boxes along a kerb, the land on its left; where the rim turns away they reach into the gap."""
     rim = np.asarray(LineString(rim).simplify(0.02).coords)
     steps = np.diff(rim, axis=0)
@@ -76,7 +76,7 @@ def _strips(name: str, rim: Array) -> Iterator[Solid]:
         while high - low > 0.02:
             piece = min(high - low, 60.0)
             centre = start + along * (low + piece / 2) + inward * STRIP_M / 2
-            if np.abs(centre).max() < REACH_M:
+            if np.abs(centre).max() < reach_m:
                 yield Solid(
                     f"{name}_{centre[0]:.1f}_{centre[1]:.1f}_{np.degrees(np.arctan2(along[1], along[0])):.0f}",
                     "box",

@@ -9,6 +9,7 @@ import numpy as np
 from shapely.geometry import LineString  # type: ignore[import-untyped]
 from shapely.ops import unary_union  # type: ignore[import-untyped]
 
+from authoring import kit
 from authoring.kit.parts import Sink
 from authoring.mesh import write_obj
 from authoring.towns import harbour, solids
@@ -30,6 +31,8 @@ from authoring.towns.walks import crosswalks, sidewalks
 
 CELL_M = 110.0
 SEED = 12
+# How far out sidewalks are solid: beyond the bounds, for the roads that leave.
+SOLID_M = 290.0
 # What stands along the estate's sidewalks now and then.
 EXTRAS = ("bin", "bench", "cable_box") + ("none",) * 17
 
@@ -69,12 +72,13 @@ def write_harbour(folder: Path) -> None:
         furnisher.bus_stop(regions.network.streets[name], side, share)
     for street in regions.network.streets.values():
         furnisher.street(street)
-    furnish_motorway(props, regions, furnisher, rng=np.random.default_rng([SEED, 4]))
+    hedge = kit.hedge(14.0, 1.4, 1.3, np.random.default_rng([SEED, 7]))
+    furnish_motorway(props, regions, furnisher, hedge, rng=np.random.default_rng([SEED, 4]))
     build_surroundings(sink, rng=np.random.default_rng([SEED, 5]))
     taken = unary_union(
         [yards.ground(), regions.carriageways, regions.sidewalks, regions.corridors, regions.canal, QUAY, WATER]
     )
-    plant_fields(props, furnisher, taken, rng=np.random.default_rng([SEED, 6]))
+    plant_fields(props, furnisher, taken, hedge, rng=np.random.default_rng([SEED, 6]))
     _write(folder, sink, props, regions, lanes, yards)
 
 
@@ -95,9 +99,7 @@ def _lay_ground(sink: Sink, regions: Regions, yards: Yards) -> None:
         solids.flat(sink, land.difference(bare), KERB_M, "grass", "terrain")
 
 
-def _write(
-    folder: Path, sink: Sink, props: Props, regions: Regions, lanes: dict[str, Lane], yards: Yards
-) -> None:
+def _write(folder: Path, sink: Sink, props: Props, regions: Regions, lanes: dict[str, Lane], yards: Yards) -> None:
     document = Document("harbour", harbour.BOUNDS)
     meshes = folder / "harbour"
     shutil.rmtree(meshes, ignore_errors=True)
@@ -111,7 +113,7 @@ def _write(
         document.meshes.append(name)
     document.geoms.extend(props.geoms)
     document.bodies.extend(props.bodies)
-    document.solids.extend([*town_solids(regions, []), *props.solids])
+    document.solids.extend([*town_solids(regions, [], reach_m=SOLID_M), *props.solids])
     document.lanes.extend(lanes.values())
     document.sidewalks.extend(sidewalks(regions, harbour.BOUNDS))
     document.crosswalks.extend(crosswalks(regions))

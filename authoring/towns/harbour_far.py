@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from shapely.geometry import Point, box  # type: ignore[import-untyped]
 from shapely.geometry.base import BaseGeometry  # type: ignore[import-untyped]
@@ -11,7 +13,7 @@ from authoring.kit.buildings import STYLES
 from authoring.kit.industry import shed, warehouse
 from authoring.kit.industry_plant import chimney, pylon, quay_crane, silos, wires
 from authoring.kit.industry_yard import container_stack
-from authoring.kit.parts import Sink, place
+from authoring.kit.parts import Part, Sink, place
 from authoring.towns import solids
 from authoring.towns.furniture import Furnisher
 from authoring.towns.harbour_motorway import EDGE_M, MEDIAN_HALF_M
@@ -21,6 +23,26 @@ from authoring.towns.skyline import FIELD_Z_M, build_hills
 
 FAR_M = 720.0
 QUAY = box(-OUTER_M, -288.0, OUTER_M, -240.0)
+# Hedges along the estate's roads: y, from x to x; each has a gate in its middle.
+FRONTS = (
+    (-130.3, -137.0, -28.0),
+    (-150.6, -120.0, -28.0),
+    (-130.3, 28.0, 102.0),
+    (131.6, -132.0, -28.0),
+    (151.3, -110.0, -16.0),
+)
+PARK_TREES = (
+    (-131, 58),
+    (-131, 72),
+    (-131, 90),
+    (-81, 58),
+    (-81, 90),
+    (-81, 100),
+    (-104, 78),
+    (-116, 78),
+    (-92, 110),
+    (-104, 112),
+)
 WATER = box(-FAR_M, -FAR_M, FAR_M, -288.0)
 PYLONS = ((250.0, 60.0), (236.0, 190.0), (172.0, 236.0), (40.0, 300.0), (-90.0, 330.0), (-230.0, 372.0))
 
@@ -42,15 +64,22 @@ def build_surroundings(sink: Sink, *, rng: np.random.Generator) -> None:
     _pylons(sink)
 
 
-def plant_fields(props: Props, furnisher: Furnisher, taken: BaseGeometry, *, rng: np.random.Generator) -> None:
-    """Hedgerows and simple trees on the open land around the estate, and some scattered between the plots."""
-    hedge = kit.hedge(16.0, 1.7, 1.5, rng)
-    rows = [(x, y, yaw) for y in (182.0, 228.0) for x in np.arange(24.0, 120.0, 16.4) for yaw in (0.0,)]
-    rows += [(x, y, np.pi / 2) for x in (248.0, -248.0) for y in np.arange(-110.0, 120.0, 16.4)]
+def plant_fields(
+    props: Props, furnisher: Furnisher, taken: BaseGeometry, hedge: list[Part], *, rng: np.random.Generator
+) -> None:
+    """Hedgerows and simple trees on the open land around the estate, hedges before the yards, trees in car parks."""
+    for y, x0, x1 in FRONTS:
+        for x in np.arange(x0 + 7.0, x1 - 6.0, 14.3):
+            if abs(x - (x0 + x1) / 2) > 11.0:
+                props.instance("hedge", hedge, float(x), y, KERB_M, 0.0, radius_m=0.7, high_m=1.2)
+    for index, (x, y) in enumerate(PARK_TREES):
+        furnisher.plant(x, y, KERB_M, kind=index, always=True)
+    rows = [(x, y, yaw) for y in (182.0, 228.0) for x in np.arange(24.0, 120.0, 14.3) for yaw in (0.0,)]
+    rows += [(x, y, np.pi / 2) for x in (248.0, -248.0) for y in np.arange(-110.0, 120.0, 14.3)]
     for x, y, yaw in rows:
         if abs(y) > 34 and not taken.intersects(Point(x, y).buffer(5.0)):
-            props.instance("hedgerow", hedge, float(x), float(y), KERB_M, float(yaw), radius_m=0.8, high_m=1.7)
-    for _ in range(420):
+            props.instance("hedge", hedge, float(x), float(y), KERB_M, float(yaw), radius_m=0.8, high_m=1.7)
+    for _ in range(170):
         x, y = (float(v) for v in rng.uniform((-410, -236), (410, 410)))
         if taken.intersects(Point(x, y).buffer(5.0)) or not props.is_free(x, y, 4.0):
             continue
@@ -71,7 +100,9 @@ def _quay(sink: Sink, *, rng: np.random.Generator) -> None:
     for a, b in zip(hull, hull[1:] + hull[:1], strict=True):
         for z0, z1, swatch in ((0.0, 2.0, "dark_red"), (2.0, 11.0, "dark_blue")):
             ship.swatch_quad(swatch, [(*a, z0), (*b, z0), (*b, z1), (*a, z1)])
-    ship.swatch_mesh("grey_paint", [(*p, 10.5) for p in hull], [(0, 1, 4), (1, 3, 4), (1, 2, 3)], np.tile((0, 0, 1.0), (5, 1)))
+    ship.swatch_mesh(
+        "grey_paint", [(*p, 10.5) for p in hull], [(0, 1, 4), (1, 3, 4), (1, 2, 3)], np.tile((0, 0, 1.0), (5, 1))
+    )
     ship.swatch_box("white_paint", (-86.0, -7.5, 10.0), (-72.0, 7.5, 33.0))
     ship.swatch_box("dark_glass", (-71.95, -7.0, 29.5), (-71.9, 7.0, 31.5))
     for column in range(9):
@@ -82,7 +113,14 @@ def _quay(sink: Sink, *, rng: np.random.Generator) -> None:
 
 def _sheds(sink: Sink, *, rng: np.random.Generator) -> None:
     """Industry that goes on along the motorway."""
-    for x, y, yaw in ((-320, -74, np.pi), (-330, 84, 0.0), (322, 76, 0.0), (330, -80, np.pi), (-320, 170, 0.0), (320, -190, 0.0)):
+    for x, y, yaw in (
+        (-320, -74, np.pi),
+        (-330, 84, 0.0),
+        (322, 76, 0.0),
+        (330, -80, np.pi),
+        (-320, 170, 0.0),
+        (320, -190, 0.0),
+    ):
         wide = float(rng.uniform(60, 95))
         cladding = str(rng.choice(["cladding_white", "cladding_blue", "metal_panel", "cladding_green"]))
         parts = warehouse(wide, 36.0, float(rng.uniform(9, 14)), rng, cladding=cladding)
@@ -121,6 +159,6 @@ def _pylons(sink: Sink) -> None:
         across = np.array([np.cos(yaw), np.sin(yaw)])
         tips.append([np.array([*(np.array([x, y]) + across * reach * side), z * 34.0 - 1.6])
                      for z, reach in ((0.66, 6.5), (0.8, 7.5), (0.93, 5.0)) for side in (-1, 1)])  # fmt: skip
-    for first, second in zip(tips, tips[1:], strict=False):
+    for first, second in pairwise(tips):
         spans += list(zip(first, second, strict=True))
     sink.extend(wires(spans))

@@ -49,15 +49,15 @@ class Plot:
 
 PLOTS = (
     Plot(name="lorry_park", corners=(-204, -129, -142, -72), material="asphalt_worn", label="parking", fenced="nw"),
-    Plot(name="warehouse_1", corners=(-138, -129, -26, -34), material="concrete", fenced="nw"),
-    Plot(name="depot", corners=(-204, -68, -142, -34), material="roof_gravel", fenced="ns"),
+    Plot(name="warehouse_1", corners=(-138, -129, -26, -34), material="asphalt_worn", fenced="nw"),
+    Plot(name="depot", corners=(-204, -68, -142, -34), material="roof_gravel", fenced="n"),
     Plot(name="workshops", corners=(26, -129, 104, -34), material="asphalt_worn", fenced="ne"),
     Plot(name="plant", corners=(108, -129, 206, -34), material="roof_gravel", fenced="nesw"),
     Plot(name="terminal", corners=(11, -206, 206, -153), material="concrete", fenced="nesw"),
-    Plot(name="warehouse_2", corners=(-124, -231, -24, -152), material="concrete", fenced="we"),
+    Plot(name="warehouse_2", corners=(-124, -231, -24, -152), material="asphalt_worn"),
     Plot(name="tank_farm", corners=(-206, -206, -144, -153), material="roof_gravel", fenced="nesw"),
     Plot(name="office", corners=(-134, 34, -26, 129), material="asphalt_worn", label="parking"),
-    Plot(name="logistics", corners=(-206, 34, -138, 129), material="concrete", fenced="sew"),
+    Plot(name="logistics", corners=(-206, 34, -138, 129), material="asphalt_worn", fenced="sew"),
     Plot(name="petrol", corners=(28, 92, 104, 131), material="asphalt_worn"),
     Plot(name="units", corners=(112, 34, 206, 118), material="asphalt_worn", fenced="sw"),
     Plot(name="grid", corners=(144, 153, 206, 206), material="roof_gravel", fenced="nesw"),
@@ -120,7 +120,13 @@ class Yards:
         self._house("chimney", industry_plant.chimney(64.0), (124, -72), 0.0, (6.4, 6.4, 60.0))
 
     def _terminal(self) -> None:
-        rows = ((36.0, -180.0, 6, 2), (72.0, -180.0, 6, 2), (112.0, -184.0, 8, 2), (150.0, -180.0, 6, 2), (187.0, -181.0, 8, 2))
+        rows = (
+            (36.0, -180.0, 6, 2),
+            (72.0, -180.0, 6, 2),
+            (112.0, -184.0, 8, 2),
+            (150.0, -180.0, 6, 2),
+            (187.0, -181.0, 8, 2),
+        )
         for index, (x, y, deep, wide) in enumerate(rows):
             self._stack(f"terminal_{index}", deep, wide, (x, y), highest=4)
         for x in (18.0, 92.0, 131.0, 169.0):
@@ -146,7 +152,13 @@ class Yards:
         for index, y in enumerate((60.0, 66.6, 88.0, 94.6)):
             bays = [(x, y) for x in np.arange(-128, -84, 2.7)]
             self._row(f"office_{index}", bays, 90.0 if index % 2 == 0 else -90.0, CAR_BAY_M)
-        self._house("logistics", industry.warehouse(56, 36, 10.0, self.rng, cladding="cladding_green"), (-173, 72), np.pi, (56, 36, 10.0))
+        self._house(
+            "logistics",
+            industry.warehouse(56, 36, 10.0, self.rng, cladding="cladding_green"),
+            (-173, 72),
+            np.pi,
+            (56, 36, 10.0),
+        )
         self._row("logistics", [(x, 122.0) for x in np.arange(-202, -150, 4.4)], -90.0, (10.0, 3.4))
         canopy = place(industry.petrol_station(self.rng), x_m=68, y_m=119, z_m=KERB_M, yaw_rad=np.pi)
         self.sink.extend(canopy)
@@ -167,7 +179,9 @@ class Yards:
             self.sink.extend(place(industry_plant.pylon(14.0), x_m=x - 4, y_m=190.0, z_m=KERB_M, yaw_rad=np.pi / 2))
         self._stack("grid_boxes", 2, 1, (160, 192), highest=2)
         self._house("store", industry.warehouse(84, 26, 9.0, self.rng), (-64, 190), 0.0, (84, 26, 9.0))
-        self._house("store_2", industry.shed(46, 24, 7.5, self.rng, cladding="cladding_blue"), (-158, 190), 0.0, (46, 24, 9.0))
+        self._house(
+            "store_2", industry.shed(46, 24, 7.5, self.rng, cladding="cladding_blue"), (-158, 190), 0.0, (46, 24, 9.0)
+        )
         for index, (x0, x1) in enumerate(((-200, -120), (-112, -20))):
             self._row(f"store_{index}", [(x, 157.5) for x in np.arange(x0, x1, 2.7)], -90.0, CAR_BAY_M)
 
@@ -191,9 +205,7 @@ class Yards:
         self.sink.extend(place(parts, x_m=middle[0], y_m=middle[1], z_m=KERB_M, yaw_rad=yaw))
         self._solid(name, middle, yaw, size)
 
-    def _solid(
-        self, name: str, middle: tuple[float, float], yaw: float, size: tuple[float, float, float]
-    ) -> None:
+    def _solid(self, name: str, middle: tuple[float, float], yaw: float, size: tuple[float, float, float]) -> None:
         turn = (round(float(np.cos(yaw / 2)), 6), 0.0, 0.0, round(float(np.sin(yaw / 2)), 6))
         half = (size[0] / 2, size[1] / 2, size[2] / 2)
         self.props.solids.append(Solid(f"house_{name}", "box", (*middle, KERB_M + half[2]), half, turn))
@@ -213,7 +225,7 @@ class Yards:
 
     def _fence(self, plot: Plot, side: str) -> None:
         """Netting along one side, a metre inside."""
-        x0, y0, x1, y1 = np.asarray(plot.corners) + (1.0, 1.0, -1.0, -1.0)
+        x0, y0, x1, y1 = plot.outline.buffer(-1.0).bounds
         a, b = {"n": ((x0, y1), (x1, y1)), "s": ((x1, y0), (x0, y0)), "w": ((x0, y0), (x0, y1)),
                 "e": ((x1, y1), (x1, y0))}[side]  # fmt: skip
         line = np.array([a, b])

@@ -24,7 +24,9 @@ NOISE_WALL_Y_M = EDGE_M + 4.6
 LAMP_M = 38.0
 
 
-def furnish_motorway(props: Props, regions: Regions, furnisher: Furnisher, *, rng: np.random.Generator) -> None:
+def furnish_motorway(
+    props: Props, regions: Regions, furnisher: Furnisher, hedge: list[Part], *, rng: np.random.Generator
+) -> None:
     """Everything along the motorway."""
     _rails(props)
     for side, x0, x1 in NOISE_WALLS:
@@ -36,15 +38,13 @@ def furnish_motorway(props: Props, regions: Regions, furnisher: Furnisher, *, rn
     span = EDGE_M + 1.4
     for x, side, panels in ((-118.0, -1, (0, 2)), (118.0, 1, (1, 3)), (205.0, -1, (1,)), (-205.0, 1, (2,))):
         parts = gantry(span, panels)
-        props.sink.extend(
-            place(parts, x_m=x, y_m=side * span, z_m=0.0, yaw_rad=0.0 if side < 0 else np.pi)
-        )
+        props.sink.extend(place(parts, x_m=x, y_m=side * span, z_m=0.0, yaw_rad=0.0 if side < 0 else np.pi))
         for y in (0.0, side * span):
             props.solids.append(Solid(f"gantry_{x:.0f}_{y:.0f}", "box", (x, y, 3.5), (0.7, 0.3, 3.5)))
     for x, y, yaw, panel in ((-222.5, -96.0, -np.pi / 2, 3), (222.5, 96.0, np.pi / 2, 1), (-40.0, 130.5, 0.0, 2)):
         props.put("direction", direction_sign(panel, width_m=3.6), x, y, KERB_M, yaw + np.pi, radius_m=1.2, high_m=4.0)
-    _chevrons(props, regions)
-    _planting(props, regions, furnisher, rng=rng)
+    _slips(props, regions)
+    _planting(props, regions, furnisher, hedge, rng=rng)
 
 
 def _rails(props: Props) -> None:
@@ -58,12 +58,19 @@ def _rails(props: Props) -> None:
             _run(props, rail, float(x), side * (EDGE_M + 0.5), np.pi if side < 0 else 0.0, RAIL_M, 0.75)
 
 
-def _chevrons(props: Props, regions: Regions) -> None:
-    """Chevrons on the outside of the slips' bends."""
+def _slips(props: Props, regions: Regions) -> None:
+    """Lamps along the slips, chevrons on the outside of their bends."""
+    lamp = kit.street_lamp(height_m=9.0)
     for name, line in regions.network.lines.items():
         if not regions.network.streets[name].joins:
             continue
         total = paths.length(line)
+        for station in np.arange(24.0, total - 34.0, 30.0):
+            point, along = paths.at(line, float(station))
+            x, y = point + np.array([-along[1], along[0]]) * (4.6 if name.startswith("off_") else -4.6)
+            side = np.pi if name.startswith("off_") else 0.0
+            yaw = float(np.arctan2(along[1], along[0])) + np.pi + side
+            props.put("slip_lamp", lamp, float(x), float(y), KERB_M, yaw, radius_m=0.15, high_m=6.0)
         for back in (30.0, 44.0, 58.0, 72.0):
             point, along = paths.at(line, total - back)
             left = 1.0 if name.startswith("on_") else -1.0
@@ -75,15 +82,16 @@ def _chevrons(props: Props, regions: Regions) -> None:
                 props.put("chevron", parts, float(x), float(y), KERB_M, yaw, radius_m=0.1, high_m=1.5)
 
 
-def _planting(props: Props, regions: Regions, furnisher: Furnisher, *, rng: np.random.Generator) -> None:
+def _planting(
+    props: Props, regions: Regions, furnisher: Furnisher, hedge: list[Part], *, rng: np.random.Generator
+) -> None:
     """Clumps of trees, shrubs and hedges behind the rails, thicker behind the noise walls."""
-    hedge = kit.hedge(14.0, 1.5, 1.3, rng)
     shrubs = [kit.shrub(float(h), rng, foliage=leaf) for h, leaf in
               ((1.2, "foliage_green"), (1.8, "foliage_olive"), (2.3, "foliage_dark"))]  # fmt: skip
     walls = [(side, x0 - 8, x1 + 8) for side, x0, x1 in NOISE_WALLS]
     clear = furnisher.ground.views.buffer(2.5)
     for side in (1, -1):
-        for x in np.arange(-330.0, 331.0, 6.5):
+        for x in np.arange(-330.0, 331.0, 9.6):
             behind = any(side == s and x0 < x < x1 for s, x0, x1 in walls)
             y = side * (EDGE_M + (8.2 if behind else 6.5) + float(rng.uniform(-1.2, 3.0)))
             spot = Point(x, y)
@@ -95,7 +103,9 @@ def _planting(props: Props, regions: Regions, furnisher: Furnisher, *, rng: np.r
                 furnisher.plant(float(x), y, KERB_M, kind=kind, always=True, simple=draw < 0.45 or abs(x) > 200)
             elif draw < 0.72 and abs(x) < 230:
                 parts: list[Part] = shrubs[kind % 3]
-                props.instance(f"verge_shrub{kind % 3}", parts, float(x), y, KERB_M, draw * 40, radius_m=0.9, high_m=1.5)
+                props.instance(
+                    f"verge_shrub{kind % 3}", parts, float(x), y, KERB_M, draw * 40, radius_m=0.9, high_m=1.5
+                )
             elif draw < 0.8 and abs(x) < 230 and props.is_free(float(x), y, 3.0):
                 props.instance("hedge", hedge, float(x), y, KERB_M, 0.0, radius_m=0.7, high_m=1.4)
 
