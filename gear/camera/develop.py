@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gear.camera.air import Air
-from gear.camera.optics import motion_blurred, noisy, through_lens, vignetted
+from gear.camera.optics import lens_map, motion_blurred, noisy, through_lens, vignetted
 from gear.camera.puddles import Puddles
 from gear.camera.rain import Rain
 from gear.camera.response import Response
 from gear.contracts.rendering import RawView
 from gear.values.frames import GeomTable, UInt16Image, View
 from gear.values.labels import LABEL_BY_NAME
-from gear.values.optics import CameraEffects
+from gear.values.optics import CameraEffects, LensRecord
 from gear.values.rng import derive_rng
 from gear.values.scene import CameraRecord, SceneRecord
 
@@ -39,6 +39,17 @@ class Darkroom:
     puddles: Puddles
     rain: Rain
     effects: CameraEffects
+
+    def recorded(self, record: SceneRecord) -> SceneRecord:
+        """The record with the lens in it."""
+        lens = self.effects.lens
+        if not lens.bends:
+            return record
+        cameras = []
+        for camera in record.cameras:
+            found = lens_map(lens, camera.width_px, camera.height_px, camera.focal_px)
+            cameras.append(replace(camera, lens=LensRecord(k1=lens.k1, k2=lens.k2, focal_px=found.focal_px)))
+        return replace(record, cameras=tuple(cameras))
 
     def view(self, raw: RawView, camera: CameraRecord, record: SceneRecord, geoms: GeomTable) -> View:
         """One view: colour with everything that the weather and the camera add, and truth aligned with it.

@@ -57,7 +57,7 @@ def lens_map(lens: Lens, width_px: int, height_px: int, focal_px: float) -> Lens
     maps = [np.ascontiguousarray(seen[..., axis], dtype=np.float32) for axis in (0, 1)]
     for one in maps:
         one.setflags(write=False)
-    return LensMap(maps[0], maps[1], focal_px / low)
+    return LensMap(maps[0], maps[1], round(focal_px / low, 6))
 
 
 def undistorted(lens: Lens, distorted: Array) -> Array:

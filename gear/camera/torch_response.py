@@ -1,9 +1,10 @@
-"""The camera's response in torch, for gradients. Only what trains imports it."""
+"""The camera's response and its fixed linear effects in torch, for gradients. Only what trains imports it."""
 
 from __future__ import annotations
 
 import torch
 
+from gear.camera.optics import LensMap
 from gear.camera.response import Response
 
 
@@ -27,6 +28,20 @@ def apply(response: Response, light: torch.Tensor) -> torch.Tensor:
 def face_light(renderer_name: str, face: torch.Tensor) -> torch.Tensor:
     """`gear.camera.face_light` on picture values 0..1, differentiable."""
     return face if renderer_name == "classic" else decode_srgb(face)
+
+
+def vignetted(light: torch.Tensor, share: torch.Tensor) -> torch.Tensor:
+    """`gear.camera.optics.vignetted` without rounding: (..., C, H, W) light times the (H, W) of `vignette_map`."""
+    return light * share
+
+
+def through_lens(light: torch.Tensor, lens: LensMap) -> torch.Tensor:
+    """`gear.camera.optics.through_lens` for colour, without rounding: (N, C, H, W) light, bilinear."""
+    height, width = light.shape[-2:]
+    x = torch.as_tensor(lens.x.copy(), dtype=light.dtype, device=light.device) * (2 / (width - 1)) - 1
+    y = torch.as_tensor(lens.y.copy(), dtype=light.dtype, device=light.device) * (2 / (height - 1)) - 1
+    grid = torch.stack([x, y], dim=-1).expand(light.shape[0], -1, -1, -1)
+    return torch.nn.functional.grid_sample(light, grid, mode="bilinear", padding_mode="border", align_corners=True)
 
 
 def encode_srgb(light: torch.Tensor) -> torch.Tensor:

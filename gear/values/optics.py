@@ -32,6 +32,20 @@ class Lens:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class LensRecord:
+    """A lens before one camera: with the camera's size and focal length, all that its map is made of.
+
+    Attributes:
+        k1, k2: as in `Lens`.
+        focal_px: of the distorted picture, where r is counted; longer than the pinhole's so that the corners are filled.
+    """
+
+    k1: float
+    k2: float
+    focal_px: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CameraEffects:
     """What a real camera adds to a picture.
 

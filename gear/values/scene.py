@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from gear.values.geometry import Intrinsics, RigidTransform
+from gear.values.optics import LensRecord
 
 Vec3 = tuple[float, float, float]
 Quat = tuple[float, float, float, float]
@@ -143,13 +144,17 @@ class SurfaceRecord:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraRecord:
-    """One pinhole camera of one sample. World-from-camera axes: x right, y down, z forward."""
+    """One pinhole camera of one sample. World-from-camera axes: x right, y down, z forward.
+
+    With a `lens`, pictures, depth and ids are bent by it; whatever is projected with `intrinsics` is the pinhole's.
+    """
 
     name: str
     width_px: int
     height_px: int
     focal_px: float
     world_from_camera: Pose
+    lens: LensRecord | None = None
 
     @property
     def intrinsics(self) -> Intrinsics:

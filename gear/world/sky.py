@@ -84,7 +84,7 @@ class Sky:
         cover = _fraction(weather.cloudiness)
         if weather.precipitation > 0:
             # Rain falls from clouds, whatever the cloudiness says.
-            cover = max(cover, 0.72 + 0.28 * _fraction(weather.precipitation))
+            cover = max(cover, 0.82 + 0.18 * _fraction(weather.precipitation))
         turbidity = float(np.clip(2.5 + 40 * (weather.mie_scattering_scale - 0.03), 2.0, 9.0))
         # Twilight: the sun's last light goes within a few degrees.
         daylight = float(_smooth_step(math.radians(-8), math.radians(3), np.array(altitude)))

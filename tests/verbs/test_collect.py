@@ -214,6 +214,15 @@ def test_limits_that_are_too_tight_say_which(tmp_path: Path, collect_small: Coll
         collect_small("depth", tmp_path / "out", scene="far", settings=[f"scenes={library}"])
 
 
+def test_a_scene_can_be_a_file_with_a_name_in_it(tmp_path: Path, collect_small: Collect) -> None:
+    collect_small("depth", tmp_path / "a", samples=1, scene=f"{TINY_SCENES}:double", settings=[])
+    assert gear.open_dataset(tmp_path / "a")[0].record.scene == "double"
+    with pytest.raises(UnknownNameError, match=r"\(say which: --scene .*tiny.yml:board\)"):
+        collect_small("depth", tmp_path / "b", scene=str(TINY_SCENES))
+    with pytest.raises(UnknownNameError, match="did you mean double"):
+        collect_small("depth", tmp_path / "b", scene=f"{TINY_SCENES}:dubble")
+
+
 def test_a_worker_that_dies_is_reported(
     tmp_path: Path, collect_small: Collect, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -232,3 +241,46 @@ def test_filament_keeps_the_same_promises(tmp_path: Path, collect_small: Collect
             differs = (picture != patched.images[camera]).any(axis=2)
             assert differs[reach(clean, camera, 0)].mean() > 0.9
             assert (differs & ~reach(clean, camera)).mean() < 0.001
+
+
+RAIN = ["weather.precipitation=60", "weather.precipitation_deposits=80", "weather.fog_density=20"]
+
+
+def test_twins_in_rain_and_fog_differ_only_where_the_patch_is_seen(tmp_path: Path, collect_small: Collect) -> None:
+    for name, patch in (("none", "none"), ("random", "random"), ("again", "random")):
+        collect_small("semseg", tmp_path / name, patch=patch, settings=RAIN)
+    assert tree(tmp_path / "random") == tree(tmp_path / "again")
+    collect_small("semseg", tmp_path / "dry")
+    for dry, (clean, patched) in zip(
+        gear.open_dataset(tmp_path / "dry"), gear.open_twins(tmp_path / "none", tmp_path / "random"), strict=True
+    ):
+        assert np.array_equal(clean.label_ids, patched.label_ids) and np.array_equal(clean.label_ids, dry.label_ids)
+        for camera, picture in clean.images.items():
+            assert (picture != dry.images[camera]).any(axis=2).mean() > 0.5
+            differs = (picture != patched.images[camera]).any(axis=2)
+            assert not (differs & ~reach(clean, camera)).any()
+            assert differs[reach(clean, camera, 0)].mean() > 0.9
+
+
+def test_camera_effects_bend_picture_and_truth_alike_and_are_written_down(
+    tmp_path: Path, collect_small: Collect
+) -> None:
+    effects = ["camera.lens.k1=-0.15", "camera.vignette=0.3", "camera.shot_noise=1.5"]
+    for name, patch in (("none", "none"), ("random", "random"), ("again", "random")):
+        collect_small("semseg", tmp_path / name, patch=patch, settings=effects)
+    assert tree(tmp_path / "random") == tree(tmp_path / "again")
+    collect_small("semseg", tmp_path / "plain")
+    plain = gear.open_dataset(tmp_path / "plain")
+    for straight, (clean, patched) in zip(plain, gear.open_twins(tmp_path / "none", tmp_path / "random"), strict=True):
+        (camera,) = clean.record.cameras
+        assert camera.lens is not None and camera.lens.k1 == -0.15 and camera.lens.focal_px > camera.focal_px
+        assert straight.record.cameras[0].lens is None
+        assert (clean.label_ids != straight.label_ids).mean() > 0.01
+        for name, picture in clean.images.items():
+            differs = (picture != patched.images[name]).any(axis=2)
+            assert not (differs & ~reach(clean, name)).any(), "the same grain, and the mask is where the patch is seen"
+            assert differs[reach(clean, name, 0)].mean() > 0.9
+    with pytest.raises(DatasetError, match="is no twin of"):
+        gear.open_twins(tmp_path / "plain", tmp_path / "random")
+    with pytest.raises(ConfigError, match=r"camera.lens.k1: must be -0.5 to 0.5"):
+        collect_small("semseg", tmp_path / "bad", settings=["camera.lens.k1=3"])

@@ -34,7 +34,7 @@ class Session:
 
     def record(self, index: int) -> SceneRecord:
         """The scene of one sample: a pure function of the job and the index."""
-        return self.planner.plan(index)
+        return self.darkroom.recorded(self.planner.plan(index))
 
     def frame(self, record: SceneRecord) -> Frame:
         """Places the scene with the run's patch in it and takes its pictures."""
