@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +19,9 @@ from authoring.towns.chunks import chunked
 from authoring.towns.collision import town_solids
 from authoring.towns.document import Document, Geom, bay_rows
 from authoring.towns.lanes import Lane, lane_graph
+from authoring.towns.network import BAY_M
 from authoring.towns.props import Ground, Props
-from authoring.towns.regions import KERB_M, Regions
+from authoring.towns.regions import KERB_M, BayGroup, Regions
 from authoring.towns.suburb_furniture import SuburbFurnisher
 from authoring.towns.suburb_gardens import CAR_M, Gardener, shops
 from authoring.towns.suburb_park import board_solids, build_island, build_park, park_ground
@@ -103,9 +106,23 @@ def write_suburb(folder: Path) -> None:
     document.solids.extend([*town_solids(regions, ()), *props.solids])
     document.lanes.extend(suburb_lanes().values())
     document.sidewalks.extend(sidewalks(regions, suburb.BOUNDS))
-    document.crosswalks.extend(crosswalks(regions))
-    document.bays.extend([*bay_rows(regions.bay_groups), ("drives", *CAR_M, np.asarray(gardener.drive_bays))])
+    document.crosswalks.extend(walk for walk in crosswalks(regions) if "_out_" not in walk.name)
+    document.bays.extend([*bay_rows(_usable(regions)), ("drives", *CAR_M, np.asarray(gardener.drive_bays))])
     (folder / "suburb.xml").write_text(document.text(), encoding="utf-8", newline="\n")
+
+
+def _usable(regions: Regions) -> Iterator[BayGroup]:
+    """The bays that lie on asphalt with all corners: not where the kerb of a bend cuts into them."""
+    roads = regions.level_roads.buffer(0.02)
+    for group in regions.bay_groups:
+        kept = []
+        for x, y, yaw_deg in group.bays:
+            along = np.array([np.cos(np.radians(yaw_deg)), np.sin(np.radians(yaw_deg))]) * BAY_M[0] / 2
+            across = np.array([-along[1], along[0]]) * BAY_M[1] / BAY_M[0]
+            corners = [np.array([x, y]) + a * along + b * across for a, b in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
+            if roads.contains(Polygon(corners)):
+                kept.append((x, y, yaw_deg))
+        yield replace(group, bays=tuple(kept))
 
 
 def _fan(board: tuple[float, float, float], eye: tuple[float, float]) -> BaseGeometry:

@@ -16,6 +16,8 @@ from authoring.towns.regions import KERB_M, Regions
 from authoring.towns.suburb_streets import gives_way
 
 SPECIES = (("broad", 8.0), ("street", 6.5), ("linden", 8.5), ("columnar", 8.0), ("conifer", 7.5))
+# The first few keep their branches out of the road.
+STREET_SPECIES = 4
 FAR_SPECIES = (("broad", 8.0), ("linden", 7.0), ("street", 5.5), ("conifer", 8.0))
 LAMP_M = 34.0
 # The trunk of a near tree comes first among its faces; the branches after it are hidden in the crown.
@@ -86,10 +88,10 @@ class SuburbFurnisher(Furnisher):
             self._stand("lamp_modern", parts, x, y, yaw, 0.15, high=6.0)
 
     def _trees(self, street: Street, side: int, start: float, end: float) -> None:
-        kind = sum(map(ord, street.name)) % len(SPECIES)
+        kind = sum(map(ord, street.name)) % STREET_SPECIES
         for station in np.arange(start + (0 if side > 0 else street.trees_m / 2), end, street.trees_m):
             x, y, _ = self._beside(street, side, float(station), 0.85)
-            other = int(self.rng.integers(len(SPECIES)))
+            other = int(self.rng.integers(STREET_SPECIES))
             self.plant(x, y, KERB_M, kind=kind if self.rng.random() < 0.7 else other)
 
     def _meters(self, street: Street) -> None:

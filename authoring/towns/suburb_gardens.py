@@ -103,7 +103,7 @@ class Gardener:
             gaps = [(m - 0.6, m + 0.6) for m in middles]
         start = -half
         tall = 1 if rng.random() < 0.35 else 0
-        brick = str(rng.choice(["brick_red", "brick_buff", "brick_brown", "plaster_white"]))
+        brick = str(rng.choice(["brick_red", "brick_buff", "brick_red"]))
         for low, high in [*gaps, (half, half)]:
             self._boundary(plot, style, start, low, tall, brick)
             start = high
@@ -154,7 +154,7 @@ class Gardener:
         low = plot.setback_m + plot.house_m[1] + 2.0
         if plot.depth_m - low > 2:
             x, y = float(rng.uniform(-half + 1.5, half - 1.5)), float(rng.uniform(low, plot.depth_m - 1.2))
-            self._plant(plot, x, y, tree=rng.random() < 0.36, far=True, rng=rng)
+            self._plant(plot, x, y, tree=rng.random() < 0.3, far=True, rng=rng)
         if plot.kind == "detached" and rng.random() < 0.3 and plot.depth_m - low > 5:
             x = half - 1.6 if plot.garage == "left" else -half + 1.6
             self._put(plot, gardens.shed(rng), x, plot.depth_m - 1.6, 0.0)

@@ -19,7 +19,7 @@ PATH_M = 2.4
 POND = (84.0, -84.0)
 PLAY = (52.0, -116.0)
 WATER_DROP_M = 0.28
-TREES = 54
+TREES = 46
 
 
 def park_ground(regions: Regions, corners: tuple[tuple[float, float], ...]) -> Polygon:

@@ -54,7 +54,8 @@ class Plot:
     def world(self, points: npt.ArrayLike) -> Array:
         """Points (N, 2) of the plot's frame in the world."""
         cos, sin = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
-        return np.asarray(points, np.float64) @ np.array([[cos, sin], [-sin, cos]]) + self.origin
+        turned: Array = np.asarray(points, np.float64) @ np.array([[cos, sin], [-sin, cos]]) + self.origin
+        return turned
 
     def rectangle(self, x0: float, y0: float, x1: float, y1: float) -> Polygon:
         """A rectangle of the plot's frame, in the world."""

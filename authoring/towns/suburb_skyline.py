@@ -43,7 +43,7 @@ def build_skyline(sink: Sink, keep_off: BaseGeometry, rng: np.random.Generator) 
         r, theta = float(np.sqrt(rng.uniform(HOUSES_M[0] ** 2, HOUSES_M[1] ** 2))), float(rng.uniform(0, 2 * np.pi))
         x, y = r * np.cos(theta), r * np.sin(theta)
         seed = int(rng.integers(1 << 30))
-        if len(placed) >= 160 or keep_off.intersects(Point(x, y).buffer(9.0)):
+        if len(placed) >= 130 or keep_off.intersects(Point(x, y).buffer(9.0)):
             continue
         if placed and np.hypot(*(np.asarray(placed) - (x, y)).T).min() < 21.0:
             continue
@@ -56,7 +56,7 @@ def build_skyline(sink: Sink, keep_off: BaseGeometry, rng: np.random.Generator) 
     for _ in range(3000):
         r, theta = float(rng.uniform(178.0, 900.0)), float(rng.uniform(0, 2 * np.pi))
         x, y, tall = r * np.cos(theta), r * np.sin(theta), float(rng.uniform(7, 12) * (1 + r / 900))
-        if count >= 290 or keep_off.intersects(Point(x, y).buffer(0.55 * tall + 2.0)):
+        if count >= 260 or keep_off.intersects(Point(x, y).buffer(0.55 * tall + 2.0)):
             continue
         if placed and np.hypot(*(np.asarray(placed) - (x, y)).T).min() < 6.0 + 0.4 * tall:
             continue

@@ -67,7 +67,7 @@ def lay_streets(sink: Sink, regions: Regions, crossovers: BaseGeometry, paved: B
     walk = regions.sidewalks.intersection(area).difference(unary_union([stones, studs, grass]))
     crossing = crossovers.intersection(walk)
     solids.flat(sink, walk.difference(crossing), KERB_M, "pavement", "sidewalk")
-    solids.flat(sink, crossing, KERB_M, "asphalt_worn", "sidewalk")
+    solids.flat(sink, crossing, KERB_M, "asphalt", "sidewalk")
     solids.flat(sink, grass, KERB_M, "grass", "terrain")
     solids.flat(sink, stones, KERB_M, "kerb", "sidewalk")
     solids.flat(sink, studs.difference(stones), KERB_M, "tactile", "sidewalk")
@@ -86,7 +86,7 @@ def paint(sink: Sink, regions: Regions) -> None:
         start, end = network.span(street.name)
         if not street.profile.one_way:
             painter.dashes(start + 0.5, end - 0.5, 0.0, dash_m=2.0, gap_m=4.0, paint=WHITE)
-        for at_start in (True, False) if street.end else (True,):
+        for at_start in (True, False) if street.end else ():
             _mouth(painter, network, street, at_start)
         for side, bays in ((1, street.bays_left), (-1, street.bays_right)):
             if bays:
@@ -95,7 +95,7 @@ def paint(sink: Sink, regions: Regions) -> None:
 
 def _mouth(painter: Painter, network: Network, street: Street, at_start: bool) -> None:
     profile = street.profile
-    node = network.nodes[street.start if at_start else street.end or ""]
+    node = network.nodes[street.start if at_start else str(street.end)]
     mouth, line_m = network.mouths[street.name, at_start], paths.length(painter.line)
 
     def span(low_m: float, high_m: float) -> tuple[float, float]:
