@@ -22,7 +22,7 @@ def positive(text: str) -> int:
 def add_collection_arguments(parser: argparse.ArgumentParser) -> None:
     """Flags that describe a collection; shared with `gear show-config`."""
     parser.add_argument("--task", help="task plugin: semseg, detect2d, stereo3d, depth, or an installed one")
-    parser.add_argument("--scene", help="scene of the town's library (billboard01 … billboard09, truck, no_billboard)")
+    parser.add_argument("--scene", help="scene of the town's library (billboard01 … 09, truck …), or FILE.yml:NAME")
     parser.add_argument("--town", help="name of a town, or path of its MJCF (town10)")
     parser.add_argument("--split", help="train, val, test, debug, finetuning, video (test)")
     parser.add_argument("--samples", metavar="N", help="samples of the split, instead of the simulation config's")

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
+import sys
+from collections.abc import Iterator
 from typing import Any
 
 from gear.config.nodes import Mapping, Node, Place
 from gear.config.reader import read_node
 from gear.contracts.specs import Kind, TaskSpec
 from gear.contracts.tasks import Task
-from gear.plugins.catalogue import Found
-from gear.plugins.manager import catalogue
+from gear.plugins.catalogue import Found, one_line
+from gear.plugins.manager import DISTRIBUTION, catalogue
 from gear.values.errors import GearError, PluginError
 
 NO_OPTIONS = Mapping({}, Place("defaults"))
@@ -28,15 +31,29 @@ def build(found: Found, options: Node = NO_OPTIONS) -> Any:
         PluginError: a third party's `build` failed.
     """
     config = read_node(found.spec.config, options, "options")
-    try:
+    with blamed(found, "build"):
         return found.spec.build(config)
+
+
+@contextlib.contextmanager
+def blamed(found: Found, stage: str) -> Iterator[None]:
+    """Around a plugin's code: what it prints goes to stderr, and what a third party's raises says whose it is.
+
+    Raises:
+        PluginError: it raised something other than a `GearError`. A built-in that does is our bug and keeps its
+            traceback.
+    """
+    try:
+        with contextlib.redirect_stdout(sys.stderr):
+            yield
     except GearError:
         raise
     except (Exception, SystemExit) as error:
         owner = found.owner
-        raise PluginError(
-            f"{found.spec.name} ({owner.package} {owner.version})", "build", f"{type(error).__name__}: {error}"
-        ) from error
+        if owner.package == DISTRIBUTION:
+            raise
+        name = f"{found.spec.name} ({owner.package} {owner.version})"
+        raise PluginError(name, stage, one_line(error)) from error
 
 
 def build_task(name: str, options: Node = NO_OPTIONS) -> tuple[TaskSpec[Any], Task[Any, Any]]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,8 +23,8 @@ from gear.dataset.reading import Dataset
 from gear.dataset.sidecar import dump_json, load_json
 from gear.formats.png import encode_labels
 from gear.opening import open_dataset
-from gear.plugins.build import NO_OPTIONS, build, find
-from gear.plugins.catalogue import Found, one_line
+from gear.plugins.build import NO_OPTIONS, blamed, build, find
+from gear.plugins.catalogue import Found
 from gear.values.errors import DatasetError, GearError, PluginError
 from gear.values.frames import UInt8Image
 from gear.values.rng import derive_rng
@@ -179,13 +178,8 @@ class Guard:
         """
         for picture in views.values():
             picture.setflags(write=False)
-        try:
-            with contextlib.redirect_stdout(sys.stderr):
-                result = self._defense.apply(views, None, None, rng)
-        except GearError:
-            raise
-        except (Exception, SystemExit) as error:
-            raise self._error(index, one_line(error)) from error
+        with blamed(self._found, f"apply on sample {index}"):
+            result = self._defense.apply(views, None, None, rng)
         problem = self._problem(result, views)
         if problem:
             raise self._error(index, problem)

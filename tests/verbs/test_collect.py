@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import signal
@@ -19,7 +20,15 @@ import pytest
 import gear
 from gear.formats import rle
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
-from gear.values.errors import BackendError, ConfigError, DatasetError, PatchError, PlacementError, UnknownNameError
+from gear.values.errors import (
+    BackendError,
+    ConfigError,
+    DatasetError,
+    PatchError,
+    PlacementError,
+    PluginError,
+    UnknownNameError,
+)
 from gear.verbs.collect.run import CollectReport
 
 Collect = Callable[..., CollectReport]
@@ -284,3 +293,23 @@ def test_camera_effects_bend_picture_and_truth_alike_and_are_written_down(
         gear.open_twins(tmp_path / "plain", tmp_path / "random")
     with pytest.raises(ConfigError, match=r"camera.lens.k1: must be -0.5 to 0.5"):
         collect_small("semseg", tmp_path / "bad", settings=["camera.lens.k1=3"])
+
+
+def test_a_third_partys_task_that_fails_is_named_and_ours_keeps_its_traceback(
+    tmp_path: Path, collect_small: Collect, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from gear.plugins import manager
+    from gear.plugins.catalogue import Catalogue, Owner
+    from gear.plugins.tasks.depth import DepthTask
+
+    def fails(*_: Any) -> Any:
+        raise KeyError("boom")
+
+    monkeypatch.setattr(DepthTask, "ground_truth", fails)
+    with pytest.raises(KeyError, match="boom"):
+        collect_small("depth", tmp_path / "a")
+    owner = Owner(plugin="their-depth", package="their-package", version="1.2")
+    found = tuple(dataclasses.replace(f, owner=owner) for f in manager.catalogue().of_kind("task"))
+    monkeypatch.setattr("gear.plugins.build.catalogue", lambda: Catalogue(found))
+    with pytest.raises(PluginError, match=r"plugin depth \(their-package 1\.2\) failed at sample 0: KeyError: 'boom'"):
+        collect_small("depth", tmp_path / "b")

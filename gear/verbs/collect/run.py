@@ -12,7 +12,7 @@ from gear.config.dump import to_plain
 from gear.config.load import load_collection
 from gear.dataset.files import explained
 from gear.dataset.store import Store, remove_split
-from gear.plugins.build import build_task
+from gear.plugins.build import blamed, build, find
 from gear.values.serial import Json, to_json
 from gear.verbs.collect.job import Job, resolve
 from gear.verbs.collect.pipeline import collect_samples
@@ -135,8 +135,10 @@ def run_job(job: Job, *, workers: int = 1, force: bool = False, progress: Progre
             collect_samples(session, store, missing, done)
     elif missing:
         collect_in_processes(job, missing, workers, done)
-    _, task = build_task(job.config.task, job.config.options)
-    store.close(task, manifest_facts(job))
+    plugin = find("task", job.config.task)
+    task = build(plugin, job.config.options)
+    with blamed(plugin, "finalise"):
+        store.close(task, manifest_facts(job))
     return CollectReport(root=job.root, split=job.plan.info.split, samples=job.plan.samples, made=len(missing))
 
 

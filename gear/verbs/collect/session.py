@@ -10,7 +10,8 @@ from typing import Any
 from gear.camera.develop import Darkroom
 from gear.contracts.rendering import Renderer
 from gear.contracts.tasks import Encoded, Sample, Task
-from gear.plugins.build import build_task
+from gear.plugins.build import blamed, build, find
+from gear.plugins.catalogue import Found
 from gear.render.opening import open_renderer
 from gear.values.frames import Frame
 from gear.values.scene import SceneRecord
@@ -26,6 +27,7 @@ class Session:
     """Everything that makes samples of one job."""
 
     job: Job
+    plugin: Found
     task: Task[Any, Any]
     world: World
     planner: ScenePlanner
@@ -49,20 +51,32 @@ class Session:
 
     def finish(self, frame: Frame, record: SceneRecord) -> tuple[Sample, Encoded]:
         """Measures the frame and turns it into files; needs neither world nor renderer, so it can run beside them."""
-        sample = self.task.ground_truth(frame, record)
-        return sample, self.task.encode(sample, self.job.plan.info)
+        with blamed(self.plugin, f"sample {record.index}"):
+            sample = self.task.ground_truth(frame, record)
+            return sample, self.task.encode(sample, self.job.plan.info)
 
 
 @contextlib.contextmanager
 def open_session(job: Job) -> Iterator[Session]:
     """Builds a worker's world and renderer, and closes the renderer at the end."""
-    _, task = build_task(job.config.task, job.config.options)
+    plugin = find("task", job.config.task)
+    task: Task[Any, Any] = build(plugin, job.config.options)
+    with blamed(plugin, "rig"):
+        rig = task.rig()
     world = World.build(town=job.config.town, scene_name=job.config.scene, scene=job.scene, weather=job.weather)
     renderer = open_renderer(job.config.renderer, world.model, quality=job.config.quality)
     release_memory()
     try:
-        planner = ScenePlanner(world, task.rig(), job.split, split_name=job.config.split)
+        planner = ScenePlanner(world, rig, job.split, split_name=job.config.split)
         darkroom = darkroom_of(job.weather, job.config.renderer, world.town_name, job.config.camera)
-        yield Session(job=job, task=task, world=world, planner=planner, renderer=renderer, darkroom=darkroom)
+        yield Session(
+            job=job,
+            plugin=plugin,
+            task=task,
+            world=world,
+            planner=planner,
+            renderer=renderer,
+            darkroom=darkroom,
+        )
     finally:
         renderer.close()
