@@ -27,6 +27,7 @@ SKY_DISTANCE_M = 2e4
 
 _COARSE_PX = 16
 _STRIP_ROWS = 32
+_LEAST_FALL = np.float32(3e-4)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -62,35 +63,35 @@ class Air:
         if self.fog_per_m <= 0 and not self.clear_per_m.any():
             return linear_rgb.copy()
         rays, glow = self._directions(camera)
-        result = np.empty_like(linear_rgb)
+        planes = [np.empty(depth_m.shape, np.uint16) for _ in range(3)]
+        colours = cv2.split(linear_rgb)
         # Strips stay in the processor's cache: half the time of whole pictures.
         for top in range(0, len(depth_m), _STRIP_ROWS):
             rows = slice(top, top + _STRIP_ROWS)
-            through = self._through(depth_m[rows], rays[rows], float(camera.world_from_camera.position_m[2]))
-            light = linear_rgb[rows].astype(np.float32)
-            light -= glow[rows]
-            light *= through
-            light += glow[rows]
-            light += np.float32(0.5)
-            result[rows] = light
-        return result
+            through = self._through(depth_m[rows], rays[:, rows], float(camera.world_from_camera.position_m[2]))
+            for channel, plane in enumerate(planes):
+                own = glow[channel][rows]
+                light = colours[channel][rows].astype(np.float32)
+                light -= own
+                light *= through[channel]
+                light += own
+                light += np.float32(0.5)
+                plane[rows] = light
+        return np.asarray(cv2.merge(planes), dtype=np.uint16)
 
     def transmittance(self, depth_m: FloatImage, camera: CameraRecord) -> FloatImage:
         """T of each pixel and channel, (H, W, 3) float32 in 0..1."""
         rays, _ = self._directions(camera)
-        return self._through(depth_m, rays, float(camera.world_from_camera.position_m[2]))
+        return np.stack(self._through(depth_m, rays, float(camera.world_from_camera.position_m[2])), axis=-1)
 
-    def _through(self, depth_m: FloatImage, rays: FloatImage, height_m: float) -> FloatImage:
-        """(h, w, 3) for (h, w) depth and (h, w, 2) rays: their length, and how far they climb, by metre of depth."""
+    def _through(self, depth_m: FloatImage, rays: FloatImage, height_m: float) -> list[FloatImage]:
+        """(h, w) a channel for (h, w) depth and (2, h, w) rays: their length, and how they climb, a metre of depth."""
         seen = depth_m == depth_m
-        rise = np.divide(rays[..., 1], rays[..., 0])
-        length_m = np.where(seen, depth_m * rays[..., 0], np.float32(SKY_DISTANCE_M))
+        rise = rays[1] / rays[0]
+        length_m = np.where(seen, depth_m * rays[0], np.float32(SKY_DISTANCE_M))
         tau = self._fog(length_m, rise, height_m)
         length_m *= seen
-        through = np.empty((*depth_m.shape, 3), np.float32)
-        for channel, per_m in enumerate(self.clear_per_m):
-            np.exp(-(tau + np.float32(per_m) * length_m), out=through[..., channel])
-        return through
+        return [np.exp(length_m * np.float32(-per_m) - tau) for per_m in self.clear_per_m]
 
     def _fog(self, length_m: FloatImage, rise: FloatImage, height_m: float) -> FloatImage:
         """Optical thickness of the fog along rays: the integral of exp(-k height), solved.
@@ -105,12 +106,13 @@ class Air:
         # Nothing is denser than the fog on the ground, also where a sky is seen below the horizon.
         start = np.maximum(rate * (np.float32(height_m) + np.float32(self.fog_from_m) * rise), 0)
         fall = np.maximum(rate * rise * inside_m, -start)
-        fall = np.where(np.abs(fall) < 1e-5, np.float32(1e-5), fall)
+        np.copyto(fall, _LEAST_FALL, where=np.abs(fall) < _LEAST_FALL)
         density = np.exp(-start)
-        return np.asarray(np.float32(self.fog_per_m) * inside_m * density * (-np.expm1(-fall) / fall))
+        density *= (1 - np.exp(-fall)) / fall
+        return np.asarray(density * inside_m * np.float32(self.fog_per_m))
 
-    def _directions(self, camera: CameraRecord) -> tuple[FloatImage, FloatImage]:
-        """(H, W, 2) metres of ray and of climb a metre of depth, and (H, W, 3) light of the air in units of the frame.
+    def _directions(self, camera: CameraRecord) -> tuple[FloatImage, list[FloatImage]]:
+        """(2, H, W) metres of ray and of climb a metre of depth, and (H, W) light of the air a channel.
 
         The light changes slowly, so it is worked out on a coarse grid.
         """
@@ -126,16 +128,16 @@ class Air:
         share = (azimuth - before)[..., None]
         ring = np.asarray(self.ring)
         glow = (1 - share) * ring[before % len(ring)] + share * ring[(before + 1) % len(ring)]
-        return self._exact_rays(camera), _enlarged(glow * LINEAR_FULL_SCALE, width, height)
+        return self._exact_rays(camera), [_enlarged(glow[..., c] * LINEAR_FULL_SCALE, width, height) for c in range(3)]
 
     @staticmethod
     def _exact_rays(camera: CameraRecord) -> FloatImage:
         x = ((np.arange(camera.width_px) + 0.5 - camera.width_px / 2) / camera.focal_px).astype(np.float32)
         y = ((np.arange(camera.height_px) + 0.5 - camera.height_px / 2) / camera.focal_px).astype(np.float32)[:, None]
         up = camera.world_from_camera_transform.rotation[2].astype(np.float32)
-        rays = np.empty((camera.height_px, camera.width_px, 2), np.float32)
-        np.sqrt(x * x + (y * y + 1), out=rays[..., 0])
-        np.add(x * up[0], y * up[1] + up[2], out=rays[..., 1])
+        rays = np.empty((2, camera.height_px, camera.width_px), np.float32)
+        np.sqrt(x * x + (y * y + 1), out=rays[0])
+        np.add(x * up[0], y * up[1] + up[2], out=rays[1])
         return rays
 
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import cv2
 import numpy as np
 import numpy.typing as npt
-
-from gear.values.geometry import Array
 
 TILE_PX = 1024
 _FOLD = 4096
@@ -35,7 +34,7 @@ def periodic_noise(rng: np.random.Generator, octaves: Sequence[int], slope: floa
     return ranks.reshape(total.shape)
 
 
-def sampled(picture: npt.NDArray[np.float32], x: Array, y: Array) -> npt.NDArray[np.float32]:
+def sampled(picture: npt.NDArray[np.float32], x: npt.NDArray[Any], y: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
     """A periodic picture at (N,) places in its pixels, bilinear: (N,) or (N, channels)."""
     # OpenCV's remap takes at most 32767 columns: the list is folded into rows.
     rows = -(-len(x) // _FOLD)

@@ -12,14 +12,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
 from gear.camera.noise import TILE_PX, periodic_noise, sampled
 from gear.values.frames import LINEAR_FULL_SCALE, FloatImage, UInt16Image
-from gear.values.geometry import Array
 from gear.values.rng import derive_rng
 from gear.values.scene import CameraRecord
+
+_Floats = npt.NDArray[np.float32]
 
 TILE_M = 96.0
 """The pattern of a town's puddles comes back after so many metres."""
@@ -41,8 +43,8 @@ class Puddles:
         town: whose pattern it is.
         share: of open ground that lies under water, 0..1.
         ripples: how much falling rain stirs it, 0..1.
-        mirrored: (rows, columns, 3) float32, light by elevation (row 0 is level, the last one overhead) and azimuth
-            (column 0 is east, counter-clockwise); 1.0 is the frame's full scale.
+        mirrored: (rows, columns, 3) float32, light by the sine of its height (row 0 is level, the last one
+            overhead) and azimuth (column 0 is east, counter-clockwise); 1.0 is the frame's full scale.
     """
 
     town: str
@@ -68,43 +70,51 @@ class Puddles:
         rows, columns = np.nonzero(open_ground)
         if self.share <= 0 or not len(rows):
             return result
-        depth = depth_m[rows, columns].astype(np.float64)
-        pose = camera.world_from_camera_transform
-        pixels = np.column_stack([columns, rows]).astype(np.float64)
-        towards = camera.intrinsics.unproject(pixels, depth) @ pose.rotation.T
-        at_m = (towards[:, :2] + pose.translation_m[:2]) * (TILE_PX / TILE_M)
-        water = _smooth(sampled(_pattern(self.town), at_m[:, 0], at_m[:, 1]), 1 - self.share, _EDGE)
-        wet = water > 0
-        rows, columns, towards, at_m = rows[wet], columns[wet], towards[wet], at_m[wet]
-        water = water[wet, None]
-        distance_m = np.linalg.norm(towards, axis=1)
-        sine = np.clip(-towards[:, 2] / distance_m, 0.0, 1.0)
-        elevation, azimuth = self._reflected(towards, sine, at_m, distance_m)
-        mirror = (WATER_F0 + (1 - WATER_F0) * (1 - np.sin(elevation)) ** 5)[:, None]
-        light = self._light(elevation, azimuth) * LINEAR_FULL_SCALE
+        position_m = camera.world_from_camera_transform.translation_m
+        towards = _towards(rows, columns, depth_m[rows, columns], camera)
+        at_px = [(towards[axis] + np.float32(position_m[axis] % TILE_M)) * (TILE_PX / TILE_M) for axis in (0, 1)]
+        water = _smooth(sampled(_pattern(self.town), *at_px), 1 - self.share, _EDGE)
+        wet = np.flatnonzero(water > 0)
+        if not len(wet):
+            return result
+        rows, columns, water = rows[wet], columns[wet], water[wet, None]
+        east, north, up = (axis[wet] for axis in towards)
+        distance_m = np.sqrt(east * east + north * north + up * up)
+        sine = self._stirred(np.clip(-up / distance_m, 0, 1), distance_m, [axis[wet] for axis in at_px])
+        flat = (1 - sine) ** 2
+        mirror = (WATER_F0 + (1 - WATER_F0) * flat * flat * (1 - sine))[:, None]
+        light = self._light(sine, cv2.phase(east, north).reshape(-1)) * np.float32(LINEAR_FULL_SCALE)
         below = linear_rgb[rows, columns].astype(np.float32)
         under = below * BOTTOM * (1 - mirror) + light * mirror
         mixed = below + water * (under - below)
         result[rows, columns] = np.minimum(mixed + 0.5, LINEAR_FULL_SCALE).astype(np.uint16)
         return result
 
-    def _reflected(self, towards: Array, sine: Array, at_px: Array, distance_m: Array) -> tuple[Array, Array]:
-        """Elevation and azimuth, in radians, of what (N, 3) rays see in the water."""
-        elevation = np.arcsin(sine)
-        azimuth = np.arctan2(towards[:, 1], towards[:, 0])
-        if self.ripples > 0:
-            scale = TILE_M / _RIPPLE_TILE_M
-            # Ripples that are smaller than a pixel cancel out.
-            slope = _RIPPLE_SLOPE * self.ripples / (1 + distance_m / 6)
-            stirred = sampled(_pattern("ripples"), at_px[:, 0] * scale, at_px[:, 1] * scale) - 0.5
-            elevation = np.abs(elevation + 2 * slope * stirred)
-        return elevation, azimuth
+    def _stirred(self, sine: _Floats, distance_m: _Floats, at_px: list[_Floats]) -> _Floats:
+        """(N,) sines of the heights that rays see in the water, moved by ripples."""
+        if self.ripples <= 0:
+            return sine
+        scale = TILE_M / _RIPPLE_TILE_M
+        # Ripples that are smaller than a pixel cancel out.
+        slope = _RIPPLE_SLOPE * self.ripples / (1 + distance_m / 6)
+        ripple = sampled(_pattern("ripples"), at_px[0] * scale, at_px[1] * scale) - np.float32(0.5)
+        return np.asarray(np.minimum(np.abs(sine + 2 * slope * ripple), 1), dtype=np.float32)
 
-    def _light(self, elevation: Array, azimuth: Array) -> npt.NDArray[np.float32]:
+    def _light(self, sine: _Floats, azimuth_rad: _Floats) -> _Floats:
         rows, columns = self.mirrored.shape[:2]
-        # The last row stands one below the border, so that the zenith does not wrap around to the horizon.
-        row = np.clip(elevation / (np.pi / 2), 0, 1) * (rows - 1)
-        return sampled(self.mirrored, azimuth / (2 * np.pi) * columns, np.minimum(row, rows - 1.001))
+        # A little below the last row, so that the zenith does not wrap around to the horizon.
+        row = np.minimum(sine * (rows - 1), np.float32(rows - 1.001))
+        return sampled(self.mirrored, azimuth_rad * np.float32(columns / (2 * np.pi)), row)
+
+
+def _towards(
+    rows: npt.NDArray[np.intp], columns: npt.NDArray[np.intp], depth_m: _Floats, camera: CameraRecord
+) -> list[_Floats]:
+    """East, north and up, (N,) each in metres, from the camera to what pixels show."""
+    x = (columns.astype(np.float32) - np.float32((camera.width_px - 1) / 2)) * depth_m * np.float32(1 / camera.focal_px)
+    y = (rows.astype(np.float32) - np.float32((camera.height_px - 1) / 2)) * depth_m * np.float32(1 / camera.focal_px)
+    rotation = camera.world_from_camera_transform.rotation.astype(np.float32)
+    return [row[0] * x + row[1] * y + row[2] * depth_m for row in rotation]
 
 
 @cache

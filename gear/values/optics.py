@@ -37,7 +37,7 @@ class LensRecord:
 
     Attributes:
         k1, k2: as in `Lens`.
-        focal_px: of the distorted picture, where r is counted; longer than the pinhole's so that the corners are filled.
+        focal_px: of the distorted picture; longer than the pinhole's where its corners would be empty.
     """
 
     k1: float

@@ -85,11 +85,11 @@ def lighting_of(weather: Weather, *, sky_face_px: int = SKY_FACE_PX) -> Lighting
 def mirrored_light(weather: Weather, rows: int, columns: int) -> Floats:
     """(rows, columns, 3) what still water in a street mirrors, in units of the frame.
 
-    Row 0 is level and the last one overhead; column 0 is east, counter-clockwise.
+    Rows stand at evenly spaced sines of height, from level to overhead; column 0 is east, counter-clockwise.
     """
     sky = Sky.of(weather)
     elevation, azimuth = np.meshgrid(
-        np.linspace(0, math.pi / 2, rows), np.arange(columns) / columns * 2 * math.pi, indexing="ij"
+        np.arcsin(np.linspace(0, 1, rows)), np.arange(columns) / columns * 2 * math.pi, indexing="ij"
     )
     level = np.cos(elevation)
     directions = np.stack([np.cos(azimuth) * level, np.sin(azimuth) * level, np.sin(elevation)], axis=-1)
