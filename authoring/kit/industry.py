@@ -104,8 +104,8 @@ def petrol_station(rng: np.random.Generator) -> list[Part]:
     sink.swatch_box("signal_green", (-11.04, -5.54, low + 0.25), (11.04, 5.54, low + 0.6), skip="zZ")
     for u in np.arange(-9.0, 9.1, 3.6):
         for v in (-2.6, 2.6):
-            sink.swatch_quad("lamp_glass", [(u - 0.4, v + 0.25, low - 0.01), (u + 0.4, v + 0.25, low - 0.01),
-                                            (u + 0.4, v - 0.25, low - 0.01), (u - 0.4, v - 0.25, low - 0.01)])  # fmt: skip
+            light = [(u + a * 0.4, v - b * 0.25, low - 0.01) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+            sink.swatch_quad("lamp_glass", light)
     _fascia(sink, int(rng.integers(FASCIA_COUNT)), 0.0, -5.56, low + 0.1, 5.6)
     for v in (-2.6, 2.6):
         for u in (-7.5, 7.5):
@@ -195,16 +195,15 @@ def _office(sink: Sink, x0: float, x1: float, front: float, top: float) -> None:
             sink.swatch_box(
                 "white_paint", (u - 0.98, face - 0.02, low - 0.08), (u + 0.98, face + 0.03, low + 1.58), skip="Y"
             )
-            sink.swatch_quad("grey_glass", [(u - 0.9, face - 0.03, low), (u + 0.9, face - 0.03, low),
-                                            (u + 0.9, face - 0.03, low + 1.5), (u - 0.9, face - 0.03, low + 1.5)])  # fmt: skip
+            pane = [(u + a * 0.9, face - 0.03, low + b * 1.5) for a, b in ((-1, 0), (1, 0), (1, 1), (-1, 1))]
+            sink.swatch_quad("grey_glass", pane)
 
 
 def _side_window(sink: Sink, x: float, y: float, top: float) -> None:
     side = 1.0 if x > 0 else -1.0
     near = sorted((x, x + side * 0.04))
     sink.swatch_box("anthracite", (near[0], y - 1.6, top - 1.2), (near[1], y + 1.6, top), skip="X" if side < 0 else "x")
-    face = np.array([(x + side * 0.05, y - side * 1.5, top - 1.1), (x + side * 0.05, y + side * 1.5, top - 1.1),
-                     (x + side * 0.05, y + side * 1.5, top - 0.1), (x + side * 0.05, y - side * 1.5, top - 0.1)])  # fmt: skip
+    face = [(x + side * 0.05, y + side * a * 1.5, top + b) for a, b in ((-1, -1.1), (1, -1.1), (1, -0.1), (-1, -0.1))]
     sink.swatch_quad("grey_glass", face)
 
 

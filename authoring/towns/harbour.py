@@ -12,7 +12,7 @@ from authoring.towns.network import Network, Node, Profile, Street
 BOUNDS = (-240.0, -235.0, 240.0, 235.0)
 
 ESTATE = Profile(lane_m=3.8, sidewalk_m=3.6, speed_mps=13.9)
-TERMINAL = Profile(lane_m=3.9, sidewalk_m=3.2, speed_mps=11.1)
+TERMINAL = Profile(lane_m=3.9, sidewalk_m=3.6, speed_mps=11.1)
 ON_SLIP = Profile(forward=1, backward=0, lane_m=3.6, sidewalk_m=0.0, speed_mps=16.7)
 OFF_SLIP = Profile(forward=0, backward=1, lane_m=3.6, sidewalk_m=0.0, speed_mps=16.7)
 SLIP_RADIUS_M = 48.0

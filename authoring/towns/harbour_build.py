@@ -116,6 +116,8 @@ def _write(folder: Path, sink: Sink, props: Props, regions: Regions, lanes: dict
     document.solids.extend([*town_solids(regions, [], reach_m=SOLID_M), *props.solids])
     document.lanes.extend(lanes.values())
     document.sidewalks.extend(sidewalks(regions, harbour.BOUNDS))
-    document.crosswalks.extend(crosswalks(regions))
+    # Nobody walks across slips and the roads that leave: no sidewalk goes along the former, no car on the latter.
+    dead = tuple(f"_{street.name}" for street in regions.network.streets.values() if street.end is None)
+    document.crosswalks.extend(walk for walk in crosswalks(regions) if not walk.name.endswith(dead))
     document.bays.extend([*bay_rows(regions.bay_groups), *yards.bays])
     (folder / "harbour.xml").write_text(document.text(), encoding="utf-8", newline="\n")

@@ -68,6 +68,23 @@ PLOTS = (
     Plot(name="verge_west", corners=(-238, 124, -223.5, 157), material="roof_gravel", label="terrain"),
     Plot(name="verge_petrol", corners=(106, 120, 150, 131.5), material="grass", label="terrain"),
     Plot(name="verge_terminal", corners=(-22.5, -232, -8, -203), material="grass", label="terrain"),
+    *(
+        Plot(name=f"gate_{index}", corners=corners, material="asphalt_worn")
+        for index, corners in enumerate(
+            (
+                (-179, -136, -165, -129),
+                (-90, -131.6, -75, -129),
+                (58, -136, 72, -129),
+                (-81, -152, -67, -147),
+                (-179, 129, -165, 136),
+                (-87, 129, -73, 136),
+                (34, 131, 48, 136),
+                (86, 131, 100, 136),
+                (162, 118, 176, 136),
+                (-70, 147, -56, 153),
+            )
+        )
+    ),
 )
 
 
@@ -196,8 +213,8 @@ class Yards:
             if self.props.is_free(float(x), y, -2.0):
                 goods = industry_yard.pallets(self.rng)
                 self.props.put("goods", goods, float(x), y, KERB_M, yaw, radius_m=2.0, high_m=1.5)
-        for index, (x, y) in enumerate(((-34, -74), (-34, -122), (30, -95), (110, 70), (-128, -160), (-30, 58))):
-            self._stack(f"boxes_{index}", 1 + index % 2, 1, (float(x) + 4, float(y)), highest=2)
+        for index, (x, y) in enumerate(((-56, -121), (-34, -122), (34, -95), (190, 101), (-34, -168), (-38, 46))):
+            self._stack(f"boxes_{index}", 1 + index % 2, 1, (float(x), float(y)), highest=2)
 
     def _house(
         self, name: str, parts: list[Part], middle: tuple[float, float], yaw: float, size: tuple[float, float, float]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import filecmp
+from itertools import pairwise
 from pathlib import Path
 
 import mujoco
@@ -174,7 +175,7 @@ def test_drivers_see_the_boards(model: mujoco.MjModel, data: mujoco.MjData, name
     ahead, lateral = (scene["ego"][key] for key in ("ahead_m", "lateral_m"))  # type: ignore[call-overload]
     clear = 0
     for _, points, _ in lanes(model).values():
-        for start, end in zip(points[:-1], points[1:], strict=True):
+        for start, end in pairwise(points):
             heading = (end - start) / np.linalg.norm(end - start)
             for step in np.arange(0, np.linalg.norm(end - start), 3.0):
                 place = start + heading * step
