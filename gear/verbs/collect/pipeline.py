@@ -7,9 +7,7 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 
 from gear.dataset.store import Store
-from gear.values.frames import Frame
-from gear.values.scene import SceneRecord
-from gear.verbs.collect.session import Session
+from gear.verbs.collect.session import Session, Shot
 
 IN_FLIGHT = 2
 """Frames that may wait for the writer; more would only cost memory."""
@@ -32,16 +30,15 @@ def collect_samples(session: Session, store: Store, indices: Iterable[int], done
     with ThreadPoolExecutor(max_workers=1, thread_name_prefix="gear-writer") as writer:
         try:
             for index in indices:
-                record = session.record(index)
-                frame = session.frame(record)
+                shot = session.shoot(session.record(index))
                 settle(IN_FLIGHT - 1)
-                waiting.append((index, writer.submit(_write, session, store, frame, record)))
+                waiting.append((index, writer.submit(_write, session, store, shot)))
             settle(0)
         except BaseException:
             writer.shutdown(wait=True, cancel_futures=True)
             raise
 
 
-def _write(session: Session, store: Store, frame: Frame, record: SceneRecord) -> None:
-    sample, encoded = session.finish(frame, record)
+def _write(session: Session, store: Store, shot: Shot) -> None:
+    sample, encoded = session.finish(shot)
     store.write(sample, encoded)

@@ -3,23 +3,39 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from gear.camera.develop import Darkroom
-from gear.contracts.rendering import Renderer
+from gear.contracts.rendering import RawView, Renderer
 from gear.contracts.tasks import Encoded, Sample, Task
 from gear.plugins.build import blamed, build, find
 from gear.plugins.catalogue import Found
 from gear.render.opening import open_renderer
-from gear.values.frames import Frame
+from gear.values.frames import Frame, GeomTable, SceneObject
 from gear.values.scene import SceneRecord
 from gear.verbs.collect.job import Job
 from gear.world.air import darkroom_of
 from gear.world.memory import release_memory
 from gear.world.planner import ScenePlanner
 from gear.world.world import World
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Shot:
+    """What the renderer saw of one scene.
+
+    Attributes:
+        record: the scene.
+        raw: one view a camera, in the record's order.
+        geoms, objects: the tables to read it, as in `Frame`.
+    """
+
+    record: SceneRecord
+    raw: tuple[RawView, ...]
+    geoms: GeomTable
+    objects: Mapping[int, SceneObject]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -38,21 +54,26 @@ class Session:
         """The scene of one sample: a pure function of the job and the index."""
         return self.darkroom.recorded(self.planner.plan(index))
 
-    def frame(self, record: SceneRecord) -> Frame:
-        """Places the scene with the run's patch in it and takes its pictures."""
+    def shoot(self, record: SceneRecord) -> Shot:
+        """Places the scene with the run's patch in it and renders it."""
         names = tuple(surface.name for surface in record.surfaces)
         placed = self.world.place(record, self.job.patch.by_surface(names))
         raw = self.renderer.render(placed.stage, record.cameras)
-        views = {
-            camera.name: self.darkroom.view(view, camera, record, placed.geoms)
-            for camera, view in zip(record.cameras, raw, strict=True)
-        }
-        return Frame(views=views, geoms=placed.geoms, objects=placed.objects)
+        return Shot(record=record, raw=raw, geoms=placed.geoms, objects=placed.objects)
 
-    def finish(self, frame: Frame, record: SceneRecord) -> tuple[Sample, Encoded]:
-        """Measures the frame and turns it into files; needs neither world nor renderer, so it can run beside them."""
-        with blamed(self.plugin, f"sample {record.index}"):
-            sample = self.task.ground_truth(frame, record)
+    def develop(self, shot: Shot) -> Frame:
+        """Turns what the renderer saw into pictures; needs neither world nor renderer, so it can run beside them."""
+        views = {
+            camera.name: self.darkroom.view(view, camera, shot.record, shot.geoms)
+            for camera, view in zip(shot.record.cameras, shot.raw, strict=True)
+        }
+        return Frame(views=views, geoms=shot.geoms, objects=shot.objects)
+
+    def finish(self, shot: Shot) -> tuple[Sample, Encoded]:
+        """Develops and measures a shot and turns it into files, beside the next one's rendering."""
+        frame = self.develop(shot)
+        with blamed(self.plugin, f"sample {shot.record.index}"):
+            sample = self.task.ground_truth(frame, shot.record)
             return sample, self.task.encode(sample, self.job.plan.info)
 
 
