@@ -17,6 +17,8 @@ from authoring.towns.regions import KERB_M, Regions
 WATER_M = -1.7
 COPING_M = 0.6
 TACTILE_DEPTH_M = 0.8
+YARD_M = KERB_M - 0.01
+"""Yards lie a finger lower than what borders them: where a site reaches over one, the site is what is seen."""
 
 
 def lay_ground(sink: Sink, regions: Regions, sites: BaseGeometry) -> None:
@@ -43,7 +45,7 @@ def lay_ground(sink: Sink, regions: Regions, sites: BaseGeometry) -> None:
     taken = unary_union([sites, quay])
     for interior in regions.interiors:
         solids.flat(
-            sink, interior.difference(taken), KERB_M, "cobbles" if interior.area < 12000 else "concrete", "ground"
+            sink, interior.difference(taken), YARD_M, "cobbles" if interior.area < 12000 else "concrete", "ground"
         )
     for median in regions.medians.values():
         _median(sink, median)
