@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -41,7 +41,7 @@ class Store:
             if not target.exists():
                 write_whole(self.root, patch_path(self.plan.info.patch_label, name), data)
 
-    def missing(self, progress: Callable[[int], None] = lambda _: None) -> list[int]:
+    def missing(self) -> list[int]:
         """Indices of samples that have no sidecar yet; a sample with one is whole and is never made again."""
         folder = inside(self.root, split_folder(self.split)) / "samples"
         there = {path.name for path in folder.iterdir()} if folder.is_dir() else set()

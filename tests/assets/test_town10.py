@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import filecmp
+import importlib
 from itertools import pairwise
 from pathlib import Path
 
@@ -292,9 +293,9 @@ def is_seen(
 
 
 def test_regenerating_gives_the_same_bytes(tmp_path: Path) -> None:
-    authoring = pytest.importorskip("authoring.towns.assemble")
+    authoring = importlib.import_module("authoring.towns.assemble")
     for package in ("shapely", "mapbox_earcut"):
-        pytest.importorskip(package)
+        importlib.import_module(package)
     authoring.write_town10(tmp_path)
     committed = sorted(path.name for path in (TOWN.parent / "town10").iterdir())
     assert sorted(path.name for path in (tmp_path / "town10").iterdir()) == committed

@@ -1,11 +1,10 @@
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gear.metrics.boxes import footprints, iou_2d, iou_ground_and_space, share_of_first
-
-shapely = pytest.importorskip("shapely")
 
 
 def boxes(seed: int, count: int) -> np.ndarray:
