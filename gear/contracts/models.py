@@ -1,9 +1,16 @@
-"""The model protocol. torch appears in types alone."""
+"""The model protocol. torch appears in types alone.
+
+What `forward` gives without targets is named the same for every network of a task, so that losses and attacks need not
+know networks: `logits` (B, C, H, W) for semantic segmentation, at the picture's size, C = 19 Cityscapes train ids or 34
+label ids; `depth_m` (B, H, W) for depth, metres, at the picture's size. Detectors and stereo networks give their heads'
+raw outputs, one tensor a name with the batch in front. Their losses are what attacks work on.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from gear.values.frames import UInt8Image
 
@@ -31,3 +38,61 @@ class Model(Protocol):
     def taps(self) -> Mapping[str, nn.Module]:
         """Modules whose outputs are the named feature maps."""
         ...
+
+
+class Trainable(Model, Protocol):
+    """A model that `gear train` can train: its losses are those of `forward` with the batch's samples."""
+
+    def module(self) -> nn.Module:
+        """The network, under the key names that its weights are saved with."""
+        ...
+
+
+class BatchPredictor(Model, Protocol):
+    """A model that predicts several samples at once, which is faster on most machines."""
+
+    def predict_many(self, samples: Sequence[Mapping[str, UInt8Image]]) -> list[Any]:
+        """`predict` for each; pictures may differ in size."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recipe:
+    """How a network is trained unless one says otherwise.
+
+    Attributes:
+        optimiser: AdamW, or SGD with momentum 0.9.
+        learning_rate: at its highest; it warms up and then falls with a cosine.
+        weight_decay: of weights; biases and normalisation have none.
+        batch: samples a step.
+        epochs: passes over the data.
+        crop_px: height and width of random crops; None trains on whole pictures.
+        scales: range of random resizing before the crop; (1, 1) for none.
+        gradient_norm: gradients are clipped to this; 0 for not at all.
+    """
+
+    optimiser: Literal["adamw", "sgd"] = "adamw"
+    learning_rate: float = 1e-3
+    weight_decay: float = 1e-2
+    batch: int = 8
+    epochs: int = 20
+    crop_px: tuple[int, int] | None = None
+    scales: tuple[float, float] = (1.0, 1.0)
+    gradient_norm: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PublishedWeights:
+    """Weights that others publish; nothing is downloaded.
+
+    Attributes:
+        data: what they were trained on.
+        source: where a user finds them.
+        licence: of the weights, as far as their authors say.
+        size_mb: of the file.
+    """
+
+    data: str
+    source: str
+    licence: str
+    size_mb: float

@@ -8,7 +8,7 @@ from typing import Any, Generic, Literal, TypeVar
 
 from gear.contracts.attacks import Attack
 from gear.contracts.defenses import Defense
-from gear.contracts.models import Model
+from gear.contracts.models import Model, PublishedWeights, Recipe
 from gear.contracts.tasks import Task
 
 ConfigT = TypeVar("ConfigT")
@@ -64,12 +64,18 @@ class ModelSpec(Spec[ConfigT, Model]):
         views: names of the cameras that it looks at.
         taps: names of the feature maps that it exposes.
         has_gradients: whether `forward` is differentiable to the pixels.
+        recipe: how it is trained; None where `gear train` cannot.
+        published: weights that others publish for it.
+        normalisation: one line on what its graph wants of a picture in 0..1.
     """
 
     tasks: tuple[str, ...]
     views: tuple[str, ...]
     taps: tuple[str, ...] = ()
     has_gradients: bool = True
+    recipe: Recipe | None = None
+    published: tuple[PublishedWeights, ...] = ()
+    normalisation: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,0 +1,1 @@
+"""Task losses, in torch: for training and for attacks."""

@@ -1,0 +1,1 @@
+"""Networks in torch: graphs, weights, and what runs them. Never imported by what collects."""

@@ -1,0 +1,109 @@
+"""The base of gear's networks: a torch graph behind the `Model` protocol."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from gear.nn.options import NetworkOptions
+from gear.nn.runtime import autocast, device_of, prepare
+from gear.values.frames import UInt8Image
+
+IMAGENET_MEAN = (0.485, 0.456, 0.406)
+IMAGENET_STD = (0.229, 0.224, 0.225)
+
+
+class Network(nn.Module, ABC):
+    """A graph with its normalisation, losses and answers.
+
+    Attributes:
+        graph: the network itself, under official key names.
+        options: as given.
+        device: where it runs.
+    """
+
+    def __init__(self, graph: nn.Module, options: NetworkOptions, *, views: Sequence[str] = ("left",)) -> None:
+        super().__init__()
+        prepare()
+        self.graph = graph
+        self.options = options
+        self.device = device_of(options.device)
+        self._views = tuple(views)
+        self.to(self.device)
+        self.eval()
+
+    def module(self) -> nn.Module:
+        """The graph."""
+        return self.graph
+
+    def forward(self, views: Mapping[str, Tensor], targets: Sequence[Any] | None = None) -> Mapping[str, Tensor]:
+        """Outputs of a batch of (B, 3, H, W) pictures in 0..1, or its losses where the batch's samples are given.
+
+        Inputs may lie on any device; what comes out lies on the network's, in float32.
+        """
+        pictures = {name: views[name].to(self.device) for name in self._views}
+        with autocast(self.device, self.options.precision):
+            raw = self.run(pictures)
+        outputs = {name: tensor.float() for name, tensor in raw.items()}
+        return outputs if targets is None else self.losses(outputs, targets)
+
+    def taps(self) -> Mapping[str, nn.Module]:
+        """Named feature maps; none unless a network says so."""
+        return {}
+
+    def predict(self, views: Mapping[str, UInt8Image]) -> Any:
+        """The task's prediction for one sample."""
+        return self.predict_many([views])[0]
+
+    def predict_many(self, samples: Sequence[Mapping[str, UInt8Image]]) -> list[Any]:
+        """The task's predictions; pictures of one size go through the graph together."""
+        sizes = [sample[self._views[0]].shape[:2] for sample in samples]
+        answers: list[Any] = [None] * len(samples)
+        for size in dict.fromkeys(sizes):
+            chosen = [index for index, other in enumerate(sizes) if other == size]
+            with torch.inference_mode():
+                outputs = self(as_batch([samples[index] for index in chosen], self._views))
+                for index, answer in zip(chosen, self.answers(outputs, size), strict=True):
+                    answers[index] = answer
+        return answers
+
+    @abstractmethod
+    def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        """Named outputs of a batch of pictures in 0..1 on the network's device."""
+
+    @abstractmethod
+    def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
+        """Named numbers without dimensions, to be minimised in training."""
+
+    @abstractmethod
+    def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
+        """The task's predictions from the outputs of a batch of pictures of (height, width)."""
+
+
+class Normalise(nn.Module):
+    """(x - mean) / std by channel; its numbers are not part of the saved state."""
+
+    mean: Tensor
+    std: Tensor
+
+    def __init__(self, mean: Sequence[float] = IMAGENET_MEAN, std: Sequence[float] = IMAGENET_STD) -> None:
+        super().__init__()
+        self.register_buffer("mean", torch.tensor(mean).view(1, -1, 1, 1), persistent=False)
+        self.register_buffer("std", torch.tensor(std).view(1, -1, 1, 1), persistent=False)
+
+    def forward(self, pictures: Tensor) -> Tensor:
+        """(B, 3, H, W) of 0..1, normalised."""
+        return (pictures - self.mean) / self.std
+
+
+def as_batch(samples: Sequence[Mapping[str, UInt8Image]], views: Sequence[str]) -> dict[str, Tensor]:
+    """Pictures of one size as `Model.forward` takes them: (B, 3, H, W) float32 in 0..1 by camera name."""
+    return {
+        name: torch.from_numpy(np.stack([sample[name] for sample in samples])).permute(0, 3, 1, 2).float() / 255
+        for name in views
+    }

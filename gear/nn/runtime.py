@@ -1,0 +1,66 @@
+"""The CPU's and the GPU's habits, in one place: allocator, threads, devices, precision, random weights."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import functools
+import os
+import sys
+from collections.abc import Iterator
+from typing import Literal
+
+import torch
+
+from gear.values.errors import GearError
+
+M_TRIM_THRESHOLD, M_TOP_PAD, M_MMAP_MAX = -1, -2, -4
+TOP_PAD_BYTES = 256 << 20
+
+
+@functools.cache
+def prepare(threads: int = 0) -> None:
+    """Sets the allocator and the number of threads, once a process.
+
+    glibc gives large activations back to the kernel after every step and fetches them again; keeping them makes an
+    attack's step up to twice as fast. Only memory is managed otherwise, no number changes. Elsewhere than on glibc
+    nothing is done.
+
+    Args:
+        threads: of torch's own; 0 for one a core that this process may use.
+    """
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    torch.set_num_threads(threads or int(os.environ.get("OMP_NUM_THREADS", cores)))
+    if not sys.platform.startswith("linux"):
+        return
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    if mallopt is not None:
+        mallopt(M_MMAP_MAX, 0)
+        mallopt(M_TRIM_THRESHOLD, 2**31 - 1)
+        mallopt(M_TOP_PAD, TOP_PAD_BYTES)
+
+
+def device_of(wish: Literal["auto", "cpu", "cuda"]) -> torch.device:
+    """The device that was asked for.
+
+    Raises:
+        GearError: there is no such device.
+    """
+    if wish == "cuda" and not torch.cuda.is_available():
+        raise GearError("device cuda: torch sees no GPU here; use device=auto or device=cpu")
+    if wish == "auto":
+        return torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    return torch.device(wish)
+
+
+def autocast(device: torch.device, precision: Literal["float32", "bfloat16"]) -> torch.autocast:
+    """A context in which the graph runs at the precision."""
+    return torch.autocast(device.type, torch.bfloat16, enabled=precision == "bfloat16")
+
+
+@contextlib.contextmanager
+def seeded(seed: int) -> Iterator[None]:
+    """Layers made inside draw their first weights from `seed`; torch's own generator is as before afterwards."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        yield
