@@ -1,0 +1,1 @@
+"""Patches into pictures, differentiably. Never imported by what collects."""
