@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, Literal, TypeVar
 
@@ -67,6 +67,11 @@ class ModelSpec(Spec[ConfigT, Model]):
         recipe: how it is trained; None where `gear train` cannot.
         published: weights that others publish for it.
         normalisation: one line on what its graph wants of a picture in 0..1.
+        parameters: how many its graph has with default options; 0 where nobody counted.
+        needs: modules that `build` imports beside what gear itself depends on, such as `torchvision`.
+        convert: makes of a published file's tensors, by key, those of `module().state_dict()`; `gear weights convert`
+            calls it after it has taken the state out of the checkpoint and `module.` off its keys, and checks the
+            result strictly. None where published files hold the network's own keys. Imports torch inside, if at all.
     """
 
     tasks: tuple[str, ...]
@@ -76,6 +81,9 @@ class ModelSpec(Spec[ConfigT, Model]):
     recipe: Recipe | None = None
     published: tuple[PublishedWeights, ...] = ()
     normalisation: str = ""
+    parameters: int = 0
+    needs: tuple[str, ...] = ()
+    convert: Callable[[Mapping[str, Any]], Mapping[str, Any]] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

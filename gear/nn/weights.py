@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import functools
 import importlib.metadata
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import torch
 from safetensors import SafetensorError, safe_open
@@ -14,7 +14,8 @@ from safetensors.torch import save as to_bytes
 from torch import Tensor, nn
 
 from gear.dataset.files import write_whole
-from gear.nn.options import NONE, SHIPPED
+from gear.nn.options import NONE, SHIPPED, NetworkOptions
+from gear.nn.runtime import seeded
 from gear.values.errors import GearError
 
 GROUP = "gear.weights"
@@ -24,6 +25,27 @@ OPTIONAL = "num_batches_tracked"
 """Files older than this counter lack it; nothing uses it."""
 
 SHOWN_KEYS = 3
+
+GraphT = TypeVar("GraphT", bound=nn.Module)
+
+
+def build_graph(make: Callable[[], GraphT], options: NetworkOptions, name: str) -> GraphT:
+    """A network's graph with the weights that its options ask for.
+
+    Args:
+        make: builds the graph; its layers draw their first weights from `options.seed`.
+        options: of the network.
+        name: of the model plugin, for the shipped weights.
+
+    Raises:
+        GearError: the weights are not there, or are of another network.
+    """
+    path = resolve(options.weights, name)
+    with seeded(options.seed):
+        graph = make()
+    if path is not None:
+        load_into(graph, path)
+    return graph
 
 
 def resolve(weights: str, name: str) -> Path | None:

@@ -13,6 +13,8 @@ from gear.contracts.specs import AnySpec, Spec
 from gear.plugins.catalogue import Found
 
 COMMON = {field.name for field in dataclasses.fields(Spec)}
+ELSEWHERE = {"recipe", "published", "convert", "parameters"}
+"""What `gear models` says of a network."""
 
 UNITS = {
     "px": "pixels", "m": "metres", "mm": "millimetres", "deg": "degrees", "rad": "radians", "s": "seconds",
@@ -26,7 +28,7 @@ def summary(found: Found) -> dict[str, Any]:
     capabilities = {
         field.name: sorted(value) if isinstance(value := getattr(found.spec, field.name), frozenset) else value
         for field in dataclasses.fields(found.spec)
-        if field.name not in COMMON
+        if field.name not in COMMON | ELSEWHERE
     }
     return {
         "kind": found.kind,

@@ -38,6 +38,9 @@ CAPABILITY_TYPES: dict[str, type] = {
     "needs_gradients": bool,
     "needs_calibration": bool,
     "needs_model": bool,
+    "normalisation": str,
+    "parameters": int,
+    "needs": tuple,
 }
 NAME = re.compile(r"[a-z][a-z0-9_]*")
 DISTRIBUTION = "mujoco-gear"
