@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Generic, Literal, TypeVar
 
 from gear.contracts.attacks import Attack
@@ -48,11 +48,15 @@ class TaskSpec(Spec[ConfigT, Task[Any, Any]]):
         views: names of the cameras of its default rig, the reference first.
         layout: one line on the files that it writes.
         original_name: what CARLA-GeAR calls it in its configs and JSON, or "" if it does not know it.
+        figure: the evaluator's figure by which training chooses among checkpoints; "" chooses by the loss.
+        less_is_better: whether that figure is an error.
     """
 
     views: tuple[str, ...]
     layout: str
     original_name: str = ""
+    figure: str = ""
+    less_is_better: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,6 +76,9 @@ class ModelSpec(Spec[ConfigT, Model]):
         convert: makes of a published file's tensors, by key, those of `module().state_dict()`; `gear weights convert`
             calls it after it has taken the state out of the checkpoint and `module.` off its keys, and checks the
             result strictly. None where published files hold the network's own keys. Imports torch inside, if at all.
+        starts: what `gear train --init NAME` can begin with beside random weights and files: by name (`imagenet` is the
+            customary one), a function that is given the built model and puts the weights into it. It raises a
+            GearError that says which package to install where they are not there. Imports torch inside.
     """
 
     tasks: tuple[str, ...]
@@ -84,6 +91,7 @@ class ModelSpec(Spec[ConfigT, Model]):
     parameters: int = 0
     needs: tuple[str, ...] = ()
     convert: Callable[[Mapping[str, Any]], Mapping[str, Any]] | None = None
+    starts: Mapping[str, Callable[[Any], None]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,7 +13,7 @@ from gear.contracts.specs import AnySpec, Spec
 from gear.plugins.catalogue import Found
 
 COMMON = {field.name for field in dataclasses.fields(Spec)}
-ELSEWHERE = {"recipe", "published", "convert", "parameters"}
+ELSEWHERE = {"recipe", "published", "convert", "parameters", "starts"}
 """What `gear models` says of a network."""
 
 UNITS = {

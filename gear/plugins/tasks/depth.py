@@ -150,6 +150,7 @@ depth: TaskSpec[DepthConfig] = TaskSpec(
     views=(VIEW,),
     layout="leftImg8bit/<split>/rgb_%04d.png, gtFine/<split>/rgb_%04d.{png,tiff}, filenames/<split>_list{,_kitti}.txt",
     original_name="depth",
+    figure="eigen_d1",
 )
 
 

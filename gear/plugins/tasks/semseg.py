@@ -166,6 +166,7 @@ semseg: TaskSpec[SemsegConfig] = TaskSpec(
     views=(VIEW,),
     layout="{leftImg8bit,gtFine,camera}/<split>/<city>/<city>_<sequence>_<frame>_*.{png,json}",
     original_name="ss",
+    figure="miou",
 )
 
 
