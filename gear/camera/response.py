@@ -90,7 +90,7 @@ def response_for(renderer_name: str, weather: Weather) -> Response:
         return IDENTITY
     low_sun = float(np.clip((40 - weather.sun_altitude_deg) / 30, 0, 1))
     clouds = max(weather.cloudiness, 80.0 if weather.precipitation > 0 else 0.0) / 100
-    return Response(exposure=round(3.4 + 1.2 * low_sun - 1.6 * clouds, 3), contrast=round(1.35 + 0.05 * clouds, 3))
+    return Response(exposure=round(4.5 + 1.2 * low_sun - 2.0 * clouds, 3), contrast=round(1.43 + 0.05 * clouds, 3))
 
 
 def face_light(renderer_name: str, face: UInt8Image) -> Floats:

@@ -81,7 +81,7 @@ def test_every_weather_has_a_fixed_setting() -> None:
         assert 75 < 255 * setting.curve(0.1) < 140
         assert 225 < 255 * setting.curve(0.85) < 252
     assert all(response_for("classic", weather) == IDENTITY for weather in PRESETS.values())
-    assert response_for("filament", Weather(name="x", sun_altitude_deg=-5)).exposure < 5
+    assert response_for("filament", Weather(name="x", sun_altitude_deg=-5)).exposure < 6
 
 
 def test_settings_out_of_range_are_refused() -> None:
