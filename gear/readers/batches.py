@@ -1,0 +1,101 @@
+"""Batches as models take them: `model.forward(batch.views, batch.samples)`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from torch import Tensor
+from torch.utils.data import DataLoader
+
+from gear.readers.order import order
+from gear.readers.torch_dataset import Item, TorchDataset
+
+AHEAD = 2
+"""Batches that each worker process reads ahead."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Batch:
+    """Samples that go through a network together.
+
+    Attributes:
+        views: (B, 3, H, W) float32 sRGB pictures in 0..1 by camera name.
+        samples: the B samples, with their ground truth.
+        indices: their numbers in the split.
+    """
+
+    views: Mapping[str, Tensor]
+    samples: tuple[Any, ...]
+    indices: tuple[int, ...]
+
+
+def batches(
+    dataset: TorchDataset,
+    *,
+    size: int,
+    seed: int | None = None,
+    epoch: int = 0,
+    start: int = 0,
+    only_full: bool = False,
+    workers: int = 0,
+) -> Iterator[Batch]:
+    """One pass over a split.
+
+    Args:
+        dataset: whose items have pictures of one size.
+        size: samples a batch.
+        seed: of the order; None reads from the first to the last.
+        epoch: number of the pass; order and augmentation follow from it.
+        start: batches to leave out at the beginning, without reading them: where a stopped pass goes on.
+        only_full: whether a last batch of fewer samples is left out.
+        workers: processes that read ahead; 0 reads here. They change nothing but time.
+
+    Raises:
+        ValueError: `size` is below 1, or pictures of a batch differ in size.
+        DatasetError: a sample cannot be read.
+    """
+    if size < 1:
+        raise ValueError(f"size must be at least 1, got {size}")
+    dataset.epoch = epoch
+    indices = order(len(dataset), seed=seed, epoch=epoch)
+    groups = [indices[i : i + size] for i in range(0, len(indices), size)]
+    chosen = [group for group in groups[start:] if len(group) == size or not only_full]
+    reader: DataLoader[Item] = DataLoader(
+        dataset,
+        batch_sampler=chosen,
+        num_workers=workers,
+        collate_fn=_collate,
+        prefetch_factor=AHEAD if workers else None,
+        multiprocessing_context="spawn" if workers else None,
+        generator=torch.Generator(),  # torch would draw from its global one
+    )
+    for items in reader:
+        yield _finished(items)
+
+
+def as_pictures(views: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    """uint8 pictures to float32 in 0..1."""
+    return {name: tensor.float() / 255 for name, tensor in views.items()}
+
+
+def _collate(items: Sequence[Item]) -> Batch:
+    """Still uint8: a quarter of the bytes to send between processes."""
+    stacked = {name: _stack(name, items) for name in items[0].views}
+    return Batch(
+        views=stacked, samples=tuple(item.sample for item in items), indices=tuple(item.index for item in items)
+    )
+
+
+def _stack(name: str, items: Sequence[Item]) -> Tensor:
+    tensors = [item.views[name] for item in items]
+    sizes = {tuple(tensor.shape[1:]) for tensor in tensors}
+    if len(sizes) > 1:
+        raise ValueError(f"pictures {name!r} of a batch must have one size, got {sorted(sizes)}")
+    return torch.stack(tensors)
+
+
+def _finished(batch: Any) -> Batch:
+    return Batch(views=as_pictures(batch.views), samples=batch.samples, indices=batch.indices)
