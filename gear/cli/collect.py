@@ -7,6 +7,7 @@ import argparse
 EXAMPLE = """examples:
   gear collect --task stereo3d
   gear collect --task semseg --scene billboard04 --patch patches/ --out data/twin
+  gear collect --task semseg --split train --probes --out data/train
   gear collect --config my.yml --set weather.cloudiness=30 --set options.camera.width_px=1024
 """
 
@@ -54,6 +55,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--workers", type=positive, default=1, metavar="N", help="processes; change nothing but time (1)"
     )
+    parser.add_argument(
+        "--probes",
+        action="store_const",
+        const=True,
+        help="also keep what patches need to be put in afterwards; for `gear attack` and `gear gap`",
+    )
     parser.add_argument("--force", action="store_true", help="replace a split that was made with another configuration")
 
 
@@ -76,6 +83,7 @@ def run(args: argparse.Namespace) -> int:
             renderer=args.renderer,
             quality=args.quality,
             out=args.out,
+            probes=args.probes,
             settings=args.settings,
             workers=args.workers,
             force=args.force,

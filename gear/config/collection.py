@@ -138,6 +138,7 @@ class CollectionConfig:
         camera: optional effects: `shot_noise`, `read_noise` (percent), `vignette`, `shutter_s`, `lens` (`k1`, `k2`).
         seed, samples: instead of the simulation config's.
         patch_seed: of random patches; not the split's, so that all splits show the same one.
+        probes: also keep each surface's reach rendered black and white, from which compositors put patches in.
         simulation: name or path of the simulation config.
         options: the task's own options (`gear plugins show TASK`).
     """
@@ -156,6 +157,7 @@ class CollectionConfig:
     seed: int | None = None
     samples: int | None = None
     patch_seed: int = 0
+    probes: bool = False
     simulation: str = "default"
     options: Node = field(default_factory=lambda: Mapping({}, Place("defaults")))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -69,6 +69,19 @@ class Encoded:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Auxiliary:
+    """A file that a sample owns beside its task's, such as a probe.
+
+    Attributes:
+        path: relative to the dataset's root; its hash is among the sidecar's `files`.
+        facts: what is needed to read it; JSON.
+    """
+
+    path: str
+    facts: Json
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Sidecar:
     """What is kept beside each sample: `gear/<split>/<index>.json`.
 
@@ -77,12 +90,14 @@ class Sidecar:
         surfaces: measured surfaces.
         facts: the task's own.
         files: sha256 by relative path.
+        auxiliary: further files by name; empty unless they were asked for.
     """
 
     record: SceneRecord
     surfaces: tuple[SurfaceTruth, ...]
     facts: Json
     files: Mapping[str, str]
+    auxiliary: Mapping[str, Auxiliary] = field(default_factory=dict)
 
 
 class Evaluator(Protocol[SampleT_contra, PredictionT_contra]):

@@ -15,6 +15,11 @@ def sidecar_path(split: str, index: int) -> str:
     return f"{split_folder(split)}/samples/{index:06d}.json"
 
 
+def auxiliary_path(split: str, kind: str, index: int, name: str) -> str:
+    """A file that a sample owns beside its task's: `kind` is its folder."""
+    return f"{split_folder(split)}/{kind}/{index:06d}_{name}"
+
+
 def plan_path(split: str) -> str:
     """What the split was begun with; written first."""
     return f"{split_folder(split)}/plan.json"

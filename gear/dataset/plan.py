@@ -25,6 +25,7 @@ class Plan:
         patch: label and sha256 of the patch's pictures.
         info: names for the format's index files.
         samples: how many frames the split has.
+        auxiliary: kinds of further files that each sample owns: `probes`. Pictures and labels do not depend on them.
     """
 
     task: dict[str, str]
@@ -33,6 +34,7 @@ class Plan:
     patch: dict[str, str]
     info: SplitInfo
     samples: int
+    auxiliary: tuple[str, ...] = ()
 
     @property
     def twin_key(self) -> str:
@@ -42,7 +44,15 @@ class Plan:
     @property
     def content_key(self) -> str:
         """Equal for two splits whose common samples are equal byte for byte."""
-        return _digest({"twin": self.twin_key, "patch": self.patch})
+        content = {"twin": self.twin_key, "patch": self.patch}
+        return _digest(content | ({"auxiliary": list(self.auxiliary)} if self.auxiliary else {}))
+
+    def as_json(self) -> Json:
+        """As written. Auxiliary files are only spoken of where there are any."""
+        content = to_json(self)
+        if not self.auxiliary:
+            del content["auxiliary"]
+        return content
 
 
 def _digest(value: Json) -> str:
@@ -79,7 +89,7 @@ def begin(root: Path, plan: Plan) -> None:
             )
     there = read_plan(root, split)
     if there is not None and there.content_key != plan.content_key:
-        what = ", ".join(differences(to_json(there), to_json(plan))[:4])
+        what = ", ".join(differences(there.as_json(), plan.as_json())[:4])
         raise DatasetError(
             root,
             f"split {split!r} was made with another configuration ({what});"
@@ -92,7 +102,7 @@ def begin(root: Path, plan: Plan) -> None:
             " use --force to replace it",
         )
     if there is None or there.samples != plan.samples:
-        write_whole(root, plan_path(split), dump_json(to_json(plan)))
+        write_whole(root, plan_path(split), dump_json(plan.as_json()))
 
 
 def differences(old: Json, new: Json, key: str = "") -> list[str]:

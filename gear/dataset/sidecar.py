@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from gear.contracts.tasks import Sidecar
+from gear.contracts.tasks import Auxiliary, Sidecar
 from gear.dataset.files import read_bytes
 from gear.values.errors import DatasetError, FieldError
 from gear.values.scene import SceneRecord
@@ -31,15 +31,16 @@ def load_json(path: Path) -> Json:
 
 
 def sidecar_bytes(sidecar: Sidecar) -> bytes:
-    """As written beside a sample."""
-    return dump_json(
-        {
-            "record": to_json(sidecar.record),
-            "surfaces": to_json(sidecar.surfaces),
-            "facts": sidecar.facts,
-            "files": dict(sidecar.files),
-        }
-    )
+    """As written beside a sample. Auxiliary files are only spoken of where there are any."""
+    content = {
+        "record": to_json(sidecar.record),
+        "surfaces": to_json(sidecar.surfaces),
+        "facts": sidecar.facts,
+        "files": dict(sidecar.files),
+    }
+    if sidecar.auxiliary:
+        content["auxiliary"] = to_json(dict(sidecar.auxiliary))
+    return dump_json(content)
 
 
 def read_sidecar(path: Path) -> Sidecar:
@@ -55,6 +56,7 @@ def read_sidecar(path: Path) -> Sidecar:
             surfaces=from_json(tuple[SurfaceTruth, ...], data["surfaces"], "surfaces"),
             facts=data["facts"],
             files=from_json(dict[str, str], data["files"], "files"),
+            auxiliary=from_json(dict[str, Auxiliary], data.get("auxiliary", {}), "auxiliary"),
         )
     except (KeyError, TypeError, FieldError) as error:
         raise DatasetError(path, f"is not a sidecar of this version of gear: {error}") from error

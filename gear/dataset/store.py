@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gear.contracts.tasks import Encoded, Sample, Sidecar, Task
+from gear.contracts.tasks import Auxiliary, Encoded, Sample, Sidecar, Task
 from gear.dataset.files import clear_scratch, explained, inside, sha256, sync_folder, write_whole
 from gear.dataset.layout import manifest_path, patch_path, plan_path, sidecar_path, split_folder
 from gear.dataset.plan import Plan, begin, read_plan
@@ -47,17 +47,28 @@ class Store:
         there = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
         return [i for i in range(self.plan.samples) if f"{i:06d}.json" not in there]
 
-    def write(self, sample: Sample, encoded: Encoded) -> None:
+    def write(
+        self, sample: Sample, encoded: Encoded, auxiliary: Mapping[str, tuple[Auxiliary, bytes]] | None = None
+    ) -> None:
         """Writes one sample's files, then its sidecar.
+
+        `auxiliary` holds further files of the sample by name.
 
         Raises:
             DatasetError: the disk refuses.
         """
+        further = auxiliary or {}
         hashes: dict[str, str] = {}
-        for relative, data in sorted(encoded.files.items()):
+        for relative, data in sorted([*encoded.files.items(), *((file.path, data) for file, data in further.values())]):
             write_whole(self.root, relative, data)
             hashes[relative] = sha256(data)
-        sidecar = Sidecar(record=sample.record, surfaces=sample.surfaces, facts=encoded.facts, files=hashes)
+        sidecar = Sidecar(
+            record=sample.record,
+            surfaces=sample.surfaces,
+            facts=encoded.facts,
+            files=hashes,
+            auxiliary={name: file for name, (file, _) in further.items()},
+        )
         write_whole(self.root, sidecar_path(self.split, sample.record.index), sidecar_bytes(sidecar))
 
     def sidecars(self) -> list[Sidecar]:

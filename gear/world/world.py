@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import tempfile
 from collections import OrderedDict
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import mujoco
@@ -110,10 +111,13 @@ class World:
         if scene.truck is not None:
             library.path("vehicle", scene.truck.asset)
             carrier = library.vehicles[scene.truck.asset]
-        composition = compose(library, scene.boards, plan_pool(scene, library), carrier, weather)
-        model, classes = render_model(composition)
+        with tempfile.TemporaryDirectory(prefix="gear-") as folder:
+            composition = compose(library, scene.boards, plan_pool(scene, library), carrier, weather)
+            composition = composition.laid_out(Path(folder))
+            release_memory()
+            model, classes = render_model(composition)
+            release_memory()
         world = _assemble(library, scene_name, scene, weather, composition, model, classes)
-        del composition
         release_memory()
         return world
 
@@ -137,10 +141,7 @@ class World:
             PlacementError: the record needs actors that this world does not hold.
             ValueError: a surface is named that is not there.
         """
-        shown = dict(surfaces or {})
-        unknown = set(shown) - {face.name for face in self.faces}
-        if unknown:
-            raise ValueError(f"no surface named {', '.join(sorted(unknown))}; there are {len(self.faces)}")
+        faces = self._faces(surfaces or {})
         taken = self._assign(record)
         self._pose(record, taken)
         object_id = self.statics.object_id.copy()
@@ -156,12 +157,29 @@ class World:
             surface_index[face.geom_id] = index
         for array in (object_id, surface_index):
             array.setflags(write=False)
-        faces = {face.geom_id: self._show(face, shown.get(face.name, "none")) for face in self.faces}
         return PlacedStage(
             stage=Stage(model=self.model, data=self._data, paint_rgb=paint, faces=faces),
             geoms=GeomTable(label_code=self.classes.label_code, object_id=object_id, surface_index=surface_index),
             objects=objects,
         )
+
+    def redressed(self, placed: PlacedStage, surfaces: SurfaceAlbedos) -> Stage:
+        """What was placed last, with other faces; nothing is moved.
+
+        Args:
+            placed: of the last `place`.
+            surfaces: what each surface shows, by name; the neutral face where nothing is said.
+
+        Raises:
+            ValueError: a surface is named that is not there.
+        """
+        return replace(placed.stage, faces=self._faces(surfaces))
+
+    def _faces(self, surfaces: SurfaceAlbedos) -> dict[int, UInt8Image]:
+        unknown = set(surfaces) - {face.name for face in self.faces}
+        if unknown:
+            raise ValueError(f"no surface named {', '.join(sorted(unknown))}; there are {len(self.faces)}")
+        return {face.geom_id: self._show(face, surfaces.get(face.name, "none")) for face in self.faces}
 
     def _geoms_of(self, slot: Slot) -> _SlotGeoms:
         body = self.model.body(slot.body).id

@@ -121,6 +121,7 @@ def resolve(config: CollectionConfig) -> Job:
         patch={"label": patch.label, "sha256": patch.digest},
         info=info,
         samples=split.samples * split.frames,
+        auxiliary=("probes",) if config.probes else (),
     )
     return Job(
         config=config,

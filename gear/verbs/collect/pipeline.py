@@ -40,5 +40,4 @@ def collect_samples(session: Session, store: Store, indices: Iterable[int], done
 
 
 def _write(session: Session, store: Store, shot: Shot) -> None:
-    sample, encoded = session.finish(shot)
-    store.write(sample, encoded)
+    store.write(*session.finish(shot))

@@ -60,6 +60,7 @@ def collect(
     renderer: str | None = None,
     quality: str | None = None,
     out: str | Path | None = None,
+    probes: bool | None = None,
     settings: Iterable[str] = (),
     workers: int = 1,
     force: bool = False,
@@ -72,6 +73,7 @@ def collect(
         config: name or path of a collection config; the other arguments go before what it says.
         town, scene, split, samples, seed, weather, patch, renderer, quality: as in the config.
         out: root of the dataset.
+        probes: also keep what compositors need; see `gear.formats.probes`.
         settings: further `KEY=VALUE` texts for any key of the config.
         workers: processes; they change nothing but time.
         force: replaces a split that was made with another configuration.
@@ -92,6 +94,7 @@ def collect(
         "renderer": renderer,
         "quality": quality,
         "root": out,
+        "probes": None if probes is None else str(probes).lower(),
     }
     flags = {key: None if value is None else str(value) for key, value in given.items()}
     return collect_config(
@@ -145,7 +148,7 @@ def run_job(job: Job, *, workers: int = 1, force: bool = False, progress: Progre
 def manifest_facts(job: Job) -> dict[str, Json]:
     """What the manifest says beside hashes: nothing in it depends on the machine's paths, the clock or the workers."""
     config: dict[str, Any] = to_plain(job.config)
-    for name in ("root", "patch", "town", "scenes", "simulation"):
+    for name in ("root", "patch", "town", "scenes", "simulation", *(() if job.config.probes else ("probes",))):
         config.pop(name)
     return {
         "task": dict(job.plan.task),

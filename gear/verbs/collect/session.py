@@ -10,14 +10,16 @@ from typing import Any
 from gear.camera.develop import Darkroom
 from gear.contracts.rendering import RawView, Renderer
 from gear.contracts.tasks import Encoded, Sample, Task
+from gear.formats.probes import AuxiliaryFiles, probe_files
 from gear.plugins.build import blamed, build, find
 from gear.plugins.catalogue import Found
 from gear.render.opening import open_renderer
 from gear.values.frames import Frame, GeomTable, SceneObject
 from gear.values.scene import SceneRecord
 from gear.verbs.collect.job import Job
+from gear.verbs.collect.probes import ProbeShot, develop_probes, shoot_probes
 from gear.world.air import darkroom_of
-from gear.world.memory import release_memory
+from gear.world.memory import forget_search_trees, forget_shown, release_memory
 from gear.world.planner import ScenePlanner
 from gear.world.world import World
 
@@ -30,12 +32,14 @@ class Shot:
         record: the scene.
         raw: one view a camera, in the record's order.
         geoms, objects: the tables to read it, as in `Frame`.
+        probes: the same scene with black and with white surfaces, where that was asked for.
     """
 
     record: SceneRecord
     raw: tuple[RawView, ...]
     geoms: GeomTable
     objects: Mapping[int, SceneObject]
+    probes: ProbeShot | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -59,7 +63,8 @@ class Session:
         names = tuple(surface.name for surface in record.surfaces)
         placed = self.world.place(record, self.job.patch.by_surface(names))
         raw = self.renderer.render(placed.stage, record.cameras)
-        return Shot(record=record, raw=raw, geoms=placed.geoms, objects=placed.objects)
+        probes = shoot_probes(self.world, self.renderer, placed, record) if self.job.config.probes else None
+        return Shot(record=record, raw=raw, geoms=placed.geoms, objects=placed.objects, probes=probes)
 
     def develop(self, shot: Shot) -> Frame:
         """Turns what the renderer saw into pictures; needs neither world nor renderer, so it can run beside them."""
@@ -69,12 +74,16 @@ class Session:
         }
         return Frame(views=views, geoms=shot.geoms, objects=shot.objects)
 
-    def finish(self, shot: Shot) -> tuple[Sample, Encoded]:
+    def finish(self, shot: Shot) -> tuple[Sample, Encoded, AuxiliaryFiles]:
         """Develops and measures a shot and turns it into files, beside the next one's rendering."""
         frame = self.develop(shot)
         with blamed(self.plugin, f"sample {shot.record.index}"):
             sample = self.task.ground_truth(frame, shot.record)
-            return sample, self.task.encode(sample, self.job.plan.info)
+            encoded = self.task.encode(sample, self.job.plan.info)
+        if shot.probes is None:
+            return sample, encoded, {}
+        probes = develop_probes(self.darkroom, shot.probes, shot.raw, shot.record, shot.geoms)
+        return sample, encoded, probe_files(probes, self.job.plan.info.split, shot.record.index)
 
 
 @contextlib.contextmanager
@@ -85,7 +94,9 @@ def open_session(job: Job) -> Iterator[Session]:
     with blamed(plugin, "rig"):
         rig = task.rig()
     world = World.build(town=job.config.town, scene_name=job.config.scene, scene=job.scene, weather=job.weather)
+    forget_search_trees(world.model)
     renderer = open_renderer(job.config.renderer, world.model, quality=job.config.quality)
+    forget_shown(world.model)
     release_memory()
     try:
         planner = ScenePlanner(world, rig, job.split, split_name=job.config.split)

@@ -1,0 +1,133 @@
+"""Probes: a surface's reach in one view with the surface white and with it black, as files beside a sample.
+
+Light is linear. With B seen with all surfaces black and W_i with only surface i white, a view with patches on them is
+
+    I = B + sum over i of w_i (W_i - B)
+
+where w_i is what surface i's texture shows at a pixel, 0..1 (`gear.camera.response.face_light`). Shading, shadows,
+air, occluders in front and soft edges are all in W_i - B. Probes hold neither noise nor the response; both come after.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+
+from gear.contracts.tasks import Auxiliary, Sidecar
+from gear.dataset.files import inside, read_bytes
+from gear.dataset.layout import auxiliary_path
+from gear.dataset.reading import Dataset
+from gear.values.errors import DatasetError
+from gear.values.frames import UInt16Image
+
+AuxiliaryFiles = Mapping[str, tuple[Auxiliary, bytes]]
+"""What is written beside a sample, by name."""
+
+KIND = "probes"
+_SHADES = ("black", "white")
+_PNG = [cv2.IMWRITE_PNG_COMPRESSION, 6, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_PAETH]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Probe:
+    """One surface's reach in one view.
+
+    Attributes:
+        surface: its name.
+        view: name of the camera.
+        left_px, top_px: index pixel of the crop's first pixel.
+        black: (h, w, 3) uint16, linear light 0..`LINEAR_FULL_SCALE`, every surface black.
+        white: (h, w, 3) uint16, the same with this surface white.
+    """
+
+    surface: str
+    view: str
+    left_px: int
+    top_px: int
+    black: UInt16Image
+    white: UInt16Image
+
+    @property
+    def name(self) -> str:
+        """In a sidecar's list, without the shade."""
+        return f"probe/{self.view}/{self.surface}"
+
+
+def crop_probe(surface: str, view: str, black: UInt16Image, white: UInt16Image) -> Probe | None:
+    """The smallest crop of two (H, W, 3) frames that holds all pixels in which they differ; None where none does."""
+    reach = (black != white).any(axis=2)
+    rows, columns = np.flatnonzero(reach.any(axis=1)), np.flatnonzero(reach.any(axis=0))
+    if not rows.size:
+        return None
+    crop = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    return Probe(
+        surface=surface,
+        view=view,
+        left_px=int(columns[0]),
+        top_px=int(rows[0]),
+        black=black[crop].copy(),
+        white=white[crop].copy(),
+    )
+
+
+def probe_files(probes: Sequence[Probe], split: str, index: int) -> AuxiliaryFiles:
+    """Two 16-bit RGB PNG files a probe."""
+    files = {}
+    for probe in probes:
+        facts = {"left_px": probe.left_px, "top_px": probe.top_px}
+        for shade, picture in zip(_SHADES, (probe.black, probe.white), strict=True):
+            path = auxiliary_path(split, KIND, index, f"{probe.view}_{probe.surface}_{shade}.png")
+            files[f"{probe.name}/{shade}"] = (Auxiliary(path=path, facts=facts), _encode(picture))
+    return files
+
+
+def probes_of(dataset: Dataset[Any], index: int, view: str) -> tuple[Probe, ...]:
+    """The probes of one sample in one view, in order of surfaces; a surface that does not reach the picture has none.
+
+    Raises:
+        DatasetError: the split was collected without probes, or a file is missing or broken.
+        IndexError: there is no such sample.
+    """
+    if KIND not in dataset.plan.auxiliary:
+        raise DatasetError(
+            dataset.root,
+            f"split {dataset.plan.info.split!r} has no probes; collect it with --probes (into another --out,"
+            " or with --force)",
+        )
+    sidecar = dataset.sidecar(index)
+    found = []
+    for surface in sidecar.record.surfaces:
+        if f"probe/{view}/{surface.name}/black" in sidecar.auxiliary:
+            found.append(_read(dataset, sidecar, view, surface.name))
+    return tuple(found)
+
+
+def _read(dataset: Dataset[Any], sidecar: Sidecar, view: str, surface: str) -> Probe:
+    pictures, facts = [], {}
+    for shade in _SHADES:
+        file = sidecar.auxiliary[f"probe/{view}/{surface}/{shade}"]
+        path, facts = inside(dataset.root, file.path), file.facts
+        data = read_bytes(path)
+        picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
+        if picture is None or picture.dtype != np.uint16 or picture.ndim != 3:
+            raise DatasetError(path, "is no probe; delete the sample's sidecar and run the same collection again")
+        pictures.append(np.ascontiguousarray(picture[..., ::-1], dtype=np.uint16))
+    black, white = pictures
+    return Probe(
+        surface=surface,
+        view=view,
+        left_px=int(facts["left_px"]),
+        top_px=int(facts["top_px"]),
+        black=black,
+        white=white,
+    )
+
+
+def _encode(picture: UInt16Image) -> bytes:
+    done, data = cv2.imencode(".png", np.ascontiguousarray(picture[..., ::-1]), _PNG)
+    assert done
+    return bytes(data)
