@@ -1,0 +1,91 @@
+"""One sample in, one augmented sample out."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from gear.augment.depth import cut_depth
+from gear.augment.geometry import draw_window
+from gear.augment.pictures import Colours, recolour
+from gear.augment.registry import geometry_of
+from gear.contracts.tasks import Sample, SampleT
+from gear.plugins.tasks.depth import DepthSample
+from gear.values.errors import FieldError, GearError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Augmentation:
+    """What is done to training samples.
+
+    Attributes:
+        flip: how often a sample is mirrored.
+        colour: how often colours are changed.
+        colours: how far.
+        cut_depth: how often depth is pasted into a picture (monocular depth only).
+    """
+
+    flip: float = 0.5
+    colour: float = 0.8
+    colours: Colours = field(default_factory=Colours)
+    cut_depth: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("flip", "colour", "cut_depth"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise FieldError(name, f"is a share of the samples, 0 to 1, got {getattr(self, name):g}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Framing:
+    """Which part of a picture training sees, and how large.
+
+    Attributes:
+        crop_px: height and width of what the network sees; None for the whole picture's.
+        scales: range of the size at which things are shown; 1 is the picture's own.
+    """
+
+    crop_px: tuple[int, int] | None = None
+    scales: tuple[float, float] = (1.0, 1.0)
+
+
+def augment(sample: SampleT, how: Augmentation, framing: Framing, rng: np.random.Generator) -> SampleT:
+    """A new sample whose ground truth is as exact as the given one's.
+
+    Sizes are drawn evenly in their logarithm. Moved samples have no `surfaces`, and their `record` still tells the
+    scene as it was rendered.
+
+    Raises:
+        GearError: crops or scales are wanted of a third party's samples that nobody can move.
+    """
+    moved: Any = _moved(sample, how, framing, rng)
+    if isinstance(moved, DepthSample) and rng.random() < how.cut_depth:
+        moved = cut_depth(moved, rng)
+    if rng.random() < how.colour:
+        moved = dataclasses.replace(moved, images=recolour(moved.images, how.colours, rng))
+    return moved  # type: ignore[no-any-return]
+
+
+def _moved(sample: Sample, how: Augmentation, framing: Framing, rng: np.random.Generator) -> Sample:
+    geometry = geometry_of(sample)
+    is_framed = framing.crop_px is not None or framing.scales != (1.0, 1.0)
+    if geometry is None:
+        if is_framed:
+            raise GearError(
+                f"{type(sample).__name__} cannot be cropped or resized: its package registers no geometry "
+                "(gear.augment.registry.register); train with crop_px=null and scales=[1, 1]"
+            )
+        return sample
+    if rng.random() < how.flip:
+        sample = geometry.flip(sample)
+    if is_framed:
+        size = next(iter(sample.images.values())).shape
+        low, high = np.log(framing.scales)
+        scale = float(np.exp(rng.uniform(low, high)))
+        size_px = (int(size[0]), int(size[1]))
+        window = draw_window(size_px, framing.crop_px or size_px, scale, rng, is_centred=geometry.is_centred)
+        sample = geometry.cut(sample, window)
+    return sample
