@@ -71,15 +71,31 @@ def write_whole(root: Path, relative: str, data: bytes) -> None:
         scratch.mkdir(parents=True, exist_ok=True)
         target.parent.mkdir(parents=True, exist_ok=True)
         temporary = scratch / f"{os.getpid()}-{threading.get_ident()}"
-        try:
-            with temporary.open("wb") as stream:
-                stream.write(data)
-                stream.flush()
-                os.fsync(stream.fileno())
-            temporary.replace(target)
-        except OSError:
-            temporary.unlink(missing_ok=True)
-            raise
+        _write_and_rename(temporary, target, data)
+
+
+def write_alone(path: Path, data: bytes) -> None:
+    """The same for a file that belongs to no dataset; what is half-written lies beside it under a hidden name.
+
+    Raises:
+        DatasetError: the disk refuses.
+    """
+    with explained(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary = path.with_name(f".{path.name}.{os.getpid()}-{threading.get_ident()}")
+        _write_and_rename(temporary, path, data)
+
+
+def _write_and_rename(temporary: Path, target: Path, data: bytes) -> None:
+    try:
+        with temporary.open("wb") as stream:
+            stream.write(data)
+            stream.flush()
+            os.fsync(stream.fileno())
+        temporary.replace(target)
+    except OSError:
+        temporary.unlink(missing_ok=True)
+        raise
 
 
 def clear_scratch(root: Path) -> None:

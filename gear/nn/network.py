@@ -48,7 +48,7 @@ class Network(nn.Module, ABC):
         """
         pictures = {name: views[name].to(self.device) for name in self._views}
         with autocast(self.device, self.options.precision):
-            raw = self.run(pictures)
+            raw = self.run(pictures) if targets is None else self.run_for_losses(pictures)
         outputs = {name: tensor.float() for name, tensor in raw.items()}
         return outputs if targets is None else self.losses(outputs, targets)
 
@@ -75,6 +75,10 @@ class Network(nn.Module, ABC):
     @abstractmethod
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """Named outputs of a batch of pictures in 0..1 on the network's device."""
+
+    def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        """What `losses` is given: the outputs, unless a network has heads that only training looks at."""
+        return self.run(pictures)
 
     @abstractmethod
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:

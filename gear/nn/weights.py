@@ -1,9 +1,7 @@
-"""Weights on disk: safetensors, strictly loaded; published files are read without running anything in them."""
+"""Weights on disk: safetensors, strictly loaded."""
 
 from __future__ import annotations
 
-import functools
-import importlib.metadata
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
@@ -13,13 +11,11 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save as to_bytes
 from torch import Tensor, nn
 
-from gear.dataset.files import write_whole
-from gear.nn.options import NONE, SHIPPED, NetworkOptions
+from gear.dataset.files import write_alone
+from gear.nn.options import NetworkOptions
 from gear.nn.runtime import seeded
+from gear.nn.shipped import not_safetensors, resolve
 from gear.values.errors import GearError
-
-GROUP = "gear.weights"
-"""Entry points of this group name a module whose `FOLDER` holds `models/` and `patches/`."""
 
 OPTIONAL = "num_batches_tracked"
 """Files older than this counter lack it; nothing uses it."""
@@ -46,41 +42,6 @@ def build_graph(make: Callable[[], GraphT], options: NetworkOptions, name: str) 
     if path is not None:
         load_into(graph, path)
     return graph
-
-
-def resolve(weights: str, name: str) -> Path | None:
-    """The file that the option `weights` of network `name` means; None for random weights.
-
-    Raises:
-        GearError: there is no such file, or none is shipped.
-    """
-    if weights == NONE:
-        return None
-    if weights != SHIPPED:
-        return Path(weights)
-    path = shipped(name)
-    if path is None:
-        raise GearError(
-            f"{name} has no weights here: install mujoco-gear-weights, or say weights=FILE.safetensors "
-            "(gear weights convert makes one of a published file), or weights=none for random ones"
-        )
-    return path
-
-
-def shipped(name: str) -> Path | None:
-    """The reference weights of a network, where an installed package has them."""
-    for folder in shipped_folders():
-        path = folder / "models" / f"{name}.safetensors"
-        if path.is_file():
-            return path
-    return None
-
-
-@functools.cache
-def shipped_folders() -> tuple[Path, ...]:
-    """Folders of the installed weights packages."""
-    entries = sorted(importlib.metadata.entry_points(group=GROUP), key=lambda entry: entry.name)
-    return tuple(Path(entry.load().FOLDER) for entry in entries)
 
 
 def load_into(network: nn.Module, path: str | Path) -> dict[str, str]:
@@ -122,10 +83,8 @@ def read(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
         with safe_open(str(path), framework="pt") as opened:
             metadata = dict(opened.metadata() or {})
             state = {key: opened.get_tensor(key) for key in opened.keys()}  # noqa: SIM118
-    except SafetensorError as error:
-        raise GearError(
-            f"{path}: not a safetensors file ({error}); gear weights convert makes one of a published file"
-        ) from error
+    except (SafetensorError, OSError) as error:
+        raise not_safetensors(path, error) from error
     return {k: v.float() if v.dtype in (torch.float16, torch.bfloat16) else v for k, v in state.items()}, metadata
 
 
@@ -135,14 +94,13 @@ def write(path: str | Path, state: Mapping[str, Tensor], metadata: Mapping[str, 
     Args:
         path: of the file.
         state: by key.
-        metadata: any texts.
+        metadata: any texts; `gear.nn.shipped.WeightsFile` says which ones gear looks at.
         halves: whether weights of two dimensions and more are stored in float16; statistics and biases never are.
     """
     tensors = {key: value.detach().cpu().clone().contiguous() for key, value in state.items()}
     if halves:
         tensors = {key: value.half() if _may_halve(value) else value for key, value in tensors.items()}
-    target = Path(path)
-    write_whole(target.parent, target.name, to_bytes(tensors, dict(metadata)))
+    write_alone(Path(path), to_bytes(tensors, dict(metadata)))
 
 
 def _may_halve(tensor: Tensor) -> bool:

@@ -7,9 +7,13 @@ BUILTINS: tuple[str, ...] = (
     "gear.plugins.tasks.detect2d",
     "gear.plugins.tasks.stereo3d",
     "gear.plugins.tasks.depth",
+    "gear.plugins.models.ddrnet23_slim",
+    "gear.plugins.models.bisenet_x39",
     "gear.plugins.defenses.lgs",
     "gear.plugins.defenses.jpeg",
     "gear.plugins.defenses.median",
     "gear.plugins.defenses.gaussian",
     "gear.plugins.defenses.bit_depth",
+    "gear.plugins.attacks.scene_specific",
+    "gear.plugins.attacks.carla_gear",
 )

@@ -1,0 +1,84 @@
+"""Losses of semantic segmentation, over Cityscapes train ids."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from gear.formats.cityscapes import IGNORED_TRAIN_ID, LABELS
+
+TRAIN_ID_OF_LABEL_ID: npt.NDArray[np.uint8] = np.full(256, IGNORED_TRAIN_ID, dtype=np.uint8)
+TRAIN_ID_OF_LABEL_ID[[label.id for label in LABELS]] = [label.train_id for label in LABELS]
+
+
+class SegmentedSample(Protocol):
+    """What the losses look at."""
+
+    @property
+    def label_ids(self) -> npt.NDArray[np.uint8]:
+        """(H, W) uint8 label ids."""
+        ...
+
+
+def train_ids(samples: Sequence[SegmentedSample], device: torch.device) -> Tensor:
+    """(B, H, W) int64 train ids of samples of one size; 255 for what is not evaluated."""
+    ids = TRAIN_ID_OF_LABEL_ID[np.stack([sample.label_ids for sample in samples])]
+    return torch.from_numpy(ids).to(device).long()
+
+
+def hard_cross_entropy(logits: Tensor, ids: Tensor, *, easy: float, least: float) -> Tensor:
+    """Cross-entropy over the pixels that the network finds hard: online hard example mining, of pixels.
+
+    Shrivastava et al., arXiv 1604.03540, as the recipes of segmentation have it: pixels whose right class has a
+    probability below `easy` count; if they are fewer than `least` of all, those with the largest losses do.
+
+    Args:
+        logits: (B, C, H, W).
+        ids: (B, H, W) int64, 255 is ignored.
+        easy: probability, 0..1; 1 keeps every pixel.
+        least: share of the pixels that are not ignored.
+
+    Returns:
+        The mean over the pixels that count; 0 where none has a class.
+    """
+    each = functional.cross_entropy(logits, ids, ignore_index=IGNORED_TRAIN_ID, reduction="none").flatten()
+    known = (ids != IGNORED_TRAIN_ID).flatten()
+    with torch.no_grad():
+        ranked = each.masked_fill(~known, -1.0)
+        fewest = math.ceil(least * int(known.sum()))
+        hard = ranked >= -math.log(easy)
+        if int(hard.sum()) < fewest:
+            hard = ranked >= ranked.topk(fewest).values[-1]
+    return (each * hard).sum() / hard.sum().clamp_min(1)
+
+
+class SegmentationLosses:
+    """Hard cross-entropy of the main head and of the others.
+
+    Attributes:
+        easy, least: see `hard_cross_entropy`.
+        auxiliary_weight: of each other head, in the sum that training minimises.
+    """
+
+    def __init__(self, *, easy: float, least: float, auxiliary_weight: float) -> None:
+        self.easy, self.least, self.auxiliary_weight = easy, least, auxiliary_weight
+
+    def __call__(self, outputs: Mapping[str, Tensor], targets: Sequence[SegmentedSample]) -> dict[str, Tensor]:
+        """`cross_entropy` of the output `logits`, and, weighed, one loss for each further output by its name.
+
+        Outputs are (B, 19, H, W) at the size of the targets' labels.
+        """
+        ids = train_ids(targets, outputs["logits"].device)
+        losses = {"cross_entropy": hard_cross_entropy(outputs["logits"], ids, easy=self.easy, least=self.least)}
+        for name, logits in outputs.items():
+            if name != "logits":
+                loss = hard_cross_entropy(logits, ids, easy=self.easy, least=self.least)
+                losses[name] = self.auxiliary_weight * loss
+        return losses

@@ -1,0 +1,72 @@
+"""BiSeNet with Xception39, a network of the paper: semantic segmentation in real time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.models import PublishedWeights, Recipe
+from gear.contracts.specs import ModelSpec
+from gear.nn.options import SegmentationOptions
+
+if TYPE_CHECKING:
+    from gear.nn.semseg import SemsegNetwork
+
+NAME = "bisenet_x39"
+
+EASY = 0.7
+LEAST = 1 / 16
+AUXILIARY_WEIGHT = 1.0
+
+
+def build(options: SegmentationOptions) -> SemsegNetwork:
+    """The network with its weights."""
+    from gear.losses.semantic import SegmentationLosses
+    from gear.nn.bisenet import BiSeNetX39
+    from gear.nn.semseg import CLASSES, SemsegNetwork
+    from gear.nn.shipped import trained_option
+    from gear.nn.weights import build_graph
+
+    return SemsegNetwork(
+        build_graph(lambda: BiSeNetX39(CLASSES, auxiliary=options.auxiliary), options, NAME),
+        options,
+        SegmentationLosses(easy=EASY, least=LEAST, auxiliary_weight=AUXILIARY_WEIGHT),
+        input_scale=trained_option(options.weights, NAME, "input_scale") or 1.0,
+    )
+
+
+def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
+    """See `gear.nn.bisenet.from_official`."""
+    from gear.nn.bisenet import from_official
+
+    return from_official(state)
+
+
+bisenet_x39: ModelSpec[SegmentationOptions] = ModelSpec(
+    name=NAME,
+    summary="BiSeNet with Xception39 (Yu et al., 2018): semantic segmentation by a spatial and a context path.",
+    config=SegmentationOptions,
+    build=build,
+    tasks=("semseg",),
+    views=("left",),
+    taps=("spatial_7x7", "spatial_1x1", "ct2", "ct1", "ct0"),
+    recipe=Recipe(learning_rate=1e-3, weight_decay=1e-2, batch=8, epochs=40, scales=(0.75, 1.5)),
+    published=(
+        PublishedWeights(
+            data="Cityscapes, 19 classes (validation mIoU 70.3)",
+            source="github.com/ycszen/TorchSeg, README, Google Drive 1hb_qk3QLwZtQUmevZUFOHNiRHhRr0IQB",
+            licence="code MIT; Cityscapes' terms: trained models may be shared, no commercial use",
+            size_mb=15.0,
+        ),
+    ),
+    normalisation="RGB in 0..1, less ImageNet's mean, over its standard deviation",
+    parameters=1_842_289,
+    convert=convert,
+)
+
+
+@hookimpl
+def gear_models() -> list[ModelSpec[SegmentationOptions]]:
+    """This network."""
+    return [bisenet_x39]

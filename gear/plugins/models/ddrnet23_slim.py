@@ -1,0 +1,72 @@
+"""DDRNet-23-slim, a network of the paper: semantic segmentation in real time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.models import PublishedWeights, Recipe
+from gear.contracts.specs import ModelSpec
+from gear.nn.options import SegmentationOptions
+
+if TYPE_CHECKING:
+    from gear.nn.semseg import SemsegNetwork
+
+NAME = "ddrnet23_slim"
+
+EASY = 0.9
+LEAST = 1 / 16
+AUXILIARY_WEIGHT = 0.4
+
+
+def build(options: SegmentationOptions) -> SemsegNetwork:
+    """The network with its weights."""
+    from gear.losses.semantic import SegmentationLosses
+    from gear.nn.ddrnet import DDRNet23Slim
+    from gear.nn.semseg import CLASSES, SemsegNetwork
+    from gear.nn.shipped import trained_option
+    from gear.nn.weights import build_graph
+
+    return SemsegNetwork(
+        build_graph(lambda: DDRNet23Slim(CLASSES, auxiliary=options.auxiliary), options, NAME),
+        options,
+        SegmentationLosses(easy=EASY, least=LEAST, auxiliary_weight=AUXILIARY_WEIGHT),
+        input_scale=trained_option(options.weights, NAME, "input_scale") or 1.0,
+    )
+
+
+def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
+    """See `gear.nn.ddrnet.from_official`."""
+    from gear.nn.ddrnet import from_official
+
+    return from_official(state)
+
+
+ddrnet23_slim: ModelSpec[SegmentationOptions] = ModelSpec(
+    name=NAME,
+    summary="DDRNet-23-slim (Hong et al., 2021): semantic segmentation in two branches, at 1/8 and down to 1/64.",
+    config=SegmentationOptions,
+    build=build,
+    tasks=("semseg",),
+    views=("left",),
+    taps=("rb1", "rb2", "rbb1", "rbb2"),
+    recipe=Recipe(learning_rate=1e-3, weight_decay=1e-2, batch=8, epochs=40, scales=(0.75, 1.5)),
+    published=(
+        PublishedWeights(
+            data="Cityscapes, 19 classes (validation mIoU 77.8)",
+            source="github.com/ydhongHIT/DDRNet, README, Google Drive 1d_K3Af5fKHYwxSo8HkxpnhiekhwovmiP",
+            licence="code MIT; Cityscapes' terms: trained models may be shared, no commercial use",
+            size_mb=23.0,
+        ),
+    ),
+    normalisation="RGB in 0..1, less ImageNet's mean, over its standard deviation",
+    parameters=5_734_342,
+    convert=convert,
+)
+
+
+@hookimpl
+def gear_models() -> list[ModelSpec[SegmentationOptions]]:
+    """This network."""
+    return [ddrnet23_slim]

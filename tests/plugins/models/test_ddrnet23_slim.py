@@ -1,0 +1,9 @@
+from __future__ import annotations
+
+from gear.plugins.models.ddrnet23_slim import ddrnet23_slim
+from gear.testing.model_contract import ModelContract
+
+
+class TestDDRNet23Slim(ModelContract):
+    spec = ddrnet23_slim
+    options = {"weights": "none", "device": "cpu"}
