@@ -8,7 +8,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Generic, TypeVar
 
+from gear.contracts.evaluation import Draws, Spread
 from gear.formats.coco import CATEGORY_NAMES, Annotation, Detection, Picture, dataset_json, results_json
+from gear.metrics.coco_curves import known_mean, matches, resampled
+from gear.values.serial import Json
 
 SampleT = TypeVar("SampleT", contravariant=True)
 
@@ -49,25 +52,12 @@ class CocoEvaluator(Generic[SampleT]):
     def result(self) -> Mapping[str, float]:
         """COCO's twelve figures for boxes (`ap`, `ap50`, …, `ar100`, …) and `ap_<category>` for what occurs; 0..1 or
         NaN."""
-        from pycocotools.coco import COCO
-        from pycocotools.cocoeval import COCOeval
-
         names = (*STATS, *RECALLS)
-        # The same picture may come twice, so pictures are numbered here.
-        pictures = [replace(picture, id=number) for number, picture in enumerate(self.pictures)]
-        results = [item for number, found in enumerate(self.detections) for item in results_json(number, found)]
-        occurring = sorted({item.category_id for item in _labelled(pictures)})
+        occurring = sorted({item.category_id for item in _labelled(self.pictures)})
         if not occurring:
             return {name: float("nan") for name in names}
+        evaluation = self._matched()
         with contextlib.redirect_stdout(io.StringIO()):
-            truth = COCO()
-            truth.dataset = dataset_json(pictures, description="", created="2022-01-01")
-            truth.createIndex()
-            found = truth.loadRes(results) if results else COCO()
-            evaluation = COCOeval(truth, found, "bbox")
-            evaluation.params.catIds = sorted(CATEGORY_NAMES)
-            evaluation.params.imgIds = [picture.id for picture in pictures]
-            evaluation.evaluate()
             evaluation.accumulate()
             evaluation.summarize()
         figures = {name: _known(value) for name, value in zip(names, evaluation.stats, strict=True)}
@@ -79,6 +69,56 @@ class CocoEvaluator(Generic[SampleT]):
                     precision[:, :, index, 0, -1].mean()
                 )
         return figures
+
+    def resampled(self, draws: Draws) -> Spread:
+        """`ap`, `ap50`, `ap75` and `ap_<category>`."""
+        found = matches(self._matched())
+        values = resampled(list(found.values()), draws)
+        spread = {
+            "ap": known_mean(values, (1, 2)),
+            "ap50": known_mean(values[:, :, :1], (1, 2)),
+            "ap75": known_mean(values[:, :, 5:6], (1, 2)),
+        }
+        for column, category_id in enumerate(found):
+            spread[f"ap_{CATEGORY_NAMES[category_id].replace(' ', '_')}"] = values[:, column].mean(axis=1)
+        return spread
+
+    def _matched(self) -> Any:
+        """pycocotools' evaluation with every picture matched."""
+        # The same picture may come twice, so pictures are numbered here.
+        pictures = [replace(picture, id=number) for number, picture in enumerate(self.pictures)]
+        truth = dataset_json(pictures, description="", created="2022-01-01")
+        lines = [line for number, found in enumerate(self.detections) for line in results_json(number, found)]
+        for number, line in enumerate(lines):
+            line |= {"id": number + 1, "iscrowd": 0, "area": line["bbox"][2] * line["bbox"][3]}
+        self._adapt(truth["annotations"], lines)
+        with contextlib.redirect_stdout(io.StringIO()):
+            evaluation = coco_eval(truth, lines)
+            self._limit(evaluation.params)
+            evaluation.evaluate()
+        return evaluation
+
+    def _adapt(self, labels: list[Json], found: list[Json]) -> None:
+        """Room for other ideas of an object's size."""
+
+    def _limit(self, parameters: Any) -> None:
+        """Room for other limits."""
+
+
+def coco_eval(truth: Json, found: list[Json]) -> Any:
+    """A `COCOeval` of boxes over all of COCO's categories."""
+    from pycocotools.coco import COCO
+    from pycocotools.cocoeval import COCOeval
+
+    labels, answers = COCO(), COCO()
+    labels.dataset = truth
+    answers.dataset = {"images": truth["images"], "categories": truth["categories"], "annotations": found}
+    labels.createIndex()
+    answers.createIndex()
+    evaluation = COCOeval(labels, answers, "bbox")
+    evaluation.params.catIds = sorted(CATEGORY_NAMES)
+    evaluation.params.imgIds = [picture["id"] for picture in truth["images"]]
+    return evaluation
 
 
 def _labelled(pictures: Sequence[Picture]) -> list[Annotation]:

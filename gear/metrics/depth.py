@@ -88,6 +88,27 @@ class DepthEvaluator:
         return {name: float(np.mean(np.sort(values))) if values else float("nan") for name, values in known.items()}
 
 
+class NearDepth(DepthEvaluator):
+    """What a reference network is held to: whole pictures below 80 m, predictions clipped there; no sky."""
+
+    def __init__(self) -> None:
+        super().__init__(max_depth_m=80.0, crop="none")
+
+    def update(self, sample: DepthTruth, prediction: FloatImage) -> Mapping[str, float]:
+        """Takes (H, W) metres; returns this picture's figures."""
+        return _renamed(super().update(sample, prediction))
+
+    def result(self) -> Mapping[str, float]:
+        """`d1` to `d3`, `abs_rel`, `sq_rel`, `rmse_m`, `rmse_log`, `log10`, `silog`: means over pictures."""
+        return _renamed(super().result())
+
+
+def _renamed(figures: Mapping[str, float]) -> dict[str, float]:
+    """Eigen's figures without their prefix."""
+    prefix = "eigen_"
+    return {name.removeprefix(prefix): value for name, value in figures.items() if name.startswith(prefix)}
+
+
 def _devkit(truth_m: Array, found_m: Array) -> dict[str, float]:
     error, inverse, log = found_m - truth_m, 1 / truth_m - 1 / found_m, np.log(truth_m) - np.log(found_m)
     return {

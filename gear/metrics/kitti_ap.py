@@ -13,6 +13,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
+from gear.contracts.evaluation import Draws, Spread
 from gear.formats.kitti_object import KittiLabel
 from gear.metrics.kitti_match import (
     DIFFICULTIES,
@@ -73,6 +74,20 @@ class KittiEvaluator(Generic[SampleT]):
         known = [v for k in NEIGHBOURS if (v := figures[f"{k.lower()}_3d_moderate_r40"]) == v]
         return {"ap_3d_moderate": float(np.mean(known)) if known else float("nan"), **figures}
 
+    def resampled(self, draws: Draws) -> Spread:
+        """`<class>_<2d|bev|3d>_moderate_r40` and `ap_3d_moderate`."""
+        moderate = next(difficulty for difficulty in DIFFICULTIES if difficulty.name == "moderate")
+        spread: dict[str, Array] = {}
+        for kind in NEIGHBOURS:
+            for overlap in OVERLAPS:
+                chosen = [choose(picture, kind, moderate, overlap) for picture in self.pictures]
+                spread[f"{kind.lower()}_{overlap}_moderate_r40"] = resampled_r40(chosen, draws)
+        classes = np.array([spread[f"{kind.lower()}_3d_moderate_r40"] for kind in NEIGHBOURS])
+        known = ~np.isnan(classes)
+        total = np.where(known, classes, 0.0).sum(axis=0)
+        spread["ap_3d_moderate"] = np.where(known.any(axis=0), total / np.maximum(known.sum(axis=0), 1), np.nan)
+        return spread
+
     def _add(self, figures: dict[str, float], kind: str, difficulty: Difficulty, overlap: Overlap) -> None:
         chosen = [choose(picture, kind, difficulty, overlap) for picture in self.pictures]
         precision, orientation = curves(chosen)
@@ -81,6 +96,33 @@ class KittiEvaluator(Generic[SampleT]):
             stem = f"{kind.lower()}_{name}_{difficulty.name}"
             figures[f"{stem}_r11"] = float(curve[:: STEPS // 10].mean())
             figures[f"{stem}_r40"] = float(curve[1:].mean())
+
+
+def resampled_r40(chosen: Sequence[Chosen], draws: Draws) -> Array:
+    """(R,) average precision at 40 recalls over the pictures of each draw, (R, N); NaN if there is nothing to be found.
+
+    Every picture is matched once at every threshold that any draw can have.
+    """
+    wanted = np.array([int((picture.label_state == 0).sum()) for picture in chosen])
+    scores = [(score, number) for number, picture in enumerate(chosen) for score in matched_scores(picture)]
+    scores.sort(reverse=True)
+    ordered, owners = np.array([s for s, _ in scores]), np.array([n for _, n in scores], dtype=np.int64)
+    thresholds = np.unique(ordered)[::-1]
+    parts = [count(picture, thresholds) for picture in chosen] if len(thresholds) else []
+    hits, alarms = np.array([part.tp for part in parts]), np.array([part.fp for part in parts])
+    values = np.full(len(draws), np.nan)
+    for row, drawn in enumerate(draws):
+        weights = np.bincount(drawn, minlength=len(chosen))
+        total = int(weights @ wanted)
+        if not total:
+            continue
+        drawn_scores = np.repeat(ordered, weights[owners]) if len(ordered) else ordered
+        steps = recall_thresholds(drawn_scores.tolist(), total)
+        columns = len(thresholds) - 1 - np.searchsorted(thresholds[::-1], steps)
+        tp = weights @ hits[:, columns] if len(steps) else np.zeros(1)
+        fp = weights @ alarms[:, columns] if len(steps) else np.zeros(1)
+        values[row] = _monotone(tp / np.maximum(tp + fp, 1.0))[1:].mean()
+    return values
 
 
 def curves(chosen: Sequence[Chosen]) -> tuple[Array, Array]:

@@ -104,14 +104,32 @@ class Chosen:
     min_overlap: float
 
 
-def choose(picture: PictureBoxes, kind: str, difficulty: Difficulty, overlap: Overlap) -> Chosen:
-    """Sorts labels and detections into those that count, those that are ignored and those of no concern."""
+def choose(
+    picture: PictureBoxes,
+    kind: str,
+    difficulty: Difficulty,
+    overlap: Overlap,
+    *,
+    min_overlap: float | None = None,
+    max_distance_m: float = np.inf,
+) -> Chosen:
+    """Sorts labels and detections into those that count, those that are ignored and those of no concern.
+
+    Args:
+        picture: labels and detections.
+        kind: of object.
+        difficulty: what a label may lack.
+        overlap: in the picture, from above, or in space.
+        min_overlap: that a match needs; the benchmark's by default.
+        max_distance_m: what lies farther ahead is ignored.
+    """
     label_state = np.full(len(picture.labels), -1, dtype=np.int8)
     for i, label in enumerate(picture.labels):
         hard = (
             label.occluded > difficulty.max_occluded
             or label.truncated > difficulty.max_truncated
             or label.box_px[3] - label.box_px[1] <= difficulty.min_height_px
+            or label.location_m[2] > max_distance_m
         )
         if label.type == kind:
             label_state[i] = 1 if hard else 0
@@ -123,7 +141,7 @@ def choose(picture: PictureBoxes, kind: str, difficulty: Difficulty, overlap: Ov
         if int(abs(found.box_px[3] - found.box_px[1])) < difficulty.min_height_px:
             detection_state[j] = 1
         elif found.type == kind:
-            detection_state[j] = 0
+            detection_state[j] = 1 if found.location_m[2] > max_distance_m else 0
     label_alpha = np.array([label.alpha_rad for label in picture.labels])
     found_alpha = np.array([found.alpha_rad for found in picture.detections])
     return Chosen(
@@ -134,7 +152,7 @@ def choose(picture: PictureBoxes, kind: str, difficulty: Difficulty, overlap: Ov
         angle_gain=np.asarray((1 + np.cos(label_alpha[:, None] - found_alpha[None])) / 2),
         # DontCare regions have no place in space, so they excuse in the picture alone.
         excused=(picture.in_dont_care > MIN_OVERLAP[kind]) & (overlap == "2d"),
-        min_overlap=MIN_OVERLAP[kind],
+        min_overlap=MIN_OVERLAP[kind] if min_overlap is None else min_overlap,
     )
 
 

@@ -146,6 +146,23 @@ class SemanticEvaluator:
         return figures
 
 
+class PresentClasses(SemanticEvaluator):
+    """mIoU over the evaluated classes that occur in the ground truth, train left out.
+
+    The benchmark counts a class that is predicted but never there as 0; here such pixels count against the classes
+    that they belong to, and the class itself is NaN: absent.
+    """
+
+    def result(self) -> Mapping[str, float]:
+        """`miou` and `iou_<class>`; shares, 0..1, NaN for what does not occur."""
+        figures = {
+            f"iou_{label.name.replace(' ', '_')}": iou if self.confusion[label.id].any() else float("nan")
+            for label, iou in zip(EVALUATED, _class_iou(self.confusion).values(), strict=True)
+            if label.name != "train"
+        }
+        return {"miou": _mean(figures.values()), **figures}
+
+
 def _ids(category: str) -> list[int]:
     return [label.id for label in EVALUATED if label.category == category]
 

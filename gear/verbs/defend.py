@@ -16,6 +16,7 @@ from gear.config.dump import to_plain
 from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
 from gear.contracts.defenses import Defense, DefenseResult
+from gear.contracts.models import Model
 from gear.contracts.specs import DefenseSpec
 from gear.dataset.files import clear_scratch, explained, inside, write_whole
 from gear.dataset.layout import GEAR
@@ -167,8 +168,14 @@ def begin(root: Path, split: str, plan: Json) -> None:
 class Guard:
     """A third party's defense, whose failures say whose they are."""
 
-    def __init__(self, found: Found, defense: Defense) -> None:
-        self._found, self._defense = found, defense
+    def __init__(self, found: Found, defense: Defense, model: Model | None = None, state: Any = None) -> None:
+        """Args:
+        found: whose it is.
+        defense: the thing itself.
+        model: what it guards, for a defense that looks into it.
+        state: what its `fit` gave.
+        """
+        self._found, self._defense, self._model, self._state = found, defense, model, state
 
     def apply(self, views: Mapping[str, UInt8Image], rng: np.random.Generator, index: int) -> DefenseResult:
         """Cleans one sample.
@@ -179,7 +186,7 @@ class Guard:
         for picture in views.values():
             picture.setflags(write=False)
         with blamed(self._found, f"apply on sample {index}"):
-            result = self._defense.apply(views, None, None, rng)
+            result = self._defense.apply(views, self._model, self._state, rng)
         problem = self._problem(result, views)
         if problem:
             raise self._error(index, problem)

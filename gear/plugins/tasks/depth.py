@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 
+from gear.contracts.evaluation import Masks
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Encoded, Evaluator, Sample, Sidecar, SplitInfo
-from gear.formats import kitti_depth
+from gear.formats import kitti_depth, results
 from gear.formats.billboard_info import billboard_info
 from gear.formats.jsontext import dump
 from gear.formats.png import encode_labels, encode_rgb, encode_tiff
-from gear.metrics.depth import Crop, DepthEvaluator
+from gear.metrics.depth import Crop, DepthEvaluator, NearDepth
 from gear.plugins.tasks.common import CameraOptions, draw_surfaces, images_of, read_plain, read_rgb, surfaces_of
 from gear.values.errors import FieldError
 from gear.values.frames import FloatImage, Frame, UInt8Image
 from gear.values.rig import Rig
 from gear.values.scene import SceneRecord
+from gear.values.serial import Json
 
 VIEW = "left"
 PREVIEW_MAX_DEPTH_M = 80.0
@@ -130,6 +132,30 @@ class DepthTask:
     def evaluator(self) -> Evaluator[DepthSample, FloatImage]:
         """The devkit's figures and Eigen's."""
         return DepthEvaluator(max_depth_m=self.config.eval_max_depth_m, crop=self.config.eval_crop)
+
+    def reports(self) -> Mapping[str, Evaluator[DepthSample, FloatImage]]:
+        """`reference`: whole pictures below 80 m; the sky has no ground truth."""
+        return {"reference": NearDepth()}
+
+    def without(self, sample: DepthSample, masks: Masks) -> DepthSample:
+        """No ground truth inside the mask."""
+        return replace(sample, depth_m=np.where(masks[VIEW], np.float32(np.nan), sample.depth_m))
+
+    def encode_prediction(self, sample: DepthSample, prediction: FloatImage, info: SplitInfo) -> Encoded:
+        """The devkit's 16-bit picture, which ends at 256 m, and every bit of it in metres."""
+        units, metres = results.kitti_depth_paths(sample.record.index)
+        depth_m = np.asarray(prediction, dtype=np.float32)
+        return Encoded(
+            files={units: encode_labels(kitti_depth.to_units(depth_m)), metres: encode_tiff(depth_m)}, facts={}
+        )
+
+    def decode_prediction(self, root: Path, sample: DepthSample, facts: Json, info: SplitInfo) -> FloatImage:
+        """Reads the metres."""
+        return read_plain(root, results.kitti_depth_paths(sample.record.index)[1])
+
+    def finalise_predictions(self, facts: Sequence[tuple[SceneRecord, Json]], info: SplitInfo) -> Mapping[str, bytes]:
+        """The pictures are all there is."""
+        return {}
 
     def preview(self, sample: DepthSample) -> Mapping[str, UInt8Image]:
         """The picture, and inverse depth in colours, nearest red, nothing black."""

@@ -12,7 +12,7 @@ import numpy as np
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Encoded, Evaluator, Sample, Sidecar, SplitInfo
-from gear.formats import coco, rle
+from gear.formats import coco, results, rle
 from gear.formats.billboard_info import billboard_info
 from gear.formats.jsontext import dump
 from gear.formats.png import encode_rgb
@@ -20,12 +20,13 @@ from gear.groundtruth.boxes import box_in_camera
 from gear.groundtruth.objects import observe_objects
 from gear.groundtruth.visibility import VisibilityLimits
 from gear.metrics.coco_ap import CocoEvaluator
+from gear.metrics.coco_reference import TallObjects
 from gear.plugins.tasks.common import CameraOptions, draw_box, draw_surfaces, expect, images_of, read_rgb, surfaces_of
 from gear.values.frames import Frame, UInt8Image
 from gear.values.labels import LABELS
 from gear.values.rig import Rig
 from gear.values.scene import CameraRecord, SceneRecord
-from gear.values.serial import from_json, to_json
+from gear.values.serial import Json, from_json, to_json
 from gear.values.truth import BoxPx
 
 VIEW = "left"
@@ -167,6 +168,41 @@ class Detect2dTask:
     def evaluator(self) -> Evaluator[Detect2dSample, tuple[coco.Detection, ...]]:
         """COCO's average precision."""
         return CocoEvaluator(lambda sample: self._as_picture(sample.record, sample.objects))
+
+    def reports(self) -> Mapping[str, Evaluator[Detect2dSample, tuple[coco.Detection, ...]]]:
+        """`reference`: AP50 of traffic's categories, of objects that are tall enough."""
+        return {"reference": TallObjects(lambda sample: self._as_picture(sample.record, sample.objects))}
+
+    def encode_prediction(
+        self, sample: Detect2dSample, prediction: Sequence[coco.Detection], info: SplitInfo
+    ) -> Encoded:
+        """The detections wait in the facts for the split's one file."""
+        plain = [
+            coco.Detection(
+                category_id=int(one.category_id),
+                box_px=(float(one.box_px[0]), float(one.box_px[1]), float(one.box_px[2]), float(one.box_px[3])),
+                score=float(one.score),
+            )
+            for one in prediction
+        ]
+        return Encoded(files={}, facts={"detections": to_json(plain)})
+
+    def decode_prediction(
+        self, root: Path, sample: Detect2dSample, facts: Json, info: SplitInfo
+    ) -> tuple[coco.Detection, ...]:
+        """They are in the facts."""
+        return from_json(tuple[coco.Detection, ...], facts["detections"], "detections")
+
+    def finalise_predictions(self, facts: Sequence[tuple[SceneRecord, Json]], info: SplitInfo) -> Mapping[str, bytes]:
+        """COCO's results file."""
+        lines = [
+            line
+            for record, one in facts
+            for line in coco.results_json(
+                record.index, from_json(tuple[coco.Detection, ...], one["detections"], "detections")
+            )
+        ]
+        return {results.coco_path(info.split): dump(lines)}
 
     def preview(self, sample: Detect2dSample) -> Mapping[str, UInt8Image]:
         """Masks and boxes over the picture; ignored objects dashed in grey, without a word."""

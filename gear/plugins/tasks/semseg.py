@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -11,21 +11,23 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from gear.contracts.evaluation import Masks
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Encoded, Evaluator, Sample, Sidecar, SplitInfo
-from gear.formats import cityscapes
+from gear.formats import cityscapes, results
 from gear.formats.billboard_info import billboard_info
 from gear.formats.cityscapes_polygons import polygons_json
 from gear.formats.jsontext import dump
 from gear.formats.png import encode_labels, encode_rgb
 from gear.groundtruth.labelmaps import coarsen, instance_map, label_map
-from gear.metrics.semantic import SemanticEvaluator
+from gear.metrics.semantic import PresentClasses, SemanticEvaluator
 from gear.plugins.tasks.common import CameraOptions, draw_surfaces, images_of, read_plain, read_rgb, surfaces_of
 from gear.values.errors import FieldError
 from gear.values.frames import Frame, UInt8Image
 from gear.values.rig import Rig
 from gear.values.scene import SceneRecord
+from gear.values.serial import Json
 
 VIEW = "left"
 
@@ -144,6 +146,34 @@ class SemsegTask:
     def evaluator(self) -> Evaluator[SemsegSample, npt.NDArray[np.uint8]]:
         """mIoU and iIoU."""
         return SemanticEvaluator()
+
+    def reports(self) -> Mapping[str, Evaluator[SemsegSample, npt.NDArray[np.uint8]]]:
+        """`reference`: mIoU over the classes that occur, without train."""
+        return {"reference": PresentClasses()}
+
+    def without(self, sample: SemsegSample, masks: Masks) -> SemsegSample:
+        """Unlabelled inside the mask, which no figure counts."""
+        silent = masks[VIEW]
+        return replace(
+            sample,
+            label_ids=np.where(silent, np.uint8(0), sample.label_ids),
+            instance_ids=np.where(silent, np.uint16(0), sample.instance_ids),
+        )
+
+    def encode_prediction(self, sample: SemsegSample, prediction: npt.NDArray[np.uint8], info: SplitInfo) -> Encoded:
+        """A picture of label ids, as the benchmark's script wants it."""
+        path = results.cityscapes_path(info.town, sample.record.sequence, sample.record.frame)
+        return Encoded(files={path: encode_labels(prediction.astype(np.uint8))}, facts={})
+
+    def decode_prediction(
+        self, root: Path, sample: SemsegSample, facts: Json, info: SplitInfo
+    ) -> npt.NDArray[np.uint8]:
+        """Reads the picture."""
+        return read_plain(root, results.cityscapes_path(info.town, sample.record.sequence, sample.record.frame))
+
+    def finalise_predictions(self, facts: Sequence[tuple[SceneRecord, Json]], info: SplitInfo) -> Mapping[str, bytes]:
+        """The pictures are all there is."""
+        return {}
 
     def preview(self, sample: SemsegSample) -> Mapping[str, UInt8Image]:
         """The labels' colours over the picture, borders between instances in white."""

@@ -9,6 +9,8 @@ from pathlib import Path
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Encoded, Evaluator, Sample, Sidecar, SplitInfo
+from gear.dataset.files import read_bytes
+from gear.formats import results
 from gear.formats.billboard_info import billboard_info
 from gear.formats.jsontext import dump
 from gear.formats.kitti_object import (
@@ -20,6 +22,7 @@ from gear.formats.kitti_object import (
     format_labels,
     label_corners,
     occlusion_level,
+    parse_labels,
     split_lists,
     truncation,
 )
@@ -29,6 +32,7 @@ from gear.groundtruth.objects import observe_objects
 from gear.groundtruth.raster import NEAR_M
 from gear.groundtruth.visibility import VisibilityLimits
 from gear.metrics.kitti_ap import KittiEvaluator
+from gear.metrics.kitti_reference import NearCars
 from gear.plugins.tasks.common import (
     CameraOptions,
     draw_box,
@@ -44,7 +48,7 @@ from gear.values.frames import Frame, SceneObject, UInt8Image, View
 from gear.values.labels import KittiType
 from gear.values.rig import Rig
 from gear.values.scene import SceneRecord
-from gear.values.serial import from_json, to_json
+from gear.values.serial import Json, from_json, to_json
 from gear.values.truth import BoxPx, ObjectTruth
 
 LEFT, RIGHT = "left", "right"
@@ -223,6 +227,25 @@ class Stereo3dTask:
     def evaluator(self) -> Evaluator[Stereo3dSample, tuple[KittiLabel, ...]]:
         """KITTI's average precisions."""
         return KittiEvaluator(lambda sample: [thing.label() for thing in sample.objects])
+
+    def reports(self) -> Mapping[str, Evaluator[Stereo3dSample, tuple[KittiLabel, ...]]]:
+        """`reference`: cars seen from above, at IoU 0.5, below 40 m."""
+        return {"reference": NearCars(lambda sample: [thing.label() for thing in sample.objects])}
+
+    def encode_prediction(self, sample: Stereo3dSample, prediction: Sequence[KittiLabel], info: SplitInfo) -> Encoded:
+        """A result file."""
+        lines = results.kitti_result_lines(prediction)
+        return Encoded(files={results.kitti_object_path(sample.record.index): lines}, facts={})
+
+    def decode_prediction(
+        self, root: Path, sample: Stereo3dSample, facts: Json, info: SplitInfo
+    ) -> tuple[KittiLabel, ...]:
+        """Reads the result file."""
+        return parse_labels(read_bytes(root / results.kitti_object_path(sample.record.index)).decode())
+
+    def finalise_predictions(self, facts: Sequence[tuple[SceneRecord, Json]], info: SplitInfo) -> Mapping[str, bytes]:
+        """The result files are all there is."""
+        return {}
 
     def preview(self, sample: Stereo3dSample) -> Mapping[str, UInt8Image]:
         """3D boxes on the left picture, ignored regions dashed in grey, and the right picture."""

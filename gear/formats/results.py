@@ -1,0 +1,54 @@
+"""Predictions in the result layouts that each benchmark's own script reads. Relative to one folder of predictions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from gear.formats.cityscapes import city_name, stem
+from gear.formats.kitti_object import KittiLabel
+
+
+def cityscapes_path(town: str, sequence: int, frame: int) -> str:
+    """A picture of label ids; the benchmark's script finds it by its stem, anywhere under the folder."""
+    return f"cityscapes/{city_name(town)}/{stem(town, sequence, frame)}_predLabelIds.png"
+
+
+def kitti_depth_paths(index: int) -> tuple[str, str]:
+    """The 16-bit picture that the devkit reads, and metres without loss beside it."""
+    return f"depth/rgb_{index:04d}.png", f"depth_metres/rgb_{index:04d}.tiff"
+
+
+def kitti_object_path(index: int) -> str:
+    """A result file; the devkit reads `data/%06d.txt`."""
+    return f"data/{index:06d}.txt"
+
+
+def kitti_result_lines(found: Iterable[KittiLabel]) -> bytes:
+    """16 fields a line with every digit, so that an independent evaluation sees what gear's own does.
+
+    Raises:
+        ValueError: a detection has no score.
+    """
+    return "".join(_result_line(label) + "\n" for label in found).encode()
+
+
+def _result_line(label: KittiLabel) -> str:
+    if label.score is None:
+        raise ValueError("every detection needs a score")
+    numbers = (
+        label.alpha_rad,
+        *label.box_px,
+        label.height_m,
+        label.width_m,
+        label.length_m,
+        *label.location_m,
+        label.rotation_y_rad,
+        label.score,
+    )
+    head = f"{label.type} {float(label.truncated)!r} {label.occluded:d} "
+    return head + " ".join(repr(float(value)) for value in numbers)
+
+
+def coco_path(split: str) -> str:
+    """The one results file of a split."""
+    return f"coco_results_{split}.json"

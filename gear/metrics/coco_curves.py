@@ -1,0 +1,93 @@
+"""Average precision from what pycocotools has matched, for any weights of the pictures.
+
+pycocotools matches picture by picture and only then gathers, so a resampled data set needs no second matching: each
+picture counts as often as it was drawn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.contracts.evaluation import Draws
+from gear.values.geometry import Array
+
+RECALLS = np.linspace(0.0, 1.0, 101)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Matches:
+    """Detections of one category, surest first.
+
+    Attributes:
+        owner: (D,) number of the picture.
+        hit: (T, D) found a label, at each overlap.
+        counts: (T, D) is no detection that is ignored.
+        wanted: (N,) labels to be found in each picture.
+    """
+
+    owner: npt.NDArray[np.int64]
+    hit: npt.NDArray[np.bool_]
+    counts: npt.NDArray[np.bool_]
+    wanted: npt.NDArray[np.int64]
+
+
+def matches(evaluation: Any) -> dict[int, Matches]:
+    """By category, of an evaluated `COCOeval`: its first range of areas; only categories with labels to be found."""
+    parameters = evaluation.params
+    pictures, areas = len(parameters.imgIds), len(parameters.areaRng)
+    found = {}
+    for index, category in enumerate(parameters.catIds):
+        first = index * areas * pictures
+        rows = [(n, row) for n, row in enumerate(evaluation.evalImgs[first : first + pictures]) if row is not None]
+        wanted = np.zeros(pictures, dtype=np.int64)
+        for number, row in rows:
+            wanted[number] = int(np.sum(np.asarray(row["gtIgnore"]) == 0))
+        if wanted.any():
+            found[category] = _gathered(rows, wanted, parameters.maxDets[-1], len(parameters.iouThrs))
+    return found
+
+
+def _gathered(rows: list[tuple[int, Any]], wanted: npt.NDArray[np.int64], most: int, overlaps: int) -> Matches:
+    scores = np.concatenate([np.asarray(row["dtScores"])[:most] for _, row in rows])
+    owner = np.concatenate([np.full(len(row["dtScores"][:most]), number, dtype=np.int64) for number, row in rows])
+    hit = np.concatenate([np.asarray(row["dtMatches"])[:, :most].reshape(overlaps, -1) for _, row in rows], axis=1) > 0
+    ignored = np.concatenate([np.asarray(row["dtIgnore"])[:, :most].reshape(overlaps, -1) for _, row in rows], axis=1)
+    surest = np.argsort(-scores, kind="stable")
+    return Matches(owner=owner[surest], hit=hit[:, surest], counts=ignored[:, surest] == 0, wanted=wanted)
+
+
+def average_precision(found: Matches, weights: npt.NDArray[np.int64]) -> Array:
+    """(T,) interpolated at 101 recalls, with each picture counted `weights` times; NaN without labels."""
+    total = int(weights @ found.wanted)
+    if not total:
+        return np.full(len(found.hit), np.nan)
+    each = weights[found.owner] * found.counts
+    tp, fp = np.cumsum(each * found.hit, axis=1), np.cumsum(each * ~found.hit, axis=1)
+    precision = tp / (tp + fp + np.spacing(1))
+    best = np.maximum.accumulate(precision[:, ::-1], axis=1)[:, ::-1]
+    values = np.zeros(len(best))
+    for row in range(len(best)):
+        at = np.searchsorted(tp[row] / total, RECALLS, side="left")
+        values[row] = float(best[row][at[at < best.shape[1]]].sum()) / len(RECALLS)
+    return values
+
+
+def resampled(found: Sequence[Matches], draws: Draws) -> Array:
+    """(R, categories, T) average precision over the pictures of each draw."""
+    values = np.full((len(draws), len(found), len(found[0].hit) if found else 1), np.nan)
+    for row, drawn in enumerate(draws):
+        for column, one in enumerate(found):
+            values[row, column] = average_precision(one, np.bincount(drawn, minlength=len(one.wanted)))
+    return values
+
+
+def known_mean(values: Array, axes: tuple[int, ...]) -> Array:
+    """Mean over axes, NaN left out; NaN where all is."""
+    known = ~np.isnan(values)
+    total = np.where(known, values, 0.0).sum(axis=axes)
+    return np.asarray(np.where(known.any(axis=axes), total / np.maximum(known.sum(axis=axes), 1), np.nan))

@@ -1,0 +1,67 @@
+"""What a reference network of 2D detection is held to: what moves in traffic, where there is enough of it to see."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from gear.contracts.evaluation import Draws, Spread
+from gear.formats.coco import CATEGORY_NAMES
+from gear.metrics.coco_ap import CocoEvaluator, SampleT
+from gear.metrics.coco_curves import Matches, average_precision, known_mean, matches, resampled
+from gear.values.serial import Json
+
+CATEGORIES = ("person", "bicycle", "car", "motorcycle", "bus", "truck")
+MIN_HEIGHT_PX = 32.0
+AT_HEIGHT_PX = 800
+"""Heights are those of a picture of 800 rows."""
+
+MIN_INSTANCES = 50
+LARGE = 1e10
+
+
+class TallObjects(CocoEvaluator[SampleT]):
+    """AP at IoU 0.5, mean over the categories of traffic that have at least 50 instances.
+
+    An instance counts if its visible box is at least 32 px high in a picture of 800 rows; lower ones, and detections
+    as low that found nothing, are ignored as pycocotools ignores what leaves a range of areas.
+    """
+
+    def result(self) -> Mapping[str, float]:
+        """`ap50`, `ap50_<category>` (NaN where there are fewer instances) and `instances_<category>`."""
+        found = self._found()
+        counts = {name: int(one.wanted.sum()) if (one := found.get(name)) else 0 for name in CATEGORIES}
+        values = {
+            name: float(average_precision(found[name], np.ones(len(self.pictures), dtype=np.int64))[0])
+            if counts[name] >= MIN_INSTANCES
+            else float("nan")
+            for name in CATEGORIES
+        }
+        total = float(known_mean(np.array(list(values.values())), (0,)))
+        instances = {f"instances_{name}": float(count) if self.pictures else np.nan for name, count in counts.items()}
+        return {"ap50": total, **{f"ap50_{name}": value for name, value in values.items()}, **instances}
+
+    def resampled(self, draws: Draws) -> Spread:
+        """`ap50` and `ap50_<category>`; which categories count is decided by the whole data set."""
+        found = {name: one for name, one in self._found().items() if int(one.wanted.sum()) >= MIN_INSTANCES}
+        values = resampled(list(found.values()), draws)[:, :, 0]
+        return {"ap50": known_mean(values, (1,)), **{f"ap50_{name}": values[:, i] for i, name in enumerate(found)}}
+
+    def _found(self) -> dict[str, Matches]:
+        if not self.pictures:
+            return {}
+        by_category = matches(self._matched())
+        return {
+            CATEGORY_NAMES[number]: one for number, one in by_category.items() if CATEGORY_NAMES[number] in CATEGORIES
+        }
+
+    def _adapt(self, labels: list[Json], found: list[Json]) -> None:
+        """Height takes the place of area."""
+        for item in (*labels, *found):
+            item["area"] = item["bbox"][3] * AT_HEIGHT_PX / self.pictures[item["image_id"]].height_px
+
+    def _limit(self, parameters: Any) -> None:
+        parameters.areaRng, parameters.areaRngLbl = [[MIN_HEIGHT_PX, LARGE]], ["tall"]
+        parameters.iouThrs = np.array([0.5])

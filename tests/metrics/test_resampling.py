@@ -1,0 +1,213 @@
+"""Figures over resampled pictures, and those that reference networks are held to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gear.formats.coco import Annotation, Detection, Picture
+from gear.formats.kitti_object import KittiLabel, dont_care
+from gear.metrics.coco_ap import CocoEvaluator
+from gear.metrics.coco_reference import TallObjects
+from gear.metrics.depth import DepthEvaluator, NearDepth
+from gear.metrics.kitti_ap import KittiEvaluator
+from gear.metrics.kitti_reference import NearCars
+from gear.metrics.semantic import PresentClasses
+from gear.values.rng import derive_rng
+
+CATEGORIES = (1, 3, 6)
+
+
+def picture(index: int, height_px: int = 800) -> tuple[Picture, tuple[Detection, ...]]:
+    """Boxes, and detections that lie somewhat off, miss, or are too many."""
+    rng = derive_rng(3, "picture", index)
+    annotations, found = [], []
+    for number in range(int(rng.integers(2, 9))):
+        left, top = rng.uniform(0, 900), rng.uniform(0, 500)
+        width, height = rng.uniform(15, 200), rng.uniform(10, 150)
+        category = int(rng.choice(CATEGORIES))
+        box = (float(left), float(top), float(width), float(height))
+        annotations.append(
+            Annotation(
+                category_id=category, box_xywh=box, area_px=int(width * height), rle="", is_crowd=number % 5 == 4,
+                extras={},
+            )
+        )  # fmt: skip
+        for _ in range(int(rng.integers(0, 3))):
+            dx, dy = rng.normal(0, 12, 2)
+            edges = (left + dx, top + dy, left + dx + width, top + dy + height)
+            found.append(
+                Detection(category_id=category, box_px=tuple(map(float, edges)), score=float(rng.uniform(0, 1)))  # type: ignore[arg-type]
+            )
+    shown = Picture(id=index, file_name="", height_px=height_px, width_px=1333, annotations=tuple(annotations))
+    return shown, tuple(found)
+
+
+def gathered(evaluator: Any, indices: Any) -> Any:
+    for index in indices:
+        evaluator.update(*picture(int(index)))
+    return evaluator
+
+
+def same(shown: Picture) -> Picture:
+    return shown
+
+
+def test_coco_over_drawn_pictures_is_pycocotools_over_them() -> None:
+    draws = np.array([[0, 1, 2, 3, 4, 5], [5, 5, 1, 1, 1, 0], [2, 2, 2, 2, 2, 2]])
+    spread = gathered(CocoEvaluator(same), range(6)).resampled(draws)
+    assert {"ap", "ap50", "ap75", "ap_person", "ap_car", "ap_bus"} == set(spread)
+    for row, drawn in enumerate(draws):
+        whole = gathered(CocoEvaluator(same), drawn).result()
+        for name in ("ap", "ap50", "ap75"):
+            assert spread[name][row] == pytest.approx(whole[name], abs=1e-12), (row, name)
+        for name, value in whole.items():
+            if name.startswith("ap_") and name in spread:
+                assert spread[name][row] == pytest.approx(value, abs=1e-12)
+    assert 0.05 < spread["ap"][0] < 0.95
+
+
+def test_tall_objects_are_pycocotools_without_the_low_ones() -> None:
+    """An independent run: only tall labels, detections cut at 32 px unless they lie on a label."""
+    evaluator = gathered(TallObjects(same), range(60))
+    figures = evaluator.result()
+    counts = {
+        name: sum(
+            not a.is_crowd and a.box_xywh[3] >= 32 and a.category_id == category
+            for i in range(60)
+            for a in picture(i)[0].annotations
+        )
+        for name, category in (("person", 1), ("car", 3), ("bus", 6))
+    }
+    assert {name: figures[f"instances_{name}"] for name in counts} == counts
+    assert all(count >= 50 for count in counts.values())
+    assert np.isnan(figures["ap50_truck"]) and figures["instances_truck"] == 0
+    assert figures["ap50"] == pytest.approx(np.mean([figures[f"ap50_{name}"] for name in counts]))
+    spread = evaluator.resampled(np.array([np.arange(60)]))
+    assert spread["ap50"][0] == pytest.approx(figures["ap50"]) and spread["ap50_car"][0] == figures["ap50_car"]
+
+
+def test_a_low_label_is_neither_missed_nor_a_false_alarm() -> None:
+    tall = Annotation(category_id=3, box_xywh=(0, 0, 50, 60), area_px=1, rle="", is_crowd=False, extras={})
+    low = replace(tall, box_xywh=(200.0, 0.0, 50.0, 20.0))
+    shown = Picture(id=0, file_name="", height_px=800, width_px=1333, annotations=(tall, low))
+    sure = Detection(category_id=3, box_px=(0, 0, 50, 60), score=0.6)
+
+    def ap(found: tuple[Detection, ...], height_px: int = 800) -> float:
+        evaluator = TallObjects(same)
+        for _ in range(50):
+            evaluator.update(replace(shown, height_px=height_px), found)
+        return evaluator.result()["ap50_car"]
+
+    assert ap((sure,)) == pytest.approx(1)
+    on_low = Detection(category_id=3, box_px=(200, 0, 250, 20), score=0.9)
+    assert ap((sure, on_low)) == pytest.approx(1)
+    nowhere = Detection(category_id=3, box_px=(500, 0, 550, 20), score=0.9)
+    assert ap((sure, nowhere)) == pytest.approx(1), "as low as what is ignored"
+    wrong = Detection(category_id=3, box_px=(500, 0, 550, 60), score=0.9)
+    assert ap((sure, wrong)) == pytest.approx(0.5)
+    assert ap((sure,), height_px=400) == pytest.approx(0.505, abs=0.01), "20 of 400 rows are 40 of 800"
+
+
+def car(ahead_m: float, right_m: float = 0.0, score: float | None = None) -> KittiLabel:
+    return KittiLabel(
+        type="Car", truncated=0, occluded=0, alpha_rad=0, box_px=(100, 100, 200, 160), height_m=1.5, width_m=1.8,
+        length_m=4.2, location_m=(right_m, 1.6, ahead_m), rotation_y_rad=0, score=score,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Lines:
+    labels: tuple[KittiLabel, ...]
+
+
+def kitti_picture(index: int) -> tuple[Lines, tuple[KittiLabel, ...]]:
+    rng = derive_rng(5, "kitti", index)
+    labels = [car(float(z), float(x)) for z, x in rng.uniform((5, -10), (70, 10), (6, 2))]
+    found = [
+        replace(
+            label, location_m=tuple(np.array(label.location_m) + rng.normal(0, 0.35, 3)), score=float(rng.uniform())
+        )
+        for label in labels
+        if rng.uniform() < 0.8
+    ]
+    found += [car(float(z), float(x), float(rng.uniform())) for z, x in rng.uniform((5, -10), (70, 10), (2, 2))]
+    return Lines((*labels, dont_care((0, 0, 20, 20)))), tuple(found)
+
+
+def fed(evaluator: Any, indices: Any) -> Any:
+    for index in indices:
+        evaluator.update(*kitti_picture(int(index)))
+    return evaluator
+
+
+@pytest.mark.parametrize("kind", [KittiEvaluator, NearCars])
+def test_kitti_over_drawn_pictures_is_the_evaluation_of_them(kind: Any) -> None:
+    draws = np.array([np.arange(12), [3] * 12, [0, 0, 1, 1, 2, 2, 3, 4, 5, 11, 11, 11]])
+    spread = fed(kind(lambda one: one.labels), range(12)).resampled(draws)
+    for row, drawn in enumerate(draws):
+        whole = fed(kind(lambda one: one.labels), drawn).result()
+        for name, values in spread.items():
+            assert values[row] == pytest.approx(whole[name], nan_ok=True), name
+    name = "car_bev_moderate_r40"
+    assert 0.05 < spread[name][0] < 0.95
+
+
+def test_near_cars_ignore_what_is_far() -> None:
+    def ap(labels: list[KittiLabel], found: list[KittiLabel]) -> float:
+        evaluator = NearCars(lambda one: one.labels)
+        for _ in range(60):
+            evaluator.update(Lines(tuple(labels)), tuple(found))
+        return evaluator.result()["car_bev_moderate_r40"]
+
+    assert ap([car(20), car(50)], [car(20, score=0.9)]) == pytest.approx(1)
+    assert ap([car(20), car(50)], [car(20, score=0.9), car(50, score=0.95), car(60, score=0.99)]) == pytest.approx(1)
+    assert ap([car(20), car(30)], [car(20, score=0.9)]) == pytest.approx(0.5, abs=0.03)
+    assert ap([car(20)], [car(20, 1.3, score=0.9)]) == pytest.approx(1), "0.5 is enough of an overlap"
+    assert ap([car(20)], [car(20, 1.5, score=0.9)]) == pytest.approx(0)
+
+
+@dataclass(frozen=True)
+class Labels:
+    label_ids: Any
+    instance_ids: Any
+
+
+def test_absent_classes_are_left_out_and_train_with_them() -> None:
+    truth = np.full((10, 10), 7, np.uint8)
+    truth[5:] = 8
+    said = truth.copy()
+    said[0, :5] = 26  # a car that is nowhere
+    said[9] = 31
+    evaluator = PresentClasses()
+    evaluator.update(Labels(truth, truth.astype(np.uint16)), said)
+    figures = evaluator.result()
+    assert figures["iou_road"] == pytest.approx(45 / 50) and figures["iou_sidewalk"] == pytest.approx(40 / 50)
+    assert np.isnan(figures["iou_car"]) and "iou_train" not in figures
+    assert figures["miou"] == pytest.approx((45 / 50 + 40 / 50) / 2)
+    assert len(figures) == 1 + 18
+
+
+@dataclass(frozen=True)
+class Depths:
+    depth_m: Any
+
+
+def test_near_depth_is_eigens_without_a_crop() -> None:
+    rng = derive_rng(1, "depth")
+    truth = rng.uniform(2, 160, (20, 30)).astype(np.float32)
+    truth[:4] = np.nan
+    said = (truth * rng.uniform(0.7, 1.4, truth.shape)).astype(np.float32)
+    said[:4] = 500
+    near, whole = NearDepth(), DepthEvaluator(max_depth_m=80, crop="none")
+    single = near.update(Depths(truth), said)
+    whole.update(Depths(truth), said)
+    figures = near.result()
+    assert figures == {n.removeprefix("eigen_"): v for n, v in whole.result().items() if n.startswith("eigen_")}
+    known = np.isfinite(truth) & (truth < 80)
+    clipped = np.minimum(said[known].astype(float), 80)
+    assert figures["rmse_m"] == pytest.approx(np.sqrt(np.mean((clipped - truth[known]) ** 2)))
+    assert single["d1"] == figures["d1"] and 0.2 < figures["d1"] < 1
