@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from gear.values.errors import GearError
     from gear.verbs.collect.run import CollectReport, collect
     from gear.verbs.defend import DefendReport, defend
+    from gear.verbs.train.run import TrainReport, train
     from gear.view.write import ViewReport, write_view
 
 __all__ = [
@@ -26,12 +27,14 @@ __all__ = [
     "Dataset",
     "DefendReport",
     "GearError",
+    "TrainReport",
     "Twins",
     "ViewReport",
     "collect",
     "defend",
     "open_dataset",
     "open_twins",
+    "train",
     "write_view",
 ]
 
@@ -40,12 +43,14 @@ _HOME = {
     "Dataset": "gear.opening",
     "DefendReport": "gear.verbs.defend",
     "GearError": "gear.values.errors",
+    "TrainReport": "gear.verbs.train.run",
     "Twins": "gear.opening",
     "ViewReport": "gear.view.write",
     "collect": "gear.verbs.collect.run",
     "defend": "gear.verbs.defend",
     "open_dataset": "gear.opening",
     "open_twins": "gear.opening",
+    "train": "gear.verbs.train.run",
     "write_view": "gear.view.write",
 }
 

@@ -17,6 +17,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from gear.contracts.models import Recipe
 from gear.contracts.specs import ModelSpec
 from gear.values.frames import FloatImage, UInt8Image
 
@@ -73,6 +74,10 @@ class TinyNetwork(nn.Module, ABC):
         size = (pictures.shape[2], pictures.shape[3])
         raw = functional.interpolate(self.head(hidden), size=size, mode="bilinear", align_corners=False)
         return self.outputs(raw) if targets is None else {"loss": self.loss(raw, targets)}
+
+    def module(self) -> nn.Module:
+        """Itself: what `gear train` trains and saves."""
+        return self
 
     def taps(self) -> Mapping[str, nn.Module]:
         """`stem` and `trunk`."""
@@ -151,6 +156,7 @@ tiny_segmenter = ModelSpec(
     tasks=("semseg",),
     views=(VIEW,),
     taps=("stem", "trunk"),
+    recipe=Recipe(learning_rate=3e-3, batch=2, epochs=2),
 )
 
 tiny_depth = ModelSpec(
@@ -161,4 +167,5 @@ tiny_depth = ModelSpec(
     tasks=("depth",),
     views=(VIEW,),
     taps=("stem", "trunk"),
+    recipe=Recipe(learning_rate=3e-3, batch=2, epochs=2),
 )

@@ -1,0 +1,125 @@
+"""`gear train`."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+from gear.cli.collect import positive
+
+if TYPE_CHECKING:
+    from gear.verbs.train.checkpoint import Progress
+
+EXAMPLE = """examples:
+  gear train --task semseg --model ddrnet23_slim --data data/training/semseg --time-budget 10m --out runs/semseg
+  gear train --task depth --model glpdepth --data data/a data/b:finetuning --val data/c:val --epochs 25 --out runs/depth
+  gear train --task detect2d --model retinanet_r18 --data data/det --init imagenet --precision bfloat16 --out runs/det
+  gear train --task semseg --model ddrnet23_slim --data data/ss --set augmentation.flip=0 --set crop_px='[512, 512]' \\
+      --out runs/ss
+
+DIR is a dataset's root, a folder of roots, or DIR:SPLIT. The folder of --out gets model.safetensors (use it with
+--set weights=FILE), train.json, card.md and curves.png; the same command again goes on where it was stopped.
+"""
+SECONDS = {"s": 1, "m": 60, "h": 3600, "": 60}
+
+
+def budget(text: str) -> float:
+    """`90s`, `10m`, `1.5h`, or minutes, in seconds; for argparse."""
+    match = re.fullmatch(r"(\d+(?:\.\d*)?)([smh]?)", text.strip())
+    if not match or not float(match[1]):
+        raise argparse.ArgumentTypeError(f"a time is written 90s, 10m or 1.5h, got {text!r}")
+    return float(match[1]) * SECONDS[match[2]]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the command's flags."""
+    parser.epilog = EXAMPLE
+    parser.add_argument("--task", required=True, metavar="NAME", help="task plugin; gear plugins --kind task")
+    parser.add_argument("--model", required=True, metavar="NAME", help="model plugin; gear plugins --kind model")
+    parser.add_argument("--data", required=True, nargs="+", metavar="DIR", help="what to train on")
+    parser.add_argument("--val", nargs="+", default=[], metavar="DIR", help="what to validate on (a share of --data)")
+    parser.add_argument("--out", required=True, metavar="DIR", help="folder of the results")
+    length = parser.add_mutually_exclusive_group()
+    length.add_argument("--epochs", type=positive, metavar="N", help="passes over the data (the network's recipe)")
+    length.add_argument("--time-budget", type=budget, metavar="TIME", help="time instead of passes: 90s, 10m, 1.5h")
+    parser.add_argument("--batch", type=positive, metavar="N", help="samples a step (recipe)")
+    parser.add_argument("--lr", type=float, metavar="X", help="highest learning rate (recipe)")
+    parser.add_argument("--seed", type=int, metavar="N", help="of weights, order and augmentation (0)")
+    parser.add_argument("--init", metavar="FILE|NAME", help="first weights: a file, shipped, imagenet … (random)")
+    parser.add_argument("--precision", choices=("float32", "bfloat16"), help="of the training steps (float32)")
+    parser.add_argument("--device", choices=("auto", "cpu", "cuda"), help="where it runs (auto)")
+    parser.add_argument("--workers", type=positive, metavar="N", help="threads that read; change nothing but time (2)")
+    parser.add_argument("--allow-test-data", action="store_true", help="learn from test splits, too")
+    parser.add_argument(
+        "--set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        dest="settings",
+        help="any key of the training's config, options.KEY for the network's own; repeatable",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Trains and says what it came to."""
+    from gear.verbs.train.run import train
+
+    with TrainingBar() as bar:
+        report = train(
+            args.task,
+            args.model,
+            args.data,
+            out=args.out,
+            val=args.val,
+            epochs=args.epochs,
+            time_budget_s=args.time_budget,
+            batch=args.batch,
+            lr=args.lr,
+            seed=args.seed,
+            init=args.init,
+            precision=args.precision,
+            device=args.device,
+            workers=args.workers,
+            settings=args.settings,
+            allow_test_data=args.allow_test_data,
+            watch=bar,
+        )
+    print(report.summary())
+    return 0
+
+
+class TrainingBar:
+    """Per cent, loss and the last validation on stderr; every validation leaves a line."""
+
+    SHOWN = 3
+
+    def __init__(self) -> None:
+        from tqdm import tqdm
+
+        self._bar: tqdm[Any] = tqdm(
+            total=100, unit="%", disable=None, dynamic_ncols=True,
+            bar_format="{l_bar}{bar}| {elapsed}<{remaining} {postfix}",
+        )  # fmt: skip
+
+    def __call__(self, progress: Progress, share: float, figures: dict[str, float] | None) -> None:
+        """After a step, or, with figures, after a validation."""
+        self._bar.update(100 * share - self._bar.n)
+        if progress.steps:
+            point = progress.steps[-1]
+            self._bar.set_postfix_str(f"step {progress.step} loss {point['loss']:.3f} lr {point['rate']:.1e}")
+        if figures is not None:
+            chosen = [*list(figures.items())[: self.SHOWN], ("loss", figures["loss"])]
+            text = "  ".join(f"{name} {value:.4f}" for name, value in dict(chosen).items())
+            mark = " *" if progress.best_step == progress.step else ""
+            self._bar.write(f"step {progress.step:>6}  {text}{mark}", file=sys.stderr)
+
+    def __enter__(self) -> TrainingBar:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._bar.close()

@@ -1,0 +1,1 @@
+"""`gear.train`: any task with any network that has losses."""

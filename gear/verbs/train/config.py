@@ -1,0 +1,97 @@
+"""What a training is made of: the network's recipe, with what the user changes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from gear.augment.apply import Augmentation, Framing
+from gear.config.dump import to_yaml
+from gear.config.nodes import Mapping as MappingNode
+from gear.config.nodes import Node, Place, Scalar, parse_text
+from gear.config.overrides import merged, with_overrides
+from gear.config.reader import read_node
+from gear.contracts.models import Recipe
+from gear.values.errors import FieldError
+
+SHARES = ("warm_up", "final_rate", "validation_share")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrainConfig(Recipe):
+    """A recipe and the circumstances of one training.
+
+    Attributes:
+        seed: of first weights, order, augmentation and whatever the network draws.
+        time_budget_s: instead of `epochs`: the learning rate falls with the time that is left; 0 counts epochs.
+        precision: of the training steps; validation is always in float32.
+        device: `auto` takes a GPU where there is one.
+        init: what to begin with: "" is random weights, `shipped` the reference weights, a path of a safetensors file,
+            or a name that the network knows, such as `imagenet`.
+        warm_up: share of the training in which the learning rate rises.
+        final_rate: learning rate at the end, as a share of the highest.
+        ema: weight of the past in the running mean of the weights, which is what is validated and kept; 0 for none.
+        validation_share: share of the training data that is kept for validation where no other data are given.
+        validation_samples: at most so many samples are validated on, spread over the data.
+        patience: stops after so many validations without a better one; 0 never does.
+        workers: threads that decode and augment; they change nothing but time.
+        cache_gb: memory for decoded samples; what does not fit is decoded again. Changes nothing but time.
+        augmentation: of training samples.
+        options: the network's own (`gear plugins show MODEL`).
+    """
+
+    seed: int = 0
+    time_budget_s: float = 0.0
+    precision: Literal["float32", "bfloat16"] = "float32"
+    device: Literal["auto", "cpu", "cuda"] = "auto"
+    init: str = ""
+    warm_up: float = 0.03
+    final_rate: float = 0.01
+    ema: float = 0.998
+    validation_share: float = 0.08
+    validation_samples: int = 48
+    patience: int = 0
+    workers: int = 2
+    cache_gb: float = 4.0
+    augmentation: Augmentation = field(default_factory=Augmentation)
+    options: Node = field(default_factory=lambda: MappingNode({}, Place("defaults")))
+
+    def __post_init__(self) -> None:
+        for name in ("batch", "epochs", "workers", "validation_samples"):
+            if getattr(self, name) < 1:
+                raise FieldError(name, f"must be at least 1, got {getattr(self, name)}")
+        for name in ("seed", "time_budget_s", "patience", "cache_gb", "weight_decay", "gradient_norm"):
+            if getattr(self, name) < 0:
+                raise FieldError(name, f"must not be negative, got {getattr(self, name):g}")
+        for name in SHARES:
+            if not 0 <= getattr(self, name) < 1:
+                raise FieldError(name, f"is a share, 0 or more and below 1, got {getattr(self, name):g}")
+        if not self.learning_rate > 0:
+            raise FieldError("learning_rate", f"must be above 0, got {self.learning_rate:g}")
+        if not 0 <= self.ema < 1:
+            raise FieldError("ema", f"must be 0 or more and below 1, got {self.ema:g}")
+        if not 0 < self.scales[0] <= self.scales[1]:
+            raise FieldError("scales", f"must be a range above 0, got {self.scales}")
+        if self.crop_px is not None and min(self.crop_px) < 16:
+            raise FieldError("crop_px", f"must be at least 16 px a side, got {self.crop_px}")
+
+    @property
+    def framing(self) -> Framing:
+        """What training sees of a picture."""
+        return Framing(crop_px=self.crop_px, scales=self.scales)
+
+
+def read_config(recipe: Recipe, flags: Mapping[str, Any], settings: Iterable[str] = ()) -> TrainConfig:
+    """A recipe with flags (None where one was not given) and `KEY=VALUE` texts on top.
+
+    Raises:
+        ConfigError: a key is not known, or a value refused.
+    """
+    base = parse_text(to_yaml(recipe), "recipe")
+    given: dict[str, tuple[Place, Node]] = {
+        key: (Place(f"--{key}"), Scalar(str(value), False, Place(f"--{key}")))
+        for key, value in flags.items()
+        if value is not None
+    }
+    return read_node(TrainConfig, with_overrides(merged(base, MappingNode(given, base.place)), settings))

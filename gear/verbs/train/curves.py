@@ -1,0 +1,46 @@
+"""The figure of a training: losses, learning rate, the task's figure."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+from gear.contracts.specs import TaskSpec
+from gear.dataset.files import write_whole
+from gear.verbs.train.checkpoint import Progress
+
+FILE = "curves.png"
+BLUE, RED, GREEN = "#1f5fa8", "#b3402a", "#2f7d4f"
+
+
+def write_curves(root: Path, spec: TaskSpec, progress: Progress, title: str) -> None:  # type: ignore[type-arg]
+    """Writes `curves.png`."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.0, 3.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    left, right = figure.subplots(1, 2)
+    figure.suptitle(title, fontsize=10)
+
+    left.plot([p["step"] for p in progress.steps], [p["loss"] for p in progress.steps], color=BLUE, label="training")
+    steps = [entry["step"] for entry in progress.validations]
+    left.plot(steps, [entry["loss"] for entry in progress.validations], "o-", color=RED, ms=3, label="validation")
+    left.set(xlabel="step", ylabel="loss")
+    left.grid(alpha=0.3)
+    left.legend(frameon=False, fontsize=8)
+
+    if spec.figure:
+        values = [entry.get(spec.figure, float("nan")) for entry in progress.validations]
+        right.plot(steps, values, "o-", color=GREEN, ms=3)
+        right.axvline(progress.best_step, color=GREEN, lw=0.8, ls=":")
+    right.set(xlabel="step", ylabel=spec.figure)
+    right.grid(alpha=0.3)
+    rate = right.twinx()
+    rate.plot([p["step"] for p in progress.steps], [p["rate"] for p in progress.steps], color="0.6", lw=1)
+    rate.set_ylabel("learning rate", color="0.5")
+    rate.tick_params(colors="0.5")
+
+    data = io.BytesIO()
+    figure.savefig(data, format="png", dpi=120, metadata={"Software": None})
+    write_whole(root, FILE, data.getvalue())

@@ -1,0 +1,199 @@
+"""The training itself: steps, validations, checkpoints, in an order that depends on seed and data alone."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import nn
+
+from gear.contracts.specs import TaskSpec
+from gear.contracts.tasks import Task
+from gear.nn.runtime import autocast, device_of, seeded
+from gear.readers import Batch
+from gear.values.errors import GearError
+from gear.values.rng import derive_rng
+from gear.values.serial import Json
+from gear.verbs.train import checkpoint
+from gear.verbs.train.checkpoint import Progress
+from gear.verbs.train.config import TrainConfig
+from gear.verbs.train.feed import Feed
+from gear.verbs.train.optimise import RunningMean, clip_gradients, optimiser_of, rate_share
+from gear.verbs.train.validate import rank, total, validate
+
+NOTE_EVERY = 10
+"""Steps whose mean loss becomes one point of the history."""
+
+CHECKPOINT_EVERY_S = 120.0
+VALIDATION_SHARE = 0.1
+"""Of the time, where time is the budget."""
+
+MOST_BROKEN_STEPS = 20
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Parts:
+    """What a training works with.
+
+    Attributes:
+        spec, task: what is learnt, and its evaluator.
+        model: being trained.
+        twin: another one of its kind, in float32, that is given the mean weights and validated.
+        views: cameras that it looks at.
+        validation: held-out samples.
+        feed: training batches.
+        root: folder of the results.
+        plan: what a checkpoint must have been begun with.
+    """
+
+    spec: TaskSpec[Any]
+    task: Task[Any, Any]
+    model: Any
+    twin: Any
+    views: Sequence[str]
+    validation: Sequence[Any]
+    feed: Feed
+    root: Path
+    plan: Json
+
+
+Watch = Callable[[Progress, float, dict[str, float] | None], None]
+"""Told of the progress, the share that is over, and the figures where a validation has just ended."""
+
+Keep = Callable[[dict[str, torch.Tensor], Progress], None]
+"""Told of the mean weights whenever they are the best so far."""
+
+
+class Training:
+    """One training, fresh or taken up again."""
+
+    def __init__(self, parts: Parts, config: TrainConfig, *, watch: Watch | None, keep: Keep) -> None:
+        self._parts, self._config, self._watch, self._keep = parts, config, watch, keep
+        self._module: nn.Module = parts.model.module()
+        self._memory = torch.channels_last if config.precision == "bfloat16" else torch.contiguous_format
+        for parameter in self._module.parameters():
+            if parameter.dim() == 4:
+                parameter.data = parameter.data.contiguous(memory_format=self._memory)
+        self._optimiser = optimiser_of(self._module, config)
+        self._mean = RunningMean(self._module, config.ema)
+        self._device = device_of(config.device)
+        self._broken = 0
+        found = checkpoint.load(parts.root, parts.plan, self._module, self._mean, self._optimiser)
+        self.progress, _ = found or (Progress(), {})
+        self._saved_s = self.progress.elapsed_s
+
+    @property
+    def share(self) -> float:
+        """How much of the training is over, 0..1."""
+        if self._config.time_budget_s:
+            return min(1.0, self.progress.elapsed_s / self._config.time_budget_s)
+        return min(1.0, self.progress.step / (self._config.epochs * self._parts.feed.batches))
+
+    def run(self) -> Progress:
+        """Trains to the end."""
+        _train_mode(self._parts.model, True)
+        batches = self._parts.feed.from_position(self.progress.position)
+        with contextlib.closing(batches):  # type: ignore[type-var]
+            while self.share < 1 and not self._has_enough:
+                with self._timed():
+                    self._step(next(batches))
+                if self._is_time_to_validate:
+                    self._validate()
+                elif self.progress.elapsed_s - self._saved_s > CHECKPOINT_EVERY_S:
+                    self._save()
+                if self._watch is not None:
+                    self._watch(self.progress, self.share, None)
+        if not self.progress.validations or self.progress.validations[-1]["step"] != self.progress.step:
+            self._validate()
+        _train_mode(self._parts.model, False)
+        return self.progress
+
+    @property
+    def _has_enough(self) -> bool:
+        return bool(self._config.patience) and self.progress.worse >= self._config.patience
+
+    @property
+    def _is_time_to_validate(self) -> bool:
+        """After every pass; with a time budget, as soon as validations have not taken more than their share."""
+        progress = self.progress
+        if not self._config.time_budget_s:
+            return progress.position.batch == 0
+        last = progress.validations[-1] if progress.validations else None
+        since_s = progress.elapsed_s - (last["elapsed_s"] if last else 0.0)
+        wanted_s = last["took_s"] / VALIDATION_SHARE if last else self._config.time_budget_s / 10
+        return since_s > max(wanted_s, self._config.time_budget_s / 20)
+
+    def _step(self, batch: Batch) -> None:
+        progress, config = self.progress, self._config
+        factor = rate_share(self.share, warm_up=config.warm_up, final=config.final_rate)
+        for group in self._optimiser.param_groups:
+            group["lr"] = config.learning_rate * factor
+        views = {name: picture.contiguous(memory_format=self._memory) for name, picture in batch.views.items()}
+        with seeded(int(derive_rng(config.seed, "step", progress.step).integers(2**31))):
+            with autocast(self._device, config.precision):
+                loss = total(self._parts.model.forward(views, batch.samples))
+            self._optimiser.zero_grad(set_to_none=True)
+            loss.backward()  # type: ignore[no-untyped-call]
+        norm = clip_gradients(self._module, config.gradient_norm)
+        self._count_broken(bool(torch.isfinite(norm)), loss)
+        if torch.isfinite(norm):
+            self._optimiser.step()
+            self._mean.update(self._module, progress.step)
+            progress.open_losses.append(float(loss.detach()))
+        progress.step += 1
+        progress.position = progress.position.following(self._parts.feed.batches)
+        if progress.step % NOTE_EVERY == 0 and progress.open_losses:
+            point = {"step": progress.step, "loss": math.fsum(progress.open_losses) / len(progress.open_losses)}
+            progress.steps.append(point | {"rate": config.learning_rate * factor})
+            progress.open_losses.clear()
+
+    def _count_broken(self, is_finite: bool, loss: torch.Tensor) -> None:
+        """A step that overflows is left out; a training that only overflows is over."""
+        self._broken = 0 if is_finite else self._broken + 1
+        if self._broken > MOST_BROKEN_STEPS:
+            raise GearError(
+                f"the loss is {float(loss.detach()):g} or its gradients are, {self._broken} steps in a row, at step "
+                f"{self.progress.step}; lower --lr, or clip with --set gradient_norm=1"
+            )
+
+    def _validate(self) -> None:
+        parts, progress = self._parts, self.progress
+        with self._timed() as spent:
+            parts.twin.module().load_state_dict(self._mean.state)
+            figures = validate(parts.twin, parts.task, parts.validation, parts.views)
+        best = max((rank(old, parts.spec) for old in progress.validations), default=(-math.inf, -math.inf))
+        is_better = rank(figures, parts.spec) > best or not progress.validations
+        entry = {"step": progress.step, "elapsed_s": progress.elapsed_s, "took_s": spent[0], **figures}
+        progress.validations.append(entry)
+        progress.worse = 0 if is_better else progress.worse + 1
+        if is_better:
+            progress.best_step = progress.step
+            self._keep({key: value.detach().cpu().clone() for key, value in self._mean.state.items()}, progress)
+        self._save()
+        if self._watch is not None:
+            self._watch(progress, self.share, figures)
+
+    def _save(self) -> None:
+        checkpoint.save(
+            self._parts.root, self._parts.plan, self.progress, self._module, self._mean, self._optimiser, {}
+        )
+        self._saved_s = self.progress.elapsed_s
+
+    @contextlib.contextmanager
+    def _timed(self) -> Iterator[list[float]]:
+        """Adds what is done inside to the elapsed time; gives it as the one item of a list afterwards."""
+        spent, begin = [0.0], time.perf_counter()
+        yield spent
+        spent[0] = time.perf_counter() - begin
+        self.progress.elapsed_s += spent[0]
+
+
+def _train_mode(model: Any, is_training: bool) -> None:
+    module: nn.Module = model if isinstance(model, nn.Module) else model.module()
+    module.train(is_training)

@@ -1,0 +1,66 @@
+"""Optimiser, learning rate, and the running mean of the weights."""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import Tensor, nn
+
+from gear.verbs.train.config import TrainConfig
+
+MOMENTUM = 0.9
+
+
+def optimiser_of(module: nn.Module, config: TrainConfig) -> torch.optim.Optimizer:
+    """AdamW or SGD over what may be trained. Vectors and numbers (biases, normalisation) do not decay."""
+    trained = [parameter for parameter in module.parameters() if parameter.requires_grad]
+    groups = [
+        {"params": [p for p in trained if p.dim() > 1], "weight_decay": config.weight_decay},
+        {"params": [p for p in trained if p.dim() <= 1], "weight_decay": 0.0},
+    ]
+    if config.optimiser == "sgd":
+        return torch.optim.SGD(groups, lr=config.learning_rate, momentum=MOMENTUM)
+    return torch.optim.AdamW(groups, lr=config.learning_rate)
+
+
+def rate_share(progress: float, *, warm_up: float, final: float) -> float:
+    """Learning rate as a share of the highest: a straight rise, then half a cosine (Loshchilov and Hutter, "SGDR",
+    2017, eq. 5, without restarts).
+
+    Args:
+        progress: share of the training that is over, 0..1.
+        warm_up: share in which it rises.
+        final: at the end.
+    """
+    if progress < warm_up:
+        return final + (1 - final) * progress / warm_up
+    fallen = min(1.0, (progress - warm_up) / (1 - warm_up))
+    return final + (1 - final) * (1 + math.cos(math.pi * fallen)) / 2
+
+
+class RunningMean:
+    """The mean of the weights over the last steps (Polyak and Juditsky, 1992), younger in the beginning.
+
+    Attributes:
+        state: by key, as in the module's own state; whole numbers are the module's newest.
+    """
+
+    def __init__(self, module: nn.Module, decay: float) -> None:
+        self.decay = decay
+        self.state = {key: value.detach().clone() for key, value in module.state_dict().items()}
+
+    @torch.no_grad()
+    def update(self, module: nn.Module, step: int) -> None:
+        """Takes in the weights after a step, counted from 0."""
+        decay = min(self.decay, (1 + step) / (10 + step))
+        for key, value in module.state_dict().items():
+            if value.is_floating_point():
+                self.state[key].lerp_(value, 1 - decay)
+            else:
+                self.state[key].copy_(value)
+
+
+def clip_gradients(module: nn.Module, most: float) -> Tensor:
+    """Scales gradients to a norm of at most `most` (0: leaves them); returns the norm before."""
+    return nn.utils.clip_grad_norm_(module.parameters(), most if most > 0 else math.inf)

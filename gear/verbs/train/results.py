@@ -1,0 +1,179 @@
+"""What a training leaves behind: weights that say where they come from, the history, a model card."""
+
+from __future__ import annotations
+
+import json
+import math
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from torch import Tensor
+
+from gear.config.dump import to_plain
+from gear.dataset.files import sha256, write_whole
+from gear.nn.weights import write as write_weights
+from gear.plugins.catalogue import Found
+from gear.values.serial import Json
+from gear.verbs.train.checkpoint import Progress
+from gear.verbs.train.config import TrainConfig
+from gear.verbs.train.data import Samples
+
+WEIGHTS = "model.safetensors"
+HISTORY = "train.json"
+CARD = "card.md"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Origin:
+    """Where weights come from.
+
+    Attributes:
+        model: whose they are.
+        task: its name.
+        config: of the training.
+        training, validation: the data.
+        command: that makes them again.
+        look_hash: of what the training data show; "" where they were collected with several looks.
+    """
+
+    model: Found
+    task: str
+    config: TrainConfig
+    training: Samples
+    validation: Samples
+    command: str
+    look_hash: str
+
+    def metadata(self, figures: Mapping[str, Any]) -> dict[str, str]:
+        """What stands in the weights file: texts, those of several values as JSON."""
+        data = {"training": self.training.facts(), "validation": self.validation.facts()}
+        return {
+            "model": self.model.spec.name,
+            "package": self.model.owner.package,
+            "task": self.task,
+            "gear": version("mujoco-gear"),
+            "command": self.command,
+            "seed": str(self.config.seed),
+            "look_hash": self.look_hash,
+            "data": json.dumps(data, sort_keys=True),
+            "metrics": json.dumps(known(figures), sort_keys=True),
+            "options": json.dumps(to_plain(self.config.options), sort_keys=True),
+        }
+
+
+def known(figures: Mapping[str, Any]) -> dict[str, Any]:
+    """Without what is no number, for JSON."""
+    return {key: value for key, value in figures.items() if not (isinstance(value, float) and math.isnan(value))}
+
+
+def figures_of(validation: Mapping[str, Any]) -> dict[str, float]:
+    """A validation without its times."""
+    return {key: value for key, value in validation.items() if key not in ("step", "elapsed_s", "took_s")}
+
+
+def command_of(
+    task: str, model: str, data: Sequence[str], val: Sequence[str], flags: Mapping[str, Any], settings: Sequence[str]
+) -> str:
+    """The command line that does the same."""
+    words = ["gear", "train", "--task", task, "--model", model, "--data", *data, *(["--val", *val] if val else [])]
+    for key, value in flags.items():
+        if value is not None:
+            words += [f"--{key.replace('_', '-')}", f"{value}"]
+    for setting in settings:
+        words += ["--set", setting]
+    return shlex.join([*words, "--out", "DIR"])
+
+
+def keep_weights(root: Path, state: Mapping[str, Tensor], origin: Origin, progress: Progress) -> None:
+    """Writes the weights, matrices in float16."""
+    figures = figures_of(progress.validations[-1])
+    write_weights(root / WEIGHTS, state, origin.metadata(figures), halves=True)
+
+
+def write_history(root: Path, origin: Origin, progress: Progress) -> None:
+    """Writes `train.json` and `card.md`."""
+    config: Any = to_plain(origin.config)
+    history = {
+        "task": origin.task,
+        "model": origin.model.full_name,
+        "command": origin.command,
+        "config": config,
+        "training": origin.training.facts(),
+        "validation": origin.validation.facts(),
+        "finished_steps": progress.step,
+        "elapsed_s": round(progress.elapsed_s, 3),
+        "best_step": progress.best_step,
+        "steps": progress.steps,
+        "validations": [known(entry) for entry in progress.validations],
+    }
+    write_whole(root, HISTORY, (json.dumps(history, indent=1) + "\n").encode())
+    write_whole(root, CARD, card(root, origin, progress).encode())
+
+
+def card(root: Path, origin: Origin, progress: Progress) -> str:
+    """The model card, in Markdown."""
+    best = next(entry for entry in progress.validations if entry["step"] == progress.best_step)
+    weights = (root / WEIGHTS).read_bytes()
+    config = origin.config
+    spec: Any = origin.model.spec
+    lines = [
+        f"# {spec.name} for {origin.task}",
+        "",
+        spec.summary,
+        "",
+        f"- weights: `{WEIGHTS}`, {len(weights) / 1e6:.1f} MB, sha256 `{sha256(weights)}`",
+        f"- made by: `{origin.command}`",
+        f"- gear {version('mujoco-gear')}, seed {config.seed}, begun with {config.init or 'random weights'}",
+        f"- {config.optimiser}, learning rate {config.learning_rate:g}, weight decay {config.weight_decay:g}, "
+        f"batch {config.batch}, crop {_size(config.crop_px)}, {config.precision}",
+        f"- {progress.step} steps in {progress.elapsed_s / 60:.1f} minutes; the weights are those after step "
+        f"{progress.best_step}",
+        f"- look of the data: `{origin.look_hash or 'several'}`",
+        "",
+        "## Training data",
+        "",
+        *_data_table(origin.training),
+        "",
+        "## Validation",
+        "",
+        f"On {len(origin.validation)} held-out samples, whole pictures, float32:",
+        "",
+        "| figure | value |",
+        "|---|---|",
+        *(f"| {name} | {value:.4f} |" for name, value in known(figures_of(best)).items()),
+        "",
+        "![curves](curves.png)",
+        "",
+        "## Limits",
+        "",
+        "Trained on rendered pictures of gear's towns alone. It knows their looks, weathers and cameras; on real",
+        "pictures, or on towns that look otherwise, nothing is promised.",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _size(crop_px: tuple[int, int] | None) -> str:
+    return "none" if crop_px is None else f"{crop_px[1]}x{crop_px[0]}"
+
+
+def _data_table(samples: Samples) -> list[str]:
+    rows = ["| scene | weather | split | seed | patch | samples |", "|---|---|---|---|---|---|"]
+    for fact in samples.facts():
+        entry: Any = fact
+        cells = (entry[key] for key in ("scene", "weather", "split", "seed", "patch", "samples"))
+        rows.append("| " + " | ".join(str(cell) for cell in cells) + " |")
+    return rows
+
+
+def look_of(samples: Samples) -> Json:
+    """What the pictures' look follows from, where all samples agree: assets, renderer and versions."""
+    looks = {
+        json.dumps({key: dataset.manifest[key] for key in ("assets", "renderer", "versions")}, sort_keys=True)
+        for dataset in samples.datasets
+    }
+    return json.loads(looks.pop()) if len(looks) == 1 else None

@@ -1,0 +1,224 @@
+"""`gear.train`: the whole verb as one call."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gear.config.dump import to_plain
+from gear.contracts.specs import ModelSpec, TaskSpec
+from gear.dataset.files import clear_scratch, explained
+from gear.nn.runtime import prepare
+from gear.plugins.build import blamed, find
+from gear.plugins.catalogue import Found
+from gear.values.errors import GearError
+from gear.values.serial import Json
+from gear.verbs.train.config import TrainConfig, read_config
+from gear.verbs.train.curves import write_curves
+from gear.verbs.train.data import TRAINING, VALIDATION, Samples, all_of, keep_some, open_all, spread
+from gear.verbs.train.feed import Cache, Feed
+from gear.verbs.train.loop import Parts, Training, Watch
+from gear.verbs.train.results import WEIGHTS, Origin, command_of, figures_of, keep_weights, write_history
+from gear.verbs.train.starting import begin_with, build_network
+
+GIGABYTE = 1e9
+CHANGE_NOTHING = ("workers", "cache_gb", "device")
+"""Settings with which a training may be taken up again that was begun with others."""
+
+Paths = str | Path | Sequence[str | Path]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrainReport:
+    """What a training came to.
+
+    Attributes:
+        root: folder of the results.
+        weights: the file, for `weights=FILE` of the network.
+        steps: how many were made in all.
+        elapsed_s: time that they took, with validations.
+        best_step: after which the weights stood.
+        figures: of the validation of those weights.
+        figure: name of the one that chose them; "" is the loss.
+    """
+
+    root: Path
+    weights: Path
+    steps: int
+    elapsed_s: float
+    best_step: int
+    figures: dict[str, float]
+    figure: str
+
+    def summary(self) -> str:
+        """One line for a person."""
+        name = self.figure or "loss"
+        value = self.figures.get(name, float("nan"))
+        return (
+            f"{self.weights}: {name} {value:.4f} after step {self.best_step} of {self.steps} "
+            f"({self.elapsed_s / 60:.1f} minutes)"
+        )
+
+
+def train(
+    task: str,
+    model: str,
+    data: Paths,
+    *,
+    out: str | Path,
+    val: Paths = (),
+    epochs: int | None = None,
+    time_budget_s: float | None = None,
+    batch: int | None = None,
+    lr: float | None = None,
+    seed: int | None = None,
+    init: str | Path | None = None,
+    precision: str | None = None,
+    device: str | None = None,
+    workers: int | None = None,
+    settings: Iterable[str] = (),
+    allow_test_data: bool = False,
+    watch: Watch | None = None,
+) -> TrainReport:
+    """Trains a network; takes up again what was begun in `out`, and does nothing where it is finished.
+
+    The same seed, data and settings give the same weights on one machine, stopped and taken up again or not, unless
+    time is the budget.
+
+    Args:
+        task: name of a task plugin.
+        model: name of a model plugin that can do the task and be trained.
+        data: roots of datasets, folders of roots, or `DIR:SPLIT`.
+        out: folder of the results: `model.safetensors`, `train.json`, `card.md`, `curves.png`.
+        val: data to validate on; by default some sequences of `data` are kept for it.
+        epochs, time_budget_s, batch, lr, seed, init, precision, device, workers: as in `TrainConfig`, where `lr` is
+            `learning_rate`; what is not given is as the network's recipe says.
+        settings: further `KEY=VALUE` texts for any key of `TrainConfig`, such as `augmentation.flip=0`; the network's
+            own options are `options.KEY`.
+        allow_test_data: whether `test` splits may be learnt from.
+        watch: told after every step and every validation.
+
+    Raises:
+        GearError: anything that the user can put right; its text is one line.
+    """
+    prepare()
+    given: dict[str, Any] = {
+        "epochs": epochs, "time_budget_s": time_budget_s, "batch": batch, "learning_rate": lr, "seed": seed,
+        "init": init, "precision": precision, "device": device, "workers": workers,
+    }  # fmt: skip
+    settings = tuple(settings)
+    found, task_found = find("model", model), find("task", task)
+    recipe = trainable(found, task)
+    config = read_config(recipe, given, settings)
+    training, validation = _samples(_listed(data), _listed(val), task, config, allow_test_data)
+    root = Path(out)
+    with explained(root):
+        root.mkdir(parents=True, exist_ok=True)
+    clear_scratch(root)
+    flags = {"epochs": epochs, "time_budget": _budget(time_budget_s), "batch": batch, "lr": lr, "seed": seed,
+             "init": init, "precision": precision}  # fmt: skip
+    origin = Origin(
+        model=found,
+        task=task,
+        config=config,
+        training=training,
+        validation=validation,
+        command=command_of(task, model, _listed(data), _listed(val), flags, settings),
+        look_hash="",
+    )
+    spec = task_found.spec
+    assert isinstance(spec, TaskSpec)
+    training_run = Training(
+        _parts(found, spec, origin, root),
+        config,
+        watch=watch,
+        keep=lambda state, progress: keep_weights(root, state, origin, progress),
+    )
+    progress = training_run.run()
+    write_curves(root, spec, progress, f"{found.spec.name} on {task}")
+    write_history(root, origin, progress)
+    best = next(entry for entry in progress.validations if entry["step"] == progress.best_step)
+    return TrainReport(
+        root=root,
+        weights=root / WEIGHTS,
+        steps=progress.step,
+        elapsed_s=progress.elapsed_s,
+        best_step=progress.best_step,
+        figures=figures_of(best),
+        figure=spec.figure,
+    )
+
+
+def trainable(found: Found, task: str) -> Any:
+    """The recipe of a network for a task.
+
+    Raises:
+        GearError: it does not do the task, or cannot be trained.
+    """
+    spec = found.spec
+    assert isinstance(spec, ModelSpec)
+    if task not in spec.tasks:
+        raise GearError(f"model {spec.name!r} does {', '.join(spec.tasks)}, not {task}")
+    if spec.recipe is None:
+        raise GearError(f"model {spec.name!r} cannot be trained by gear: its plugin gives no recipe")
+    return spec.recipe
+
+
+def _parts(found: Found, spec: TaskSpec[Any], origin: Origin, root: Path) -> Parts:
+    config = origin.config
+    model = build_network(found, config, precision=config.precision)
+    begin_with(found, model, config.init)
+    twin = build_network(found, config, precision="float32")
+    views = found.spec.views  # type: ignore[attr-defined]
+    limit = config.cache_gb * GIGABYTE
+    validation = Cache(origin.validation, limit / 4)
+    training = Cache(origin.training, limit)
+    with blamed(found, "module"):
+        twin.module()
+    return Parts(
+        spec=spec,
+        task=origin.training.datasets[0].task,
+        model=model,
+        twin=twin,
+        views=views,
+        validation=validation,
+        feed=Feed(training, config, views),
+        root=root,
+        plan=_plan(origin),
+    )
+
+
+def _plan(origin: Origin) -> Json:
+    """What the bytes of a training follow from."""
+    config: Any = to_plain(origin.config)
+    for name in CHANGE_NOTHING:
+        config.pop(name)
+    return {
+        "task": origin.task,
+        "model": origin.model.full_name,
+        "version": origin.model.owner.version,
+        "config": config,
+        "training": origin.training.facts(),
+        "validation": origin.validation.facts(),
+    }
+
+
+def _samples(
+    data: Sequence[str], val: Sequence[str], task: str, config: TrainConfig, allow_tests: bool
+) -> tuple[Samples, Samples]:
+    training = all_of(open_all(data, task, names=TRAINING, allow_tests=allow_tests))
+    if val:
+        held_out = all_of(open_all(val, task, names=VALIDATION, allow_tests=allow_tests))
+    else:
+        training, held_out = keep_some(training, config.validation_share, config.seed)
+    return training, spread(held_out, config.validation_samples)
+
+
+def _listed(paths: Paths) -> list[str]:
+    return [str(paths)] if isinstance(paths, (str, Path)) else [str(path) for path in paths]
+
+
+def _budget(seconds: float | None) -> str | None:
+    return None if seconds is None else f"{seconds:g}s"

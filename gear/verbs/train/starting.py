@@ -1,0 +1,64 @@
+"""Building a network for training, and what it begins with."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+from gear.config.nodes import Mapping, Place, Scalar
+from gear.config.overrides import with_value
+from gear.contracts.specs import ModelSpec
+from gear.nn.options import NONE, SHIPPED
+from gear.nn.shipped import resolve
+from gear.nn.weights import load_into
+from gear.plugins.build import blamed, build
+from gear.plugins.catalogue import Found
+from gear.values.errors import GearError, UnknownNameError
+from gear.verbs.train.config import TrainConfig
+
+
+def build_network(found: Found, config: TrainConfig, *, precision: str) -> Any:
+    """The network with random weights from the seed, on the device.
+
+    Options that a network does not have are not given to it: one that knows no `precision` runs at torch's.
+
+    Raises:
+        ConfigError: its options do not fit.
+        PluginError: a third party's `build` failed.
+    """
+    wanted = {"weights": NONE, "seed": str(config.seed), "device": config.device, "precision": precision}
+    fields = {field.name for field in dataclasses.fields(found.spec.config)}
+    options = config.options
+    place = Place("gear train")
+    for name, text in wanted.items():
+        is_given = isinstance(options, Mapping) and name in options.entries
+        if name in fields and not is_given:
+            options = with_value(options, (name,), Scalar(text, False, place))
+    return build(found, options)
+
+
+def begin_with(found: Found, model: Any, init: str) -> None:
+    """Puts first weights into a network: `shipped`, a file's, or those that the network knows by name.
+
+    Raises:
+        GearError: there are none, or they do not fit.
+        UnknownNameError: neither a file nor a name that the network knows.
+    """
+    spec = found.spec
+    assert isinstance(spec, ModelSpec)
+    if not init or init == NONE:
+        return
+    if init in spec.starts:
+        with blamed(found, f"starts[{init!r}]"):
+            spec.starts[init](model)
+    elif init == SHIPPED:
+        path = resolve(SHIPPED, spec.name)
+        assert path is not None
+        load_into(model.module(), path)
+    elif Path(init).is_file():
+        load_into(model.module(), init)
+    elif Path(init).suffix:
+        raise GearError(f"--init {init}: there is no such file")
+    else:
+        raise UnknownNameError("start", init, (SHIPPED, *spec.starts), f"for {spec.name}; or give a safetensors file")

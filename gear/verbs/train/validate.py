@@ -1,0 +1,42 @@
+"""Validation: the task's own figures and the network's own losses over held-out samples."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import torch
+
+from gear.contracts.specs import TaskSpec
+from gear.contracts.tasks import Task
+from gear.readers import as_pictures, picture_tensor
+
+LOSS = "loss"
+
+
+def validate(model: Any, task: Task[Any, Any], samples: Sequence[Any], views: Sequence[str]) -> dict[str, float]:
+    """The evaluator's figures over the samples, and `loss`, the mean of the summed losses, in eval mode."""
+    evaluator, losses = task.evaluator(), []
+    for index in range(len(samples)):
+        sample = samples[index]
+        pictures = {name: sample.images[name] for name in views}
+        batch = as_pictures({name: picture_tensor(picture)[None] for name, picture in pictures.items()})
+        with torch.no_grad():
+            losses.append(float(total(model.forward(batch, [sample]))))
+        evaluator.update(sample, model.predict(pictures))
+    return {**evaluator.result(), LOSS: math.fsum(losses) / len(losses)}
+
+
+def total(losses: Mapping[str, torch.Tensor]) -> torch.Tensor:
+    """The sum of named losses, which is what is minimised."""
+    return torch.stack([loss.float() for loss in losses.values()]).sum()
+
+
+def rank(figures: Mapping[str, float], spec: TaskSpec[Any]) -> tuple[float, float]:
+    """How good a validation is; larger is better. The task's figure decides, between equals the loss."""
+    loss = -figures[LOSS] if figures[LOSS] == figures[LOSS] else -math.inf
+    value = figures.get(spec.figure, math.nan)
+    if value != value:
+        return (-math.inf, loss)
+    return (-value if spec.less_is_better else value, loss)
