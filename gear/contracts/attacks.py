@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -49,11 +49,50 @@ class Compositor(Protocol):
         ...
 
 
+State = Mapping[str, npt.NDArray[Any]]
+"""What an attack needs to go on where it was cut off: arrays by name."""
+
+
+class Watch(Protocol):
+    """Looks on while an attack works: progress, curves, checkpoints, early stopping."""
+
+    def resume(self) -> State | None:
+        """The last state that an earlier run of the same attack left behind; None for a fresh start."""
+        ...
+
+    def step(
+        self,
+        done: int,
+        figures: Mapping[str, float],
+        patches: Callable[[], tuple[Patch, ...]],
+        state: Callable[[], State],
+    ) -> bool:
+        """Told after every step; True asks the attack to end now.
+
+        Args:
+            done: steps so far.
+            figures: what is worth a curve: terms, losses, norms.
+            patches: gives the patches as they are now; called only when they are wanted.
+            state: gives the state to resume from, likewise.
+        """
+        ...
+
+
 class Attack(Protocol):
     """Optimises patches against a model."""
 
     def optimise(
-        self, model: Model, dataset: Sequence[Any], compositor: Compositor, *, budget: Budget, rng: np.random.Generator
+        self,
+        model: Model,
+        dataset: Sequence[Any],
+        compositor: Compositor,
+        *,
+        budget: Budget,
+        rng: np.random.Generator,
+        watch: Watch | None = None,
     ) -> tuple[Patch, ...]:
-        """One patch a surface; the model is left as it was."""
+        """One patch a surface; the model is left as it was.
+
+        An attack that pays `watch` no attention works, but shows no progress and cannot be resumed.
+        """
         ...

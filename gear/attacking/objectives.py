@@ -1,0 +1,206 @@
+"""What an attack maximises: the terms of each task, from a model's outputs or losses.
+
+Every term is a number that grows with the harm. Pixels on the patch never count: an attack is judged by what it does
+elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from gear.contracts.models import Model
+from gear.formats import rle
+from gear.formats.cityscapes import IGNORED_TRAIN_ID, LABELS
+
+TRAIN_IDS = torch.tensor([label.train_id for label in LABELS if label.id >= 0])
+TRAIN_CLASSES = 19
+
+Kind = Literal["semseg", "depth", "losses"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Term:
+    """One thing to make large.
+
+    Attributes:
+        value: differentiable, without dimensions.
+        weight: of its gradient, after that has been brought to unit length.
+    """
+
+    value: Tensor
+    weight: float = 1.0
+
+
+class Objective(Protocol):
+    """Terms of a batch."""
+
+    def terms(
+        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
+    ) -> Mapping[str, Term]:
+        """Terms by name for pictures (B, 3, H, W) with the patch in them; none where nothing is left to be harmed.
+
+        Args:
+            model: what is attacked.
+            views: pictures by camera name.
+            samples: the batch's samples, whose own pictures are without the patch.
+            indexes: their numbers in the data set, to remember things by.
+        """
+        ...
+
+
+def kind_of(sample: Any) -> Kind:
+    """Which terms suit a sample, by its ground truth: labels, depth, or the model's own losses."""
+    if hasattr(sample, "label_ids"):
+        return "semseg"
+    return "depth" if hasattr(sample, "depth_m") else "losses"
+
+
+def outside(samples: Sequence[Any], view: str, device: torch.device) -> Tensor:
+    """(B, H, W) bool: where no patch surface is seen."""
+    masks = []
+    for sample in samples:
+        height, width = sample.images[view].shape[:2]
+        free = np.ones((height, width), dtype=np.bool_)
+        for surface in sample.surfaces:
+            if surface.camera == view and surface.visible_px:
+                free &= ~rle.decode(surface.mask_rle, height, width)
+        masks.append(free)
+    return torch.from_numpy(np.stack(masks)).to(device)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SemsegObjective:
+    """Cross-entropy of pixels that are right (Y) and of those that are wrong already (N) (Rossolini et al., 2022).
+
+    Attributes:
+        gamma: share of Y's gradient, the rest is N's; `dynamic` is the share of pixels that are right.
+        attacked, target: label ids: pixels of `attacked` (of any class where None) are pushed to `target`; untargeted
+            where `target` is None.
+    """
+
+    gamma: float | Literal["dynamic"] = "dynamic"
+    attacked: int | None = None
+    target: int | None = None
+
+    def terms(
+        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
+    ) -> Mapping[str, Term]:
+        """`correct` and `wrong`, or `target`."""
+        view = next(iter(views))
+        logits = model.forward(views)["logits"]
+        labels = train_labels(samples, logits.shape[1]).to(logits.device)
+        counts = outside(samples, view, logits.device) & (labels != IGNORED_TRAIN_ID)
+        if self.target is not None:
+            return self._targeted(logits, labels, counts)
+        loss = functional.cross_entropy(logits, labels, ignore_index=IGNORED_TRAIN_ID, reduction="none")
+        right = counts & (logits.detach().argmax(1) == labels)
+        wrong = counts & ~right
+        if self.gamma == "dynamic":
+            gamma = float(right.sum() / counts.sum().clamp_min(1))
+        else:
+            gamma = self.gamma
+        terms = {"correct": (right, gamma), "wrong": (wrong, 1 - gamma)}
+        return {n: Term(value=_mean(loss, where), weight=w) for n, (where, w) in terms.items() if w and where.any()}
+
+    def _targeted(self, logits: Tensor, labels: Tensor, counts: Tensor) -> Mapping[str, Term]:
+        assert self.target is not None
+        classes = logits.shape[1]
+        wanted = class_of(self.target, classes)
+        if self.attacked is not None:
+            counts = counts & (labels == class_of(self.attacked, classes))
+        loss = functional.cross_entropy(logits, torch.full_like(labels, wanted), reduction="none")
+        return {"target": Term(value=-_mean(loss, counts))}
+
+
+class DepthObjective:
+    """Smooth L1 against the network's own answer to the picture without the patch, split where the error is small.
+
+    Args:
+        gamma: share of the pixels whose error is still below `split_m`; the rest is the others'.
+        split_m: metres.
+        direction: `any` error, or only `farther` or `nearer` than the clean answer: log-depth is pushed that way.
+    """
+
+    def __init__(
+        self, *, gamma: float = 0.8, split_m: float = 0.5, direction: Literal["any", "farther", "nearer"] = "any"
+    ) -> None:
+        self._gamma, self._split_m, self._direction = gamma, split_m, direction
+        self._clean: dict[int, Tensor] = {}
+
+    def terms(
+        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
+    ) -> Mapping[str, Term]:
+        """`small` and `large`, or the direction's name."""
+        view = next(iter(views))
+        clean = torch.stack(
+            [self._answer(model, sample, index, view) for sample, index in zip(samples, indexes, strict=True)]
+        )
+        depth_m = model.forward(views)["depth_m"]
+        clean = clean.to(depth_m.device, depth_m.dtype)
+        free = outside(samples, view, depth_m.device)
+        if self._direction != "any":
+            sign = 1.0 if self._direction == "farther" else -1.0
+            change = depth_m.clamp_min(1e-3).log() - clean.clamp_min(1e-3).log()
+            return {self._direction: Term(value=sign * _mean(change, free))}
+        error = functional.smooth_l1_loss(depth_m, clean, reduction="none")
+        small = free & ((depth_m - clean).detach().abs() <= self._split_m)
+        terms = {"small": (small, self._gamma), "large": (free & ~small, 1 - self._gamma)}
+        return {n: Term(value=_mean(error, where), weight=w) for n, (where, w) in terms.items() if w and where.any()}
+
+    def _answer(self, model: Model, sample: Any, index: int, view: str) -> Tensor:
+        if index not in self._clean:
+            picture = torch.from_numpy(sample.images[view].copy()).permute(2, 0, 1)[None].float() / 255
+            with torch.no_grad():
+                self._clean[index] = model.forward({view: picture})["depth_m"][0].cpu()
+        return self._clean[index]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LossObjective:
+    """The model's own training losses against the ground truth, each its own term: detectors and stereo networks.
+
+    Attributes:
+        signs: by loss name: 1 to make it large, -1 small, 0 to leave it out; names that are not there count as 1.
+    """
+
+    signs: Mapping[str, float]
+
+    def terms(
+        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
+    ) -> Mapping[str, Term]:
+        """One a loss."""
+        losses = model.forward(views, samples)
+        signs = {name: self.signs.get(name, 1.0) for name in losses}
+        return {name: Term(value=loss, weight=signs[name]) for name, loss in losses.items() if signs[name]}
+
+
+def train_labels(samples: Sequence[Any], classes: int) -> Tensor:
+    """(B, H, W) int64 targets for logits over 19 train ids or over label ids; 255 is ignored in both.
+
+    Raises:
+        ValueError: fewer classes than Cityscapes has train ids.
+    """
+    labels = torch.from_numpy(np.stack([sample.label_ids for sample in samples])).long()
+    trained = TRAIN_IDS[labels]
+    if classes == TRAIN_CLASSES:
+        return trained
+    if classes < TRAIN_CLASSES:
+        raise ValueError(f"logits over {classes} classes; Cityscapes has {TRAIN_CLASSES} train ids")
+    return torch.where(trained == IGNORED_TRAIN_ID, IGNORED_TRAIN_ID, labels)
+
+
+def class_of(label_id: int, classes: int) -> int:
+    """The channel of a label id."""
+    return int(TRAIN_IDS[label_id]) if classes == TRAIN_CLASSES else label_id
+
+
+def _mean(values: Tensor, where: Tensor) -> Tensor:
+    """Over the chosen; 0 with a gradient of 0 where nothing is chosen."""
+    return (values * where).sum() / where.sum().clamp_min(1)

@@ -1,0 +1,111 @@
+"""The scene-specific attack exactly as CARLA-GeAR's patches were made, but for the defects of its code.
+
+Its step sizes live in each network's own input units; here they are said in unit space. Segmentation networks took
+normalised pictures, so a step of 0.5 was 0.5 standard deviations of ImageNet; detectors and depth networks took
+pictures in 0..1; the stereo network took 0..255 with a step of 10.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from gear.contracts.attacks import Budget, Compositor, Patch, Watch
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.models import Model
+from gear.contracts.specs import AttackSpec
+
+IMAGENET_STD = (0.229, 0.224, 0.225)
+PaperTask = Literal["semseg", "depth", "detect2d", "stereo3d"]
+STEREO_LOSSES_LEFT_OUT = ("rpn_loss_cls", "RCNN_loss_cls")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CarlaGearConfig:
+    """Options: only the size; everything else is the paper's.
+
+    Attributes:
+        height_px, width_px: of every patch.
+    """
+
+    height_px: int = 150
+    width_px: int = 300
+
+
+class CarlaGear:
+    """One unit gradient a term, a constant learning rate, gamma 1 for segmentation and 0.8 for depth."""
+
+    def __init__(self, config: CarlaGearConfig) -> None:
+        self._config = config
+
+    def optimise(
+        self,
+        model: Model,
+        dataset: Sequence[Any],
+        compositor: Compositor,
+        *,
+        budget: Budget,
+        rng: np.random.Generator,
+        watch: Watch | None = None,
+    ) -> tuple[Patch, ...]:
+        """One patch a surface.
+
+        The paper's budget is 51 passes over 100 samples: 2550 steps for segmentation, which takes two samples a step,
+        5100 for the others.
+        """
+        from gear.attacking.appearance import Appearance
+        from gear.attacking.loop import Settings, optimise
+        from gear.attacking.objectives import DepthObjective, LossObjective, Objective, SemsegObjective
+
+        task = task_of(dataset[0])
+        settings = Settings(
+            height_px=self._config.height_px,
+            width_px=self._config.width_px,
+            batch=2 if task == "semseg" else 1,
+            learning_rate=LEARNING_RATES[task],
+            decay=False,
+            smoothness=0.1,
+            appearance=Appearance(noise=0.02, brightness=BRIGHTNESS[task], contrast=0.1, blur_px=6),
+        )
+        objective: Objective = LossObjective(signs=dict.fromkeys(STEREO_LOSSES_LEFT_OUT, 0.0))
+        if task == "semseg":
+            objective = SemsegObjective(gamma=1.0)
+        elif task == "depth":
+            objective = DepthObjective(gamma=0.8)
+        return optimise(settings, objective, model, dataset, compositor, budget=budget, rng=rng, watch=watch)
+
+
+LEARNING_RATES: dict[PaperTask, float | tuple[float, float, float]] = {
+    "semseg": (0.5 * IMAGENET_STD[0], 0.5 * IMAGENET_STD[1], 0.5 * IMAGENET_STD[2]),
+    "depth": 0.5,
+    "detect2d": 0.5,
+    "stereo3d": 10 / 255,
+}
+BRIGHTNESS: dict[PaperTask, float] = {"semseg": 0.02 / 0.224, "depth": 0.02, "detect2d": 0.02, "stereo3d": 0.02}
+
+
+def task_of(sample: Any) -> PaperTask:
+    """Which of the paper's tasks a sample is of."""
+    from gear.attacking.objectives import kind_of
+
+    kind = kind_of(sample)
+    if kind != "losses":
+        return kind
+    return "stereo3d" if len(sample.images) > 1 else "detect2d"
+
+
+carla_gear: AttackSpec[CarlaGearConfig] = AttackSpec(
+    name="carla_gear",
+    summary="The scene-specific attack with the CARLA-GeAR paper's settings.",
+    config=CarlaGearConfig,
+    build=CarlaGear,
+)
+
+
+@hookimpl
+def gear_attacks() -> list[AttackSpec[CarlaGearConfig]]:
+    """This attack."""
+    return [carla_gear]

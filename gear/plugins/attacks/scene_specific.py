@@ -1,0 +1,165 @@
+"""The scene-specific attack with gear's settings: textures of one scene's surfaces, by Adam through the compositor.
+
+The method is that of CARLA-GeAR (Nesti et al., 2022) and of Rossolini et al. (WACV 2022), kept in unit space, with a
+falling learning rate and the intentions of their losses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from gear.contracts.attacks import Budget, Compositor, Patch, Watch
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.models import Model
+from gear.contracts.specs import AttackSpec
+from gear.formats.cityscapes import LABELS
+from gear.values.errors import FieldError
+
+if TYPE_CHECKING:
+    from gear.attacking.objectives import Objective
+
+LABEL_IDS: Mapping[str, int] = {label.name: label.id for label in LABELS if label.is_evaluated}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AppearanceOptions:
+    """What is varied on the patch before every picture, in unit space; 0 for nothing.
+
+    Attributes:
+        noise: standard deviation of noise on every value.
+        brightness: standard deviation of one number added to all values.
+        contrast: standard deviation of one factor around 1.
+        blur_px: largest side of a box blur, from 3 on.
+    """
+
+    noise: float = 0.02
+    brightness: float = 0.05
+    contrast: float = 0.1
+    blur_px: int = 4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SceneSpecificConfig:
+    """Options.
+
+    Attributes:
+        height_px, width_px: of every patch.
+        batch: samples a step.
+        learning_rate: of Adam in unit space; it falls to 0 with a cosine.
+        smoothness: length of the smoothness gradient beside the objective's, which is 1.
+        printability: likewise of non-printability, over what an offset press can print.
+        per_term: bring the gradient of every term of the objective to unit length by itself.
+        gamma: semantic segmentation: share of the pixels that are still right, 0 to 1; below 0 for their share of
+            all pixels, step by step. Depth: share of the pixels whose error is below half a metre, 0.8 where below 0.
+        attacked, target: semantic segmentation: Cityscapes classes; pixels of `attacked` (all where empty) are pushed
+            to `target`; untargeted where `target` is empty.
+        direction: depth: push it anywhere, farther or nearer.
+        losses: detectors and stereo networks: sign of a loss by name, `+` and `-` to make it large or small, e.g.
+            `bbox_regression=-`; names that are left out are made large.
+        appearance: what is varied on the patch.
+    """
+
+    height_px: int = 150
+    width_px: int = 300
+    batch: int = 2
+    learning_rate: float = 0.06
+    smoothness: float = 0.1
+    printability: float = 0.0
+    per_term: bool = True
+    gamma: float = -1.0
+    attacked: str = ""
+    target: str = ""
+    direction: Literal["any", "farther", "nearer"] = "any"
+    losses: dict[str, str] = field(default_factory=dict)
+    appearance: AppearanceOptions = field(default_factory=AppearanceOptions)
+
+    def __post_init__(self) -> None:
+        if not 0 < self.learning_rate <= 10:
+            raise FieldError("learning_rate", f"must be above 0, up to 10, got {self.learning_rate:g}")
+        if self.gamma > 1:
+            raise FieldError("gamma", f"must be 0 to 1, or below 0, got {self.gamma:g}")
+        for name in ("attacked", "target"):
+            value = getattr(self, name)
+            if value and value not in LABEL_IDS:
+                raise FieldError(name, f"must be one of {', '.join(LABEL_IDS)}, got {value!r}")
+        if self.attacked and not self.target:
+            raise FieldError("target", "must say what the attacked class is to become")
+        for name, sign in self.losses.items():
+            if sign not in SIGNS:
+                raise FieldError(f"losses.{name}", f"must be one of {', '.join(SIGNS)}, got {sign!r}")
+
+
+SIGNS = {"+": 1.0, "-": -1.0, "0": 0.0}
+
+
+class SceneSpecific:
+    """Adam on all surfaces' textures at once."""
+
+    def __init__(self, config: SceneSpecificConfig) -> None:
+        from gear.attacking.appearance import Appearance
+        from gear.attacking.loop import Settings
+
+        look = config.appearance
+        self._config = config
+        self._settings = Settings(
+            height_px=config.height_px,
+            width_px=config.width_px,
+            batch=config.batch,
+            learning_rate=config.learning_rate,
+            smoothness=config.smoothness,
+            printability=config.printability,
+            per_term=config.per_term,
+            appearance=Appearance(
+                noise=look.noise, brightness=look.brightness, contrast=look.contrast, blur_px=look.blur_px
+            ),
+        )
+
+    def optimise(
+        self,
+        model: Model,
+        dataset: Sequence[Any],
+        compositor: Compositor,
+        *,
+        budget: Budget,
+        rng: np.random.Generator,
+        watch: Watch | None = None,
+    ) -> tuple[Patch, ...]:
+        """One patch a surface."""
+        from gear.attacking.loop import optimise
+
+        objective = objective_of(self._config, dataset[0])
+        return optimise(self._settings, objective, model, dataset, compositor, budget=budget, rng=rng, watch=watch)
+
+
+def objective_of(config: SceneSpecificConfig, sample: Any) -> Objective:
+    """What is made large, by the task that the sample is of."""
+    from gear.attacking.objectives import DepthObjective, LossObjective, SemsegObjective, kind_of
+
+    kind = kind_of(sample)
+    if kind == "semseg":
+        return SemsegObjective(
+            gamma="dynamic" if config.gamma < 0 else config.gamma,
+            attacked=LABEL_IDS.get(config.attacked),
+            target=LABEL_IDS.get(config.target),
+        )
+    if kind == "depth":
+        return DepthObjective(gamma=0.8 if config.gamma < 0 else config.gamma, direction=config.direction)
+    return LossObjective(signs={name: SIGNS[sign] for name, sign in config.losses.items()})
+
+
+scene_specific: AttackSpec[SceneSpecificConfig] = AttackSpec(
+    name="scene_specific",
+    summary="Adam on the patches of one scene through the compositor, over appearances; gear's settings.",
+    config=SceneSpecificConfig,
+    build=SceneSpecific,
+)
+
+
+@hookimpl
+def gear_attacks() -> list[AttackSpec[SceneSpecificConfig]]:
+    """This attack."""
+    return [scene_specific]

@@ -1,0 +1,144 @@
+"""Batches, resuming, and what has no gradient."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from gear.attacking.appearance import Appearance
+from gear.attacking.loop import Settings, batch_of, optimise
+from gear.attacking.objectives import SemsegObjective, train_labels
+from gear.contracts.attacks import Budget, Patch, State
+from gear.plugins.attacks.scene_specific import scene_specific
+from gear.testing.attack_contract import AttackContract
+from gear.testing.compare import difference
+from gear.testing.tiny_compositor import TinyCompositor
+from gear.values.errors import FieldError, GearError
+from gear.values.rng import derive_rng
+
+SETTINGS = Settings(height_px=12, width_px=24, batch=1)
+
+
+class Contract(AttackContract):
+    spec = scene_specific
+
+
+class Watching:
+    """Keeps every state; may start from one; may stop early."""
+
+    def __init__(self, start: State | None = None, stop_at: int = 10**9) -> None:
+        self.start, self.stop_at = start, stop_at
+        self.states: list[State] = []
+        self.figures: list[Mapping[str, float]] = []
+
+    def resume(self) -> State | None:
+        return self.start
+
+    def step(
+        self,
+        done: int,
+        figures: Mapping[str, float],
+        patches: Callable[[], tuple[Patch, ...]],
+        state: Callable[[], State],
+    ) -> bool:
+        self.states.append(state())
+        self.figures.append(dict(figures))
+        assert all(patch.rgb.shape == (12, 24, 3) for patch in patches())
+        return done >= self.stop_at
+
+
+def run(watch: Watching, steps: int = 6) -> tuple[Patch, ...]:
+    contract = Contract()
+    dataset = contract.dataset()
+    return optimise(
+        SETTINGS,
+        SemsegObjective(),
+        contract.model(),
+        dataset,
+        TinyCompositor(dataset),
+        budget=Budget(steps=steps),
+        rng=derive_rng(3, "attack"),
+        watch=watch,
+    )
+
+
+def test_an_epoch_shows_every_sample_once() -> None:
+    steps = [batch_of(step, 7, 3, seed=5) for step in range(4)]
+    first = steps[0] + steps[1]
+    assert len(set(first)) == 6 and set(first) <= set(range(7))
+    assert steps[2] + steps[3] != first, "every epoch has an order of its own"
+    assert batch_of(0, 2, 8, seed=5) in ([0, 1], [1, 0])
+
+
+def test_what_was_cut_off_goes_on_as_if_it_had_not_been() -> None:
+    whole = Watching()
+    patches = run(whole)
+    cut = Watching(stop_at=3)
+    run(cut)
+    assert len(cut.states) == 3
+    resumed = Watching(start=cut.states[-1])
+    assert not difference(run(resumed), patches, "patches")
+    assert not difference(resumed.states[-1], whole.states[-1], "state")
+    assert {"wrong", "gradient", "smoothness"} <= set(whole.figures[0])
+
+
+def test_a_state_of_another_size_is_refused() -> None:
+    state = {name: np.zeros((1, 3, 4, 4), np.float32) for name in ("textures", "mean", "square")}
+    with pytest.raises(GearError, match="start it afresh"):
+        run(Watching(start={**state, "done": np.int64(1), "seed": np.int64(1)}))
+
+
+def test_a_model_that_passes_no_gradient_is_told_of() -> None:
+    contract = Contract()
+    dataset = contract.dataset()
+
+    class Opaque:
+        def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
+            return {"logits": torch.zeros(1, 34, *views["left"].shape[2:])}
+
+        def predict(self, views: Any) -> Any:
+            raise NotImplementedError
+
+        def taps(self) -> Mapping[str, torch.nn.Module]:
+            return {}
+
+    with pytest.raises(GearError, match="no gradient reaches the patch"):
+        optimise(
+            SETTINGS,
+            SemsegObjective(),
+            Opaque(),
+            dataset,
+            TinyCompositor(dataset),
+            budget=Budget(steps=50),
+            rng=derive_rng(3, "attack"),
+        )
+
+
+def test_looks_differ_and_have_gradients() -> None:
+    patch = torch.full((3, 8, 8), 0.5, requires_grad=True)
+    looks = [Appearance().vary(patch, derive_rng(1, "look", n)) for n in range(3)]
+    assert not torch.equal(looks[0], looks[1])
+    assert torch.equal(looks[2], Appearance().vary(patch, derive_rng(1, "look", 2)))
+    (gradient,) = torch.autograd.grad(looks[0].sum(), patch)
+    assert (gradient > 0).any()
+    plain = Appearance(noise=0, brightness=0, contrast=0, blur_px=0)
+    assert torch.equal(plain.vary(patch, derive_rng(1, "look", 0)), patch)
+
+
+def test_labels_follow_the_channels() -> None:
+    (sample, _) = Contract().dataset()
+    by_train_id, by_label_id = train_labels([sample], 19), train_labels([sample], 34)
+    building = torch.from_numpy(sample.label_ids == 11)[None]
+    assert (by_train_id[building] == 2).all() and (by_label_id[building] == 11).all()
+    assert torch.equal(by_train_id == 255, by_label_id == 255)
+
+
+@pytest.mark.parametrize("options", [{"batch": 0}, {"height_px": 1}, {"smoothness": -1.0}])
+def test_bad_settings_are_refused(options: dict[str, Any]) -> None:
+    with pytest.raises(FieldError, match="must be"):
+        Settings(**options)
