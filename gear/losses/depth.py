@@ -1,0 +1,108 @@
+"""Losses of monocular depth. What has no ground truth, sky among it, is NaN and counts for nothing.
+
+Depths are (B, H, W) planar z in metres. Means are taken over the known pixels of the whole batch; a batch without any
+has loss 0, through which no gradient flows.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+LEAST_M = 1e-3
+"""Nearer than this nothing is, and logarithms are taken of no less."""
+
+LEAST_SQUARE = 1e-12
+"""Keeps the gradient of a root finite where the error vanishes."""
+
+CAP_M = 80.0
+"""As far as KITTI's depth is customarily learnt and judged."""
+
+
+def known(depth_m: Tensor, cap_m: float | None = CAP_M) -> Tensor:
+    """Boolean mask of the pixels that have a ground truth of at most `cap_m` (None for any)."""
+    is_known = torch.isfinite(depth_m) & (depth_m > LEAST_M)
+    return is_known if cap_m is None else is_known & (depth_m <= cap_m)
+
+
+def silog(
+    predicted_m: Tensor, depth_m: Tensor, *, balance: float = 0.5, scale: float = 1.0, cap_m: float | None = CAP_M
+) -> Tensor:
+    """Scale-invariant logarithmic error: scale * sqrt(mean(g^2) - balance * mean(g)^2), g the difference of logarithms.
+
+    Eigen et al., NeurIPS 2014, eq. 3, under a root; GLPDepth (arXiv 2201.07436, eq. 3) has balance 0.5. AdaBins (CVPR
+    2021, eq. 4) has balance 0.85 and scale 10: see `adabins_silog`.
+
+    Args:
+        predicted_m: above 0.
+        depth_m: ground truth, NaN where unknown.
+        balance: 0 is the plain root mean square, 1 does not care for a wrong scale at all.
+        scale: a factor.
+        cap_m: what lies farther is not learnt.
+    """
+    mask = known(depth_m, cap_m)
+    count = mask.sum().clamp_min(1)
+    errors = _log_errors(predicted_m, depth_m, mask)
+    mean = errors.sum() / count
+    square = (errors.square().sum() / count - balance * mean.square()).clamp_min(LEAST_SQUARE)
+    loss: Tensor = scale * (square.sqrt() - LEAST_SQUARE**0.5)
+    return loss
+
+
+def adabins_silog(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float | None = CAP_M) -> Tensor:
+    """AdaBins' pixel loss: 10 * sqrt(variance + 0.15 * squared mean) of the logarithms' differences."""
+    return silog(predicted_m, depth_m, balance=0.85, scale=10.0, cap_m=cap_m)
+
+
+def log_l1(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float | None = CAP_M) -> Tensor:
+    """Mean absolute difference of logarithms: relative errors, with little care for outliers."""
+    mask = known(depth_m, cap_m)
+    return _log_errors(predicted_m, depth_m, mask).abs().sum() / mask.sum().clamp_min(1)
+
+
+def smooth_l1(predicted_m: Tensor, depth_m: Tensor, *, beta_m: float = 1.0, cap_m: float | None = CAP_M) -> Tensor:
+    """Mean smooth L1 error in metres: squares below `beta_m`, absolute beyond (Girshick, ICCV 2015)."""
+    mask = known(depth_m, cap_m)
+    target_m = torch.where(mask, depth_m, predicted_m.detach())
+    return functional.smooth_l1_loss(predicted_m, target_m, beta=beta_m, reduction="sum") / mask.sum().clamp_min(1)
+
+
+def bins_chamfer(centres_m: Tensor, depth_m: Tensor, *, cap_m: float | None = CAP_M) -> Tensor:
+    """How far bins lie from depths and depths from bins (Fan et al., CVPR 2017; AdaBins, CVPR 2021, eq. 5).
+
+    For each picture the mean over its known pixels of the squared distance to the nearest bin, plus the mean over the
+    bins of the squared distance to the nearest known depth; then the mean over the pictures that have known pixels. On
+    a line, neighbours are found by sorting, so no table of pixels times bins is ever made.
+
+    Args:
+        centres_m: (B, bins) centres in any order.
+        depth_m: (B, H, W) ground truth, NaN where unknown.
+        cap_m: what lies farther does not count.
+    """
+    terms = []
+    for centres, picture, mask in zip(centres_m, depth_m, known(depth_m, cap_m), strict=True):
+        if bool(mask.any()):
+            depths = picture[mask].sort().values
+            ordered = centres.sort().values
+            to_bins = (depths - _nearest(ordered, depths)).square().mean()
+            to_depths = (ordered - _nearest(depths, ordered)).square().mean()
+            terms.append(to_bins + to_depths)
+    return torch.stack(terms).mean() if terms else centres_m.sum() * 0
+
+
+def _nearest(ordered: Tensor, wanted: Tensor) -> Tensor:
+    """For each of `wanted` the nearest of the ascending `ordered`, with its gradient."""
+    with torch.no_grad():
+        above = torch.searchsorted(ordered.detach(), wanted.detach()).clamp(1, max(len(ordered) - 1, 1))
+        above = above.clamp_max(len(ordered) - 1)
+        below = (above - 1).clamp_min(0)
+        chosen = torch.where(wanted - ordered[below] <= ordered[above] - wanted, below, above)
+    return ordered[chosen]
+
+
+def _log_errors(predicted_m: Tensor, depth_m: Tensor, mask: Tensor) -> Tensor:
+    """Differences of logarithms, 0 where the mask is false."""
+    target_m = torch.where(mask, depth_m, torch.ones_like(depth_m))
+    errors = predicted_m.clamp_min(LEAST_M).log() - target_m.log()
+    return torch.where(mask, errors, torch.zeros_like(errors))

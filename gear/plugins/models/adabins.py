@@ -1,0 +1,69 @@
+"""AdaBins (Bhat et al., CVPR 2021): depth as a choice between bins that the picture itself decides on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.models import Model, PublishedWeights, Recipe
+from gear.contracts.specs import ModelSpec
+from gear.nn.depth_options import AdaBinsOptions
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+NAME = "adabins"
+
+
+def build(options: AdaBinsOptions) -> Model:
+    """The network with its weights.
+
+    Raises:
+        GearError: timm, torchvision or the weights are not there.
+    """
+    from gear.nn.adabins import AdaBins
+    from gear.nn.adabins_graph import AdaBinsGraph
+    from gear.nn.depth_network import trained_scale
+    from gear.nn.weights import build_graph
+
+    graph = build_graph(lambda: AdaBinsGraph(options), options, NAME)
+    return AdaBins(graph, options, input_scale=trained_scale(options, NAME))
+
+
+def convert(state: Mapping[str, Tensor]) -> Mapping[str, Any]:
+    """The authors' checkpoints under the graph's keys."""
+    from gear.nn.adabins import from_official
+
+    return from_official(state)
+
+
+spec = ModelSpec(
+    name=NAME,
+    summary="AdaBins, EfficientNet-B5: monocular depth with adaptive bins (one of the paper's networks).",
+    config=AdaBinsOptions,
+    build=build,
+    tasks=("depth",),
+    views=("left",),
+    taps=("stem", "trunk", "decoder"),
+    recipe=Recipe(learning_rate=3.57e-4, weight_decay=0.1, batch=16, epochs=25, gradient_norm=0.1),
+    published=(
+        PublishedWeights(
+            data="KITTI, Eigen split, up to 80 m",
+            source="AdaBins_kitti.pt, which github.com/shariqfarooq123/AdaBins links to",
+            licence="none stated for the weights (the authors' code is GPL-3.0); KITTI is CC BY-NC-SA 3.0: "
+            "non-commercial",
+            size_mb=940.0,
+        ),
+    ),
+    normalisation="ImageNet's mean and deviation; pictures of more than 500 patches of 32 x 32 are made smaller",
+    parameters=78_257_328,
+    needs=("torchvision", "timm"),
+    convert=convert,
+)
+
+
+@hookimpl
+def gear_models() -> list[ModelSpec[AdaBinsOptions]]:
+    """This module's model."""
+    return [spec]

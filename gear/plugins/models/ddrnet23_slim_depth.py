@@ -1,0 +1,47 @@
+"""Depth from DDRNet-23-slim's trunk: a reference network that two CPU cores train in minutes."""
+
+from __future__ import annotations
+
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.models import Model, Recipe
+from gear.contracts.specs import ModelSpec
+from gear.nn.depth_options import DepthOptions
+
+NAME = "ddrnet23_slim_depth"
+
+HABIT = 0.5
+"""It sees pictures at half their sides, which is what makes it fast on CPUs; depth is smooth nearly everywhere."""
+
+
+def build(options: DepthOptions) -> Model:
+    """The network with its weights.
+
+    Raises:
+        GearError: the weights are not there.
+    """
+    from gear.nn.ddrnet_depth import DdrnetDepth, ddrnet_depth_graph
+    from gear.nn.depth_network import trained_scale
+    from gear.nn.weights import build_graph
+
+    graph = build_graph(ddrnet_depth_graph, options, NAME)
+    return DdrnetDepth(graph, options, input_scale=trained_scale(options, NAME, HABIT))
+
+
+spec = ModelSpec(
+    name=NAME,
+    summary="DDRNet-23-slim with one channel of log-depth: the fast reference network for depth.",
+    config=DepthOptions,
+    build=build,
+    tasks=("depth",),
+    views=("left",),
+    taps=("rb1", "rb2", "rbb1", "rbb2"),
+    recipe=Recipe(learning_rate=1e-3, batch=8, epochs=40),
+    normalisation="ImageNet's mean and deviation, at half the picture's sides unless input_scale says otherwise",
+    parameters=5_694_817,
+)
+
+
+@hookimpl
+def gear_models() -> list[ModelSpec[DepthOptions]]:
+    """This module's model."""
+    return [spec]

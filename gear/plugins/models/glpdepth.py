@@ -1,0 +1,69 @@
+"""GLPDepth with its published encoder, MiT-b4 (Kim et al., arXiv 2201.07436)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.models import Model, PublishedWeights, Recipe
+from gear.contracts.specs import ModelSpec
+from gear.nn.depth_options import GlpnOptions
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+NAME = "glpdepth"
+
+
+def build(options: GlpnOptions) -> Model:
+    """The network with its weights.
+
+    Raises:
+        GearError: transformers or the weights are not there.
+    """
+    from gear.nn.depth_network import trained_scale
+    from gear.nn.glpn import Glpn, glpn_graph
+    from gear.nn.weights import build_graph
+
+    graph = build_graph(lambda: glpn_graph(options), options, NAME)
+    return Glpn(graph, options, input_scale=trained_scale(options, NAME))
+
+
+def convert(state: Mapping[str, Tensor]) -> Mapping[str, Any]:
+    """The authors' checkpoints and transformers' folders under the graph's keys."""
+    from gear.nn.glpn_official import from_official
+
+    return from_official(state)
+
+
+spec = ModelSpec(
+    name=NAME,
+    summary="GLPDepth, MiT-b4: monocular depth with a transformer encoder (one of the paper's networks).",
+    config=GlpnOptions,
+    build=build,
+    tasks=("depth",),
+    views=("left",),
+    taps=("stem", "trunk", "decoder"),
+    recipe=Recipe(learning_rate=1e-4, batch=12, epochs=25),
+    published=(
+        PublishedWeights(
+            data="KITTI, Eigen split, up to 80 m",
+            source="vinvino02/glpn-kitti on the Hugging Face hub: its weights file; or the checkpoint that "
+            "github.com/vinvino02/GLPDepth links to",
+            licence="non-commercial by the authors' repository (the hub's card says Apache-2.0); KITTI is "
+            "CC BY-NC-SA 3.0",
+            size_mb=245.0,
+        ),
+    ),
+    normalisation="RGB in 0..1 as it is; sides are mirrored out to multiples of 32",
+    parameters=61_220_903,
+    needs=("transformers",),
+    convert=convert,
+)
+
+
+@hookimpl
+def gear_models() -> list[ModelSpec[GlpnOptions]]:
+    """This module's model."""
+    return [spec]

@@ -1,0 +1,47 @@
+"""GLPDepth with the smallest encoder, MiT-b0: a reference network that one GPU trains in minutes."""
+
+from __future__ import annotations
+
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.models import Model, Recipe
+from gear.contracts.specs import ModelSpec
+from gear.nn.depth_options import GlpnB0Options
+from gear.plugins.models.glpdepth import convert
+
+NAME = "glpn_b0"
+
+
+def build(options: GlpnB0Options) -> Model:
+    """The network with its weights.
+
+    Raises:
+        GearError: transformers or the weights are not there.
+    """
+    from gear.nn.depth_network import trained_scale
+    from gear.nn.glpn import Glpn, glpn_graph
+    from gear.nn.weights import build_graph
+
+    graph = build_graph(lambda: glpn_graph(options), options, NAME)
+    return Glpn(graph, options, input_scale=trained_scale(options, NAME))
+
+
+spec = ModelSpec(
+    name=NAME,
+    summary="GLPDepth with the small encoder MiT-b0: the same graph and loss, seventeen times fewer parameters.",
+    config=GlpnB0Options,
+    build=build,
+    tasks=("depth",),
+    views=("left",),
+    taps=("stem", "trunk", "decoder"),
+    recipe=Recipe(learning_rate=5e-4, batch=8, epochs=40, gradient_norm=1.0),
+    normalisation="RGB in 0..1 as it is; sides are mirrored out to multiples of 32",
+    parameters=3_414_807,
+    needs=("transformers",),
+    convert=convert,
+)
+
+
+@hookimpl
+def gear_models() -> list[ModelSpec[GlpnB0Options]]:
+    """This module's model."""
+    return [spec]
