@@ -1,0 +1,62 @@
+"""The network of centres behind the `Model` protocol."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from torch import Tensor, nn
+
+from gear.formats.kitti_object import KittiLabel
+from gear.losses.stereo import Grid, LabelledPair, centre_losses, centre_targets
+from gear.nn.network import Network, Normalise
+from gear.nn.stereo_centre import KINDS, STRIDE, StereoCentre, StereoCentreShape, fit_to_network, in_picture_px
+from gear.nn.stereo_decode import Peaks, decode
+from gear.nn.stereo_options import LEFT, RIGHT, StereoCentreOptions
+from gear.nn.weights import build_graph
+
+NAME = "stereo_centre"
+
+
+class StereoCentreNetwork(Network):
+    """Outputs as `gear.nn.stereo_centre.StereoCentre` names them, lengths in pixels of the pictures given."""
+
+    graph: StereoCentre
+    options: StereoCentreOptions
+
+    def __init__(self, options: StereoCentreOptions) -> None:
+        graph = build_graph(lambda: StereoCentre(StereoCentreShape(width=options.width)), options, NAME)
+        super().__init__(graph, options, views=(LEFT, RIGHT))
+        self.normalise = Normalise().to(self.device)
+
+    def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        """The graph's maps."""
+        # With channels last, torch 2.13's convolutions on the CPU write past their memory where channels are few.
+        pair = [self.normalise(pictures[name].contiguous()) for name in (LEFT, RIGHT)]
+        left, ratio = fit_to_network(pair[0], self.options.input_scale)
+        right, _ = fit_to_network(pair[1], self.options.input_scale)
+        return in_picture_px(self.graph(left, right), ratio)
+
+    def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[LabelledPair]) -> Mapping[str, Tensor]:
+        """`gear.losses.stereo.centre_losses`."""
+        intrinsics = targets[0].calibration.intrinsics
+        ratio = self._ratio((intrinsics.height_px, intrinsics.width_px))
+        height, width = outputs["heat"].shape[-2:]
+        grid = Grid(height=height, width=width, cell_px=(STRIDE * ratio[0], STRIDE * ratio[1]))
+        bins_px = self.graph.log_bins.exp() * ratio[0]
+        return centre_losses(outputs, centre_targets(targets, KINDS, grid), bins_px=bins_px, cell_px=grid.cell_px)
+
+    def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[KittiLabel, ...]]:
+        """The detections, with scores."""
+        ratio = self._ratio(size_px)
+        cell_px = (STRIDE * ratio[0], STRIDE * ratio[1])
+        peaks = Peaks(least_score=self.options.least_score)
+        return decode(outputs, KINDS, self.options.calibration(size_px), cell_px, peaks)
+
+    def taps(self) -> Mapping[str, nn.Module]:
+        """`layer1` of both pictures, the left ones first; `volume`; `layer2` to `layer4`."""
+        return {name: getattr(self.graph, name) for name in ("layer1", "volume", "layer2", "layer3", "layer4")}
+
+    def _ratio(self, size_px: tuple[int, ...]) -> tuple[float, float]:
+        """How many pixels of a picture of (height, width) one of the network's input is, in x and in y."""
+        height, width = (max(1, round(side * self.options.input_scale)) for side in size_px)
+        return size_px[1] / width, size_px[0] / height

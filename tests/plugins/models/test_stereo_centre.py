@@ -1,0 +1,11 @@
+from __future__ import annotations
+
+from typing import ClassVar
+
+from gear.plugins.models.stereo_centre import stereo_centre
+from gear.testing.model_contract import ModelContract
+
+
+class TestStereoCentre(ModelContract):
+    spec = stereo_centre
+    options: ClassVar[dict[str, object]] = {"weights": "none", "device": "cpu", "width": 8}
