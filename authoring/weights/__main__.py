@@ -1,0 +1,72 @@
+"""Collects what the reference weights are trained on and measured with:
+
+    python -m authoring.weights training --task semseg --out data            # into data/training/semseg/…
+    python -m authoring.weights held-out --task semseg --out data            # into data/held-out/semseg/…
+    python -m authoring.weights training --task depth --samples 400 --list   # the commands alone
+
+Each collection is one `gear collect`, so the same command again goes on where it was stopped. Then:
+
+    gear train --task semseg --model ddrnet23_slim --data data/training/semseg --out runs/semseg
+    gear evaluate … --data data/held-out/semseg/…
+"""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from authoring.weights.plan import HELD_OUT_SAMPLES, TRAINING_OPTIONS, Collection, held_out, training
+
+TRAINING_SAMPLES = 1000
+
+
+def main() -> int:
+    """Runs the collections, some at a time."""
+    parser = argparse.ArgumentParser(
+        prog="python -m authoring.weights", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("part", choices=("training", "held-out"))
+    parser.add_argument("--task", required=True, choices=tuple(TRAINING_OPTIONS))
+    parser.add_argument("--out", type=Path, default=Path("data"), help="root; <part>/<task>/ lies in it (data)")
+    parser.add_argument(
+        "--samples", type=int, help=f"in all, about ({TRAINING_SAMPLES} of training, {HELD_OUT_SAMPLES} held out)"
+    )
+    parser.add_argument("--jobs", type=int, default=2, help="collections at a time (2)")
+    parser.add_argument("--list", action="store_true", help="print the commands and do nothing")
+    args = parser.parse_args()
+    if args.part == "training":
+        plan = training(args.task, args.samples or TRAINING_SAMPLES)
+    else:
+        plan = held_out(args.task, args.samples or HELD_OUT_SAMPLES)
+    root: Path = args.out / args.part / args.task
+    if args.list:
+        for collection in plan:
+            print(shlex.join(["gear", "collect", *collection.arguments(), "--out", str(root / collection.name)]))
+        return 0
+    total, begin = sum(collection.samples for collection in plan), time.monotonic()
+    print(f"{total} samples in {len(plan)} collections into {root}", file=sys.stderr)
+    finished = 0
+    failed = []
+    with ThreadPoolExecutor(args.jobs) as pool:
+        for collection, problem in zip(plan, pool.map(lambda one: collect(one, root), plan), strict=True):
+            finished += collection.samples
+            minutes = (time.monotonic() - begin) / 60
+            print(f"{finished:>5}/{total}  {minutes:5.1f} min  {collection.name} {problem}", file=sys.stderr)
+            failed += [collection.name] if problem else []
+    return 1 if failed else 0
+
+
+def collect(collection: Collection, root: Path) -> str:
+    """Collects one in a process of its own; returns what went wrong, or nothing."""
+    command = [sys.executable, "-m", "gear.cli.main", "collect", *collection.arguments()]
+    done = subprocess.run([*command, "--out", str(root / collection.name)], capture_output=True, text=True, check=False)
+    return "" if done.returncode == 0 else done.stderr.strip().splitlines()[-1]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,139 @@
+"""The data of the reference weights: which scenes, weathers, patches and seeds, and which are never trained on.
+
+Two scenes (town10's billboard07, suburb's billboard05) and one weather (CloudyNoon) are held out: nothing is trained
+on them, and no checkpoint is chosen by them. Training seeds are 20000 to 20999, those of the held-out collections 30000
+to 30999; the seeds of the paper's splits (123, 131, 363, 0, 60) occur in neither.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gear.config.load import find_config
+from gear.config.nodes import parse_file
+from gear.config.reader import read_node
+from gear.world.scene_spec import SceneLibrary
+
+TOWNS = ("town10", "suburb", "harbour")
+HELD_OUT_SCENES = (("town10", "billboard07"), ("suburb", "billboard05"))
+HELD_OUT_WEATHER = "CloudyNoon"
+
+WEATHERS = (
+    "ClearNoon", "CloudySunset", "SoftRainNoon", "ClearNoon", "WetNoon", "ClearSunset", "ClearNoon", "MidRainyNoon",
+    "CloudySunset", "HardRainNoon",
+)  # fmt: skip
+"""Dealt out in turn; the default weather comes more often."""
+
+DRIVES_A_TOWN = 3
+"""Collections without a board in each town: the ego car is anywhere in it."""
+
+SHARES = {"no_billboard": 0.45, "board": 0.45, "truck": 0.1}
+"""Of the training samples, by kind of scene."""
+
+FIRST_TRAINING_SEED, FIRST_HELD_OUT_SEED = 20_000, 30_000
+HELD_OUT_SAMPLES = 300
+
+TRAINING_OPTIONS: dict[str, tuple[str, ...]] = {
+    "semseg": ("options.width_px=1024", "options.height_px=512", "options.polygons=false"),
+    "detect2d": (
+        "options.width_px=800",
+        "options.height_px=480",
+        "options.visibility.min_box_area_px2=324",
+        "options.visibility.min_visible_px=36",
+    ),
+    "stereo3d": (),
+    "depth": (),
+}
+"""Smaller pictures where labels allow it: semantic segmentation at half size, detection at three fifths, with limits of
+visibility to match. Stereo and depth are small as they are."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Collection:
+    """One `gear collect`.
+
+    Attributes:
+        task, town, scene, weather, split: as its flags.
+        patch: `none` or `random`.
+        seed: of the split, and of the random patch.
+        samples: how many.
+        settings: its `--set` texts.
+    """
+
+    task: str
+    town: str
+    scene: str
+    weather: str
+    split: str
+    patch: str
+    seed: int
+    samples: int
+    settings: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """Of its folder."""
+        return f"{self.town}-{self.scene}-{self.weather}-{self.patch}"
+
+    def arguments(self) -> list[str]:
+        """Of `gear collect`, without `--out`."""
+        flags = {
+            "task": self.task, "town": self.town, "scene": self.scene, "weather": self.weather, "split": self.split,
+            "patch": self.patch, "seed": self.seed, "samples": self.samples,
+        }  # fmt: skip
+        settings = [*self.settings, f"patch_seed={self.seed}"]
+        return [word for key, value in flags.items() for word in (f"--{key}", str(value))] + [
+            word for setting in settings for word in ("--set", setting)
+        ]
+
+
+def training(task: str, samples: int) -> list[Collection]:
+    """The training collections of a task, with about so many samples in all."""
+    places = [(town, scene) for town in TOWNS for scene in scenes_of(town) if (town, scene) not in HELD_OUT_SCENES]
+    drives = [place for place in places if place[1] == "no_billboard" for _ in range(DRIVES_A_TOWN)]
+    boards = [place for place in places if place[1].startswith("billboard")]
+    trucks = [place for place in places if place[1] == "truck"]
+    counts = {kind: round(samples * share) for kind, share in SHARES.items()}
+    result = []
+    for kind, members in (("no_billboard", drives), ("board", boards), ("truck", trucks)):
+        for number, (town, scene) in enumerate(members):
+            order = len(result)
+            result.append(
+                Collection(
+                    task=task,
+                    town=town,
+                    scene=scene,
+                    weather=WEATHERS[order % len(WEATHERS)],
+                    split="train",
+                    patch="none" if kind == "no_billboard" or number % 2 else "random",
+                    seed=FIRST_TRAINING_SEED + order,
+                    samples=max(1, round(counts[kind] / len(members))),
+                    settings=TRAINING_OPTIONS[task],
+                )
+            )
+    return result
+
+
+def held_out(task: str, samples: int = HELD_OUT_SAMPLES) -> list[Collection]:
+    """What the weights are measured on, at the task's own size: both scenes, in a known weather and in the other."""
+    pairs = [(place, weather) for place in HELD_OUT_SCENES for weather in ("ClearNoon", HELD_OUT_WEATHER)]
+    return [
+        Collection(
+            task=task,
+            town=town,
+            scene=scene,
+            weather=weather,
+            split="test",
+            patch="none",
+            seed=FIRST_HELD_OUT_SEED + number,
+            samples=max(1, round(samples / len(pairs))),
+            settings=(),
+        )
+        for number, ((town, scene), weather) in enumerate(pairs)
+    ]
+
+
+def scenes_of(town: str) -> list[str]:
+    """Names of a town's scenes, in the order of its library."""
+    library = read_node(SceneLibrary, parse_file(find_config("scenes", town)))
+    return list(library.scenes)

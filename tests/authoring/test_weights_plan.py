@@ -1,0 +1,61 @@
+"""The data plan of the reference weights: nothing that is held out is trained on, and every collection can be made."""
+
+from __future__ import annotations
+
+import pytest
+
+from authoring.weights.plan import (
+    HELD_OUT_SCENES,
+    HELD_OUT_WEATHER,
+    TRAINING_OPTIONS,
+    Collection,
+    held_out,
+    training,
+)
+from gear.config.collection import SimulationConfig
+from gear.config.load import find_config, load_collection
+from gear.config.nodes import parse_file
+from gear.config.reader import read_node
+from gear.verbs.collect.job import resolve
+
+TASKS = tuple(TRAINING_OPTIONS)
+
+
+def flags(collection: Collection) -> dict[str, str | None]:
+    words = iter(collection.arguments())
+    return {word.removeprefix("--"): next(words) for word in words if word != "--set" or not next(words)}
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_nothing_held_out_is_trained_on(task: str) -> None:
+    plan = training(task, 1000)
+    assert not {(one.town, one.scene) for one in plan} & set(HELD_OUT_SCENES)
+    assert HELD_OUT_WEATHER not in {one.weather for one in plan}
+    assert {(one.town, one.scene) for one in held_out(task)} == set(HELD_OUT_SCENES)
+    assert HELD_OUT_WEATHER in {one.weather for one in held_out(task)}
+
+
+def test_seeds_are_nobody_elses() -> None:
+    simulation = read_node(SimulationConfig, parse_file(find_config("simulation", "default")))
+    paper = {split.seed for split in simulation.splits.values()}
+    learnt = [one.seed for one in training("semseg", 1000)]
+    measured = [one.seed for one in held_out("semseg")]
+    assert len({*learnt, *measured, *paper}) == len(learnt) + len(measured) + len(paper)
+
+
+@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("samples", [40, 1000])
+def test_the_numbers_are_about_what_was_asked_for(task: str, samples: int) -> None:
+    plan = training(task, samples)
+    assert abs(sum(one.samples for one in plan) - samples) <= len(plan) / 2
+    assert len({one.name for one in plan}) == len(plan)
+    assert sum(one.samples for one in held_out(task)) == 300
+    assert len({one.town for one in plan}) == 3 and len({one.weather for one in plan}) == 7
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_every_collection_can_be_made(task: str) -> None:
+    for one in (training(task, 200)[0], training(task, 200)[12], held_out(task)[-1]):
+        job = resolve(load_collection(None, flags(one), [*one.settings, f"patch_seed={one.seed}"]))
+        assert job.plan.info.seed == one.seed and job.plan.samples == one.samples
+        assert job.plan.info.split == one.split
