@@ -16,6 +16,7 @@ COMMANDS: dict[str, str] = {
     "view": "one self-contained HTML page of a dataset",
     "train": "train a network on collected data",
     "defend": "write a dataset's pictures as a defense cleans them",
+    "evaluate": "run a model, with or without a defense, over datasets: metrics, predictions, twins compared",
     "export": "write a dataset in another layout",
     "towns": "list towns and their scenes, or draw a map and a picture of every scene",
     "models": "list the installed networks: size, input, published weights, shipped weights and what is missing",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 import re
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -83,12 +84,16 @@ def _load(path: Path) -> Any:
         GearError: it cannot be read so.
     """
     try:
-        with torch.serialization.safe_globals(PLAIN_GLOBALS):
+        with torch.serialization.safe_globals(PLAIN_GLOBALS), warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of pickles in newer protocols, which then load or do not
             return torch.load(path, map_location="cpu", weights_only=True)
     except pickle.UnpicklingError as error:
         wanted = re.search(r"GLOBAL ([\w.]+)", str(error))
         if wanted is None:
-            raise GearError(f"{path}: not a checkpoint that can be read safely ({_first_line(error)})") from error
+            # torch's own text suggests to read the file unsafely; only its reason is passed on.
+            reason = re.search(r"WeightsUnpickler error: *(\S.*)", str(error))
+            why = reason[1] if reason else "it is no plain pickle of tensors"
+            raise GearError(f"{path}: not a checkpoint that can be read safely ({why})") from error
         raise GearError(
             f"{path}: refused, because reading it would run {wanted[1]}; have somebody who trusts the file save its "
             "state dict alone (torch.save(model.state_dict(), FILE)), or get it as safetensors"
@@ -98,4 +103,4 @@ def _load(path: Path) -> Any:
 
 
 def _first_line(error: BaseException) -> str:
-    return (str(error).strip().splitlines() or [type(error).__name__])[0]
+    return f"{type(error).__name__}: {(str(error).strip().splitlines() or ['nothing in it'])[0]}"

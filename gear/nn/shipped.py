@@ -19,7 +19,9 @@ from gear.values.serial import Json
 GROUP = "gear.weights"
 """Entry points of this group name a module whose `FOLDER` holds `models/` and `patches/`."""
 
-JSON_KEYS = ("metrics", "options", "data")
+CHECKOUT = Path(__file__).resolve().parents[2] / "weights" / "gear_weights"
+
+JSON_KEYS = ("metrics", "options", "data", "look")
 """Metadata whose texts are JSON."""
 
 
@@ -33,7 +35,8 @@ class WeightsFile:
         shapes: by key.
         metadata: as written, all texts. gear writes, as far as it knows: `model`, `task`, `gear` (version), `source`
             and `source_sha256` (of a published file), `licence`, `command`, `seed`, `look_hash`, and as JSON `data`
-            (what it was trained on), `metrics` (figures by name) and `options` (of the model, such as `input_scale`).
+            (what it was trained on), `metrics` (figures by name), `options` (of the model, such as `input_scale`) and
+            `look` (`gear.verbs.look.Look`).
     """
 
     path: Path
@@ -120,7 +123,7 @@ def shipped(name: str) -> Path | None:
 
 @functools.cache
 def shipped_folders() -> tuple[Path, ...]:
-    """Folders of the installed weights packages, in the order of their names.
+    """Folders of the installed weights packages, in the order of their names; in a checkout, last, the one beside gear.
 
     Raises:
         GearError: a package of that kind cannot be imported, or has no folder.
@@ -132,7 +135,7 @@ def shipped_folders() -> tuple[Path, ...]:
         except (ImportError, AttributeError, TypeError) as error:
             package = entry.dist.name if entry.dist else entry.value
             raise GearError(f"the weights package {package} is broken ({error}); install it again") from error
-    return tuple(folders)
+    return tuple(dict.fromkeys([*folders, *([CHECKOUT] if CHECKOUT.is_dir() else [])]))
 
 
 def _read(text: str) -> Json:

@@ -1,0 +1,69 @@
+"""`gear weights`."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+EXAMPLE = """examples:
+  gear weights convert ddrnet23_slim best_val.pth ddrnet.safetensors
+  gear weights convert bisenet_x39 cityscapes-bisenet-X39.pth bisenet.safetensors --set auxiliary=false
+  gear weights show ddrnet.safetensors
+  gear weights show ddrnet23_slim --json           the shipped reference weights of a model
+
+A published file is read without running anything in it; one that wants more than numbers is refused.
+gear models says where published weights are found.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the command's flags."""
+    parser.epilog = EXAMPLE
+    actions = parser.add_subparsers(title="actions", metavar="ACTION", dest="action", required=True)
+    converting = actions.add_parser("convert", help="make a safetensors file of a published one, strictly checked")
+    converting.add_argument("model", metavar="MODEL", help="model plugin; gear models")
+    converting.add_argument("source", metavar="IN", help="the published file: .pth, .pt, .pkl, .safetensors")
+    converting.add_argument("out", metavar="OUT", help="the file to write; ends in .safetensors")
+    converting.add_argument("--half", action="store_true", help="store matrices in float16, half the size")
+    converting.add_argument(
+        "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings",
+        help="an option of the model that changes its graph; repeatable",
+    )  # fmt: skip
+    converting.add_argument("--json", action="store_true", help="print JSON")
+    showing = actions.add_parser("show", help="print what a weights file says of itself")
+    showing.add_argument("file", metavar="FILE", help="a safetensors file, or a model whose shipped weights are meant")
+    showing.add_argument("--json", action="store_true", help="print JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Converts or shows."""
+    return convert(args) if args.action == "convert" else show(args)
+
+
+def convert(args: argparse.Namespace) -> int:
+    """Converts and prints the hash."""
+    from gear.verbs.weights.convert import convert_weights
+
+    report = convert_weights(args.model, args.source, args.out, settings=args.settings, halves=args.half)
+    if args.json:
+        facts = {"model": report.model, "path": str(report.path), "sha256": report.sha256,
+                 "size_mb": round(report.size_mb, 3), "tensors": report.tensors}  # fmt: skip
+        print(json.dumps(facts, indent=1))
+    else:
+        print(report.summary())
+    return 0
+
+
+def show(args: argparse.Namespace) -> int:
+    """Prints the header."""
+    from gear.verbs.weights.show import show_weights
+
+    facts = show_weights(args.file).to_json()
+    if args.json:
+        print(json.dumps(facts, indent=1))
+        return 0
+    print(f"{facts['path']}: {facts['tensors']} tensors, {facts['numbers']} numbers, {facts['size_mb']:.1f} MB")
+    print(f"  sha256: {facts['sha256']}")
+    for key, value in sorted(facts["metadata"].items()):
+        print(f"  {key}: {value if isinstance(value, str) else json.dumps(value)}")
+    return 0

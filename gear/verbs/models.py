@@ -1,0 +1,125 @@
+"""`gear.list_models`: the installed networks, with what is published for them and what is shipped."""
+
+from __future__ import annotations
+
+import importlib.util
+from dataclasses import dataclass
+from typing import Any
+
+from gear.contracts.specs import ModelSpec
+from gear.nn.shipped import WeightsFile, inspect, shipped
+from gear.plugins.catalogue import Found
+from gear.plugins.manager import catalogue
+from gear.values.serial import Json, to_json
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShippedWeights:
+    """A network's reference weights.
+
+    Attributes:
+        file: its header.
+        stale: what of the look that they were trained on has changed since; None where the file does not say.
+    """
+
+    file: WeightsFile
+    stale: tuple[str, ...] | None
+
+    def to_json(self) -> Json:
+        """As JSON."""
+        facts = self.file.facts()
+        return {
+            "path": str(self.file.path),
+            "size_mb": round(self.file.size_mb, 3),
+            "metrics": facts.get("metrics", {}),
+            "data": facts.get("data", {}),
+            "options": facts.get("options", {}),
+            "look_hash": facts.get("look_hash", ""),
+            "look_is_current": None if self.stale is None else not self.stale,
+            "look_changes": list(self.stale or ()),
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModelFacts:
+    """One installed network.
+
+    Attributes:
+        found: the plugin.
+        missing: modules that it needs and that are not installed.
+        shipped: its reference weights, if an installed package has them.
+    """
+
+    found: Found
+    missing: tuple[str, ...]
+    shipped: ShippedWeights | None
+
+    @property
+    def spec(self) -> ModelSpec[Any]:
+        """The plugin's spec."""
+        assert isinstance(self.found.spec, ModelSpec)
+        return self.found.spec
+
+    def to_json(self) -> Json:
+        """As JSON."""
+        spec = self.spec
+        return {
+            "name": spec.name,
+            "package": self.found.owner.package,
+            "version": self.found.owner.version,
+            "summary": spec.summary,
+            "tasks": list(spec.tasks),
+            "views": list(spec.views),
+            "parameters": spec.parameters or None,
+            "normalisation": spec.normalisation,
+            "taps": list(spec.taps),
+            "has_gradients": spec.has_gradients,
+            "is_trainable": spec.recipe is not None,
+            "starts": sorted(spec.starts),
+            "missing": list(self.missing),
+            "published": [to_json(weights) for weights in spec.published],
+            "shipped": None if self.shipped is None else self.shipped.to_json(),
+        }
+
+
+def list_models(task: str | None = None) -> list[ModelFacts]:
+    """Every installed network, by name; torch is not imported.
+
+    Args:
+        task: only those that can do it.
+
+    Raises:
+        UnknownNameError: there is no such task.
+        GearError: a weights package or file is broken.
+    """
+    plugins = catalogue()
+    if task is not None:
+        task = plugins.get("task", task).spec.name
+    return [
+        ModelFacts(found=found, missing=_missing(found.spec.needs), shipped=_shipped(found.spec.name))
+        for found in plugins.of_kind("model")
+        if isinstance(found.spec, ModelSpec) and (task is None or task in found.spec.tasks)
+    ]
+
+
+def _missing(modules: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(name for name in modules if importlib.util.find_spec(name.partition(".")[0]) is None)
+
+
+def _shipped(name: str) -> ShippedWeights | None:
+    path = shipped(name)
+    if path is None:
+        return None
+    file = inspect(path)
+    return ShippedWeights(file=file, stale=_changes(file))
+
+
+def _changes(file: WeightsFile) -> tuple[str, ...] | None:
+    value = file.facts().get("look")
+    if value is None:
+        return None
+    # Comparing looks reads the towns' assets; nobody pays for it who has no shipped weights.
+    from gear.verbs.look import look_now, read_look
+
+    look = read_look(value)
+    return None if look is None else tuple(look.differences(look_now(look)))

@@ -1,0 +1,123 @@
+"""`gear.convert_weights`: a published file as safetensors, checked against the network that is to use it."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from gear.config.overrides import with_overrides
+from gear.contracts.specs import ModelSpec
+from gear.dataset.files import read_bytes, sha256
+from gear.nn.checkpoints import read_published
+from gear.nn.options import NONE
+from gear.nn.weights import mismatches, write
+from gear.plugins.build import NO_OPTIONS, blamed, build, find
+from gear.plugins.catalogue import Found
+from gear.plugins.manager import DISTRIBUTION
+from gear.values.errors import GearError
+
+SUFFIX = ".safetensors"
+
+PLAIN_BUILD = {"weights": NONE, "device": "cpu"}
+"""How a network is built to compare keys with; options that a config does not have are left out."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConvertReport:
+    """What was written.
+
+    Attributes:
+        model: whose weights they are.
+        path: of the new file.
+        sha256: of it.
+        size_mb: of it, in 10^6 bytes.
+        tensors: how many it holds.
+    """
+
+    model: str
+    path: Path
+    sha256: str
+    size_mb: float
+    tensors: int
+
+    def summary(self) -> str:
+        """For a person."""
+        return (
+            f"{self.path}: {self.tensors} tensors of {self.model}, {self.size_mb:.1f} MB\nsha256 {self.sha256}\n"
+            f"use it with: --model {self.model} --set weights={self.path}"
+        )
+
+
+def convert_weights(
+    model: str, source: str | Path, out: str | Path, *, settings: Iterable[str] = (), halves: bool = False
+) -> ConvertReport:
+    """Makes a safetensors file of a published one, strictly checked against the network.
+
+    Nothing in the published file is run; what of it is not the network (an optimiser's state, criteria) is left out.
+
+    Args:
+        model: name of a model plugin.
+        source: a checkpoint of PyTorch's (zip or older), or a safetensors file.
+        out: file to write.
+        settings: `KEY=VALUE` texts for the model's options that change its graph.
+        halves: whether weights of two dimensions and more are stored in float16.
+
+    Raises:
+        GearError: anything that the user can put right; its text is one line.
+    """
+    target, origin = Path(out), Path(source)
+    if target.suffix != SUFFIX:
+        raise GearError(f"{target}: the file to write is to end in {SUFFIX}")
+    if target.exists() and origin.exists() and target.samefile(origin):
+        raise GearError(f"{target}: is the file to read; write another one")
+    found = find("model", model)
+    graph = _graph(found, settings)
+    state: Mapping[str, Any] = read_published(origin)
+    spec = found.spec
+    assert isinstance(spec, ModelSpec)
+    if spec.convert is not None:
+        with blamed(found, "convert"):
+            state = spec.convert(state)
+    problems = mismatches(graph.state_dict(), state)
+    if problems:
+        raise GearError(
+            f"{origin}: not weights of {model}: {'; '.join(problems)}"
+            f" (options that change the graph are given by --set; gear plugins show {model})"
+        )
+    published = read_bytes(origin)
+    metadata = {
+        "model": spec.name,
+        "package": found.owner.package,
+        "source": origin.name,
+        "source_sha256": sha256(published),
+        "gear": _version(),
+    }
+    write(target, state, metadata, halves=halves)
+    data = read_bytes(target)
+    return ConvertReport(model=spec.name, path=target, sha256=sha256(data), size_mb=len(data) / 1e6, tensors=len(state))
+
+
+def _graph(found: Found, settings: Iterable[str]) -> Any:
+    """The network's module, with random weights.
+
+    Raises:
+        GearError: the options do not fit, something is not installed, or the model has no module.
+    """
+    names = {field.name for field in dataclasses.fields(found.spec.config)}
+    plain = [f"{name}={value}" for name, value in PLAIN_BUILD.items() if name in names]
+    product = build(found, with_overrides(NO_OPTIONS, [*plain, *settings]))
+    module = getattr(product, "module", None)
+    if module is None:
+        raise GearError(f"model {found.spec.name!r} has no module whose weights could be converted")
+    return module()
+
+
+def _version() -> str:
+    try:
+        return version(DISTRIBUTION)
+    except PackageNotFoundError:
+        return "source"
