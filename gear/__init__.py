@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from gear.values.errors import GearError
     from gear.verbs.collect.run import CollectReport, collect
     from gear.verbs.defend import DefendReport, defend
+    from gear.verbs.evaluate.report import EvaluateReport
+    from gear.verbs.evaluate.run import evaluate
     from gear.verbs.train.run import TrainReport, train
     from gear.view.write import ViewReport, write_view
 
@@ -26,12 +28,14 @@ __all__ = [
     "CollectReport",
     "Dataset",
     "DefendReport",
+    "EvaluateReport",
     "GearError",
     "TrainReport",
     "Twins",
     "ViewReport",
     "collect",
     "defend",
+    "evaluate",
     "open_dataset",
     "open_twins",
     "train",
@@ -42,12 +46,14 @@ _HOME = {
     "CollectReport": "gear.verbs.collect.run",
     "Dataset": "gear.opening",
     "DefendReport": "gear.verbs.defend",
+    "EvaluateReport": "gear.verbs.evaluate.report",
     "GearError": "gear.values.errors",
     "TrainReport": "gear.verbs.train.run",
     "Twins": "gear.opening",
     "ViewReport": "gear.view.write",
     "collect": "gear.verbs.collect.run",
     "defend": "gear.verbs.defend",
+    "evaluate": "gear.verbs.evaluate.run",
     "open_dataset": "gear.opening",
     "open_twins": "gear.opening",
     "train": "gear.verbs.train.run",

@@ -99,14 +99,16 @@ class NearDepth(DepthEvaluator):
         return _renamed(super().update(sample, prediction))
 
     def result(self) -> Mapping[str, float]:
-        """`d1` to `d3`, `abs_rel`, `sq_rel`, `rmse_m`, `rmse_log`, `log10`, `silog`: means over pictures."""
+        """`d1`, `rmse_m`, `d2`, `d3`, `abs_rel`, `sq_rel`, `rmse_log`, `log10`, `silog`: means over pictures."""
         return _renamed(super().result())
 
 
 def _renamed(figures: Mapping[str, float]) -> dict[str, float]:
     """Eigen's figures without their prefix."""
     prefix = "eigen_"
-    return {name.removeprefix(prefix): value for name, value in figures.items() if name.startswith(prefix)}
+    plain = {name.removeprefix(prefix): value for name, value in figures.items() if name.startswith(prefix)}
+    first = {name: plain[name] for name in ("d1", "rmse_m")}
+    return first | plain
 
 
 def _devkit(truth_m: Array, found_m: Array) -> dict[str, float]:

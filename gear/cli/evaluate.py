@@ -1,0 +1,81 @@
+"""`gear evaluate`."""
+
+from __future__ import annotations
+
+import argparse
+
+from gear.cli.collect import positive
+
+EXAMPLE = """examples:
+  gear evaluate --model ddrnet23_slim --data data/clean
+  gear evaluate --model ddrnet23_slim --data data/none data/random data/patch --report outside_patch
+  gear evaluate --model ddrnet23_slim --set weights=net.safetensors --defense jpeg --data data/clean
+
+Predictions, results.json and table.txt lie under --out. Run it again to go on where it was stopped.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the command's flags."""
+    parser.epilog = EXAMPLE
+    parser.add_argument("--model", required=True, metavar="NAME", help="model plugin; gear plugins --kind model")
+    parser.add_argument(
+        "--data", required=True, nargs="+", metavar="DIR", help="datasets of its task, twins among them"
+    )
+    parser.add_argument("--split", help="of the datasets, where they have several")
+    parser.add_argument("--defense", metavar="NAME", help="defense plugin; gear plugins --kind defense")
+    for flag, dest, what in (("--set", "settings", "model"), ("--defense-set", "defense_settings", "defense")):
+        parser.add_argument(
+            flag,
+            metavar="KEY=VALUE",
+            action="append",
+            default=[],
+            dest=dest,
+            help=f"an option of the {what}; repeatable",
+        )
+    parser.add_argument("--calibration", metavar="DIR", help="dataset that the defense learns from")
+    parser.add_argument("--calibration-patched", metavar="DIR", help="the same with patches")
+    parser.add_argument(
+        "--report",
+        metavar="NAME",
+        action="append",
+        default=[],
+        dest="reports",
+        help="further figures: reference (what a shipped network is held to), outside_patch; repeatable",
+    )
+    parser.add_argument("--out", metavar="DIR", help="folder for the results (evaluations/<task>/<model>[+<defense>])")
+    parser.add_argument("--batch", type=positive, default=1, metavar="N", help="samples through the model together (1)")
+    parser.add_argument("--workers", type=positive, default=2, metavar="N", help="threads that read and measure (2)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the defense's draws and the bootstrap (0)")
+    parser.add_argument("--resamples", type=int, default=1000, metavar="N", help="of the bootstrap; 0 for none (1000)")
+    parser.add_argument("--json", action="store_true", help="print results.json instead of the table")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Evaluates and prints the table."""
+    import json
+
+    from gear.cli.progress import ProgressBar
+    from gear.verbs.evaluate.run import evaluate
+    from gear.verbs.evaluate.table import table
+
+    with ProgressBar() as progress:
+        report = evaluate(
+            args.data,
+            model=args.model,
+            settings=args.settings,
+            defense=args.defense,
+            defense_settings=args.defense_settings,
+            split=args.split,
+            calibration=args.calibration,
+            calibration_patched=args.calibration_patched,
+            reports=args.reports,
+            out=args.out,
+            batch=args.batch,
+            workers=args.workers,
+            seed=args.seed,
+            resamples=args.resamples,
+            progress=progress,
+        )
+    print(json.dumps(report.as_json(), indent=1, allow_nan=False) if args.json else table(report), end="")
+    return 0

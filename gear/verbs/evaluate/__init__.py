@@ -1,0 +1,1 @@
+"""`gear evaluate`: a model, with or without a defense, over datasets of its task."""

@@ -1,0 +1,111 @@
+"""Who is evaluated: names and options to specs, and whether they suit each other, before anything is loaded."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from gear.config.dump import to_plain
+from gear.config.nodes import Node
+from gear.config.overrides import with_overrides
+from gear.config.reader import read_node
+from gear.contracts.evaluation import Maskable, Reports
+from gear.contracts.specs import DefenseSpec, ModelSpec
+from gear.dataset.reading import Dataset
+from gear.plugins.build import NO_OPTIONS, find
+from gear.plugins.catalogue import Found
+from gear.values.errors import GearError, UnknownNameError
+from gear.values.serial import Json
+
+OUTSIDE_PATCH = "outside_patch"
+"""The task's own figures with the ground truth on and next to the patch left out."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chosen:
+    """A plugin with the options that it will be built with."""
+
+    found: Found
+    options: Node
+
+    def facts(self) -> Json:
+        """Name, package, version and options, defaults filled in."""
+        owner = self.found.owner
+        config = read_node(self.found.spec.config, self.options, "")
+        named = {"name": self.found.spec.name, "package": owner.package, "version": owner.version}
+        return {**named, "options": to_plain(config)}
+
+
+def chosen_model(name: str, settings: Iterable[str]) -> Chosen:
+    """A model by name.
+
+    Raises:
+        GearError: there is no such model, or an option does not fit.
+    """
+    found, options = find("model", name), with_overrides(NO_OPTIONS, settings)
+    read_node(found.spec.config, options, "")
+    return Chosen(found=found, options=options)
+
+
+def chosen_defense(name: str, settings: Iterable[str]) -> Chosen:
+    """A defense by name.
+
+    Raises:
+        GearError: there is no such defense, or an option does not fit.
+    """
+    found, options = find("defense", name), with_overrides(NO_OPTIONS, settings)
+    read_node(found.spec.config, options, "")
+    return Chosen(found=found, options=options)
+
+
+def check_model(model: Chosen, dataset: Dataset[Any]) -> None:
+    """Whether the model can do the dataset's task and sees its cameras.
+
+    Raises:
+        GearError: it cannot.
+    """
+    spec, task = model.found.spec, dataset.plan.task["name"]
+    assert isinstance(spec, ModelSpec)
+    if task not in spec.tasks:
+        raise GearError(f"model {spec.name!r} does {', '.join(spec.tasks)}; {dataset.root} is a {task} dataset")
+    cameras = {camera.name for camera in dataset.task.rig().cameras}
+    missing = [name for name in spec.views if name not in cameras]
+    if missing:
+        raise GearError(f"model {spec.name!r} looks at {', '.join(missing)}, which {dataset.root} does not have")
+
+
+def check_defense(defense: Chosen, model: Chosen, task: str, *, is_calibrated: bool) -> None:
+    """Whether the defense guards the task, finds its feature maps and has what it learns from.
+
+    Raises:
+        GearError: it does not.
+    """
+    spec, guarded = defense.found.spec, model.found.spec
+    assert isinstance(spec, DefenseSpec) and isinstance(guarded, ModelSpec)
+    if spec.tasks and task not in spec.tasks:
+        raise GearError(f"defense {spec.name!r} is for {', '.join(spec.tasks)}; this is a {task} dataset")
+    missing = [tap for tap in spec.taps if tap not in guarded.taps]
+    if missing:
+        has = ", ".join(guarded.taps) or "none"
+        raise GearError(
+            f"defense {spec.name!r} needs the feature maps {', '.join(missing)}; {guarded.name!r} has {has}"
+        )
+    if spec.needs_calibration and not is_calibrated:
+        raise GearError(
+            f"defense {spec.name!r} must learn first: give --calibration DIR, a clean dataset of the task"
+            " (and --calibration-patched DIR, its twin with patches, if it wants one)"
+        )
+
+
+def check_reports(names: Iterable[str], dataset: Dataset[Any]) -> None:
+    """Whether the task has the reports.
+
+    Raises:
+        UnknownNameError: it has none of such a name.
+    """
+    known = [OUTSIDE_PATCH] if isinstance(dataset.task, Maskable) else []
+    known += list(dataset.task.reports()) if isinstance(dataset.task, Reports) else []
+    for name in names:
+        if name not in known:
+            raise UnknownNameError(f"report of task {dataset.plan.task['name']!r}", name, known)

@@ -1,0 +1,57 @@
+"""The true patch in a sample: where it is seen, and how well a defense's mask finds it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from gear.contracts.tasks import Sample
+from gear.formats import rle
+
+Mask = npt.NDArray[np.bool_]
+
+MARGIN_PX = 5
+"""What lies this near to the patch is left out with it: its light and the network's smoothing reach that far."""
+
+SURE = 0.5
+"""A soft mask counts as the patch from here on."""
+
+
+def patch_masks(sample: Sample) -> dict[str, Mask]:
+    """(H, W) of the visible pixels of every surface, by camera name."""
+    masks: dict[str, Mask] = {name: np.zeros(image.shape[:2], dtype=np.bool_) for name, image in sample.images.items()}
+    for surface in sample.surfaces:
+        if surface.visible_px:
+            height, width = sample.images[surface.camera].shape[:2]
+            masks[surface.camera] |= rle.decode(surface.mask_rle, height, width)
+    return masks
+
+
+def widened(masks: Mapping[str, Mask], margin_px: int = MARGIN_PX) -> dict[str, Mask]:
+    """Each mask and all within a distance of it."""
+    size = 2 * margin_px + 1
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
+    return {name: cv2.dilate(mask.astype(np.uint8), disc).astype(np.bool_) for name, mask in masks.items()}
+
+
+def mask_figures(sample: Sample, found: Mapping[str, Any]) -> dict[str, float]:
+    """How a defense's mask lies on the true patch: over all of its cameras together.
+
+    `mask_iou`, `mask_precision`, `mask_recall`, NaN where nothing is to be compared, and `mask_area`, the share of the
+    pictures that it covers.
+    """
+    truth = patch_masks(sample)
+    real = np.concatenate([truth[name].reshape(-1) for name in found])
+    said = np.concatenate([np.asarray(mask).reshape(-1) >= SURE for mask in found.values()])
+    both, either = int((real & said).sum()), int((real | said).sum())
+    there = bool(real.any())
+    return {
+        "mask_iou": both / either if there else float("nan"),
+        "mask_precision": both / int(said.sum()) if said.any() and there else float("nan"),
+        "mask_recall": both / int(real.sum()) if there else float("nan"),
+        "mask_area": float(said.mean()),
+    }

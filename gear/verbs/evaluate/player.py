@@ -1,0 +1,182 @@
+"""The model behind its defense: pictures in, answers with their cost out."""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.contracts.defenses import DefenseResult
+from gear.contracts.models import Model
+from gear.contracts.specs import DefenseSpec, ModelSpec
+from gear.dataset.reading import Dataset
+from gear.plugins.build import blamed, build
+from gear.plugins.catalogue import Found
+from gear.values.errors import PluginError
+from gear.values.frames import UInt8Image
+from gear.values.rng import derive_rng
+from gear.verbs.defend import Guard
+from gear.verbs.evaluate.choice import Chosen
+
+Views = Mapping[str, UInt8Image]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Answer:
+    """What comes of one sample.
+
+    Attributes:
+        prediction: the task's.
+        model_s, defense_s: wall time; of a batch, its share.
+        mask: where the defense sees the patch, (H, W) float32 in 0..1 by camera name.
+        score: how sure it is of an attack.
+    """
+
+    prediction: Any
+    model_s: float
+    defense_s: float
+    mask: Mapping[str, npt.NDArray[np.float32]] | None
+    score: float | None
+
+
+class Player:
+    """A built model with its defense, fitted where it must be."""
+
+    def __init__(
+        self,
+        model: Chosen,
+        defense: Chosen | None = None,
+        *,
+        clean: Dataset[Any] | None = None,
+        patched: Dataset[Any] | None = None,
+        seed: int = 0,
+    ) -> None:
+        """Builds, fits and wraps.
+
+        Raises:
+            GearError: options or weights do not fit, or a third party's code fails.
+        """
+        spec = model.found.spec
+        assert isinstance(spec, ModelSpec)
+        self._found, self._views, self._seed = model.found, spec.views, seed
+        bare: Model = build(model.found, model.options)
+        self.weights_sha256 = weights_digest(bare)
+        self.model: Model = bare
+        self._guard: Guard | None = None
+        self._guard_name = ""
+        if defense is not None:
+            self._guard_name = defense.found.spec.name
+            self._guard, self.model = self._guarded(defense, bare, clean, patched)
+        many = getattr(self.model, "predict_many", None)
+        self._many = many if callable(many) else None
+
+    def _guarded(
+        self, defense: Chosen, bare: Model, clean: Dataset[Any] | None, patched: Dataset[Any] | None
+    ) -> tuple[Guard, Model]:
+        found = defense.found
+        spec = found.spec
+        assert isinstance(spec, DefenseSpec)
+        product = build(found, defense.options)
+        state = None
+        if clean is not None:
+            sides = [CalibrationViews(one, self._views) if one is not None else () for one in (clean, patched)]
+            with blamed(found, "fit"):
+                state = product.fit(sides[0], sides[1], bare, derive_rng(self._seed, "calibrate", spec.name))
+        with blamed(found, "wrap"):
+            wrapped: Model = product.wrap(bare)
+        return Guard(found, product, bare if spec.needs_model or spec.taps else None, state), wrapped
+
+    def play(self, pictures: Sequence[Views], indices: Sequence[int]) -> list[Answer]:
+        """Cleans and predicts a batch of samples, of which each has its number in the split.
+
+        Raises:
+            PluginError: a third party's model or defense fails.
+        """
+        results: list[DefenseResult | None] = []
+        spent: list[float] = []
+        shown: list[Views] = []
+        for views, index in zip(pictures, indices, strict=True):
+            seen = {name: views[name] for name in self._views}
+            for picture in seen.values():
+                picture.setflags(write=False)
+            begun = time.perf_counter()
+            result = None
+            if self._guard is not None:
+                rng = derive_rng(self._seed, "evaluate", self._guard_name, index)
+                result = self._guard.apply(seen, rng, index)
+            spent.append(time.perf_counter() - begun if result else 0.0)
+            results.append(result)
+            shown.append(result.views if result else seen)
+        begun = time.perf_counter()
+        predictions = self._predict(shown, indices)
+        each_s = (time.perf_counter() - begun) / len(indices)
+        return [
+            Answer(
+                prediction=prediction,
+                model_s=each_s,
+                defense_s=defense_s,
+                mask=result.mask if result else None,
+                score=None if result is None or result.score is None else float(result.score),
+            )
+            for prediction, defense_s, result in zip(predictions, spent, results, strict=True)
+        ]
+
+    def _predict(self, shown: Sequence[Views], indices: Sequence[int]) -> list[Any]:
+        stage = f"predict on sample {indices[0]}" + (f" to {indices[-1]}" if len(indices) > 1 else "")
+        with blamed(self._found, stage):
+            if self._many is None:
+                return [self.model.predict(views) for views in shown]
+            answers = list(self._many(list(shown)))
+        if len(answers) != len(shown):
+            raise accusation(self._found, stage, f"predict_many gave {len(answers)} answers to {len(shown)} samples")
+        return answers
+
+
+class CalibrationViews(Sequence[Views]):
+    """The pictures of a dataset, read when they are looked at."""
+
+    def __init__(self, dataset: Dataset[Any], names: Sequence[str]) -> None:
+        self._dataset, self._names = dataset, tuple(names)
+
+    def __len__(self) -> int:
+        return len(self._dataset)
+
+    def __getitem__(self, index: Any) -> Any:
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        images = self._dataset[index].images
+        return {name: images[name] for name in self._names}
+
+
+def accusation(found: Found, stage: str, problem: str) -> PluginError:
+    """An error that says whose plugin it is."""
+    return PluginError(f"{found.spec.name} ({found.owner.package} {found.owner.version})", stage, problem)
+
+
+def weights_digest(model: Any) -> str | None:
+    """sha256 over names and bytes of a torch model's parameters and buffers; None for what is no torch model."""
+    torch = sys.modules.get("torch")
+    if torch is None:
+        return None
+    digest, is_empty = hashlib.sha256(), True
+    for name, tensor in _tensors(model, torch):
+        plain = tensor.detach().cpu().contiguous()
+        digest.update(f"{name} {plain.dtype} {tuple(plain.shape)}".encode())
+        digest.update(plain.reshape(-1).view(torch.uint8).numpy().tobytes())
+        is_empty = False
+    return None if is_empty else digest.hexdigest()
+
+
+def _tensors(model: Any, torch: Any) -> Iterator[tuple[str, Any]]:
+    module = model.module() if callable(getattr(model, "module", None)) else model
+    parts = {"": module} if isinstance(module, torch.nn.Module) else vars(model) if hasattr(model, "__dict__") else {}
+    for part, network in parts.items():
+        if isinstance(network, torch.nn.Module):
+            for name, tensor in network.state_dict().items():
+                yield f"{part}.{name}", tensor

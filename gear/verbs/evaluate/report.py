@@ -1,0 +1,143 @@
+"""What an evaluation found, as values, JSON and a table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from gear.values.serial import Json
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Estimate:
+    """A figure with its bounds of 95 %.
+
+    Attributes:
+        value: NaN where nothing counts.
+        interval: bounds by bootstrap over samples, or None.
+    """
+
+    value: float
+    interval: tuple[float, float] | None = None
+
+    def as_json(self) -> Json:
+        """null for NaN."""
+        low, high = self.interval or (None, None)
+        return {"value": self.value if self.value == self.value else None, "low": low, "high": high}
+
+
+Figures = Mapping[str, Mapping[str, Estimate]]
+"""By report (`task` is the task's own evaluator), then by figure."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RowReport:
+    """One dataset.
+
+    Attributes:
+        name: folder of the row in the evaluation.
+        dataset: root of the dataset.
+        facts: its split, town, scene, weather, patch and keys; JSON.
+        samples: how many it has.
+        made: how many of them this run predicted.
+        figures: over all samples.
+        cost: mean seconds a sample: `model_s`, `defense_s`.
+        defense: mean figures of the defense's mask; empty without one.
+        per_sample: each sample's own figures; JSON.
+    """
+
+    name: str
+    dataset: Path
+    facts: Json
+    samples: int
+    made: int
+    figures: Figures
+    cost: Mapping[str, float]
+    defense: Mapping[str, float]
+    per_sample: Json
+
+    @property
+    def patch(self) -> str:
+        """`none`, `random`, or the patch's name and hash."""
+        return str(self.facts["patch"])
+
+    def as_json(self) -> Json:
+        """As written into results.json."""
+        return {
+            "name": self.name,
+            "dataset": self.facts,
+            "samples": self.samples,
+            "figures": figures_json(self.figures),
+            "cost": dict(self.cost),
+            "defense": {name: value if value == value else None for name, value in self.defense.items()},
+            "per_sample": self.per_sample,
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Difference:
+    """One dataset against its twin, sample by sample.
+
+    Attributes:
+        row, against: names of the rows; what is said is `row` minus `against`.
+        figures: of the differences.
+        auroc: how well the defense's score tells the rows apart, or None without scores.
+    """
+
+    row: str
+    against: str
+    figures: Figures
+    auroc: Estimate | None
+
+    def as_json(self) -> Json:
+        """As written into results.json."""
+        return {
+            "row": self.row,
+            "against": self.against,
+            "figures": figures_json(self.figures),
+            "auroc": None if self.auroc is None else self.auroc.as_json(),
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EvaluateReport:
+    """A model, with or without a defense, over datasets.
+
+    Attributes:
+        out: folder of results.json, table.txt and the predictions.
+        facts: model, defense, task, seed, versions; JSON.
+        rows: the datasets, in the order given.
+        differences: between twins.
+    """
+
+    out: Path
+    facts: Json
+    rows: tuple[RowReport, ...]
+    differences: tuple[Difference, ...]
+
+    def as_json(self) -> Json:
+        """The content of results.json."""
+        return {
+            "format": "gear-evaluation",
+            "version": 1,
+            **self.facts,
+            "rows": [row.as_json() for row in self.rows],
+            "differences": [one.as_json() for one in self.differences],
+        }
+
+    def row(self, patch: str) -> RowReport:
+        """The first dataset with a patch of this label.
+
+        Raises:
+            KeyError: there is none.
+        """
+        for row in self.rows:
+            if row.patch == patch:
+                return row
+        raise KeyError(patch)
+
+
+def figures_json(figures: Figures) -> Json:
+    """By report, then by figure."""
+    return {report: {name: one.as_json() for name, one in rows.items()} for report, rows in figures.items()}

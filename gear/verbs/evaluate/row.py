@@ -1,0 +1,81 @@
+"""One dataset through the model: read ahead, predicted in batches, measured and written beside the next batch."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
+
+from gear.dataset.reading import Dataset
+from gear.verbs.evaluate.player import Answer, Player
+from gear.verbs.evaluate.scoring import Note, Scorer
+
+Told = Callable[[], None]
+"""Called after every sample that is whole."""
+
+
+def evaluate_row(
+    dataset: Dataset[Any], scorer: Scorer, player: Player, *, batch: int, workers: int, told: Told
+) -> tuple[list[Note], int]:
+    """Every sample's note, in order, and how many of them were predicted now.
+
+    Pictures are decoded and predictions measured and written in threads, while the model works on a batch; what waits
+    is bounded, so memory does not grow with the dataset.
+    """
+    kept = scorer.kept()
+    missing = [index for index in range(len(dataset)) if index not in kept]
+    notes: dict[int, Future[Note]] = {}
+    waiting = threading.Semaphore(2 * batch + workers)
+
+    def tell(done: Future[Note]) -> None:
+        waiting.release()
+        if not done.cancelled() and done.exception() is None:
+            told()
+
+    with ThreadPoolExecutor(workers) as readers, ThreadPoolExecutor(workers) as scorers:
+        try:
+            for index in sorted(kept):
+                waiting.acquire()
+                notes[index] = scorers.submit(scorer.again, index)
+                notes[index].add_done_callback(tell)
+            for indices, samples in _batches(dataset, missing, readers, batch, workers):
+                answers: Sequence[Answer] = player.play([sample.images for sample in samples], indices)
+                for index, sample, answer in zip(indices, samples, answers, strict=True):
+                    waiting.acquire()
+                    _raise_early(notes)
+                    notes[index] = scorers.submit(scorer.first, index, sample, answer)
+                    notes[index].add_done_callback(tell)
+            done = [notes[index].result() for index in range(len(dataset))]
+        except BaseException:
+            readers.shutdown(wait=False, cancel_futures=True)
+            scorers.shutdown(wait=False, cancel_futures=True)
+            raise
+    return done, len(missing)
+
+
+def _batches(
+    dataset: Dataset[Any], indices: Sequence[int], readers: ThreadPoolExecutor, batch: int, ahead: int
+) -> Iterator[tuple[list[int], list[Any]]]:
+    """Batches of samples in order, the next one being read while this one is worked on."""
+    coming = iter(indices)
+    queue: deque[tuple[int, Future[Any]]] = deque()
+
+    def read_on(count: int) -> None:
+        for _, index in zip(range(count), coming, strict=False):
+            queue.append((index, readers.submit(dataset.__getitem__, index)))
+
+    read_on(batch + max(batch, ahead))
+    while queue:
+        chosen = [queue.popleft() for _ in range(min(batch, len(queue)))]
+        samples = [future.result() for _, future in chosen]
+        read_on(len(chosen))
+        yield [index for index, _ in chosen], samples
+
+
+def _raise_early(notes: dict[int, Future[Note]]) -> None:
+    """A sample that failed stops the run now, not at its end."""
+    for future in notes.values():
+        if future.done() and future.exception() is not None:
+            future.result()

@@ -1,0 +1,206 @@
+"""`gear.evaluate`: resolves, predicts, compares, writes."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.metadata
+import platform
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+from gear.config.dump import to_plain
+from gear.dataset.files import clear_scratch, explained, inside, write_whole
+from gear.dataset.layout import GEAR
+from gear.dataset.plan import differences
+from gear.dataset.reading import Dataset
+from gear.dataset.sidecar import dump_json, load_json
+from gear.opening import open_dataset
+from gear.values.errors import DatasetError, GearError
+from gear.values.serial import Json
+from gear.verbs.evaluate.choice import (
+    Chosen,
+    check_defense,
+    check_model,
+    check_reports,
+    chosen_defense,
+    chosen_model,
+)
+from gear.verbs.evaluate.compare import compared, row_report
+from gear.verbs.evaluate.player import Player
+from gear.verbs.evaluate.report import EvaluateReport
+from gear.verbs.evaluate.row import evaluate_row
+from gear.verbs.evaluate.scoring import Scorer
+from gear.verbs.evaluate.table import table
+
+Progress = Callable[[int, int], None]
+"""Called with (samples finished, samples of all datasets)."""
+
+
+def evaluate(
+    data: str | Path | Sequence[str | Path],
+    *,
+    model: str,
+    settings: Iterable[str] = (),
+    defense: str | None = None,
+    defense_settings: Iterable[str] = (),
+    split: str | None = None,
+    calibration: str | Path | None = None,
+    calibration_patched: str | Path | None = None,
+    reports: Sequence[str] = (),
+    out: str | Path | None = None,
+    batch: int = 1,
+    workers: int = 2,
+    seed: int = 0,
+    resamples: int = 1000,
+    progress: Progress | None = None,
+) -> EvaluateReport:
+    """Runs a model, with or without a defense, over datasets of its task; takes up again what was begun.
+
+    Under `out` lie results.json, table.txt, and for each dataset a folder with the predictions in the format's own
+    result layout and a note of each sample. Samples that have one are never predicted again. Datasets that differ in
+    nothing but their patch are compared sample by sample. Intervals are of 95 %, by bootstrap over samples.
+
+    Args:
+        data: roots of datasets, all of one task.
+        model: name of a model plugin.
+        settings: `KEY=VALUE` texts for the model's options.
+        defense: name of a defense plugin.
+        defense_settings: `KEY=VALUE` texts for its options.
+        split: of the datasets; may be left out where each has only one.
+        calibration: dataset from which the defense learns.
+        calibration_patched: the same with patches.
+        reports: further metrics: the task's own (`reference`), or `outside_patch`, the ground truth on the patch and 5
+            px around it left out.
+        out: folder for everything; `evaluations/<task>/<model>[+<defense>]` by default.
+        batch: samples that go through the model together.
+        workers: threads that read, and threads that measure and write, beside the model.
+        seed: of the defense's draws and of the bootstrap.
+        resamples: of the bootstrap; 0 for no intervals.
+        progress: told after every sample.
+
+    Raises:
+        GearError: anything that the user can put right; its text is one line.
+    """
+    if min(batch, workers) < 1 or resamples < 0:
+        raise GearError(
+            f"batch and workers must be at least 1, resamples at least 0; got {batch}, {workers}, {resamples}"
+        )
+    chosen = chosen_model(model, settings)
+    guard = chosen_defense(defense, defense_settings) if defense else None
+    datasets = _opened([data] if isinstance(data, (str, Path)) else data, split, chosen, reports)
+    task, names = datasets[0].plan.task["name"], _row_names(datasets)
+    learnt = [open_dataset(one) if one is not None else None for one in (calibration, calibration_patched)]
+    for one in learnt:
+        if one is not None:
+            check_model(chosen, one)
+    if guard is not None:
+        check_defense(guard, chosen, task, is_calibrated=learnt[0] is not None)
+    root = (
+        Path(out)
+        if out is not None
+        else Path("evaluations", task, model.replace("/", "-") + f"+{defense}" * bool(defense))
+    )
+    if any(root.glob(f"{GEAR}/*/plan.json")):
+        raise DatasetError(root, "is a dataset; write the evaluation into a folder of its own")
+    player = Player(chosen, guard, clean=learnt[0], patched=learnt[1], seed=seed)
+    facts = {
+        "task": datasets[0].plan.task,
+        "model": chosen.facts() | {"weights_sha256": player.weights_sha256},
+        "defense": None if guard is None else guard.facts(),
+        "calibration": [None if one is None else one.plan.content_key for one in learnt],
+        "seed": seed,
+    }
+    _begin(root, facts)
+    total, finished = sum(len(one) for one in datasets), 0
+
+    def told() -> None:
+        nonlocal finished
+        finished += 1
+        if progress is not None:
+            progress(finished, total)
+
+    if progress is not None:
+        progress(0, total)
+    notes, scorers, made = [], [], []
+    for dataset, name in zip(datasets, names, strict=True):
+        scorer = Scorer(dataset, root, name, tuple(reports), chosen.found)
+        done, new = evaluate_row(dataset, scorer, player, batch=batch, workers=workers, told=told)
+        scorer.finish(done)
+        notes.append(done)
+        scorers.append(scorer)
+        made.append(new)
+    rows = tuple(
+        row_report(name, dataset, scorer, done, new, seed, resamples)
+        for name, dataset, scorer, done, new in zip(names, datasets, scorers, notes, made, strict=True)
+    )
+    found = EvaluateReport(
+        out=root,
+        facts=facts | {"reports": list(reports), "resamples": resamples, "versions": _versions(player)},
+        rows=rows,
+        differences=tuple(compared(rows, datasets, scorers, notes, seed, resamples)),
+    )
+    write_whole(root, "results.json", dump_json(found.as_json()))
+    write_whole(root, "table.txt", table(found).encode())
+    clear_scratch(root)
+    with contextlib.suppress(OSError):
+        (root / GEAR).rmdir()
+    return found
+
+
+def _opened(
+    paths: Sequence[str | Path], split: str | None, model: Chosen, reports: Sequence[str]
+) -> list[Dataset[Any]]:
+    if not paths:
+        raise GearError("there is nothing to evaluate on; give at least one dataset")
+    datasets = [open_dataset(path, split) for path in paths]
+    first = datasets[0].plan
+    for one in datasets:
+        if one.plan.task["name"] != first.task["name"]:
+            raise GearError(
+                f"{one.root} is a {one.plan.task['name']} dataset, {datasets[0].root} a {first.task['name']} one"
+            )
+        if not len(one):
+            raise DatasetError(one.root, "has no samples to evaluate on")
+        check_model(model, one)
+        check_reports(reports, one)
+    return datasets
+
+
+def _row_names(datasets: Sequence[Dataset[Any]]) -> list[str]:
+    """Folders that stay the same however datasets are ordered.
+
+    Raises:
+        GearError: a dataset was given twice.
+    """
+    names = [f"{one.plan.info.split}-{one.plan.info.patch_label}-{one.plan.content_key[:8]}" for one in datasets]
+    for one, other in combinations(range(len(names)), 2):
+        if names[one] == names[other]:
+            raise GearError(f"{datasets[one].root} and {datasets[other].root} are the same data; give each once")
+    return names
+
+
+def _begin(root: Path, facts: Json) -> None:
+    """Writes what the evaluation is of, or checks that what is there is of the same."""
+    with explained(root):
+        root.mkdir(parents=True, exist_ok=True)
+    clear_scratch(root)
+    path = inside(root, "plan.json")
+    plain = to_plain(facts)
+    if not path.exists():
+        write_whole(root, "plan.json", dump_json(plain))
+        return
+    there = load_json(path)
+    if there != plain:
+        what = ", ".join(differences(there, plain)[:3])
+        raise DatasetError(root, f"holds an evaluation of something else ({what}); use another --out")
+
+
+def _versions(player: Player) -> Json:
+    packages = {"mujoco-gear": "gear", "numpy": "numpy"}
+    versions = {name: importlib.metadata.version(package) for package, name in packages.items()}
+    if "torch" in sys.modules:
+        versions["torch"] = str(sys.modules["torch"].__version__)
+    return versions | {"python": platform.python_version(), "device": str(getattr(player.model, "device", "cpu"))}

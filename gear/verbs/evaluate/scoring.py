@@ -1,0 +1,177 @@
+"""What is made of one answer: figures, result files, and the note that says that the sample is finished."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gear.contracts.evaluation import KeepsPredictions, Reports
+from gear.contracts.tasks import Sample
+from gear.dataset.files import explained, inside, write_whole
+from gear.dataset.reading import Dataset
+from gear.dataset.sidecar import dump_json, load_json
+from gear.plugins.catalogue import Found, one_line
+from gear.plugins.manager import DISTRIBUTION
+from gear.values.errors import GearError
+from gear.values.serial import Json
+from gear.verbs.evaluate.choice import OUTSIDE_PATCH
+from gear.verbs.evaluate.patch_area import mask_figures, patch_masks, widened
+from gear.verbs.evaluate.player import Answer, accusation
+from gear.verbs.evaluate.spread import AnyEvaluator
+
+TASK = "task"
+"""The task's own evaluator, among its reports."""
+
+PREDICTIONS = "predictions"
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Note:
+    """One finished sample.
+
+    Attributes:
+        index: its number in the split.
+        figures: of this sample, by report.
+        parts: evaluators that have seen it alone, by report.
+        cost: `model_s` and `defense_s`.
+        score: of the defense, or None.
+        mask: how its mask lies on the patch, or None.
+        facts: what the task must know to read the prediction back; JSON.
+    """
+
+    index: int
+    figures: Mapping[str, Mapping[str, float]]
+    parts: Mapping[str, AnyEvaluator]
+    cost: Mapping[str, float]
+    score: float | None
+    mask: Mapping[str, float] | None
+    facts: Json
+
+    def as_json(self) -> Json:
+        """As written beside the predictions."""
+        return {
+            "index": self.index,
+            "figures": {name: without_nan(one) for name, one in self.figures.items()},
+            **self.cost,
+            "score": self.score,
+            "mask": None if self.mask is None else without_nan(self.mask),
+            "facts": self.facts,
+        }
+
+
+class Scorer:
+    """Measures and keeps the samples of one dataset; its methods may run in several threads."""
+
+    def __init__(self, dataset: Dataset[Any], root: Path, folder: str, reports: tuple[str, ...], model: Found) -> None:
+        """Args:
+        dataset: whose samples they are.
+        root: of the evaluation.
+        folder: of this dataset in it.
+        reports: further metrics by name.
+        model: whose predictions they are.
+        """
+        self._dataset, self._root, self._folder, self._model = dataset, root, folder, model
+        self._task = dataset.task
+        self._keeper = self._task if isinstance(self._task, KeepsPredictions) else None
+        self.makers: dict[str, Callable[[], AnyEvaluator]] = {TASK: self._task.evaluator}
+        for name in reports:
+            self.makers[name] = self._task.evaluator if name == OUTSIDE_PATCH else self._maker(name)
+
+    def _maker(self, name: str) -> Callable[[], AnyEvaluator]:
+        task = self._task
+        assert isinstance(task, Reports)
+        return lambda: task.reports()[name]
+
+    def kept(self) -> set[int]:
+        """Samples that are finished: their predictions need not be made again."""
+        folder = inside(self._root, f"{self._folder}/samples")
+        if self._keeper is None or not folder.is_dir():
+            return set()
+        return {int(path.stem) for path in folder.glob("*.json") if int(path.stem) < len(self._dataset)}
+
+    def first(self, index: int, sample: Sample, answer: Answer) -> Note:
+        """Measures an answer and writes it, the note last."""
+        with self._blamed(index):
+            figures, parts = self._measure(sample, answer.prediction)
+            encoded = self._keeper and self._keeper.encode_prediction(
+                sample, answer.prediction, self._dataset.plan.info
+            )
+        for relative, data in (encoded.files if encoded else {}).items():
+            write_whole(self._root, f"{self._folder}/{PREDICTIONS}/{relative}", data)
+        note = Note(
+            index=index,
+            figures=figures,
+            parts=parts,
+            cost={"model_s": answer.model_s, "defense_s": answer.defense_s},
+            score=answer.score,
+            mask=None if answer.mask is None else mask_figures(sample, answer.mask),
+            facts=encoded.facts if encoded else None,
+        )
+        write_whole(self._root, f"{self._folder}/samples/{index:06d}.json", dump_json(note.as_json()))
+        return note
+
+    def again(self, index: int) -> Note:
+        """Measures what a former run predicted."""
+        assert self._keeper is not None
+        path = inside(self._root, f"{self._folder}/samples/{index:06d}.json")
+        there = load_json(path)
+        sample = self._dataset[index]
+        folder = inside(self._root, f"{self._folder}/{PREDICTIONS}")
+        with explained(path):
+            prediction = self._keeper.decode_prediction(folder, sample, there["facts"], self._dataset.plan.info)
+        with self._blamed(index):
+            figures, parts = self._measure(sample, prediction)
+        return Note(
+            index=index,
+            figures=figures,
+            parts=parts,
+            cost={"model_s": there["model_s"], "defense_s": there["defense_s"]},
+            score=there["score"],
+            mask=None if there["mask"] is None else _with_nan(there["mask"]),
+            facts=there["facts"],
+        )
+
+    def finish(self, notes: list[Note]) -> None:
+        """Writes the split's own result files."""
+        if self._keeper is None:
+            return
+        rows = [(self._dataset.sidecar(note.index).record, note.facts) for note in notes]
+        for relative, data in self._keeper.finalise_predictions(rows, self._dataset.plan.info).items():
+            write_whole(self._root, f"{self._folder}/{PREDICTIONS}/{relative}", data)
+
+    def _measure(self, sample: Sample, prediction: Any) -> tuple[dict[str, dict[str, float]], dict[str, AnyEvaluator]]:
+        parts = {name: make() for name, make in self.makers.items()}
+        figures = {}
+        for name, part in parts.items():
+            seen = sample
+            if name == OUTSIDE_PATCH:
+                seen = self._task.without(sample, widened(patch_masks(sample)))  # type: ignore[attr-defined]
+            figures[name] = dict(part.update(seen, prediction))
+        return figures, parts
+
+    @contextmanager
+    def _blamed(self, index: int) -> Iterator[None]:
+        """A prediction that does not suit the task is its model's fault; gear's own keep their traceback.
+
+        Threads must not share a redirected stdout, so this is not `gear.plugins.build.blamed`.
+        """
+        try:
+            yield
+        except GearError:
+            raise
+        except Exception as error:
+            if self._model.owner.package == DISTRIBUTION:
+                raise
+            raise accusation(self._model, f"prediction of sample {index}", one_line(error)) from error
+
+
+def without_nan(figures: Mapping[str, float]) -> dict[str, float | None]:
+    """JSON has no NaN."""
+    return {name: float(value) if value == value else None for name, value in figures.items()}
+
+
+def _with_nan(figures: Mapping[str, float | None]) -> dict[str, float]:
+    return {name: float("nan") if value is None else value for name, value in figures.items()}

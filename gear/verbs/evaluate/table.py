@@ -1,0 +1,83 @@
+"""The table that a person reads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from gear.verbs.evaluate.report import Difference, Estimate, EvaluateReport, RowReport
+from gear.verbs.evaluate.scoring import TASK
+
+COLUMNS, FURTHER = 4, 2
+"""Figures that are shown, of the task's own and of each report; all are in results.json."""
+
+
+def table(report: EvaluateReport) -> str:
+    """Datasets as rows, each report's first figures as columns, twins' differences below the dataset."""
+    columns = _columns(report)
+    head = ["", "samples", *(_title(*column) for column in columns), "model s", "defense s", "mask IoU", "AUROC"]
+    lines = []
+    for row in report.rows:
+        lines.append(_row(row, columns))
+        lines += [_difference(one, report, columns) for one in report.differences if one.row == row.name]
+    used = [i for i, title in enumerate(head) if title in ("", "samples") or any(line[i] for line in lines)]
+    text = _aligned([[line[i] for i in used] for line in [head, *lines]])
+    guarded = report.facts["defense"]
+    title = f"{report.facts['task']['name']}: {report.facts['model']['name']}"
+    title += f" guarded by {guarded['name']}" if guarded else ""
+    return "\n".join([title, *text, *_absent(report)]) + "\n"
+
+
+def _columns(report: EvaluateReport) -> list[tuple[str, str]]:
+    seen: dict[tuple[str, str], None] = {}
+    for row in report.rows:
+        for name, figures in row.figures.items():
+            shown = list(figures)[: COLUMNS if name == TASK else FURTHER]
+            seen |= dict.fromkeys((name, figure) for figure in shown)
+    return list(seen)
+
+
+def _title(report: str, figure: str) -> str:
+    return figure if report == TASK else f"{report}.{figure}"
+
+
+def _row(row: RowReport, columns: Iterable[tuple[str, str]]) -> list[str]:
+    figures = [_estimate(row.figures.get(report, {}).get(name)) for report, name in columns]
+    defended = f"{row.cost['defense_s']:.3f}" if row.cost["defense_s"] else ""
+    mask = _number(row.defense.get("mask_iou")) if "mask_iou" in row.defense else ""
+    return [row.name, str(row.samples), *figures, f"{row.cost['model_s']:.3f}", defended, mask, ""]
+
+
+def _difference(one: Difference, report: EvaluateReport, columns: Iterable[tuple[str, str]]) -> list[str]:
+    against = next(row for row in report.rows if row.name == one.against)
+    figures = [_estimate(one.figures.get(name, {}).get(figure), is_signed=True) for name, figure in columns]
+    return [f"  minus {against.patch}", "", *figures, "", "", "", _estimate(one.auroc)]
+
+
+def _estimate(one: Estimate | None, *, is_signed: bool = False) -> str:
+    if one is None:
+        return ""
+    text = _number(one.value, is_signed=is_signed)
+    return text if one.interval is None else f"{text} [{_number(one.interval[0])}, {_number(one.interval[1])}]"
+
+
+def _number(value: float | None, *, is_signed: bool = False) -> str:
+    if value is None or value != value:
+        return "-"
+    sign = "+" if is_signed else ""
+    return f"{value:{sign}.3f}" if abs(value) < 100 else f"{value:{sign}.1f}"
+
+
+def _absent(report: EvaluateReport) -> list[str]:
+    """What had nothing to be measured on; rows and reports that agree share a line."""
+    where: dict[tuple[str, ...], list[str]] = {}
+    for row in report.rows:
+        for name, figures in row.figures.items():
+            missing = tuple(figure for figure, one in figures.items() if one.value != one.value)
+            if missing:
+                where.setdefault(missing, []).append(row.name if name == TASK else f"{row.name} ({name})")
+    return [f"nothing to measure for {', '.join(missing)} in {', '.join(rows)}" for missing, rows in where.items()]
+
+
+def _aligned(cells: Sequence[Sequence[str]]) -> list[str]:
+    widths = [max(len(line[i]) for line in cells) for i in range(len(cells[0]))]
+    return ["  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in cells]

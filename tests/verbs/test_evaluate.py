@@ -1,0 +1,346 @@
+"""`gear evaluate` on tiny datasets: figures, files, resuming, twins, defenses, and who is blamed."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sys
+import types
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from importlib.metadata import EntryPoint
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+import gear
+from gear.cli.main import main
+from gear.contracts.defenses import DefenseResult
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.specs import DefenseSpec, ModelSpec
+from gear.formats.kitti_object import parse_labels
+from gear.plugins import build as building
+from gear.plugins.manager import discover
+from gear.testing.tiny_networks import tiny_depth, tiny_segmenter
+from gear.values.errors import ConfigError, DatasetError, GearError, PluginError, UnknownNameError
+from gear.values.frames import UInt8Image
+from gear.verbs.collect.run import CollectReport
+from gear.verbs.evaluate.patch_area import patch_masks
+from gear.verbs.evaluate.run import evaluate
+
+Collect = Callable[..., CollectReport]
+Install = Callable[..., None]
+Views = Mapping[str, UInt8Image]
+HEADLINES = {"semseg": ("miou", 1), "depth": ("rmse_m", 0), "detect2d": ("ap", 1), "stereo3d": ("car_2d_easy_r40", 1)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Config:
+    strength: float = 1.0
+
+
+class Oracle:
+    """Knows the truth of every picture that it was shown beforehand; may change it."""
+
+    def __init__(self, roots: list[Path], change: Callable[[Any, Any], Any] | None = None) -> None:
+        self.known: dict[str, Any] = {}
+        self.shown = 0
+        for root in roots:
+            dataset = gear.open_dataset(root)
+            for sample in dataset:
+                prediction = dataset.task.as_prediction(sample)
+                self.known[self.key(sample.images)] = change(sample, prediction) if change else prediction
+
+    @staticmethod
+    def key(views: Views) -> str:
+        return hashlib.sha256(views["left"].tobytes()).hexdigest()
+
+    def predict(self, views: Views) -> Any:
+        self.shown += 1
+        return self.known[self.key(views)]
+
+    def taps(self) -> Mapping[str, Any]:
+        return {}
+
+
+def model_spec(build: Callable[[Any], Any], task: str, **facts: Any) -> ModelSpec[Any]:
+    spec: dict[str, Any] = {"tasks": (task,), "views": ("left",)} | facts
+    return ModelSpec(name="odd", summary="Odd.", config=Config, build=build, **spec)
+
+
+@pytest.fixture
+def install(monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
+    def put(*specs: Any) -> None:
+        module = types.ModuleType("odd_package")
+        for hook, kind in (("gear_models", ModelSpec), ("gear_defenses", DefenseSpec)):
+            chosen = [spec for spec in specs if isinstance(spec, kind)]
+            setattr(module, hook, hookimpl(lambda chosen=chosen: chosen, specname=hook))
+        sys.modules["odd_package"] = module
+        found = discover([EntryPoint(name="odd", value="odd_package", group="gear")])
+        monkeypatch.setattr(building, "catalogue", lambda: found)
+
+    yield put
+    sys.modules.pop("odd_package", None)
+
+
+def timeless(path: Path) -> Any:
+    def strip(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {key: strip(item) for key, item in value.items() if key not in ("model_s", "defense_s", "cost")}
+        return [strip(item) for item in value] if isinstance(value, list) else value
+
+    return strip(json.loads((path / "results.json").read_text()))
+
+
+@pytest.mark.parametrize("task", HEADLINES)
+def test_the_truth_scores_perfect_and_is_kept_in_the_formats_layout(
+    tmp_path: Path, collect_small: Collect, install: Install, task: str
+) -> None:
+    data = tmp_path / "data"
+    collect_small(task, data, patch="random")
+    install(model_spec(lambda _: Oracle([data]), task))
+    report = evaluate(data, model="odd", out=tmp_path / "out", reports=["reference"], resamples=20)
+    (row,) = report.rows
+    assert (row.samples, row.made) == (2, 2)
+    figure, perfect = HEADLINES[task]
+    if task != "stereo3d":  # two pictures have too few labels for forty recall steps
+        assert row.figures["task"][figure].value == pytest.approx(perfect)
+    assert "reference" in row.figures
+    folder = tmp_path / "out" / row.name / "predictions"
+    dataset = gear.open_dataset(data)
+    for index, sample in enumerate(dataset):
+        truth = dataset.task.as_prediction(sample)
+        if task == "semseg":
+            paths = sorted(folder.rglob(f"*_{index:06d}_000000*.png"))
+            assert len(paths) == 1 and np.array_equal(cv2.imread(str(paths[0]), cv2.IMREAD_UNCHANGED), truth)
+        elif task == "depth":
+            units = cv2.imread(str(folder / f"depth/rgb_{index:04d}.png"), cv2.IMREAD_UNCHANGED)
+            near = truth < 255
+            assert units.dtype == np.uint16 and np.abs(units[near] / 256 - truth[near]).max() <= 1 / 512
+        elif task == "stereo3d":
+            assert parse_labels((folder / f"data/{index:06d}.txt").read_text()) == truth
+        else:
+            found = [o for o in json.loads((folder / "coco_results_debug.json").read_text()) if o["image_id"] == index]
+            assert [(o["category_id"], o["bbox"][0]) for o in found] == [(t.category_id, t.box_px[0]) for t in truth]
+    assert json.loads((tmp_path / "out/results.json").read_text())["rows"][0]["samples"] == 2
+    assert (tmp_path / "out/table.txt").read_text().startswith(f"{task}: odd\n")
+    assert not (tmp_path / "out/gear").exists()
+
+
+@pytest.mark.parametrize("task", HEADLINES)
+def test_it_is_taken_up_again_and_predicts_nothing_twice(
+    tmp_path: Path, collect_small: Collect, install: Install, task: str
+) -> None:
+    data = tmp_path / "data"
+    collect_small(task, data, patch="random", samples=3)
+    oracle = Oracle([data])
+    install(model_spec(lambda _: oracle, task))
+
+    noted: list[int] = []
+
+    def count(finished: int, total: int) -> None:
+        noted.append(finished)
+
+    folder = tmp_path / "out"
+    evaluate(data, model="odd", out=tmp_path / "whole", reports=["reference"], resamples=20, progress=count)
+    assert noted == [0, 1, 2, 3]
+    evaluate(data, model="odd", out=folder, reports=["reference"], resamples=20)
+    (row,) = sorted(path for path in folder.iterdir() if path.is_dir())
+    (row / "samples/000001.json").unlink()
+    (folder / "results.json").unlink()
+    oracle.shown = 0
+    report = evaluate(data, model="odd", out=folder, reports=["reference"], resamples=20)
+    assert report.rows[0].made == 1 and oracle.shown == 1
+    assert timeless(folder) == timeless(tmp_path / "whole")
+    with pytest.raises(DatasetError, match=r"something else \(seed: 0 there, 1 now\)"):
+        evaluate(data, model="odd", out=folder, seed=1)
+
+
+def test_batches_and_threads_change_nothing(tmp_path: Path, collect_small: Collect, install: Install) -> None:
+    data = tmp_path / "data"
+    collect_small("semseg", data, patch="random", samples=5)
+    install(tiny_segmenter)
+    evaluate(data, model="tiny_segmenter", out=tmp_path / "one", workers=1, resamples=30)
+    evaluate(data, model="tiny_segmenter", out=tmp_path / "two", workers=4, batch=3, resamples=30)
+    one, two = timeless(tmp_path / "one"), timeless(tmp_path / "two")
+    assert one == two
+    assert len(one["model"]["weights_sha256"]) == 64
+    figure = one["rows"][0]["figures"]["task"]["pixel_accuracy"]
+    assert 0 <= figure["low"] <= figure["value"] <= figure["high"] <= 1 and figure["low"] < figure["high"]
+    assert [s["index"] for s in one["rows"][0]["per_sample"]] == [0, 1, 2, 3, 4]
+
+
+def test_twins_are_compared_and_the_patch_can_be_left_out(
+    tmp_path: Path, collect_small: Collect, install: Install
+) -> None:
+    """A network that is wrong on the random patch alone."""
+    roots = [tmp_path / "none", tmp_path / "random"]
+    for root in roots:
+        collect_small("semseg", root, patch=root.name)
+
+    def fooled(sample: Any, prediction: Any) -> Any:
+        is_patched = (
+            gear.open_dataset(roots[1])[sample.record.index].images["left"].tobytes() == sample.images["left"].tobytes()
+        )
+        return np.where(patch_masks(sample)["left"] & is_patched, np.uint8(26), prediction)
+
+    install(model_spec(lambda _: Oracle(roots, fooled), "semseg"))
+    report = evaluate(roots, model="odd", out=tmp_path / "out", reports=["outside_patch"], resamples=50)
+    none, random = report.row("none"), report.row("random")
+    assert none.figures["task"]["miou"].value == 1
+    # The board is "static" in Cityscapes, which is not evaluated: nothing is lost by being wrong there.
+    board = {p for s in gear.open_dataset(roots[0]) for p in np.unique(s.label_ids[patch_masks(s)["left"]]).tolist()}
+    assert board == {4} and random.figures["task"]["miou"].value == 1
+    (difference,) = report.differences
+    assert (difference.row, difference.against) == (random.name, none.name)
+    assert difference.figures["task"]["miou"].value == 0 and difference.auroc is None
+
+
+def test_figures_outside_the_patch_do_not_see_it(tmp_path: Path, collect_small: Collect, install: Install) -> None:
+    data = tmp_path / "data"
+    collect_small("depth", data, patch="random")
+
+    def wrong_there(sample: Any, prediction: Any) -> Any:
+        return np.where(patch_masks(sample)["left"], np.float32(3.0), prediction)
+
+    install(model_spec(lambda _: Oracle([data], wrong_there), "depth"))
+    (row,) = evaluate(data, model="odd", out=tmp_path / "out", reports=["outside_patch"]).rows
+    assert row.figures["task"]["rmse_m"].value > 0.1
+    assert row.figures["outside_patch"]["rmse_m"].value == 0
+    low, high = row.figures["task"]["rmse_m"].interval or (0, 0)
+    assert low <= row.figures["task"]["rmse_m"].value <= high
+
+
+class Finder:
+    """A defense that knows random noise when it sees it, and says how it was called."""
+
+    def __init__(self, roots: list[Path]) -> None:
+        self.masks, self.fits = {}, []  # type: ignore[var-annotated]
+        for root in roots:
+            for sample in gear.open_dataset(root):
+                self.masks[Oracle.key(sample.images)] = patch_masks(sample)["left"] & (root.name == "random")
+
+    def fit(self, clean: Any, patched: Any, model: Any, rng: np.random.Generator) -> Any:
+        self.fits.append((len(clean), len(patched), clean[0]["left"].shape, [set(v) for v in clean[:1]]))
+        return {"learnt": True}
+
+    def apply(self, views: Views, model: Any, state: Any, rng: np.random.Generator) -> DefenseResult:
+        assert state == {"learnt": True} and model is not None
+        mask = self.masks[Oracle.key(views)].astype(np.float32)
+        return DefenseResult(views=views, mask={"left": mask}, score=float(mask.mean()))
+
+    def wrap(self, model: Any) -> Any:
+        return types.SimpleNamespace(predict=lambda views: model.predict(views), taps=model.taps)
+
+
+def test_a_defense_is_fitted_wrapped_and_judged(tmp_path: Path, collect_small: Collect, install: Install) -> None:
+    roots = [tmp_path / "none", tmp_path / "random"]
+    for root in roots:
+        collect_small("semseg", root, patch=root.name)
+    finder = Finder(roots)
+    spec: DefenseSpec[Any] = DefenseSpec(
+        name="finder", summary="Finds.", config=Config, build=lambda _: finder,  # type: ignore[arg-type]
+        needs_calibration=True, needs_model=True, outputs=frozenset({"images", "mask", "score"}), taps=("stem",),
+    )  # fmt: skip
+    install(spec, tiny_segmenter, model_spec(lambda _: Oracle(roots), "semseg"))
+    with pytest.raises(GearError, match=r"'finder' needs the feature maps stem; 'odd' has none"):
+        evaluate(roots, model="odd", defense="finder", calibration=roots[0], out=tmp_path / "x")
+    with pytest.raises(GearError, match="give --calibration DIR"):
+        evaluate(roots, model="tiny_segmenter", defense="finder", out=tmp_path / "x")
+    assert not (tmp_path / "x").exists()
+    report = evaluate(
+        roots, model="tiny_segmenter", defense="finder", calibration=roots[0], calibration_patched=roots[1],
+        out=tmp_path / "out", resamples=20,
+    )  # fmt: skip
+    assert finder.fits == [(2, 2, (160, 320, 3), [{"left"}])]
+    assert report.row("random").defense["mask_iou"] == 1 and "mask_iou" not in report.row("none").defense
+    assert report.row("none").defense["mask_area"] == 0
+    (difference,) = report.differences
+    assert difference.auroc is not None and difference.auroc.value == 1
+    assert report.row("none").cost["defense_s"] > 0
+    text = (tmp_path / "out/table.txt").read_text()
+    assert "guarded by finder" in text and "minus none" in text and "mask IoU" in text
+
+
+def test_a_built_in_defense_by_the_command(
+    tmp_path: Path, collect_small: Collect, install: Install, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = tmp_path / "data"
+    collect_small("depth", data, patch="random")
+    install(tiny_depth)
+    command = ["evaluate", "--model", "tiny_depth", "--data", str(data), "--resamples", "10"]
+    assert main([*command, "--out", str(tmp_path / "plain")]) == 0
+    plain = capsys.readouterr().out
+    assert plain.startswith("depth: tiny_depth\n") and "mae_m" in plain and "defense" not in plain
+    guard = ["--defense", "jpeg", "--defense-set", "quality=5"]
+    assert main([*command, *guard, "--out", str(tmp_path / "jpeg"), "--json"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["defense"]["options"]["quality"] == 5 and facts["model"]["name"] == "tiny_depth"
+    plain_figure = timeless(tmp_path / "plain")["rows"][0]["figures"]["task"]["mae_m"]["value"]
+    assert facts["rows"][0]["figures"]["task"]["mae_m"]["value"] != plain_figure
+    assert facts == json.loads((tmp_path / "jpeg/results.json").read_text())
+
+
+def test_bad_input_is_refused_before_anything_is_built(
+    tmp_path: Path, collect_small: Collect, install: Install
+) -> None:
+    collect_small("semseg", tmp_path / "data")
+    collect_small("depth", tmp_path / "depth")
+
+    def never(_: Any) -> Any:
+        raise AssertionError("built")
+
+    other: DefenseSpec[Any] = DefenseSpec(name="other", summary="O.", config=Config, build=never, tasks=("depth",))
+    install(model_spec(never, "semseg", views=("right",)), tiny_depth, tiny_segmenter, other)
+    cases: list[tuple[type[Exception], str, dict[str, Any]]] = [
+        (UnknownNameError, "did you mean tiny_depth", {"model": "tiny_dept"}),
+        (GearError, "'tiny_depth' does depth; .* is a semseg dataset", {"model": "tiny_depth"}),
+        (GearError, "looks at right", {"model": "odd"}),
+        (ConfigError, "did you mean 'width'", {"settings": ["widht=3"]}),
+        (UnknownNameError, "did you mean reference", {"reports": ["referense"]}),
+        (GearError, "'other' is for depth", {"defense": "other"}),
+        (GearError, "are the same data", {"data": [tmp_path / "data", tmp_path / "data"]}),
+        (GearError, "nothing to evaluate", {"data": []}),
+        (GearError, "is a depth dataset, .* a semseg one", {"data": [tmp_path / "data", tmp_path / "depth"]}),
+        (GearError, "at least 1", {"batch": 0}),
+        (DatasetError, "no gear/<split>/plan.json", {"data": tmp_path / "nowhere"}),
+        (DatasetError, "is a dataset", {"out": tmp_path / "data"}),
+    ]
+    for kind, message, changes in cases:
+        arguments = {"data": tmp_path / "data", "model": "tiny_segmenter", "out": tmp_path / "x"} | changes
+        with pytest.raises(kind, match=message):
+            evaluate(arguments.pop("data"), **arguments)
+    assert not (tmp_path / "x").exists()
+
+
+def boom(views: Views) -> Any:
+    raise RuntimeError("boom")
+
+
+@pytest.mark.parametrize(
+    ("predict", "message"),
+    [
+        (boom, r"odd \(odd_package \?\) failed at predict on sample 0: RuntimeError: boom"),
+        (lambda views: sys.exit(3), "SystemExit: 3"),
+        (lambda views: np.zeros((3, 3), np.uint8), r"prediction of sample 0: ValueError: prediction must have shape"),
+        (lambda views: None, "prediction of sample 0: AttributeError"),
+        (lambda views: views["left"].__setitem__(0, 0), "ValueError: assignment destination is read-only"),
+    ],
+)
+def test_a_bad_model_is_named(
+    tmp_path: Path, collect_small: Collect, install: Install, predict: Callable[[Views], Any], message: str
+) -> None:
+    collect_small("semseg", tmp_path / "data")
+    install(model_spec(lambda _: types.SimpleNamespace(predict=predict), "semseg"))
+    with pytest.raises(PluginError, match=message):
+        evaluate(tmp_path / "data", model="odd", out=tmp_path / "out")
+
+
+def test_a_batch_of_too_few_answers_is_named(tmp_path: Path, collect_small: Collect, install: Install) -> None:
+    collect_small("semseg", tmp_path / "data")
+    install(model_spec(lambda _: types.SimpleNamespace(predict=boom, predict_many=lambda many: []), "semseg"))
+    with pytest.raises(PluginError, match="gave 0 answers to 2 samples"):
+        evaluate(tmp_path / "data", model="odd", out=tmp_path / "out", batch=2)
