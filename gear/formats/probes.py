@@ -17,6 +17,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from gear.camera.response import Response
 from gear.contracts.tasks import Auxiliary, Sidecar
 from gear.dataset.files import inside, read_bytes
 from gear.dataset.layout import auxiliary_path
@@ -29,6 +30,7 @@ AuxiliaryFiles = Mapping[str, tuple[Auxiliary, bytes]]
 
 KIND = "probes"
 _SHADES = ("black", "white")
+_RESPONSE = ("exposure", "contrast", "encoding")
 _PNG = [cv2.IMWRITE_PNG_COMPRESSION, 6, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_PAETH]
 
 
@@ -42,6 +44,7 @@ class Probe:
         left_px, top_px: index pixel of the crop's first pixel.
         black: (h, w, 3) uint16, linear light 0..`LINEAR_FULL_SCALE`, every surface black.
         white: (h, w, 3) uint16, the same with this surface white.
+        response: what makes pictures of such frames; the pictures of the sample were made with it.
     """
 
     surface: str
@@ -50,6 +53,7 @@ class Probe:
     top_px: int
     black: UInt16Image
     white: UInt16Image
+    response: Response
 
     @property
     def name(self) -> str:
@@ -57,7 +61,7 @@ class Probe:
         return f"probe/{self.view}/{self.surface}"
 
 
-def crop_probe(surface: str, view: str, black: UInt16Image, white: UInt16Image) -> Probe | None:
+def crop_probe(surface: str, view: str, black: UInt16Image, white: UInt16Image, response: Response) -> Probe | None:
     """The smallest crop of two (H, W, 3) frames that holds all pixels in which they differ; None where none does."""
     reach = (black != white).any(axis=2)
     rows, columns = np.flatnonzero(reach.any(axis=1)), np.flatnonzero(reach.any(axis=0))
@@ -71,6 +75,7 @@ def crop_probe(surface: str, view: str, black: UInt16Image, white: UInt16Image) 
         top_px=int(rows[0]),
         black=black[crop].copy(),
         white=white[crop].copy(),
+        response=response,
     )
 
 
@@ -78,7 +83,8 @@ def probe_files(probes: Sequence[Probe], split: str, index: int) -> AuxiliaryFil
     """Two 16-bit RGB PNG files a probe."""
     files = {}
     for probe in probes:
-        facts = {"left_px": probe.left_px, "top_px": probe.top_px}
+        response = {name: getattr(probe.response, name) for name in _RESPONSE}
+        facts = {"left_px": probe.left_px, "top_px": probe.top_px, "response": response}
         for shade, picture in zip(_SHADES, (probe.black, probe.white), strict=True):
             path = auxiliary_path(split, KIND, index, f"{probe.view}_{probe.surface}_{shade}.png")
             files[f"{probe.name}/{shade}"] = (Auxiliary(path=path, facts=facts), _encode(picture))
@@ -124,6 +130,7 @@ def _read(dataset: Dataset[Any], sidecar: Sidecar, view: str, surface: str) -> P
         top_px=int(facts["top_px"]),
         black=black,
         white=white,
+        response=Response(**{name: facts["response"][name] for name in _RESPONSE}),
     )
 
 

@@ -56,7 +56,7 @@ def develop_probes(
         black = quiet.view(developed(shot.black), camera, record, geoms).linear_rgb
         for surface, raws in shot.white.items():
             white = quiet.view(developed(raws), camera, record, geoms).linear_rgb
-            probe = crop_probe(surface, camera.name, black, white)
+            probe = crop_probe(surface, camera.name, black, white, darkroom.response)
             if probe is not None:
                 probes.append(probe)
     return probes

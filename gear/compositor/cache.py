@@ -1,0 +1,43 @@
+"""What was computed last is kept, up to so many bytes."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from typing import Generic, Protocol, TypeVar
+
+
+class Sized(Protocol):
+    """Something that knows its memory."""
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes that it takes."""
+        ...
+
+
+ThingT = TypeVar("ThingT", bound=Sized)
+
+
+class Cache(Generic[ThingT]):
+    """Things by key; the one that was not used for the longest time goes first. Not for several threads."""
+
+    def __init__(self, max_bytes: int) -> None:
+        self._max_bytes = max_bytes
+        self._things: OrderedDict[Hashable, ThingT] = OrderedDict()
+        self.nbytes = 0
+
+    def __len__(self) -> int:
+        return len(self._things)
+
+    def get(self, key: Hashable, make: Callable[[], ThingT]) -> ThingT:
+        """The thing of that key, made if it is not there; what is larger than the cache is not kept."""
+        if key in self._things:
+            self._things.move_to_end(key)
+            return self._things[key]
+        thing = make()
+        self._things[key] = thing
+        self.nbytes += thing.nbytes
+        while self.nbytes > self._max_bytes and self._things:
+            self.nbytes -= self._things.popitem(last=False)[1].nbytes
+        return thing

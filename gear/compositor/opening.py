@@ -1,0 +1,48 @@
+"""Compositors by name."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from gear.compositor.pasting import CACHE_BYTES, Pasting
+from gear.values.errors import UnknownNameError
+
+if TYPE_CHECKING:
+    import torch
+
+    from gear.dataset.reading import Dataset
+
+COMPOSITORS = ("transport", "homography")
+"""Names that `open_compositor` answers to, the default first."""
+
+
+def open_compositor(
+    name: str,
+    dataset: Dataset[Any],
+    *,
+    device: str | torch.device = "cpu",
+    rounding: bool = False,
+    cache_bytes: int = CACHE_BYTES,
+) -> Pasting:
+    """A compositor for the samples of a dataset.
+
+    Args:
+        name: one of `COMPOSITORS`.
+        dataset: with probes, for `transport`.
+        device: where to compute.
+        rounding: whether patches and pictures are rounded to bytes, as files are.
+        cache_bytes: memory for what is worked out once a sample.
+
+    Raises:
+        UnknownNameError: there is no such compositor.
+        DatasetError: the dataset has no probes, and they are needed.
+    """
+    if name == "transport":
+        from gear.compositor.transport import TransportCompositor
+
+        return TransportCompositor(dataset, device=device, rounding=rounding, cache_bytes=cache_bytes)
+    if name == "homography":
+        from gear.compositor.homography import HomographyCompositor
+
+        return HomographyCompositor(dataset, device=device, rounding=rounding, cache_bytes=cache_bytes)
+    raise UnknownNameError("compositor", name, COMPOSITORS)

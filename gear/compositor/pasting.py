@@ -1,0 +1,152 @@
+"""What compositors share: which sample, which view, which patches; pictures out of stored ones and composed pixels."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from gear.compositor.cache import Cache
+from gear.dataset.reading import Dataset
+from gear.values.errors import DatasetError
+from gear.values.frames import UInt8Image
+
+Sizes = tuple[tuple[int, int], ...]
+"""Height and width of each patch."""
+
+CACHE_BYTES = 1 << 30
+"""What a compositor keeps of samples that it has seen: at 512x256 some 3 MB each, at 2048x1024 some 30."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prepared:
+    """One view of one sample, ready for any patches of given sizes.
+
+    Attributes:
+        picture: (3, H, W) uint8, as stored.
+        where: (N,) int64, pixels that are composed, row-major.
+        inner: whatever the compositor needs to compose them.
+        inner_bytes: memory that `inner` takes.
+    """
+
+    picture: Tensor
+    where: Tensor
+    inner: Any
+    inner_bytes: int
+
+    @property
+    def nbytes(self) -> int:
+        """Memory in all."""
+        return self.picture.nbytes + self.where.nbytes + self.inner_bytes
+
+
+class Pasting:
+    """A compositor that replaces some pixels of stored pictures. Subclasses say which and by what.
+
+    Args:
+        dataset: the split whose samples are composed; its pictures are the background.
+        device: where to compute.
+        rounding: whether patches and pictures are rounded to bytes, as files are; gradients pass straight through.
+        cache_bytes: memory for what is worked out once a sample.
+    """
+
+    def __init__(
+        self,
+        dataset: Dataset[Any],
+        *,
+        device: str | torch.device = "cpu",
+        rounding: bool = False,
+        cache_bytes: int = CACHE_BYTES,
+    ) -> None:
+        self.dataset = dataset
+        self.device = torch.device(device)
+        self.rounding = rounding
+        self._cache: Cache[Prepared] = Cache(cache_bytes)
+
+    @property
+    def surfaces(self) -> int:
+        """How many patches it takes."""
+        return len(self.dataset.sidecar(0).record.surfaces)
+
+    def compose(self, patches: Sequence[Tensor], samples: Sequence[int], view: str) -> Tensor:
+        """(B, 3, H, W) float32 pictures in 0..1 of the samples with the patches on their surfaces.
+
+        Differentiable to the patches. Pixels that no surface reaches are the dataset's own, bit for bit.
+
+        Args:
+            patches: one a surface, sRGB in 0..1: (3, h, w) for all samples, or (B, 3, h, w) with one each.
+            samples: indices in the dataset.
+            view: name of the camera.
+
+        Raises:
+            ValueError: the number or the shape of the patches is wrong.
+            DatasetError: the dataset lacks what is needed.
+        """
+        shown = [self._checked(patch, len(samples)) for patch in patches]
+        sizes: Sizes = tuple((int(patch.shape[-2]), int(patch.shape[-1])) for patch in shown)
+        views = [self._cache.get((i, view, sizes), partial(self._load, i, view, sizes)) for i in samples]
+        columns = self._columns(shown)
+        pictures = torch.stack([v.picture for v in views]).to(torch.float32) / 255
+        flat, values = [], []
+        pixels = pictures[0, 0].numel()
+        channels = torch.arange(3, device=self.device)[:, None] * pixels
+        for number, prepared in enumerate(views):
+            mine = [c if c.ndim == 2 else c[number] for c in columns]
+            values.append(self._composed(prepared.inner, mine).T.reshape(-1))
+            flat.append((prepared.where[None, :] + channels + number * 3 * pixels).reshape(-1))
+        composed = torch.cat(values)
+        if self.rounding:
+            composed = rounded(composed)
+        pictures.view(-1).index_copy_(0, torch.cat(flat), composed)
+        return pictures
+
+    @abstractmethod
+    def _load(self, index: int, view: str, sizes: Sizes) -> Prepared:
+        """Works out what one view of one sample needs."""
+
+    @abstractmethod
+    def _columns(self, patches: Sequence[Tensor]) -> list[Tensor]:
+        """(columns, 3) or (B, columns, 3) of each patch's pyramid."""
+
+    @abstractmethod
+    def _composed(self, inner: Any, columns: Sequence[Tensor]) -> Tensor:
+        """(N, 3) values in 0..1 of the pixels that are composed."""
+
+    def _checked(self, patch: Tensor, batch: int) -> Tensor:
+        is_one = patch.ndim == 3
+        if patch.ndim not in (3, 4) or patch.shape[-3] != 3 or (not is_one and patch.shape[0] != batch):
+            raise ValueError(f"a patch must be (3, h, w), or ({batch}, 3, h, w) here, got {tuple(patch.shape)}")
+        moved = patch.to(self.device, torch.float32)
+        return rounded(moved) if self.rounding else moved
+
+    def _prepare(self, picture: UInt8Image, where: Any, inner: Any, inner_bytes: int) -> Prepared:
+        stored = torch.from_numpy(np.ascontiguousarray(picture.transpose(2, 0, 1))).to(self.device)
+        return Prepared(stored, torch.from_numpy(where).to(self.device), inner, inner_bytes)
+
+    def _demand(self, patches: Sizes, surfaces: int) -> None:
+        if len(patches) != surfaces:
+            raise ValueError(f"there are {surfaces} surfaces, got {len(patches)} patches")
+
+
+def rounded(values: Tensor) -> Tensor:
+    """Values in 0..1 as bytes hold them; gradients pass as if nothing had happened."""
+    stepped = torch.floor(values.detach() * 255 + 0.5) / 255
+    return values + (stepped - values.detach())
+
+
+def picture_of(sample: Any, view: str, dataset: Dataset[Any]) -> UInt8Image:
+    """A sample's stored picture.
+
+    Raises:
+        DatasetError: there is no such view.
+    """
+    if view not in sample.images:
+        raise DatasetError(dataset.root, f"has no view {view!r}; there are: {', '.join(sample.images)}")
+    picture: UInt8Image = sample.images[view]
+    return picture

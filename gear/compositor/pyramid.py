@@ -1,0 +1,148 @@
+"""A face's texture and its mip levels as linear functions of the patch.
+
+A patch becomes a face by area averages, and a face its mip levels by halving. Both work on rows and columns apart:
+level = rows @ patch @ columns.T. Levels that are finer than the patch are not made at all: what would read their
+texels reads the patch's pixels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.values.geometry import Array, frozen
+from gear.world.faces import FACE_SIZE_PX, box_matrix
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+Ints = npt.NDArray[np.int64]
+
+
+def halving_matrix(size: int) -> Array:
+    """(max(1, size // 2), size): a renderer's next mip level along one axis.
+
+    An even size is averaged in pairs. An odd one is read bilinearly at the middles of the larger texels, as blits do.
+    """
+    target = max(1, size // 2)
+    at = (np.arange(target) + 0.5) * size / target - 0.5
+    low = np.clip(np.floor(at).astype(int), 0, size - 1)
+    high = np.minimum(low + 1, size - 1)
+    matrix = np.zeros((target, size))
+    matrix[np.arange(target), low] += 1 - (at - low)
+    matrix[np.arange(target), high] += at - low
+    return frozen(matrix)
+
+
+@lru_cache(maxsize=16)
+def axis_matrices(patch_px: int, face_px: int) -> tuple[Array, ...]:
+    """From a patch's pixels to each mip level's texels along one axis, the face itself first, down to one texel."""
+    matrices = [box_matrix(patch_px, face_px)]
+    while matrices[-1].shape[0] > 1:
+        matrices.append(frozen(halving_matrix(matrices[-1].shape[0]) @ matrices[-1]))
+    return tuple(matrices)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reads:
+    """What stands for the texels of one axis of a level: a few columns each, with weights.
+
+    Attributes:
+        index: (texels, k) int64.
+        weight: (texels, k) float64, rows sum to 1.
+    """
+
+    index: Ints
+    weight: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pyramid:
+    """Where each mip level of a face lies in one list of columns, for patches of one size.
+
+    Attributes:
+        height_px, width_px: of the patch.
+        rows, columns: matrices of each level.
+        folded: so many levels, the finest, are read from the patch itself.
+        starts: where each level's texels begin; 0, the patch, for folded ones.
+        size: number of columns.
+    """
+
+    height_px: int
+    width_px: int
+    rows: tuple[Array, ...]
+    columns: tuple[Array, ...]
+    folded: int
+    starts: tuple[int, ...]
+    size: int
+
+    @property
+    def levels(self) -> int:
+        """How many there are."""
+        return len(self.starts)
+
+    def shape(self, level: int) -> tuple[int, int]:
+        """Rows and columns of a level's texels."""
+        return self.rows[level].shape[0], self.columns[level].shape[0]
+
+    def reads(self, level: int) -> tuple[Reads, Reads, int]:
+        """For rows and columns of a level: what is read; and how many columns lie between two rows."""
+        if level < self.folded:
+            return _nonzero(self.rows[level]), _nonzero(self.columns[level]), self.width_px
+        height, width = self.shape(level)
+        return _identity(height), _identity(width), width
+
+    def spread(self, patch: Tensor) -> Tensor:
+        """The columns of a patch: (..., 3, h, w) light to (..., size, 3)."""
+        import torch
+
+        parts = [patch.flatten(-2)]
+        for level in range(self.folded, self.levels):
+            rows, columns = (
+                torch.as_tensor(np.array(m[level]), dtype=patch.dtype, device=patch.device)
+                for m in (self.rows, self.columns)
+            )
+            parts.append((rows @ patch @ columns.T).flatten(-2))
+        return torch.cat(parts, dim=-1).transpose(-1, -2).contiguous()
+
+
+@lru_cache(maxsize=16)
+def pyramid_of(height_px: int, width_px: int) -> Pyramid:
+    """The pyramid for patches of a size."""
+    rows = list(axis_matrices(height_px, FACE_SIZE_PX[1]))
+    columns = list(axis_matrices(width_px, FACE_SIZE_PX[0]))
+    # The shorter axis stays at one texel while the longer one goes on.
+    while len(rows) < len(columns):
+        rows.append(rows[-1])
+    while len(columns) < len(rows):
+        columns.append(columns[-1])
+    sizes = [(r.shape[0], c.shape[0]) for r, c in zip(rows, columns, strict=True)]
+    folded = sum(r >= height_px and c >= width_px for r, c in sizes)
+    starts, size = [], height_px * width_px
+    for level, (height, width) in enumerate(sizes):
+        starts.append(0 if level < folded else size)
+        size += 0 if level < folded else height * width
+    return Pyramid(
+        height_px=height_px,
+        width_px=width_px,
+        rows=tuple(rows),
+        columns=tuple(columns),
+        folded=folded,
+        starts=tuple(starts),
+        size=size,
+    )
+
+
+def _nonzero(matrix: Array) -> Reads:
+    """The few columns of each row that are not zero; padded with weights of zero."""
+    most = int((matrix > 0).sum(axis=1).max())
+    index = np.argsort(-matrix, axis=1, kind="stable")[:, :most]
+    return Reads(index=index, weight=np.take_along_axis(matrix, index, axis=1))
+
+
+def _identity(size: int) -> Reads:
+    return Reads(index=np.arange(size)[:, None], weight=np.ones((size, 1)))

@@ -1,0 +1,65 @@
+"""A constant sparse matrix that gradients pass through."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SparseMatrix:
+    """A matrix and its transpose, both by rows, so that both directions are one quick product.
+
+    Attributes:
+        forward: (N, M) sparse CSR.
+        backward: (M, N) sparse CSR, the transpose.
+    """
+
+    forward: Tensor
+    backward: Tensor
+
+    @staticmethod
+    def of(matrix: Any, device: torch.device) -> SparseMatrix:
+        """From a scipy CSR matrix of float32."""
+        return SparseMatrix(_csr(matrix, device), _csr(matrix.T.tocsr(), device))
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that both take."""
+        parts = [m for csr in (self.forward, self.backward) for m in (csr.crow_indices(), csr.col_indices())]
+        return sum(p.nbytes for p in parts) + 2 * int(self.forward.values().nbytes)
+
+    def __matmul__(self, dense: Tensor) -> Tensor:
+        """(M, k) float32 to (N, k), differentiable."""
+        product: Tensor = _Product.apply(dense, self)  # type: ignore[no-untyped-call]
+        return product
+
+
+class _Product(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, dense: Tensor, matrix: SparseMatrix) -> Tensor:
+        ctx.matrix = matrix
+        product: Tensor = torch.sparse.mm(matrix.forward, dense)
+        return product
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor, None]:
+        return torch.sparse.mm(ctx.matrix.backward, gradients[0].contiguous()), None
+
+
+def _csr(matrix: Any, device: torch.device) -> Tensor:
+    matrix.sort_indices()
+    with warnings.catch_warnings():
+        # torch says once a process that such tensors are young, and that it does not check them.
+        warnings.filterwarnings("ignore", "Sparse", UserWarning)
+        return torch.sparse_csr_tensor(
+            torch.from_numpy(matrix.indptr.astype(np.int32)),
+            torch.from_numpy(matrix.indices.astype(np.int32)),
+            torch.from_numpy(matrix.data.astype(np.float32)),
+            size=matrix.shape,
+        ).to(device)
