@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
@@ -21,6 +22,9 @@ OPTIONAL = "num_batches_tracked"
 """Files older than this counter lack it; nothing uses it."""
 
 SHOWN_KEYS = 3
+
+HEADER_AT = 8
+"""A safetensors file is the length of its header in eight bytes, the header as JSON, the tensors."""
 
 GraphT = TypeVar("GraphT", bound=nn.Module)
 
@@ -89,7 +93,7 @@ def read(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
 
 
 def write(path: str | Path, state: Mapping[str, Tensor], metadata: Mapping[str, str], *, halves: bool = False) -> None:
-    """Writes tensors whole or not at all.
+    """Writes tensors whole or not at all; the same tensors and texts give the same bytes.
 
     Args:
         path: of the file.
@@ -100,7 +104,17 @@ def write(path: str | Path, state: Mapping[str, Tensor], metadata: Mapping[str, 
     tensors = {key: value.detach().cpu().clone().contiguous() for key, value in state.items()}
     if halves:
         tensors = {key: value.half() if _may_halve(value) else value for key, value in tensors.items()}
-    write_alone(Path(path), to_bytes(tensors, dict(metadata)))
+    write_alone(Path(path), _in_order(to_bytes(tensors, dict(metadata))))
+
+
+def _in_order(data: bytes) -> bytes:
+    """The same safetensors with its metadata sorted: the library writes them in another order every time."""
+    length = int.from_bytes(data[:HEADER_AT], "little")
+    header = json.loads(data[HEADER_AT : HEADER_AT + length])
+    header["__metadata__"] = dict(sorted(header.get("__metadata__", {}).items()))
+    text = json.dumps(header, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % HEADER_AT)  # tensors begin at multiples of eight
+    return len(text).to_bytes(HEADER_AT, "little") + text + data[HEADER_AT + length :]
 
 
 def _may_halve(tensor: Tensor) -> bool:

@@ -25,6 +25,18 @@ def test_what_is_written_comes_back(tmp_path: Path) -> None:
     assert [p.name for p in path.parent.iterdir()] == ["a.safetensors"], "nothing half-written stays"
 
 
+def test_the_same_gives_the_same_bytes(tmp_path: Path) -> None:
+    state = small().state_dict()
+    texts = {f"key{index}": "x" * index for index in range(9)}
+    for name, metadata in (("a", texts), ("b", dict(reversed(texts.items())))):
+        write(tmp_path / f"{name}.safetensors", state, metadata)
+    data = (tmp_path / "a.safetensors").read_bytes()
+    assert data == (tmp_path / "b.safetensors").read_bytes()
+    assert (8 + int.from_bytes(data[:8], "little")) % 8 == 0
+    again, metadata = read(tmp_path / "a.safetensors")
+    assert metadata == texts and again.keys() == state.keys()
+
+
 def test_views_and_strides_are_no_obstacle(tmp_path: Path) -> None:
     base = torch.arange(12.0).view(3, 4)
     write(tmp_path / "a.safetensors", {"a": base.t(), "b": base[:2]}, {})
