@@ -17,6 +17,8 @@ from gear.values.serial import Json
 TRAINING = ("finetuning", "train")
 VALIDATION = ("val",)
 KEPT_FOR_TESTS = "test"
+DEEPEST = 3
+"""Folders between one that is given and the roots in it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,9 +99,8 @@ def _open(path: str | Path, names: Sequence[str]) -> list[Dataset[Any]]:
         root = Path(text)
     if not root.is_dir():
         raise DatasetError(root, "there is no such folder")
-    roots = (
-        [root] if (root / "gear").is_dir() else sorted({found.parents[2] for found in root.glob("**/gear/*/plan.json")})
-    )
+    plans = (plan for depth in range(DEEPEST + 1) for plan in root.glob("*/" * depth + "gear/*/plan.json"))
+    roots = [root] if (root / "gear").is_dir() else sorted({plan.parents[2] for plan in plans})
     if not roots:
         raise DatasetError(root, "holds no dataset of gear's (there is no gear/<split>/plan.json below it)")
     return [open_dataset(place, name) for place in roots for name in ([split] if split else _wanted(place, names))]

@@ -20,7 +20,7 @@ from gear.verbs.train.curves import write_curves
 from gear.verbs.train.data import TRAINING, VALIDATION, Samples, all_of, keep_some, open_all, spread
 from gear.verbs.train.feed import Cache, Feed
 from gear.verbs.train.loop import Parts, Training, Watch
-from gear.verbs.train.results import WEIGHTS, Origin, command_of, figures_of, keep_weights, write_history
+from gear.verbs.train.results import WEIGHTS, Origin, command_of, figures_of, keep_weights, known, write_history
 from gear.verbs.train.starting import begin_with, build_network
 
 GIGABYTE = 1e9
@@ -146,7 +146,7 @@ def train(
         steps=progress.step,
         elapsed_s=progress.elapsed_s,
         best_step=progress.best_step,
-        figures=figures_of(best),
+        figures=known(figures_of(best)),
         figure=spec.figure,
     )
 

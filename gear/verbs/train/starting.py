@@ -10,6 +10,7 @@ from gear.config.nodes import Mapping, Place, Scalar
 from gear.config.overrides import with_value
 from gear.contracts.specs import ModelSpec
 from gear.nn.options import NONE, SHIPPED
+from gear.nn.runtime import seeded
 from gear.nn.shipped import resolve
 from gear.nn.weights import load_into
 from gear.plugins.build import blamed, build
@@ -35,7 +36,8 @@ def build_network(found: Found, config: TrainConfig, *, precision: str) -> Any:
         is_given = isinstance(options, Mapping) and name in options.entries
         if name in fields and not is_given:
             options = with_value(options, (name,), Scalar(text, False, place))
-    return build(found, options)
+    with seeded(config.seed):  # for those that draw their weights from torch's own generator
+        return build(found, options)
 
 
 def begin_with(found: Found, model: Any, init: str) -> None:

@@ -1,0 +1,119 @@
+"""Augmentation as a whole: repeatable, never in place, and for tasks that gear does not know."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gear.augment.apply import Augmentation, Framing, augment
+from gear.augment.geometry import Geometry, flip_array
+from gear.augment.pictures import Colours, recolour
+from gear.augment.registry import geometry_of, register
+from gear.plugins.build import build_task
+from gear.plugins.tasks.semseg import SemsegSample
+from gear.testing.compare import difference
+from gear.testing.synthetic import synthetic_frame
+from gear.values.errors import FieldError, GearError
+from gear.values.rng import derive_rng
+
+EVERYTHING = Augmentation(
+    flip=0.5, colour=1.0, colours=Colours(noise=1.0, blur=1.0, jpeg=1.0, erase=1.0), cut_depth=1.0
+)
+NOTHING = Augmentation(flip=0.0, colour=0.0)
+
+
+def sample_of(name: str) -> Any:
+    spec, _ = build_task(name)
+    task = spec.build(spec.config(width_px=192, height_px=96))
+    return task.ground_truth(*synthetic_frame(task.rig(), index=0, seed=3))
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class OtherSample(SemsegSample):
+    """A third party's, with a map that gear knows nothing of."""
+
+    heat: Any
+
+
+def other_sample() -> OtherSample:
+    sample = sample_of("semseg")
+    return OtherSample(
+        **{name: getattr(sample, name) for name in ("record", "images", "surfaces", "label_ids", "instance_ids")},
+        heat=sample.label_ids.astype(np.float32),
+    )
+
+
+@pytest.mark.parametrize("task", ["semseg", "depth", "detect2d", "stereo3d"])
+def test_the_same_generator_makes_the_same_sample(task: str) -> None:
+    framing = Framing(crop_px=(64, 96), scales=(0.7, 1.4))
+    one, two, other = (augment(sample_of(task), EVERYTHING, framing, derive_rng(0, "a", k)) for k in (1, 1, 2))
+    assert not difference(one, two, "sample")
+    assert difference(one, other, "sample")
+    assert all(picture.shape == (64, 96, 3) and picture.dtype == np.uint8 for picture in one.images.values())
+
+
+@pytest.mark.parametrize("task", ["semseg", "depth", "detect2d", "stereo3d"])
+def test_nothing_is_changed_in_place(task: str) -> None:
+    sample = sample_of(task)
+    for picture in sample.images.values():
+        picture.setflags(write=False)
+    augment(sample, EVERYTHING, Framing(), derive_rng(0, "a"))
+    assert not difference(sample, sample_of(task), "sample")
+    assert augment(sample, NOTHING, Framing(), derive_rng(0, "a")) is sample
+
+
+def test_colours_leave_ground_truth_alone() -> None:
+    sample = sample_of("semseg")
+    result = augment(sample, replace(EVERYTHING, flip=0.0), Framing(), derive_rng(0, "a"))
+    assert result.label_ids is sample.label_ids
+    assert not np.array_equal(result.images["left"], sample.images["left"])
+
+
+def test_both_views_of_a_pair_get_the_same_colours() -> None:
+    sample = sample_of("stereo3d")
+    twin = {"left": sample.images["left"], "right": sample.images["left"]}
+    quiet = Colours(noise=0.0)
+    changed = recolour(twin, quiet, derive_rng(0, "colours"))
+    assert np.array_equal(changed["left"], changed["right"])
+    assert not np.array_equal(changed["left"], sample.images["left"])
+
+
+def test_colours_without_any_reach_are_the_picture_itself() -> None:
+    picture = sample_of("semseg").images["left"]
+    still = Colours(brightness=0, contrast=0, saturation=0, balance=0, gamma=0, noise=0, blur=0, jpeg=0, erase=0)
+    assert np.array_equal(recolour({"left": picture}, still, derive_rng(0, "c"))["left"], picture)
+
+
+def test_a_strangers_samples_are_coloured_but_not_moved() -> None:
+    sample = other_sample()
+    assert geometry_of(sample) is None
+    result = augment(sample, replace(EVERYTHING, flip=1.0), Framing(), derive_rng(0, "a"))
+    assert result.label_ids is sample.label_ids and result.heat is sample.heat
+    with pytest.raises(GearError, match="OtherSample cannot be cropped or resized"):
+        augment(sample, NOTHING, Framing(crop_px=(64, 64)), derive_rng(0, "a"))
+
+
+def test_a_stranger_may_say_how(monkeypatch: pytest.MonkeyPatch) -> None:
+    from gear.augment import registry
+
+    monkeypatch.setattr(registry, "_GEOMETRIES", dict(registry._GEOMETRIES))
+
+    def flip(sample: OtherSample) -> OtherSample:
+        return replace(sample, heat=flip_array(sample.heat))
+
+    register(OtherSample, Geometry(flip=flip, cut=lambda sample, _: sample))
+    sample = other_sample()
+    result = augment(sample, replace(NOTHING, flip=1.0), Framing(), derive_rng(0, "a"))
+    assert np.array_equal(result.heat, sample.heat[:, ::-1])
+    with pytest.raises(ValueError, match="has a geometry already"):
+        register(OtherSample, Geometry(flip=lambda s: s, cut=lambda s, _: s))
+
+
+@pytest.mark.parametrize(("kind", "values"), [(Augmentation, {"flip": 1.5}), (Colours, {"brightness": 1.0}),
+                                              (Colours, {"jpeg_quality": 0}), (Colours, {"gamma": -1.0})])  # fmt: skip
+def test_what_makes_no_sense_is_refused(kind: Any, values: dict[str, float]) -> None:
+    with pytest.raises(FieldError, match=next(iter(values))):
+        kind(**values)

@@ -1,0 +1,162 @@
+"""Mirrors and windows, held against geometry: what is measured on a moved picture is what moving the truth says."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gear.augment.geometry import Window, cut_map, draw_window
+from gear.augment.registry import geometry_of
+from gear.formats import rle
+from gear.plugins.build import build_task
+from gear.testing.synthetic import synthetic_frame
+from gear.values.rng import derive_rng
+
+WIDTH, HEIGHT = 192, 96
+TASKS = ("semseg", "depth", "detect2d", "stereo3d")
+
+
+def sample_of(name: str, index: int = 0) -> Any:
+    spec, _ = build_task(name)
+    task = spec.build(spec.config(width_px=WIDTH, height_px=HEIGHT))
+    return task.ground_truth(*synthetic_frame(task.rig(), index=index, seed=3))
+
+
+def moved(sample: Any, window: Window | None = None) -> Any:
+    geometry = geometry_of(sample)
+    assert geometry is not None
+    return geometry.flip(sample) if window is None else geometry.cut(sample, window)
+
+
+def window(left: int, top: int, width: int, height: int, out: tuple[int, int] | None = None) -> Window:
+    out_width, out_height = out or (width, height)
+    return Window(
+        left_px=left, top_px=top, width_px=width, height_px=height, out_width_px=out_width, out_height_px=out_height
+    )
+
+
+def plain(value: Any) -> Any:
+    return [f"{getattr(value, field.name)}" for field in dataclasses.fields(value)]
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_two_mirrors_are_none(task: str) -> None:
+    sample = sample_of(task)
+    twice = moved(moved(sample))
+    for name, picture in sample.images.items():
+        assert np.array_equal(twice.images[name], picture)
+    for name in ("label_ids", "instance_ids", "depth_m"):
+        if hasattr(sample, name):
+            assert np.array_equal(getattr(twice, name), getattr(sample, name), equal_nan=True)
+    for one, two in zip(getattr(sample, "objects", ()), getattr(twice, "objects", ()), strict=True):
+        assert np.allclose(one.box_px, two.box_px) and one.is_ignored == two.is_ignored
+        if task == "stereo3d":
+            assert np.allclose(one.box.bottom_m, two.box.bottom_m)
+            assert math.cos(one.box.rotation_y_rad - two.box.rotation_y_rad) == pytest.approx(1)
+        else:
+            assert plain(one) == plain(two)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_moving_leaves_what_it_was_given(task: str) -> None:
+    sample = sample_of(task)
+    for picture in sample.images.values():
+        picture.setflags(write=False)
+    before = {name: picture.copy() for name, picture in sample.images.items()}
+    moved(sample)
+    moved(sample, window(16, 8, 160, 80, (80, 40)))
+    assert all(np.array_equal(before[name], picture) for name, picture in sample.images.items())
+
+
+def test_boxes_and_masks_of_a_mirror_lie_on_the_same_things() -> None:
+    sample = sample_of("detect2d")
+    assert sample.objects
+    for thing, other in zip(sample.objects, moved(sample).objects, strict=True):
+        mask = rle.decode(other.rle, HEIGHT, WIDTH)
+        assert np.array_equal(mask[:, ::-1], rle.decode(thing.rle, HEIGHT, WIDTH))
+        columns = np.flatnonzero(mask.any(axis=0))
+        assert (other.box_px[0], other.box_px[2]) == (columns[0], columns[-1] + 1)
+
+
+@pytest.mark.parametrize("shape", [(0, 0, 192, 96), (40, 10, 100, 60), (-20, -10, 232, 116), (64, 40, 64, 32)])
+def test_boxes_in_a_window_are_those_of_their_masks(shape: tuple[int, int, int, int]) -> None:
+    sample, part = sample_of("detect2d"), window(*shape)
+    result = moved(sample, part)
+    by_id = {(thing.object_id, thing.label): thing for thing in sample.objects}
+    for thing in result.objects:
+        mask = rle.decode(thing.rle, part.out_height_px, part.out_width_px)
+        before = by_id[(thing.object_id, thing.label)]
+        expected = cut_map(rle.decode(before.rle, HEIGHT, WIDTH).astype(np.uint8), part, 0)
+        assert np.array_equal(mask, expected.astype(bool)) and thing.area_px == mask.sum()
+        rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+        assert thing.box_px == (columns[0], rows[0], columns[-1] + 1, rows[-1] + 1)
+        kept = thing.area_px / before.area_px
+        assert thing.is_ignored or kept >= 0.3
+        assert thing.visible_fraction == pytest.approx(before.visible_fraction * kept)
+    left_out = by_id.keys() - {(thing.object_id, thing.label) for thing in result.objects}
+    for key in left_out:
+        assert not cut_map(rle.decode(by_id[key].rle, HEIGHT, WIDTH).astype(np.uint8), part, 0).any()
+
+
+def test_labels_stay_labels_and_nothing_is_known_beyond_the_picture() -> None:
+    sample = sample_of("semseg")
+    result = moved(sample, window(-32, -16, 256, 128, (128, 64)))
+    assert set(np.unique(result.label_ids)) <= {*np.unique(sample.label_ids), 0}
+    assert not result.label_ids[:8].any() and not result.instance_ids[:, :16].any()
+    assert np.array_equal(result.label_ids[8:56, 16:112], sample.label_ids[1::2, 1::2])
+    assert result.images["left"].shape == (64, 128, 3)
+
+
+def test_what_is_shown_twice_as_large_is_half_as_far() -> None:
+    sample = sample_of("depth")
+    result = moved(sample, window(48, 24, 96, 48, (192, 96)))
+    assert np.allclose(result.depth_m[::2, ::2], sample.depth_m[24:72, 48:144] / 2, equal_nan=True)
+    beyond = moved(sample, window(-10, 0, 192, 96))
+    assert np.isnan(beyond.depth_m[:, :10]).all() and beyond.depth_m.dtype == np.float32
+
+
+def test_the_mirrored_pair_is_a_pair_of_the_mirrored_scene() -> None:
+    """Rendering the scene's mirror image gives the labels that mirroring gives: the two are made independently."""
+    sample = sample_of("stereo3d")
+    result = moved(sample)
+    baseline_m, intrinsics = sample.calibration.baseline_m, sample.calibration.intrinsics
+    assert np.array_equal(result.images["left"], sample.images["right"][:, ::-1])
+    assert len(result.objects) > 0
+    by_id = {thing.object_id: thing for thing in sample.objects}
+    for thing in result.objects:
+        before = by_id[thing.object_id].box.corners_m
+        from_right = intrinsics.project(before - [baseline_m, 0, 0])
+        mirrored = np.stack([WIDTH - 1 - from_right[:, 0], from_right[:, 1]], axis=-1)
+        after = intrinsics.project(thing.box.corners_m)
+        assert np.allclose(np.sort(mirrored, axis=0), np.sort(after, axis=0), atol=1e-6)
+        assert 0 <= thing.box_px[0] < thing.box_px[2] <= WIDTH - 1
+
+
+def test_a_window_of_a_pair_keeps_metres_and_has_its_own_calibration() -> None:
+    sample = sample_of("stereo3d")
+    result = moved(sample, window(48, 24, 96, 48, (192, 96)))
+    assert result.calibration.intrinsics.focal_px == pytest.approx(2 * sample.calibration.intrinsics.focal_px)
+    boxes = {thing.object_id: thing.box for thing in sample.objects}
+    assert all(thing.box == boxes[thing.object_id] for thing in result.objects)
+    point = np.array([0.4, 0.3, 9.0])
+    before = sample.calibration.intrinsics.project(point) + 0.5
+    after = result.calibration.intrinsics.project(point) + 0.5
+    assert np.allclose(after, (before - [48, 24]) * 2)
+    with pytest.raises(ValueError, match="middle"):
+        moved(sample, window(40, 24, 96, 48))
+
+
+@pytest.mark.parametrize("scale", [0.5, 0.9, 1.0, 1.7])
+@pytest.mark.parametrize("centred", [False, True])
+def test_windows_are_drawn_inside_or_around(scale: float, centred: bool) -> None:
+    for number in range(20):
+        drawn = draw_window((96, 192), (64, 128), scale, derive_rng(0, "window", number), is_centred=centred)
+        assert (drawn.out_height_px, drawn.out_width_px) == (64, 128)
+        assert abs(drawn.scale / scale - 1) < 0.03
+        for start, length, whole in ((drawn.left_px, drawn.width_px, 192), (drawn.top_px, drawn.height_px, 96)):
+            assert 0 <= start <= whole - length if length <= whole else whole - length <= start <= 0
+            assert not centred or 2 * start + length == whole

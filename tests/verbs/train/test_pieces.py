@@ -1,0 +1,169 @@
+"""The parts of a training, each alone."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from torch import nn
+
+from gear.cli.train import budget
+from gear.config.nodes import Mapping, Place
+from gear.config.reader import read_node
+from gear.contracts.models import Recipe
+from gear.values.errors import ConfigError
+from gear.verbs.train.config import TrainConfig, read_config
+from gear.verbs.train.data import Samples, all_of, keep_some, open_all, spread
+from gear.verbs.train.feed import Cache, Feed, Position
+from gear.verbs.train.optimise import RunningMean, optimiser_of, rate_share
+from gear.verbs.train.validate import rank
+
+CONFIG = read_node(TrainConfig, Mapping({}, Place("test")))
+
+
+def test_the_rate_rises_and_falls() -> None:
+    rates = [rate_share(p / 1000, warm_up=0.1, final=0.01) for p in range(1001)]
+    assert rates[0] == pytest.approx(0.01) and rates[100] == pytest.approx(1) and rates[-1] == pytest.approx(0.01)
+    assert np.argmax(rates) == 100 and rates[550] == pytest.approx((1 + 0.01) / 2)
+    assert all(np.diff(rates[:101]) > 0) and all(np.diff(rates[100:]) < 0)
+    assert rate_share(0.0, warm_up=0.0, final=0.01) == 1
+
+
+def test_the_running_mean_follows_and_counts_are_the_newest() -> None:
+    module = nn.BatchNorm1d(2)
+    mean = RunningMean(module, 0.9)
+    with torch.no_grad():
+        module.weight.fill_(3.0)
+        module.num_batches_tracked.fill_(7)
+    mean.update(module, 10**6)
+    assert mean.state["weight"].tolist() == pytest.approx([1.2, 1.2])
+    assert mean.state["num_batches_tracked"].item() == 7
+    mean.update(module, 0)
+    assert mean.state["weight"].tolist() == pytest.approx([0.1 * 1.2 + 0.9 * 3] * 2)
+
+
+def test_biases_do_not_decay_and_frozen_weights_are_left_out() -> None:
+    module = nn.Sequential(nn.Linear(2, 3), nn.Linear(3, 1))
+    module[1].weight.requires_grad_(False)
+    decaying, still = optimiser_of(module, CONFIG).param_groups
+    assert [tuple(p.shape) for p in decaying["params"]] == [(3, 2)] and decaying["weight_decay"] > 0
+    assert [tuple(p.shape) for p in still["params"]] == [(3,), (1,)] and still["weight_decay"] == 0
+
+
+@dataclass(frozen=True)
+class Goal:
+    figure: str = "d1"
+    less_is_better: bool = False
+
+
+def test_checkpoints_are_ranked_by_the_tasks_figure_and_then_by_the_loss() -> None:
+    def ranked(goal: Any, **figures: float) -> tuple[float, float]:
+        return rank(figures, goal)
+
+    more, less = Goal(), Goal(less_is_better=True)
+    assert ranked(more, d1=0.9, loss=9) > ranked(more, d1=0.8, loss=1)
+    assert ranked(less, d1=0.8, loss=9) > ranked(less, d1=0.9, loss=1)
+    assert ranked(more, d1=0.5, loss=1) > ranked(more, d1=0.5, loss=2)
+    assert ranked(more, d1=math.nan, loss=1) < ranked(more, d1=0.0, loss=9)
+    assert ranked(Goal(figure=""), loss=1) > ranked(Goal(figure=""), loss=2)
+    assert ranked(more, d1=math.nan, loss=math.nan) < ranked(more, d1=math.nan, loss=9)
+
+
+def test_settings_go_before_flags_and_flags_before_the_recipe() -> None:
+    recipe = Recipe(batch=3, epochs=7, crop_px=(64, 96))
+    config = read_config(recipe, {"epochs": 8, "batch": None}, ["epochs=9", "augmentation.flip=0"])
+    assert (config.batch, config.epochs, config.crop_px) == (3, 9, (64, 96))
+    assert config.augmentation.flip == 0
+    assert read_config(recipe, {}, ["crop_px=null"]).crop_px is None
+    for setting in ("batch=0", "ema=1", "scales=[2, 1]", "learning_rate=0", "warm_up=1", "precision=int8"):
+        with pytest.raises(ConfigError, match=setting.split("=")[0]):
+            read_config(recipe, {}, [setting])
+
+
+@dataclass(frozen=True)
+class Numbered:
+    images: dict[str, Any]
+    number: int
+
+
+class Numbers:
+    def __init__(self, count: int) -> None:
+        self.count, self.reads = count, [0] * count
+
+    def __len__(self) -> int:
+        return self.count
+
+    def __getitem__(self, index: int) -> Numbered:
+        self.reads[index] += 1
+        return Numbered(images={"left": np.full((32, 32, 3), index, np.uint8)}, number=index)
+
+
+def plain(**changes: Any) -> TrainConfig:
+    texts = [f"{key}={value}" for key, value in changes.items()]
+    return read_config(Recipe(batch=3), {}, ["augmentation.colour=0", *texts])
+
+
+def take(feed: Feed, position: Position, count: int) -> list[tuple[int, ...]]:
+    batches = feed.from_position(position)
+    found = [next(batches) for _ in range(count)]
+    batches.close()  # type: ignore[attr-defined]
+    for batch in found:
+        assert [sample.number for sample in batch.samples] == list(batch.indices)
+        assert torch.equal(batch.views["left"][:, 0, 0, 0], torch.tensor(batch.indices) / 255)
+    return [batch.indices for batch in found]
+
+
+@pytest.mark.parametrize("workers", [1, 4])
+def test_batches_depend_on_the_position_alone(workers: int) -> None:
+    feed = Feed(Numbers(11), plain(workers=workers), ("left",))
+    assert feed.batches == 3
+    whole = take(feed, Position(), 9)
+    assert whole == take(Feed(Numbers(11), plain(), ("left",)), Position(), 9)
+    assert take(feed, Position(1, 2), 4) == whole[5:9]
+    first = [index for batch in whole[:3] for index in batch]
+    assert len(set(first)) == 9 and first != [index for batch in whole[3:6] for index in batch]
+
+
+def test_what_fits_is_decoded_once() -> None:
+    numbers, tight = Numbers(6), Numbers(6)
+    for cache in (Cache(numbers, 1e9), Cache(tight, 3 * 32 * 32 * 3)):
+        for _ in range(3):
+            assert [cache[i].number for i in range(6)] == list(range(6))
+    assert numbers.reads == [1] * 6
+    assert tight.reads == [1, 1, 1, 3, 3, 3]
+
+
+def test_folders_of_roots_and_single_splits(street: Callable[..., Path], tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        (tmp_path / name).symlink_to(street("semseg"))
+    assert [d.root.name for d in open_all([tmp_path], "semseg", names=("train",))] == ["one", "two"]
+    (found,) = open_all([f"{street('semseg')}:train"], "semseg", names=("val",))
+    assert found.plan.info.split == "train"
+    samples = all_of(open_all([tmp_path], "semseg", names=("train",)))
+    assert len(samples) == 12 and samples[7].record.index == 1
+    assert [fact["samples"] for fact in samples[:8].facts()] == [6, 2]  # type: ignore[call-overload,index]
+    assert [place[1] for place in spread(samples, 4).places] == [0, 3, 0, 3]
+
+
+def test_sequences_are_kept_together(street: Callable[..., Path]) -> None:
+    (dataset,) = open_all([street("semseg")], "semseg", names=("train",))
+    dataset.plan.content["frames"] = 2
+    train, val = keep_some(Samples((dataset,), tuple((0, i) for i in range(6))), 0.4, seed=1)
+    dataset.plan.content["frames"] = 1
+    assert len(train) == 4 and len(val) == 2
+    assert val.places[0][1] % 2 == 0 and val.places[1][1] == val.places[0][1] + 1
+
+
+@pytest.mark.parametrize(("text", "seconds"), [("90s", 90), ("10m", 600), ("1.5h", 5400), ("2", 120)])
+def test_times(text: str, seconds: float) -> None:
+    assert budget(text) == seconds
+    for wrong in ("", "0m", "ten", "-1m"):
+        with pytest.raises(argparse.ArgumentTypeError):
+            budget(wrong)

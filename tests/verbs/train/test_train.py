@@ -1,0 +1,228 @@
+"""`gear train` with tiny networks: it learns, says where weights come from, and goes on where it was stopped."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from safetensors import safe_open
+
+import gear
+from gear.cli.main import main
+from gear.contracts.models import Recipe
+from gear.nn.weights import load_into
+from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_segmenter
+from gear.values.errors import DatasetError, GearError, UnknownNameError
+from gear.verbs.train import loop
+from gear.verbs.train.checkpoint import Progress
+from gear.verbs.train.run import TrainReport, train
+
+Street = Callable[..., Path]
+
+
+def quick(street: Street, out: Path, **changes: Any) -> TrainReport:
+    arguments: dict[str, Any] = {"epochs": 3, "batch": 2, "workers": 1, "out": out}
+    return train("semseg", "tiny_segmenter", street("semseg"), **(arguments | changes))
+
+
+def test_it_learns_and_leaves_everything_behind(street: Street, tmp_path: Path, install: Any) -> None:
+    report = quick(street, tmp_path / "out", epochs=8, lr=0.02)
+    history = json.loads((tmp_path / "out" / "train.json").read_text())
+    losses = [entry["loss"] for entry in history["validations"]]
+    assert len(losses) == 8 and losses[-1] < 0.8 * losses[0]
+    assert report.steps == 16 and report.figures["miou"] == max(e["miou"] for e in history["validations"])
+    assert (tmp_path / "out" / "curves.png").stat().st_size > 5000
+    card = (tmp_path / "out" / "card.md").read_text()
+    assert report.weights.name in card and "gear train --task semseg --model tiny_segmenter" in card
+    network = TinySegmenter(TinyConfig(seed=9))
+    metadata = load_into(network, report.weights)
+    assert metadata["model"] == "tiny_segmenter" and metadata["seed"] == "0"
+    assert json.loads(metadata["metrics"])["miou"] == report.figures["miou"]
+    assert json.loads(metadata["data"])["training"][0]["samples"] == 5
+    sample = gear.open_dataset(street("semseg"))[0]
+    seen = np.mean(network.predict(sample.images) == sample.label_ids)
+    fresh = np.mean(TinySegmenter(TinyConfig()).predict(sample.images) == sample.label_ids)
+    assert seen > fresh
+
+
+def test_matrices_are_halved_and_statistics_are_not(street: Street, tmp_path: Path, install: Any) -> None:
+    report = quick(street, tmp_path / "out", epochs=1)
+    with safe_open(str(report.weights), framework="pt") as opened:
+        kinds = {key: opened.get_tensor(key).dtype for key in opened.keys()}  # noqa: SIM118
+    assert kinds["stem.weight"] == torch.float16
+    assert kinds["norm.running_var"] == kinds["stem.bias"] == torch.float32
+
+
+class StopError(Exception):
+    """A power cut."""
+
+
+@pytest.mark.parametrize("stop_at", [1, 3, 5])
+def test_stopped_and_taken_up_again_is_as_if_never_stopped(
+    street: Street, tmp_path: Path, install: Any, monkeypatch: pytest.MonkeyPatch, stop_at: int
+) -> None:
+    monkeypatch.setattr(loop, "CHECKPOINT_EVERY_S", 0.0)
+    settings = ["augmentation.colours.noise=1", "gradient_norm=1", "crop_px=[32, 64]", "scales=[0.8, 1.2]"]
+    whole = quick(street, tmp_path / "whole", settings=settings)
+
+    def stop(progress: Progress, share: float, figures: Any) -> None:
+        if progress.step == stop_at:
+            raise StopError
+
+    with pytest.raises(StopError):
+        quick(street, tmp_path / "parts", settings=settings, watch=stop)
+    parts = quick(street, tmp_path / "parts", settings=settings, workers=2)
+    assert parts.weights.read_bytes() == whole.weights.read_bytes()
+    assert parts.figures == whole.figures and parts.steps == whole.steps
+    one, two = (json.loads((report.root / "train.json").read_text()) for report in (whole, parts))
+    assert one["steps"] == two["steps"]
+
+
+@pytest.mark.slow
+def test_a_killed_process_is_taken_up_again(street: Street, tmp_path: Path, install: Any) -> None:
+    code = (
+        "import os, signal, sys\n"
+        "from gear.plugins import build\n"
+        "from gear.plugins.catalogue import Catalogue, Found, Owner\n"
+        "from gear.plugins.manager import catalogue\n"
+        "from gear.testing.tiny_networks import tiny_segmenter\n"
+        "from gear.verbs.train import loop\n"
+        "from gear.verbs.train.run import train\n"
+        "owner = Owner(plugin='tiny', package='tiny', version='0')\n"
+        "found = (*catalogue().found, Found(kind='model', spec=tiny_segmenter, owner=owner))\n"
+        "build.catalogue = lambda: Catalogue(found)\n"
+        "loop.CHECKPOINT_EVERY_S = 0.0\n"
+        "stop = int(sys.argv[3])\n"
+        "def watch(progress, share, figures):\n"
+        "    if progress.step == stop: os.kill(os.getpid(), signal.SIGKILL)\n"
+        "train('semseg', 'tiny_segmenter', sys.argv[1], out=sys.argv[2], epochs=3, batch=2, watch=watch)\n"
+    )
+
+    def run(out: str, stop: int) -> int:
+        words = [sys.executable, "-c", code, str(street("semseg")), str(tmp_path / out), str(stop)]
+        return subprocess.run(words, check=False, env={**os.environ, "OMP_NUM_THREADS": "1"}).returncode
+
+    assert run("whole", 0) == 0
+    assert run("parts", 3) == -signal.SIGKILL
+    assert run("parts", 0) == 0
+    weights = [(tmp_path / out / "model.safetensors").read_bytes() for out in ("whole", "parts")]
+    assert weights[0] == weights[1]
+
+
+def test_finished_work_is_not_done_again(street: Street, tmp_path: Path, install: Any) -> None:
+    first = quick(street, tmp_path / "out")
+    steps: list[int] = []
+    again = quick(street, tmp_path / "out", watch=lambda progress, *_: steps.append(progress.step))
+    assert not steps and again == first
+    with pytest.raises(DatasetError, match=r"other settings \(config.batch differ\)"):
+        quick(street, tmp_path / "out", batch=3)
+
+
+def test_the_seed_decides(street: Street, tmp_path: Path, install: Any) -> None:
+    one, two = quick(street, tmp_path / "a", seed=1), quick(street, tmp_path / "b", seed=2)
+    assert one.weights.read_bytes() != two.weights.read_bytes()
+
+
+def test_global_random_state_is_left_alone(street: Street, tmp_path: Path, install: Any) -> None:
+    before = torch.random.get_rng_state()
+    quick(street, tmp_path / "out", epochs=1)
+    assert torch.equal(before, torch.random.get_rng_state())
+
+
+def test_depth_in_half_precision_with_validation_data_of_its_own(street: Street, tmp_path: Path, install: Any) -> None:
+    report = train(
+        "depth", "tiny_depth", street("depth"), val=street("depth", "val", 2), out=tmp_path / "out", epochs=2,
+        precision="bfloat16", settings=["optimiser=sgd", "augmentation.cut_depth=0.5"],
+    )  # fmt: skip
+    history = json.loads((tmp_path / "out" / "train.json").read_text())
+    assert history["validation"][0]["split"] == "val" and history["validation"][0]["samples"] == 2
+    assert report.figure == "eigen_d1" and report.steps == 6
+
+
+def test_a_time_budget_ends_it(street: Street, tmp_path: Path, install: Any) -> None:
+    report = quick(street, tmp_path / "out", epochs=None, time_budget_s=0.5)
+    assert report.elapsed_s >= 0.5
+    history = json.loads((tmp_path / "out" / "train.json").read_text())
+    rates = [point["rate"] for point in history["steps"]]
+    assert rates == [] or rates[-1] <= max(rates)
+
+
+def test_patience_ends_it(street: Street, tmp_path: Path, install: Any) -> None:
+    report = quick(street, tmp_path / "out", epochs=50, lr=1e-12, settings=["patience=2", "ema=0"])
+    assert report.steps < 50 * 2
+
+
+def test_test_splits_are_not_learnt_from(street: Street, tmp_path: Path, install: Any) -> None:
+    root = street("semseg", "test", 2)
+    with pytest.raises(GearError, match="split 'test' is what networks are tested on"):
+        train("semseg", "tiny_segmenter", root, out=tmp_path / "out")
+    report = train("semseg", "tiny_segmenter", root, out=tmp_path / "out", epochs=1, batch=1, allow_test_data=True)
+    assert report.steps == 1
+
+
+def test_what_cannot_be_trained_is_said_in_a_line(street: Street, tmp_path: Path, install: Any) -> None:
+    out = tmp_path / "out"
+    with pytest.raises(GearError, match="'tiny_depth' does depth, not semseg"):
+        train("semseg", "tiny_depth", street("semseg"), out=out)
+    with pytest.raises(DatasetError, match="holds a semseg dataset, not depth"):
+        train("depth", "tiny_depth", street("semseg"), out=out)
+    with pytest.raises(DatasetError, match="no such folder"):
+        train("semseg", "tiny_segmenter", tmp_path / "nowhere", out=out)
+    with pytest.raises(DatasetError, match="holds no dataset"):
+        train("semseg", "tiny_segmenter", tmp_path, out=out)
+    with pytest.raises(UnknownNameError, match="no start named 'imagenet'"):
+        quick(street, out, init="imagenet")
+    with pytest.raises(GearError, match="no such file"):
+        quick(street, out, init="nothing.safetensors")
+    with pytest.raises(GearError, match="too few to keep some"):
+        train("semseg", "tiny_segmenter", street("semseg", "train", 1), out=out)
+    install(replace(tiny_segmenter, recipe=None))
+    with pytest.raises(GearError, match="gives no recipe"):
+        quick(street, out)
+
+
+def test_it_begins_with_what_it_is_told(street: Street, tmp_path: Path, install: Any) -> None:
+    first = quick(street, tmp_path / "first", epochs=4, lr=0.02)
+    second = quick(street, tmp_path / "second", epochs=1, lr=1e-9, init=first.weights, settings=["ema=0"])
+    assert second.figures["miou"] == pytest.approx(first.figures["miou"], abs=0.05)
+
+    def zeros(model: Any) -> None:
+        for parameter in model.parameters():
+            parameter.data.zero_()
+
+    install(replace(tiny_segmenter, starts={"nothing": zeros}))
+    report = quick(street, tmp_path / "third", epochs=1, lr=1e-9, init="nothing")
+    with safe_open(str(report.weights), framework="pt") as opened:
+        assert float(opened.get_tensor("stem.weight").abs().max()) < 1e-6
+
+
+class Overflowing(TinySegmenter):
+    """Its loss is no number."""
+
+    def loss(self, raw: torch.Tensor, targets: Any) -> torch.Tensor:
+        return super().loss(raw, targets) * float("nan")
+
+
+def test_a_loss_that_is_no_number_ends_it(street: Street, tmp_path: Path, install: Any) -> None:
+    install(replace(tiny_segmenter, build=Overflowing, recipe=Recipe(batch=1, epochs=9)))
+    with pytest.raises(GearError, match=r"loss is nan .* lower --lr"):
+        quick(street, tmp_path / "out", epochs=30, batch=1)
+
+
+def test_the_command(street: Street, tmp_path: Path, install: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["train", "--task", "semseg", "--model", "tiny_segmenter", "--data", str(street("semseg"))]
+    assert main([*words, "--out", str(tmp_path / "out"), "--epochs", "1", "--set", "options.width=4"]) == 0
+    captured = capsys.readouterr()
+    assert "model.safetensors: miou" in captured.out and "miou" in captured.err
+    assert main([*words, "--out", str(tmp_path / "x"), "--set", "augmentation.flop=1"]) == 2
+    assert "unknown key (did you mean 'flip'?)" in capsys.readouterr().err
