@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from gear.opening import Dataset, Twins, open_dataset, open_twins
     from gear.values.errors import GearError
+    from gear.verbs.attack.report import AttackReport
+    from gear.verbs.attack.run import attack
     from gear.verbs.collect.run import CollectReport, collect
     from gear.verbs.defend import DefendReport, defend
     from gear.verbs.evaluate.report import EvaluateReport
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
     from gear.view.write import ViewReport, write_view
 
 __all__ = [
+    "AttackReport",
     "CollectReport",
     "Dataset",
     "DefendReport",
@@ -33,6 +36,7 @@ __all__ = [
     "TrainReport",
     "Twins",
     "ViewReport",
+    "attack",
     "collect",
     "defend",
     "evaluate",
@@ -43,6 +47,7 @@ __all__ = [
 ]
 
 _HOME = {
+    "AttackReport": "gear.verbs.attack.report",
     "CollectReport": "gear.verbs.collect.run",
     "Dataset": "gear.opening",
     "DefendReport": "gear.verbs.defend",
@@ -51,6 +56,7 @@ _HOME = {
     "TrainReport": "gear.verbs.train.run",
     "Twins": "gear.opening",
     "ViewReport": "gear.view.write",
+    "attack": "gear.verbs.attack.run",
     "collect": "gear.verbs.collect.run",
     "defend": "gear.verbs.defend",
     "evaluate": "gear.verbs.evaluate.run",

@@ -13,6 +13,7 @@ from torch import Tensor
 
 from gear.attacking.appearance import Appearance
 from gear.attacking.borrowed import frozen
+from gear.attacking.group import members_of
 from gear.attacking.objectives import Objective
 from gear.attacking.regularisers import non_printability, smoothness
 from gear.contracts.attacks import Budget, Compositor, Patch, State, Watch
@@ -159,7 +160,11 @@ def _gradient(
     textures = optimiser.textures.clone().requires_grad_(True)
     samples = [dataset[index] for index in indexes]
     views = compose(settings, compositor, textures, samples, indexes, optimiser)
-    terms = objective.terms(model, views, samples, indexes)
+    terms = {
+        prefix + name: term
+        for prefix, member in members_of(model).items()
+        for name, term in objective.terms(member, views, samples, indexes).items()
+    }
     figures = {name: float(term.value.detach()) for name, term in terms.items()}
     ascent = torch.zeros_like(textures)
     if settings.per_term:
@@ -194,10 +199,8 @@ def compose(
     for index in indexes:
         rng = derive_rng(optimiser.seed, "appearance", optimiser.done, index)
         looks.append([settings.appearance.vary(texture, rng) for texture in textures])
-    return {
-        view: torch.cat([compositor.compose(look, [index], view) for look, index in zip(looks, indexes, strict=True)])
-        for view in samples[0].images
-    }
+    batches = [torch.stack(textures) for textures in zip(*looks, strict=True)]
+    return {view: compositor.compose(batches, indexes, view) for view in samples[0].images}
 
 
 def unit(gradient: Tensor) -> Tensor:

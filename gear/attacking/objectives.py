@@ -55,6 +55,14 @@ class Objective(Protocol):
         ...
 
 
+def default_objective(sample: Any) -> Objective:
+    """Untargeted harm to the sample's task."""
+    kind = kind_of(sample)
+    if kind == "semseg":
+        return SemsegObjective()
+    return DepthObjective() if kind == "depth" else LossObjective(signs={})
+
+
 def kind_of(sample: Any) -> Kind:
     """Which terms suit a sample, by its ground truth: labels, depth, or the model's own losses."""
     if hasattr(sample, "label_ids"):
@@ -132,7 +140,7 @@ class DepthObjective:
         self, *, gamma: float = 0.8, split_m: float = 0.5, direction: Literal["any", "farther", "nearer"] = "any"
     ) -> None:
         self._gamma, self._split_m, self._direction = gamma, split_m, direction
-        self._clean: dict[int, Tensor] = {}
+        self._clean: dict[tuple[int, int], Tensor] = {}
 
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
@@ -155,11 +163,12 @@ class DepthObjective:
         return {n: Term(value=_mean(error, where), weight=w) for n, (where, w) in terms.items() if w and where.any()}
 
     def _answer(self, model: Model, sample: Any, index: int, view: str) -> Tensor:
-        if index not in self._clean:
+        key = (id(model), index)
+        if key not in self._clean:
             picture = torch.from_numpy(sample.images[view].copy()).permute(2, 0, 1)[None].float() / 255
             with torch.no_grad():
-                self._clean[index] = model.forward({view: picture})["depth_m"][0].cpu()
-        return self._clean[index]
+                self._clean[key] = model.forward({view: picture})["depth_m"][0].cpu()
+        return self._clean[key]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

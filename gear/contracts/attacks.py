@@ -45,7 +45,10 @@ class Compositor(Protocol):
     """Puts patches into pictures, differentiably."""
 
     def compose(self, patches: Sequence[Tensor], samples: Sequence[int], view: str) -> Tensor:
-        """(B, 3, H, W) pictures in 0..1 of the samples with the (3, h, w) patches on their surfaces."""
+        """(B, 3, H, W) pictures in 0..1 of the samples with the patches on their surfaces.
+
+        A patch is (3, h, w) for all samples, or (B, 3, h, w) with one look for each; values in 0..1.
+        """
         ...
 
 

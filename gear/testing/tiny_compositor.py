@@ -32,7 +32,7 @@ class TinyCompositor:
         return len(self._dataset[0].record.surfaces)
 
     def compose(self, patches: Sequence[Tensor], samples: Sequence[int], view: str) -> Tensor:
-        """(B, 3, H, W) pictures in 0..1 with the (3, h, w) patches on their surfaces.
+        """(B, 3, H, W) pictures in 0..1 with the patches on their surfaces: (3, h, w), or (B, 3, h, w) one a sample.
 
         Raises:
             ValueError: the number of patches is not that of the surfaces.
@@ -40,7 +40,9 @@ class TinyCompositor:
         if len(patches) != self.surfaces:
             raise ValueError(f"there are {self.surfaces} surfaces, got {len(patches)} patches")
         self.calls += 1
-        return torch.stack([self._one(patches, self._dataset[index], view) for index in samples])
+        looks = [[patch if patch.ndim == 3 else patch[n] for patch in patches] for n in range(len(samples))]
+        shown = zip(looks, samples, strict=True)
+        return torch.stack([self._one(look, self._dataset[index], view) for look, index in shown])
 
     def _one(self, patches: Sequence[Tensor], sample: Sample, view: str) -> Tensor:
         picture = torch.from_numpy(sample.images[view].copy()).permute(2, 0, 1).float() / 255

@@ -131,24 +131,23 @@ class SceneSpecific:
         """One patch a surface."""
         from gear.attacking.loop import optimise
 
-        objective = objective_of(self._config, dataset[0])
+        objective = self.objective(dataset[0])
         return optimise(self._settings, objective, model, dataset, compositor, budget=budget, rng=rng, watch=watch)
 
+    def objective(self, sample: Any) -> Objective:
+        """What is made large, by the task that the sample is of."""
+        from gear.attacking.objectives import DepthObjective, LossObjective, SemsegObjective, kind_of
 
-def objective_of(config: SceneSpecificConfig, sample: Any) -> Objective:
-    """What is made large, by the task that the sample is of."""
-    from gear.attacking.objectives import DepthObjective, LossObjective, SemsegObjective, kind_of
-
-    kind = kind_of(sample)
-    if kind == "semseg":
-        return SemsegObjective(
-            gamma="dynamic" if config.gamma < 0 else config.gamma,
-            attacked=LABEL_IDS.get(config.attacked),
-            target=LABEL_IDS.get(config.target),
-        )
-    if kind == "depth":
-        return DepthObjective(gamma=0.8 if config.gamma < 0 else config.gamma, direction=config.direction)
-    return LossObjective(signs={name: SIGNS[sign] for name, sign in config.losses.items()})
+        config, kind = self._config, kind_of(sample)
+        if kind == "semseg":
+            return SemsegObjective(
+                gamma="dynamic" if config.gamma < 0 else config.gamma,
+                attacked=LABEL_IDS.get(config.attacked),
+                target=LABEL_IDS.get(config.target),
+            )
+        if kind == "depth":
+            return DepthObjective(gamma=0.8 if config.gamma < 0 else config.gamma, direction=config.direction)
+        return LossObjective(signs={name: SIGNS[sign] for name, sign in config.losses.items()})
 
 
 scene_specific: AttackSpec[SceneSpecificConfig] = AttackSpec(

@@ -1,0 +1,68 @@
+"""Models put together: several attacked at once, or one behind a defense that the attack knows of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from torch import Tensor, nn
+
+from gear.contracts.defenses import Defense
+from gear.contracts.models import Model
+from gear.values.frames import UInt8Image
+
+
+class Group(nn.Module):
+    """Several models as one: outputs, losses and taps are the members', under `<member>/<name>`.
+
+    Attributes:
+        members: by name.
+    """
+
+    def __init__(self, members: Mapping[str, Model]) -> None:
+        super().__init__()
+        self.members = dict(members)
+        self.networks = nn.ModuleList([member for member in members.values() if isinstance(member, nn.Module)])
+
+    def predict(self, views: Mapping[str, UInt8Image]) -> dict[str, Any]:
+        """Every member's prediction by its name."""
+        return {name: member.predict(views) for name, member in self.members.items()}
+
+    def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
+        """Every member's outputs or losses."""
+        return {
+            f"{name}/{key}": value
+            for name, member in self.members.items()
+            for key, value in member.forward(views, targets).items()
+        }
+
+    def taps(self) -> Mapping[str, nn.Module]:
+        """Every member's."""
+        return {f"{name}/{key}": tap for name, member in self.members.items() for key, tap in member.taps().items()}
+
+
+class Defended(nn.Module):
+    """A model that sees what a defense lets through, for attacks that know of the defense."""
+
+    def __init__(self, model: Model, defense: Defense) -> None:
+        super().__init__()
+        self.model, self.defense = model, defense
+
+    def predict(self, views: Mapping[str, UInt8Image]) -> Any:
+        """The guarded model's own, without the defense: attacks optimise `forward`."""
+        return self.model.predict(views)
+
+    def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
+        """The model's, of the cleaned pictures; gradients pass the defense as it declares."""
+        return self.model.forward(self.defense.forward(views), targets)
+
+    def taps(self) -> Mapping[str, nn.Module]:
+        """The model's."""
+        return self.model.taps()
+
+
+def members_of(model: Model) -> Mapping[str, Model]:
+    """What is attacked, by a prefix for its figures: the members of a group, or the model itself under no name."""
+    if isinstance(model, Group):
+        return {f"{name}/": member for name, member in model.members.items()}
+    return {"": model}

@@ -1,0 +1,46 @@
+"""Whether gradients say the truth: a step along them must change the objective by what they promise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import torch
+from torch import Tensor
+
+STEP = 0.02
+"""Root mean square of the probing step over the patch's values, in 0..1: about five levels of a byte."""
+
+
+def promised_and_kept(value: Callable[[Sequence[Tensor]], Tensor], patches: Sequence[Tensor]) -> tuple[float, float]:
+    """The change of an objective along its gradient: as the gradient promises it, and as it is.
+
+    A quotient far below 1 says that the gradient is masked: by a defense that hides it, by saturation, or by arithmetic
+    that is not differentiable.
+
+    Args:
+        value: of patches, (3, h, w) each in 0..1; deterministic.
+        patches: where to look.
+
+    Returns:
+        Twice the promised change over the step, and the measured difference between both ends.
+    """
+    asked = [patch.detach().clone().requires_grad_(True) for patch in patches]
+    total = value(asked)
+    gradients = torch.autograd.grad(total, asked, allow_unused=True) if total.requires_grad else [None] * len(asked)
+    found = [torch.zeros_like(p) if g is None else g for p, g in zip(asked, gradients, strict=True)]
+    # Towards the middle only: a step that leaves 0..1 would be cut off.
+    inside = [g * _room(p, g) for p, g in zip(asked, found, strict=True)]
+    size = torch.stack([g.square().mean() for g in inside]).mean().sqrt()
+    if size == 0:
+        return 0.0, 0.0
+    steps = [STEP * g / size for g in inside]
+    promised = float(torch.stack([(g * s).sum() for g, s in zip(found, steps, strict=True)]).sum())
+    with torch.no_grad():
+        ahead = value([(p + s / 2).clamp(0, 1) for p, s in zip(asked, steps, strict=True)])
+        behind = value([(p - s / 2).clamp(0, 1) for p, s in zip(asked, steps, strict=True)])
+    return promised, float(ahead - behind)
+
+
+def _room(patch: Tensor, gradient: Tensor) -> Tensor:
+    """1 where both ends of a step stay inside 0..1, else 0."""
+    return ((patch > STEP) & (patch < 1 - STEP)).to(gradient)

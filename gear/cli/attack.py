@@ -1,0 +1,77 @@
+"""`gear attack`."""
+
+from __future__ import annotations
+
+import argparse
+
+EXAMPLE = """examples:
+  gear collect --task semseg --scene billboard01 --split train --probes --out data/b01
+  gear attack --model ddrnet23_slim --data data/b01 --out patches/b01
+  gear attack --model ddrnet23_slim --data data/b01 --set target=sky --set attacked=road --out patches/road_to_sky
+  gear attack --model glpn_b0 --attack carla_gear --steps 5100 --data data/depth --out patches/paper
+  gear attack --model ddrnet23_slim --model bisenet_x39 --data data/b01 --data data/b02 --out patches/universal
+  gear collect --task semseg --scene billboard01 --split test --patch patches/b01 --out data/b01-patched
+
+The folder holds patch_0.png, …, patch.safetensors, attack.json and figures/.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the command's flags."""
+    parser.epilog = EXAMPLE
+    parser.add_argument("--model", required=True, action="append", metavar="NAME", help="model plugin; repeatable")
+    parser.add_argument(
+        "--data", required=True, action="append", metavar="DIR", help="dataset with probes, or DIR:SPLIT; repeatable"
+    )
+    parser.add_argument("--out", required=True, metavar="DIR", help="the patch folder")
+    parser.add_argument("--attack", default="scene_specific", metavar="NAME", help="attack plugin (scene_specific)")
+    parser.add_argument("--steps", type=int, default=300, metavar="N", help="of optimisation, at most (300)")
+    parser.add_argument("--queries", type=int, metavar="N", help="forward passes, for attacks without gradients")
+    parser.add_argument(
+        "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings", help="an option of the attack"
+    )
+    parser.add_argument("--model-set", metavar="KEY=VALUE", action="append", default=[], help="an option of the models")
+    parser.add_argument("--defense", metavar="NAME", help="a defense that the attack knows of and looks through")
+    parser.add_argument("--defense-set", metavar="KEY=VALUE", action="append", default=[], help="an option of it")
+    parser.add_argument(
+        "--val", action="append", default=[], metavar="DIR", help="dataset to judge patches on; the best are kept"
+    )
+    parser.add_argument("--every", type=int, default=25, metavar="N", help="steps between two looks at it (25)")
+    parser.add_argument("--patience", type=int, default=0, metavar="N", help="looks without a better one until it ends")
+    parser.add_argument("--compositor", default="transport", metavar="NAME", help="transport, or homography")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of everything that is drawn (0)")
+    parser.add_argument("--allow-test-data", action="store_true", help="optimise on test splits too")
+    parser.add_argument("--force", action="store_true", help="start afresh where something else is")
+    parser.add_argument("--json", action="store_true", help="print attack.json")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Attacks and says where the patches are."""
+    import json
+
+    from gear.cli.progress import ProgressBar
+    from gear.verbs.attack.run import attack
+
+    with ProgressBar(unit="step") as progress:
+        report = attack(
+            args.data,
+            model=args.model,
+            out=args.out,
+            attack=args.attack,
+            steps=args.steps,
+            queries=args.queries,
+            settings=args.settings,
+            model_settings=args.model_set,
+            defense=args.defense,
+            defense_settings=args.defense_set,
+            val=args.val,
+            every=args.every,
+            patience=args.patience,
+            compositor=args.compositor,
+            seed=args.seed,
+            allow_tests=args.allow_test_data,
+            force=args.force,
+            progress=progress,
+        )
+    print(json.dumps(report.facts, indent=2) if args.json else report.summary())
+    return 0

@@ -1,0 +1,1 @@
+"""`gear attack`: patches for any task and model."""

@@ -1,0 +1,85 @@
+"""The attacked model: one, several together, or one behind a defense."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from gear.attacking.group import Defended, Group
+from gear.contracts.models import Model
+from gear.contracts.specs import AttackSpec, DefenseSpec, ModelSpec
+from gear.dataset.reading import Dataset
+from gear.plugins.build import build
+from gear.plugins.catalogue import Found
+from gear.values.errors import GearError
+from gear.verbs.evaluate.choice import Chosen, check_defense, check_model, chosen_defense, chosen_model
+
+
+def choose_models(names: Sequence[str], settings: Iterable[str], dataset: Dataset[Any]) -> list[Chosen]:
+    """Every model with the same options, checked against the dataset.
+
+    Raises:
+        GearError: there is no such model, an option does not fit, it is named twice, or it does another task.
+    """
+    if not names:
+        raise GearError("name a model to attack: --model NAME (gear plugins --kind model lists them)")
+    if len(set(names)) < len(names):
+        raise GearError(f"a model is named twice: {', '.join(names)}")
+    chosen = [chosen_model(name, settings) for name in names]
+    for model in chosen:
+        check_model(model, dataset)
+    return chosen
+
+
+def choose_defense(name: str | None, settings: Iterable[str], models: Sequence[Chosen], task: str) -> Chosen | None:
+    """The defense that the attack knows of.
+
+    Raises:
+        GearError: it does not fit, must learn first, or lets no gradient pass.
+    """
+    if name is None:
+        return None
+    chosen = chosen_defense(name, settings)
+    for model in models:
+        check_defense(chosen, model, task, is_calibrated=False)
+    spec = chosen.found.spec
+    assert isinstance(spec, DefenseSpec)
+    if spec.gradient == "none":
+        raise GearError(f"defense {spec.name!r} declares no gradient, so an attack cannot look through it")
+    return chosen
+
+
+def check_attack(
+    found: Found, models: Sequence[Chosen], task: str, surfaces: int, queries: int | None
+) -> AttackSpec[Any]:
+    """Whether the attack can do it.
+
+    Raises:
+        GearError: it is for other tasks, for fewer surfaces, needs gradients that a model does not give, or queries.
+    """
+    spec = found.spec
+    assert isinstance(spec, AttackSpec)
+    if spec.tasks and task not in spec.tasks:
+        raise GearError(f"attack {spec.name!r} is for {', '.join(spec.tasks)}; this is a {task} dataset")
+    if surfaces > spec.max_surfaces:
+        raise GearError(
+            f"attack {spec.name!r} makes up to {spec.max_surfaces} patches; the scene has {surfaces} surfaces"
+        )
+    for model in models:
+        assert isinstance(model.found.spec, ModelSpec)
+        if spec.needs_gradients and not model.found.spec.has_gradients:
+            raise GearError(f"attack {spec.name!r} needs gradients; model {model.found.spec.name!r} gives none")
+    if not spec.needs_gradients and queries is None:
+        raise GearError(f"attack {spec.name!r} is counted in forward passes: say how many with --queries N")
+    return spec
+
+
+def build_model(models: Sequence[Chosen], defense: Chosen | None) -> Model:
+    """What `Attack.optimise` is given."""
+    built: dict[str, Model] = {}
+    for chosen in models:
+        model: Model = build(chosen.found, chosen.options)
+        if defense is not None:
+            model = Defended(model, build(defense.found, defense.options))
+        built[chosen.found.spec.name] = model
+    return next(iter(built.values())) if len(built) == 1 else Group(built)

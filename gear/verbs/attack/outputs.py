@@ -1,0 +1,79 @@
+"""A patch folder: pictures to print, exact values, what was done."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from safetensors.numpy import save as to_bytes
+
+from gear.contracts.attacks import Patch
+from gear.dataset.files import write_whole
+from gear.dataset.sidecar import dump_json
+from gear.formats.png import encode_rgb
+from gear.values.frames import UInt8Image
+from gear.values.serial import Json
+
+BLUE, RED, GREY = "#1f5fa8", "#b3402a", "0.55"
+
+
+def write_patches(root: Path, patches: Sequence[Patch], notes: Json) -> None:
+    """Writes `patch_0.png`, …, `patch.safetensors` and, last, `attack.json`, which says that the folder is whole."""
+    for patch in patches:
+        write_whole(root, f"{patch.name}.png", encode_rgb(as_picture(patch)))
+    exact = {patch.name: np.ascontiguousarray(patch.rgb, np.float32) for patch in patches}
+    write_whole(root, "patch.safetensors", to_bytes(exact))
+    write_whole(root, "attack.json", dump_json(notes))
+
+
+def as_picture(patch: Patch) -> UInt8Image:
+    """(H, W, 3) uint8, as it is printed."""
+    return np.asarray(np.floor(np.clip(patch.rgb, 0, 1) * 255 + 0.5).astype(np.uint8))
+
+
+def write_curves(
+    root: Path, title: str, curves: Mapping[str, Sequence[float]], judged: Sequence[tuple[int, float]]
+) -> None:
+    """Writes `figures/curves.png`: every figure over the steps, and the validations."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    names = [name for name, values in curves.items() if np.isfinite(values).any()]
+    panels = len(names) + bool(judged)
+    figure = Figure(figsize=(3.2 * max(panels, 1), 2.8), layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.suptitle(title, fontsize=9)
+    axes = np.atleast_1d(figure.subplots(1, max(panels, 1)))
+    for axis, name in zip(axes, names, strict=False):
+        values = np.asarray(curves[name], np.float64)
+        axis.plot(np.arange(1, len(values) + 1), values, color=GREY, lw=0.6)
+        axis.plot(*_smoothed(values), color=BLUE, lw=1.4)
+        axis.set_title(name, fontsize=8)
+    if judged:
+        axes[-1].plot(*np.transpose(judged), "o-", color=RED, ms=3)
+        axes[-1].set_title("harm on validation samples", fontsize=8)
+    for axis in axes:
+        axis.tick_params(labelsize=7)
+        axis.set_xlabel("step", fontsize=7)
+        axis.grid(alpha=0.3)
+    data = io.BytesIO()
+    figure.savefig(data, format="png", dpi=120, metadata={"Software": None})
+    write_whole(root, "figures/curves.png", data.getvalue())
+
+
+def write_samples(root: Path, pairs: Sequence[tuple[UInt8Image, UInt8Image]]) -> None:
+    """Writes `figures/samples.png`: pictures before and after, side by side, one pair a row."""
+    rows = [np.concatenate(pair, axis=1) for pair in pairs]
+    if rows:
+        write_whole(root, "figures/samples.png", encode_rgb(np.ascontiguousarray(np.concatenate(rows))))
+
+
+def _smoothed(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Steps and a running mean over a twentieth of them."""
+    known = np.isfinite(values)
+    width = max(1, int(known.sum()) // 20)
+    kernel = np.ones(width) / width
+    steps = np.flatnonzero(known) + 1
+    return np.convolve(steps, kernel, "valid"), np.convolve(values[known], kernel, "valid")

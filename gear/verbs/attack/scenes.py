@@ -1,0 +1,70 @@
+"""Samples with their compositor, and what patches do to them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from gear.attacking.borrowed import frozen
+from gear.attacking.group import members_of
+from gear.attacking.masking import promised_and_kept
+from gear.attacking.objectives import Objective
+from gear.compositor.opening import open_compositor
+from gear.contracts.attacks import Patch
+from gear.contracts.models import Model
+from gear.dataset.reading import Dataset
+from gear.values.frames import UInt8Image
+from gear.verbs.attack.data import Joined, JoinedCompositor
+
+SHOWN = 3
+"""Samples of the figure, and of the look at masking."""
+
+
+class Scenes:
+    """Samples with their compositor."""
+
+    def __init__(self, datasets: Sequence[Dataset[Any]], compositor: str, device: str) -> None:
+        self.samples = Joined(datasets)
+        self.compositor = JoinedCompositor(
+            self.samples, [open_compositor(compositor, dataset, device=device) for dataset in datasets]
+        )
+
+    def harm(self, model: Model, objective: Objective, patches: Sequence[Patch]) -> float:
+        """Mean of the objective over the samples, the patches as they are."""
+        tensors = [torch.from_numpy(patch.rgb.copy()).permute(2, 0, 1) for patch in patches]
+        with torch.no_grad(), frozen(model):
+            values = [float(self.value(model, objective, tensors, [index])) for index in range(len(self.samples))]
+        return float(np.mean(values))
+
+    def value(self, model: Model, objective: Objective, patches: Sequence[Tensor], indexes: Sequence[int]) -> Tensor:
+        """The objective of some samples: its terms, weighted and summed."""
+        samples = [self.samples[index] for index in indexes]
+        views = {view: self.compositor.compose(patches, indexes, view) for view in samples[0].images}
+        terms = [
+            term.weight * term.value
+            for member in members_of(model).values()
+            for term in objective.terms(member, views, samples, indexes).values()
+        ]
+        return torch.stack(terms).sum() if terms else torch.zeros(())
+
+    def masking(self, model: Model, objective: Objective, patches: Sequence[Patch]) -> tuple[float, float]:
+        """What the gradient promises at the patches, and what is kept."""
+        indexes = list(range(min(SHOWN, len(self.samples))))
+        tensors = [torch.from_numpy(patch.rgb.copy()).permute(2, 0, 1) for patch in patches]
+        with frozen(model):
+            return promised_and_kept(lambda changed: self.value(model, objective, changed, indexes), tensors)
+
+    def pairs(self, patches: Sequence[Patch]) -> list[tuple[UInt8Image, UInt8Image]]:
+        """A few pictures as they are and with the patches in them."""
+        tensors = [torch.from_numpy(patch.rgb.copy()).permute(2, 0, 1) for patch in patches]
+        found = []
+        for index in np.linspace(0, len(self.samples) - 1, min(SHOWN, len(self.samples))).astype(int).tolist():
+            view, picture = next(iter(self.samples[index].images.items()))
+            with torch.no_grad():
+                shown = self.compositor.compose(tensors, [index], view)[0].permute(1, 2, 0)
+            found.append((picture, (shown * 255 + 0.5).to(torch.uint8).cpu().numpy()))
+        return found

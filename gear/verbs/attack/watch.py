@@ -1,0 +1,138 @@
+"""What looks on while patches are made: curves, checkpoints, validation, early stopping."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save as to_bytes
+
+from gear.contracts.attacks import Patch, State
+from gear.dataset.files import write_whole
+from gear.values.errors import DatasetError
+
+CHECKPOINT = "checkpoint.safetensors"
+SECONDS_BETWEEN = 20.0
+Judge = Callable[[tuple[Patch, ...]], float]
+Told = Callable[[int, int], None]
+
+
+@dataclass(eq=False, kw_only=True)
+class Recorder:
+    """A `gear.contracts.attacks.Watch` that writes into the attack's folder.
+
+    Attributes:
+        root: the folder.
+        key: of what is being made; a checkpoint of something else is refused.
+        steps: of the budget.
+        judge: harm of patches on samples that the attack does not see; None without validation.
+        every: steps between validations.
+        patience: validations without a better one until the attack is ended; 0 for never.
+        told: of the steps done and of those in all.
+        curves: values by figure, one a step.
+        judged: (step, harm) of every validation.
+        best: the patches that did most harm there.
+        stopped: why the attack ended before its budget.
+        seconds: spent so far, over all runs.
+    """
+
+    root: Path
+    key: str
+    steps: int
+    judge: Judge | None = None
+    every: int = 25
+    patience: int = 0
+    told: Told | None = None
+    curves: dict[str, list[float]] = field(default_factory=dict)
+    judged: list[tuple[int, float]] = field(default_factory=list)
+    best: tuple[Patch, ...] | None = None
+    stopped: str = ""
+    seconds: float = 0.0
+
+    def __post_init__(self) -> None:
+        self._since = self._saved = time.monotonic()
+
+    def resume(self) -> State | None:
+        """The checkpoint's state, with curves and validations taken up again.
+
+        Raises:
+            DatasetError: the checkpoint cannot be read or is of another attack.
+        """
+        path = self.root / CHECKPOINT
+        if not path.exists():
+            return None
+        try:
+            with safe_open(str(path), framework="numpy") as opened:
+                notes = json.loads((opened.metadata() or {})["notes"])
+                arrays = {name: opened.get_tensor(name) for name in opened.keys()}  # noqa: SIM118
+        except (SafetensorError, KeyError, ValueError) as error:
+            raise DatasetError(path, "is damaged; remove it to start afresh") from error
+        if notes["key"] != self.key:
+            raise DatasetError(
+                self.root, "holds an unfinished attack with other settings; use another --out or --force"
+            )
+        self.curves, self.judged = notes["curves"], [(int(step), float(harm)) for step, harm in notes["judged"]]
+        self.seconds = notes["seconds"]
+        kept = sorted(name for name in arrays if name.startswith("best/"))
+        if kept:
+            self.best = tuple(Patch(name=name.removeprefix("best/"), rgb=arrays[name]) for name in kept)
+        if self.told is not None:
+            self.told(int(notes["done"]), self.steps)
+        return {name.removeprefix("state/"): arrays[name] for name in arrays if name.startswith("state/")}
+
+    def step(
+        self,
+        done: int,
+        figures: Mapping[str, float],
+        patches: Callable[[], tuple[Patch, ...]],
+        state: Callable[[], State],
+    ) -> bool:
+        """Notes the figures, validates and saves when it is time; True where validation says that it is enough."""
+        for name, value in figures.items():
+            curve = self.curves.setdefault(name, [float("nan")] * (done - 1))
+            curve += [float("nan")] * (done - 1 - len(curve)) + [float(value)]
+        if self.judge is not None and (done % self.every == 0 or done == self.steps):
+            self._validate(done, patches())
+        now = time.monotonic()
+        if now - self._saved >= SECONDS_BETWEEN:
+            self.save(done, state())
+        if self.told is not None:
+            self.told(done, self.steps)
+        return bool(self.stopped)
+
+    def save(self, done: int, state: State) -> None:
+        """Writes the checkpoint, whole or not at all."""
+        self._saved = time.monotonic()
+        self.clock()
+        arrays: dict[str, Any] = {f"state/{name}": np.ascontiguousarray(value) for name, value in state.items()}
+        arrays |= {f"best/{patch.name}": np.ascontiguousarray(patch.rgb) for patch in self.best or ()}
+        notes = {
+            "key": self.key,
+            "done": done,
+            "curves": self.curves,
+            "judged": self.judged,
+            "seconds": self.seconds,
+        }
+        write_whole(self.root, CHECKPOINT, to_bytes(arrays, {"notes": json.dumps(notes)}))
+
+    def clock(self) -> float:
+        """Seconds spent so far."""
+        now = time.monotonic()
+        self.seconds, self._since = self.seconds + now - self._since, now
+        return self.seconds
+
+    def _validate(self, done: int, patches: tuple[Patch, ...]) -> None:
+        assert self.judge is not None
+        harm = self.judge(patches)
+        if not self.judged or harm > max(value for _, value in self.judged):
+            self.best = patches
+        self.judged.append((done, harm))
+        best = max(range(len(self.judged)), key=lambda number: self.judged[number][1])
+        if self.patience and len(self.judged) - 1 - best >= self.patience:
+            self.stopped = f"no better on the validation samples for {self.patience} validations"
