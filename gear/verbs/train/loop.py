@@ -34,6 +34,9 @@ CHECKPOINT_EVERY_S = 120.0
 VALIDATION_SHARE = 0.1
 """Of the time, where time is the budget."""
 
+MOST_VALIDATIONS = 8
+"""In that time."""
+
 MOST_BROKEN_STEPS = 20
 
 
@@ -126,8 +129,8 @@ class Training:
             return progress.position.batch == 0
         last = progress.validations[-1] if progress.validations else None
         since_s = progress.elapsed_s - (last["elapsed_s"] if last else 0.0)
-        wanted_s = last["took_s"] / VALIDATION_SHARE if last else self._config.time_budget_s / 10
-        return since_s > max(wanted_s, self._config.time_budget_s / 20)
+        wanted_s = last["took_s"] / VALIDATION_SHARE if last else 0.0
+        return since_s > max(wanted_s, self._config.time_budget_s / MOST_VALIDATIONS)
 
     def _step(self, batch: Batch) -> None:
         progress, config = self.progress, self._config

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import math
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping as AnyMapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -14,16 +15,23 @@ from typing import Any
 from torch import Tensor
 
 from gear.config.dump import to_plain
+from gear.config.nodes import Mapping
+from gear.config.reader import read_node
 from gear.dataset.files import sha256, write_whole
 from gear.nn.weights import write as write_weights
 from gear.plugins.catalogue import Found
-from gear.values.serial import Json
+from gear.values.serial import to_json
+from gear.verbs.look import Look
 from gear.verbs.train.checkpoint import Progress
 from gear.verbs.train.config import TrainConfig
 from gear.verbs.train.data import Samples
+from gear.verbs.train.starting import SCALE
 
 WEIGHTS = "model.safetensors"
 HISTORY = "train.json"
+CIRCUMSTANCES = ("weights", "device", "precision", "seed")
+"""Options that say nothing of how weights are to be used."""
+
 CARD = "card.md"
 
 
@@ -37,7 +45,8 @@ class Origin:
         config: of the training.
         training, validation: the data.
         command: that makes them again.
-        look_hash: of what the training data show; "" where they were collected with several looks.
+        look: of the training data.
+        picture_share: width of the training pictures, as a share of the task's own.
     """
 
     model: Found
@@ -46,9 +55,10 @@ class Origin:
     training: Samples
     validation: Samples
     command: str
-    look_hash: str
+    look: Look
+    picture_share: float
 
-    def metadata(self, figures: Mapping[str, Any]) -> dict[str, str]:
+    def metadata(self, figures: AnyMapping[str, Any]) -> dict[str, str]:
         """What stands in the weights file: texts, those of several values as JSON."""
         data = {"training": self.training.facts(), "validation": self.validation.facts()}
         return {
@@ -58,25 +68,35 @@ class Origin:
             "gear": version("mujoco-gear"),
             "command": self.command,
             "seed": str(self.config.seed),
-            "look_hash": self.look_hash,
+            "look": json.dumps(to_json(self.look), sort_keys=True),
+            "look_hash": self.look.hash,
             "data": json.dumps(data, sort_keys=True),
             "metrics": json.dumps(known(figures), sort_keys=True),
-            "options": json.dumps(to_plain(self.config.options), sort_keys=True),
+            "options": json.dumps(self._options(), sort_keys=True),
         }
 
+    def _options(self) -> dict[str, Any]:
+        """Those of the network's options that were given, for pictures of the task's own size."""
+        given = self.config.options.entries if isinstance(self.config.options, Mapping) else {}
+        values: Any = to_plain(read_node(self.model.spec.config, self.config.options, "options"))
+        options = {name: values[name] for name in given if name not in CIRCUMSTANCES}
+        if options.get(SCALE):
+            options[SCALE] *= self.picture_share
+        return options
 
-def known(figures: Mapping[str, Any]) -> dict[str, Any]:
+
+def known(figures: AnyMapping[str, Any]) -> dict[str, Any]:
     """Without what is no number, for JSON."""
     return {key: value for key, value in figures.items() if not (isinstance(value, float) and math.isnan(value))}
 
 
-def figures_of(validation: Mapping[str, Any]) -> dict[str, float]:
+def figures_of(validation: AnyMapping[str, Any]) -> dict[str, float]:
     """A validation without its times."""
     return {key: value for key, value in validation.items() if key not in ("step", "elapsed_s", "took_s")}
 
 
 def command_of(
-    task: str, model: str, data: Sequence[str], val: Sequence[str], flags: Mapping[str, Any], settings: Sequence[str]
+    task: str, model: str, data: Sequence[str], val: Sequence[str], flags: AnyMapping[str, Any], settings: Sequence[str]
 ) -> str:
     """The command line that does the same."""
     words = ["gear", "train", "--task", task, "--model", model, "--data", *data, *(["--val", *val] if val else [])]
@@ -88,7 +108,7 @@ def command_of(
     return shlex.join([*words, "--out", "DIR"])
 
 
-def keep_weights(root: Path, state: Mapping[str, Tensor], origin: Origin, progress: Progress) -> None:
+def keep_weights(root: Path, state: AnyMapping[str, Tensor], origin: Origin, progress: Progress) -> None:
     """Writes the weights, matrices in float16."""
     figures = figures_of(progress.validations[-1])
     write_weights(root / WEIGHTS, state, origin.metadata(figures), halves=True)
@@ -132,7 +152,7 @@ def card(root: Path, origin: Origin, progress: Progress) -> str:
         f"batch {config.batch}, crop {_size(config.crop_px)}, {config.precision}",
         f"- {progress.step} steps in {progress.elapsed_s / 60:.1f} minutes; the weights are those after step "
         f"{progress.best_step}",
-        f"- look of the data: `{origin.look_hash or 'several'}`",
+        f"- look of the data: `{origin.look.hash}`",
         "",
         "## Training data",
         "",
@@ -168,12 +188,3 @@ def _data_table(samples: Samples) -> list[str]:
         cells = (entry[key] for key in ("scene", "weather", "split", "seed", "patch", "samples"))
         rows.append("| " + " | ".join(str(cell) for cell in cells) + " |")
     return rows
-
-
-def look_of(samples: Samples) -> Json:
-    """What the pictures' look follows from, where all samples agree: assets, renderer and versions."""
-    looks = {
-        json.dumps({key: dataset.manifest[key] for key in ("assets", "renderer", "versions")}, sort_keys=True)
-        for dataset in samples.datasets
-    }
-    return json.loads(looks.pop()) if len(looks) == 1 else None

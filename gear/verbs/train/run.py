@@ -15,13 +15,14 @@ from gear.plugins.build import blamed, find
 from gear.plugins.catalogue import Found
 from gear.values.errors import GearError
 from gear.values.serial import Json
+from gear.verbs.look import look_of
 from gear.verbs.train.config import TrainConfig, read_config
 from gear.verbs.train.curves import write_curves
 from gear.verbs.train.data import TRAINING, VALIDATION, Samples, all_of, keep_some, open_all, spread
 from gear.verbs.train.feed import Cache, Feed
 from gear.verbs.train.loop import Parts, Training, Watch
 from gear.verbs.train.results import WEIGHTS, Origin, command_of, figures_of, keep_weights, known, write_history
-from gear.verbs.train.starting import begin_with, build_network
+from gear.verbs.train.starting import begin_with, build_network, picture_share, with_scale
 
 GIGABYTE = 1e9
 CHANGE_NOTHING = ("workers", "cache_gb", "device")
@@ -113,6 +114,10 @@ def train(
     recipe = trainable(found, task)
     config = read_config(recipe, given, settings)
     training, validation = _samples(_listed(data), _listed(val), task, config, allow_test_data)
+    spec = task_found.spec
+    assert isinstance(spec, TaskSpec)
+    share = picture_share(training, spec)
+    config = with_scale(found, config, share)
     root = Path(out)
     with explained(root):
         root.mkdir(parents=True, exist_ok=True)
@@ -126,10 +131,9 @@ def train(
         training=training,
         validation=validation,
         command=command_of(task, model, _listed(data), _listed(val), flags, settings),
-        look_hash="",
+        look=look_of(dataset.plan for dataset in training.datasets),
+        picture_share=share,
     )
-    spec = task_found.spec
-    assert isinstance(spec, TaskSpec)
     training_run = Training(
         _parts(found, spec, origin, root),
         config,

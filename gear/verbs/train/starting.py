@@ -8,7 +8,7 @@ from typing import Any
 
 from gear.config.nodes import Mapping, Place, Scalar
 from gear.config.overrides import with_value
-from gear.contracts.specs import ModelSpec
+from gear.contracts.specs import ModelSpec, TaskSpec
 from gear.nn.options import NONE, SHIPPED
 from gear.nn.runtime import seeded
 from gear.nn.shipped import resolve
@@ -17,6 +17,30 @@ from gear.plugins.build import blamed, build
 from gear.plugins.catalogue import Found
 from gear.values.errors import GearError, UnknownNameError
 from gear.verbs.train.config import TrainConfig
+from gear.verbs.train.data import Samples
+
+SCALE = "input_scale"
+"""Option of many networks: at which share of the picture's size they run; null leaves it to the weights."""
+
+
+def picture_share(samples: Samples, spec: TaskSpec[Any]) -> float:
+    """Width of the pictures as a share of the width that the task has by itself; 1 where there is no saying."""
+    usual = getattr(spec.config(), "width_px", None)
+    widths = {dataset.sidecar(0).record.cameras[0].width_px for dataset in samples.datasets}
+    return widths.pop() / usual if usual and len(widths) == 1 else 1.0
+
+
+def with_scale(found: Found, config: TrainConfig, share: float) -> TrainConfig:
+    """Lets a network that would run at a share of its pictures' size see small pictures as they are.
+
+    Its weights then say at which share of the task's own pictures they are to be used.
+    """
+    by_itself = getattr(found.spec.config(), SCALE, 1.0)
+    is_given = isinstance(config.options, Mapping) and SCALE in config.options.entries
+    if share == 1 or by_itself is not None or is_given:
+        return config
+    options = with_value(config.options, (SCALE,), Scalar("1", False, Place("gear train")))
+    return dataclasses.replace(config, options=options)
 
 
 def build_network(found: Found, config: TrainConfig, *, precision: str) -> Any:
