@@ -24,6 +24,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from gear.contracts.evaluation import KeepsPredictions, Maskable, Reports
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Encoded, Sample, Sidecar, SplitInfo, Task
 from gear.testing.compare import difference, freeze
@@ -192,6 +193,48 @@ class TaskContract:
         """Nothing gathered, no figure."""
         result = self.task().evaluator().result()
         assert all(value != value for value in result.values())
+
+    def test_predictions_survive_their_files(self, tmp_path: Path) -> None:
+        """Where predictions are kept, reading gives back what was written, to the last bit, beside no other file."""
+        task = self.task()
+        if not isinstance(task, KeepsPredictions):
+            return
+        names: list[str] = []
+        rows = []
+        for index in (0, 1):
+            sample = freeze(self.sample(index))
+            prediction = freeze(self.spoil(task.as_prediction(sample)))
+            encoded = task.encode_prediction(sample, prediction, INFO)
+            assert task.encode_prediction(sample, prediction, INFO).files == encoded.files
+            _put(tmp_path, encoded.files)
+            facts = json.loads(json.dumps(encoded.facts, allow_nan=False))
+            assert not difference(task.decode_prediction(tmp_path, sample, facts, INFO), prediction)
+            names += encoded.files
+            rows.append((sample.record, facts))
+        names += task.finalise_predictions(rows, INFO)
+        assert names and len(set(names)) == len(names)
+        assert not any(PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts for name in names)
+
+    def test_masked_ground_truth_says_nothing(self) -> None:
+        """Where ground truth can be masked, all of it masked leaves nothing to measure, none of it leaves all."""
+        task, sample = self.task(), freeze(self.sample())
+        if not isinstance(task, Maskable):
+            return
+        prediction = task.as_prediction(sample)
+        for value in (True, False):
+            masks = {name: np.full(image.shape[:2], value) for name, image in sample.images.items()}
+            evaluator = task.evaluator()
+            for _ in range(self.repeats):
+                evaluator.update(task.without(sample, masks), prediction)
+            figure = evaluator.result()[self.headline]
+            assert math.isnan(figure) if value else math.isclose(figure, self.perfect, abs_tol=1e-9)
+
+    def test_reports_are_evaluators(self) -> None:
+        """Where there are further reports, each takes the same samples and says NaN before."""
+        task = self.task()
+        for name, evaluator in task.reports().items() if isinstance(task, Reports) else ():
+            assert all(value != value for value in evaluator.result().values()), name
+            assert not any(math.isinf(v) for v in self._gather(evaluator, [0, 1]).result().values()), name
 
     def test_preview_shows_pictures(self) -> None:
         """At least one picture, in RGB."""

@@ -25,13 +25,15 @@ from gear.formats.kitti_object import parse_labels
 from gear.plugins import build as building
 from gear.plugins.manager import discover
 from gear.testing.tiny_networks import tiny_depth, tiny_segmenter
+from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import ConfigError, DatasetError, GearError, PluginError, UnknownNameError
 from gear.values.frames import UInt8Image
-from gear.verbs.collect.run import CollectReport
+from gear.verbs.collect.run import collect
 from gear.verbs.evaluate.patch_area import patch_masks
 from gear.verbs.evaluate.run import evaluate
+from tests.verbs.conftest import size_settings
 
-Collect = Callable[..., CollectReport]
+Small = Callable[..., Path]
 Install = Callable[..., None]
 Views = Mapping[str, UInt8Image]
 HEADLINES = {"semseg": ("miou", 1), "depth": ("rmse_m", 0), "detect2d": ("ap", 1), "stereo3d": ("car_2d_easy_r40", 1)}
@@ -86,6 +88,25 @@ def install(monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
     sys.modules.pop("odd_package", None)
 
 
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Small:
+    """Datasets that tests share and only read; the folder's name is the patch."""
+    made: dict[tuple[str, str, int], Path] = {}
+
+    def root(task: str, patch: str = "random", samples: int = 2) -> Path:
+        key = (task, patch, samples)
+        if key not in made:
+            made[key] = tmp_path_factory.mktemp(task) / patch
+            settings = [f"scenes={TINY_SCENES}", *size_settings(task)]
+            collect(
+                task, town=TINY_TOWN, scene="board", split="debug", samples=samples, renderer="classic",
+                quality="fast", patch=patch, out=made[key], settings=settings,
+            )  # fmt: skip
+        return made[key]
+
+    return root
+
+
 def timeless(path: Path) -> Any:
     def strip(value: Any) -> Any:
         if isinstance(value, dict):
@@ -97,10 +118,9 @@ def timeless(path: Path) -> Any:
 
 @pytest.mark.parametrize("task", HEADLINES)
 def test_the_truth_scores_perfect_and_is_kept_in_the_formats_layout(
-    tmp_path: Path, collect_small: Collect, install: Install, task: str
+    tmp_path: Path, small: Small, install: Install, task: str
 ) -> None:
-    data = tmp_path / "data"
-    collect_small(task, data, patch="random")
+    data = small(task)
     install(model_spec(lambda _: Oracle([data]), task))
     report = evaluate(data, model="odd", out=tmp_path / "out", reports=["reference"], resamples=20)
     (row,) = report.rows
@@ -132,10 +152,9 @@ def test_the_truth_scores_perfect_and_is_kept_in_the_formats_layout(
 
 @pytest.mark.parametrize("task", HEADLINES)
 def test_it_is_taken_up_again_and_predicts_nothing_twice(
-    tmp_path: Path, collect_small: Collect, install: Install, task: str
+    tmp_path: Path, small: Small, install: Install, task: str
 ) -> None:
-    data = tmp_path / "data"
-    collect_small(task, data, patch="random", samples=3)
+    data = small(task, samples=3)
     oracle = Oracle([data])
     install(model_spec(lambda _: oracle, task))
 
@@ -159,9 +178,8 @@ def test_it_is_taken_up_again_and_predicts_nothing_twice(
         evaluate(data, model="odd", out=folder, seed=1)
 
 
-def test_batches_and_threads_change_nothing(tmp_path: Path, collect_small: Collect, install: Install) -> None:
-    data = tmp_path / "data"
-    collect_small("semseg", data, patch="random", samples=5)
+def test_batches_and_threads_change_nothing(tmp_path: Path, small: Small, install: Install) -> None:
+    data = small("semseg", samples=5)
     install(tiny_segmenter)
     evaluate(data, model="tiny_segmenter", out=tmp_path / "one", workers=1, resamples=30)
     evaluate(data, model="tiny_segmenter", out=tmp_path / "two", workers=4, batch=3, resamples=30)
@@ -173,13 +191,9 @@ def test_batches_and_threads_change_nothing(tmp_path: Path, collect_small: Colle
     assert [s["index"] for s in one["rows"][0]["per_sample"]] == [0, 1, 2, 3, 4]
 
 
-def test_twins_are_compared_and_the_patch_can_be_left_out(
-    tmp_path: Path, collect_small: Collect, install: Install
-) -> None:
+def test_twins_are_compared_and_the_patch_can_be_left_out(tmp_path: Path, small: Small, install: Install) -> None:
     """A network that is wrong on the random patch alone."""
-    roots = [tmp_path / "none", tmp_path / "random"]
-    for root in roots:
-        collect_small("semseg", root, patch=root.name)
+    roots = [small("semseg", "none"), small("semseg", "random")]
 
     def fooled(sample: Any, prediction: Any) -> Any:
         is_patched = (
@@ -199,9 +213,8 @@ def test_twins_are_compared_and_the_patch_can_be_left_out(
     assert difference.figures["task"]["miou"].value == 0 and difference.auroc is None
 
 
-def test_figures_outside_the_patch_do_not_see_it(tmp_path: Path, collect_small: Collect, install: Install) -> None:
-    data = tmp_path / "data"
-    collect_small("depth", data, patch="random")
+def test_figures_outside_the_patch_do_not_see_it(tmp_path: Path, small: Small, install: Install) -> None:
+    data = small("depth")
 
     def wrong_there(sample: Any, prediction: Any) -> Any:
         return np.where(patch_masks(sample)["left"], np.float32(3.0), prediction)
@@ -236,10 +249,8 @@ class Finder:
         return types.SimpleNamespace(predict=lambda views: model.predict(views), taps=model.taps)
 
 
-def test_a_defense_is_fitted_wrapped_and_judged(tmp_path: Path, collect_small: Collect, install: Install) -> None:
-    roots = [tmp_path / "none", tmp_path / "random"]
-    for root in roots:
-        collect_small("semseg", root, patch=root.name)
+def test_a_defense_is_fitted_wrapped_and_judged(tmp_path: Path, small: Small, install: Install) -> None:
+    roots = [small("semseg", "none"), small("semseg", "random")]
     finder = Finder(roots)
     spec: DefenseSpec[Any] = DefenseSpec(
         name="finder", summary="Finds.", config=Config, build=lambda _: finder,  # type: ignore[arg-type]
@@ -266,10 +277,9 @@ def test_a_defense_is_fitted_wrapped_and_judged(tmp_path: Path, collect_small: C
 
 
 def test_a_built_in_defense_by_the_command(
-    tmp_path: Path, collect_small: Collect, install: Install, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, small: Small, install: Install, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    data = tmp_path / "data"
-    collect_small("depth", data, patch="random")
+    data = small("depth")
     install(tiny_depth)
     command = ["evaluate", "--model", "tiny_depth", "--data", str(data), "--resamples", "10"]
     assert main([*command, "--out", str(tmp_path / "plain")]) == 0
@@ -284,11 +294,8 @@ def test_a_built_in_defense_by_the_command(
     assert facts == json.loads((tmp_path / "jpeg/results.json").read_text())
 
 
-def test_bad_input_is_refused_before_anything_is_built(
-    tmp_path: Path, collect_small: Collect, install: Install
-) -> None:
-    collect_small("semseg", tmp_path / "data")
-    collect_small("depth", tmp_path / "depth")
+def test_bad_input_is_refused_before_anything_is_built(tmp_path: Path, small: Small, install: Install) -> None:
+    data = small("semseg")
 
     def never(_: Any) -> Any:
         raise AssertionError("built")
@@ -302,15 +309,15 @@ def test_bad_input_is_refused_before_anything_is_built(
         (ConfigError, "did you mean 'width'", {"settings": ["widht=3"]}),
         (UnknownNameError, "did you mean reference", {"reports": ["referense"]}),
         (GearError, "'other' is for depth", {"defense": "other"}),
-        (GearError, "are the same data", {"data": [tmp_path / "data", tmp_path / "data"]}),
+        (GearError, "are the same data", {"data": [data, data]}),
         (GearError, "nothing to evaluate", {"data": []}),
-        (GearError, "is a depth dataset, .* a semseg one", {"data": [tmp_path / "data", tmp_path / "depth"]}),
+        (GearError, "is a depth dataset, .* a semseg one", {"data": [data, small("depth")]}),
         (GearError, "at least 1", {"batch": 0}),
         (DatasetError, "no gear/<split>/plan.json", {"data": tmp_path / "nowhere"}),
-        (DatasetError, "is a dataset", {"out": tmp_path / "data"}),
+        (DatasetError, "is a dataset", {"out": data}),
     ]
     for kind, message, changes in cases:
-        arguments = {"data": tmp_path / "data", "model": "tiny_segmenter", "out": tmp_path / "x"} | changes
+        arguments = {"data": data, "model": "tiny_segmenter", "out": tmp_path / "x"} | changes
         with pytest.raises(kind, match=message):
             evaluate(arguments.pop("data"), **arguments)
     assert not (tmp_path / "x").exists()
@@ -331,16 +338,14 @@ def boom(views: Views) -> Any:
     ],
 )
 def test_a_bad_model_is_named(
-    tmp_path: Path, collect_small: Collect, install: Install, predict: Callable[[Views], Any], message: str
+    tmp_path: Path, small: Small, install: Install, predict: Callable[[Views], Any], message: str
 ) -> None:
-    collect_small("semseg", tmp_path / "data")
     install(model_spec(lambda _: types.SimpleNamespace(predict=predict), "semseg"))
     with pytest.raises(PluginError, match=message):
-        evaluate(tmp_path / "data", model="odd", out=tmp_path / "out")
+        evaluate(small("semseg"), model="odd", out=tmp_path / "out")
 
 
-def test_a_batch_of_too_few_answers_is_named(tmp_path: Path, collect_small: Collect, install: Install) -> None:
-    collect_small("semseg", tmp_path / "data")
+def test_a_batch_of_too_few_answers_is_named(tmp_path: Path, small: Small, install: Install) -> None:
     install(model_spec(lambda _: types.SimpleNamespace(predict=boom, predict_many=lambda many: []), "semseg"))
     with pytest.raises(PluginError, match="gave 0 answers to 2 samples"):
-        evaluate(tmp_path / "data", model="odd", out=tmp_path / "out", batch=2)
+        evaluate(small("semseg"), model="odd", out=tmp_path / "out", batch=2)

@@ -1,0 +1,78 @@
+"""How close evaluating comes to the model's bare forward passes over pictures that are in memory already.
+
+    python benchmarks/evaluate.py --data DIR --model ddrnet23_slim --set weights=none --samples 16
+
+Prints seconds a sample of both, measured in alternation in one run, and their ratio (target: at most 1.1). Building
+the model and the first sample are left out of both; the bootstrap is timed by itself.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import gear
+from gear.dataset.reading import Dataset
+from gear.verbs.evaluate.choice import chosen_defense, chosen_model
+from gear.verbs.evaluate.player import Player
+from gear.verbs.evaluate.row import evaluate_row
+from gear.verbs.evaluate.scoring import TASK, Scorer
+from gear.verbs.evaluate.spread import draw, gather
+
+
+class Part(Dataset[Any]):
+    """The first samples of a split."""
+
+    count = 0
+
+    def __len__(self) -> int:
+        return min(self.count, len(self.manifest["samples"]))
+
+
+def main() -> None:
+    """Prints one line a round, then the medians."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", required=True)
+    parser.add_argument("--model", default="ddrnet23_slim")
+    parser.add_argument("--set", action="append", default=[], dest="settings")
+    parser.add_argument("--defense")
+    parser.add_argument("--samples", type=int, default=16)
+    parser.add_argument("--batch", type=int, default=1)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--rounds", type=int, default=5)
+    args = parser.parse_args()
+    opened = gear.open_dataset(args.data)
+    Part.count = args.samples
+    dataset = Part(root=opened.root, plan=opened.plan, task=opened.task, manifest=opened.manifest)
+    model = chosen_model(args.model, args.settings)
+    player = Player(model, chosen_defense(args.defense, ()) if args.defense else None)
+    pictures = [sample.images for sample in dataset[:]]
+    groups = [range(i, min(i + args.batch, len(pictures))) for i in range(0, len(pictures), args.batch)]
+    player.play([pictures[i] for i in groups[0]], groups[0])
+    print(f"{os.cpu_count()} cores, {len(pictures)} samples of {pictures[0]['left'].shape}")
+    bare, whole = [], []
+    for _ in range(args.rounds):
+        begun = time.perf_counter()
+        for group in groups:
+            player.play([pictures[i] for i in group], group)
+        bare.append((time.perf_counter() - begun) / len(pictures))
+        with tempfile.TemporaryDirectory() as folder:
+            scorer = Scorer(dataset, Path(folder), "row", (), model.found)
+            begun = time.perf_counter()
+            notes, _ = evaluate_row(dataset, scorer, player, batch=args.batch, workers=args.workers, told=lambda: None)
+            scorer.finish(notes)
+            whole.append((time.perf_counter() - begun) / len(pictures))
+        print(f"bare {bare[-1]:.3f} s, evaluate {whole[-1]:.3f} s a sample: {whole[-1] / bare[-1]:.3f}", flush=True)
+    begun = time.perf_counter()
+    gather(scorer.makers[TASK], [note.parts[TASK] for note in notes], draw(len(notes), 1000, 0))
+    print(f"1000 resamples: {time.perf_counter() - begun:.2f} s")
+    ratios = sorted(w / b for w, b in zip(whole, bare, strict=True))
+    print(f"ratio: median {ratios[len(ratios) // 2]:.3f} of {args.rounds} (at most 1.1 is the target)")
+
+
+if __name__ == "__main__":
+    main()
