@@ -13,6 +13,7 @@ import torch
 from torch import Tensor
 
 from gear.compositor.cache import Cache
+from gear.compositor.sparse import SparseMatrix, stacked_product
 from gear.dataset.reading import Dataset
 from gear.values.errors import DatasetError
 from gear.values.frames import UInt8Image
@@ -92,19 +93,15 @@ class Pasting:
         sizes: Sizes = tuple((int(patch.shape[-2]), int(patch.shape[-1])) for patch in shown)
         views = [self._cache.get((i, view, sizes), partial(self._load, i, view, sizes)) for i in samples]
         columns = self._columns(shown)
-        pictures = torch.stack([v.picture for v in views]).to(torch.float32) / 255
-        flat, values = [], []
+        pictures = torch.stack([v.picture for v in views]).to(torch.float32).div_(255)
         pixels = pictures[0, 0].numel()
-        channels = torch.arange(3, device=self.device)[:, None] * pixels
-        for number, prepared in enumerate(views):
-            mine = [c if c.ndim == 2 else c[number] for c in columns]
-            values.append(self._composed(prepared.inner, mine).T.reshape(-1))
-            flat.append((prepared.where[None, :] + channels + number * 3 * pixels).reshape(-1))
-        composed = torch.cat(values)
+        where = torch.cat([v.where + number * 3 * pixels for number, v in enumerate(views)])
+        channels = torch.arange(3, device=self.device) * pixels
+        composed = self._composed([v.inner for v in views], columns)
         if self.rounding:
             composed = rounded(composed)
-        pictures.view(-1).index_copy_(0, torch.cat(flat), composed)
-        return pictures
+        pasted: Tensor = _Paste.apply(composed, where[:, None] + channels, pictures)  # type: ignore[no-untyped-call]
+        return pasted
 
     @abstractmethod
     def _load(self, index: int, view: str, sizes: Sizes) -> Prepared:
@@ -115,8 +112,8 @@ class Pasting:
         """(columns, 3) or (B, columns, 3) of each patch's pyramid."""
 
     @abstractmethod
-    def _composed(self, inner: Any, columns: Sequence[Tensor]) -> Tensor:
-        """(N, 3) values in 0..1 of the pixels that are composed."""
+    def _composed(self, inner: Sequence[Any], columns: Sequence[Tensor]) -> Tensor:
+        """(N, 3) values in 0..1 of the pixels that are composed, of one view after the other."""
 
     def _checked(self, patch: Tensor, batch: int) -> Tensor:
         is_one = patch.ndim == 3
@@ -132,6 +129,34 @@ class Pasting:
     def _demand(self, patches: Sizes, surfaces: int) -> None:
         if len(patches) != surfaces:
             raise ValueError(f"there are {surfaces} surfaces, got {len(patches)} patches")
+
+
+class _Paste(torch.autograd.Function):
+    """Puts values into pictures; the gradient is read where they went, and nothing else is touched."""
+
+    @staticmethod
+    def forward(ctx: Any, values: Tensor, where: Tensor, pictures: Tensor) -> Tensor:
+        ctx.save_for_backward(where)
+        ctx.mark_dirty(pictures)
+        pictures.view(-1).index_copy_(0, where.view(-1), values.reshape(-1))
+        return pictures
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor, None, None]:
+        (where,) = ctx.saved_tensors
+        return gradients[0].reshape(-1).index_select(0, where.view(-1)).view(where.shape), None, None
+
+
+def products(matrices: Sequence[SparseMatrix], columns: Tensor) -> Tensor:
+    """What one surface's pixels show, of one view after the other.
+
+    Args:
+        matrices: one a view.
+        columns: (columns, 3), or (B, columns, 3) with one a view.
+    """
+    if columns.ndim == 2:
+        return stacked_product(matrices, columns)
+    return torch.cat([stacked_product([matrix], mine) for matrix, mine in zip(matrices, columns, strict=True)])
 
 
 def rounded(values: Tensor) -> Tensor:

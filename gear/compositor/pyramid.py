@@ -8,7 +8,7 @@ texels reads the patch's pixels.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 Ints = npt.NDArray[np.int64]
 
 
+@cache
 def halving_matrix(size: int) -> Array:
     """(max(1, size // 2), size): a renderer's next mip level along one axis.
 
@@ -100,14 +101,25 @@ class Pyramid:
         """The columns of a patch: (..., 3, h, w) light to (..., size, 3)."""
         import torch
 
-        parts = [patch.flatten(-2)]
+        levels = [patch]
         for level in range(self.folded, self.levels):
-            rows, columns = (
-                torch.as_tensor(np.array(m[level]), dtype=patch.dtype, device=patch.device)
-                for m in (self.rows, self.columns)
-            )
-            parts.append((rows @ patch @ columns.T).flatten(-2))
-        return torch.cat(parts, dim=-1).transpose(-1, -2).contiguous()
+            levels.append(self._next(levels[-1], patch, level))
+        return torch.cat([texels.flatten(-2) for texels in levels], dim=-1).transpose(-1, -2).contiguous()
+
+    def _next(self, last: Tensor, patch: Tensor, level: int) -> Tensor:
+        """A level from the one before it, or from the patch where there is none before it."""
+        import torch
+
+        size = tuple(last.shape[-2:])
+        is_chained = level > 0 and self.shape(level - 1) == size
+        if is_chained and size[0] % 2 == 0 and size[1] % 2 == 0:
+            return torch.nn.functional.avg_pool2d(last, 2)
+        if is_chained:
+            matrices = halving_matrix(size[0]), halving_matrix(size[1])
+        else:
+            last, matrices = patch, (self.rows[level], self.columns[level])
+        rows, columns = (torch.tensor(m, dtype=patch.dtype, device=patch.device) for m in matrices)
+        return rows @ last @ columns.T
 
 
 @lru_cache(maxsize=16)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,22 +35,27 @@ class SparseMatrix:
         parts = [m for csr in (self.forward, self.backward) for m in (csr.crow_indices(), csr.col_indices())]
         return sum(p.nbytes for p in parts) + 2 * int(self.forward.values().nbytes)
 
-    def __matmul__(self, dense: Tensor) -> Tensor:
-        """(M, k) float32 to (N, k), differentiable."""
-        product: Tensor = _Product.apply(dense, self)  # type: ignore[no-untyped-call]
-        return product
+
+def stacked_product(matrices: Sequence[SparseMatrix], dense: Tensor) -> Tensor:
+    """Products of several matrices with one (M, k) float32, below each other, differentiable to `dense`."""
+    product: Tensor = _Product.apply(dense, matrices)  # type: ignore[no-untyped-call]
+    return product
 
 
 class _Product(torch.autograd.Function):
     @staticmethod
-    def forward(ctx: Any, dense: Tensor, matrix: SparseMatrix) -> Tensor:
-        ctx.matrix = matrix
-        product: Tensor = torch.sparse.mm(matrix.forward, dense)
-        return product
+    def forward(ctx: Any, dense: Tensor, matrices: Sequence[SparseMatrix]) -> Tensor:
+        ctx.matrices = matrices
+        return torch.cat([torch.sparse.mm(matrix.forward, dense) for matrix in matrices])
 
     @staticmethod
     def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor, None]:
-        return torch.sparse.mm(ctx.matrix.backward, gradients[0].contiguous()), None
+        sizes = [matrix.forward.shape[0] for matrix in ctx.matrices]
+        parts = gradients[0].split(sizes)  # type: ignore[no-untyped-call]
+        total = torch.sparse.mm(ctx.matrices[0].backward, parts[0].contiguous())
+        for matrix, part in zip(ctx.matrices[1:], parts[1:], strict=True):
+            total += torch.sparse.mm(matrix.backward, part.contiguous())
+        return total, None
 
 
 def _csr(matrix: Any, device: torch.device) -> Tensor:

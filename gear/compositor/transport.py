@@ -14,12 +14,13 @@ from typing import Any
 
 import numpy as np
 import torch
+from scipy import sparse
 from torch import Tensor
 
 from gear.camera import torch_response
-from gear.camera.response import Response
+from gear.camera.response import IDENTITY, Response
 from gear.compositor.grain import Grain, grain_of
-from gear.compositor.pasting import Pasting, Prepared, Sizes, picture_of
+from gear.compositor.pasting import Pasting, Prepared, Sizes, picture_of, products
 from gear.compositor.pyramid import pyramid_of
 from gear.compositor.sampling import Scan, take_samples, unit_from_image
 from gear.compositor.sparse import SparseMatrix
@@ -37,19 +38,25 @@ class _Light:
 
     Attributes:
         black: (N, 3) float32 light 0..1.
-        surfaces: index of a patch, its matrix, and (N, 3) float32 of white minus black.
+        matrices: one a surface, (N, columns).
+        gains: one a surface, (N, 3) float32 of white minus black.
         response: of the camera.
         grain: of the sample, or None.
     """
 
     black: Tensor
-    surfaces: tuple[tuple[int, SparseMatrix, Tensor], ...]
-    response: Response | None
+    matrices: tuple[SparseMatrix, ...]
+    gains: tuple[Tensor, ...]
+    response: Response
     grain: Grain | None
+
+    def shown(self, light: Tensor) -> Tensor:
+        """(N, 3) light as the camera shows it, 0..1."""
+        return torch_response.apply(self.response, light if self.grain is None else self.grain.on(light))
 
     @property
     def nbytes(self) -> int:
-        return self.black.nbytes + sum(m.nbytes + d.nbytes for _, m, d in self.surfaces)
+        return self.black.nbytes + sum(m.nbytes + g.nbytes for m, g in zip(self.matrices, self.gains, strict=True))
 
 
 class TransportCompositor(Pasting):
@@ -62,13 +69,13 @@ class TransportCompositor(Pasting):
             for p in patches
         ]
 
-    def _composed(self, inner: _Light, columns: Sequence[Tensor]) -> Tensor:
-        light = inner.black
-        for number, matrix, gain in inner.surfaces:
-            light = light + (matrix @ columns[number]) * gain
-        if inner.grain is not None:
-            light = inner.grain.on(light)
-        return light if inner.response is None else torch_response.apply(inner.response, light)
+    def _composed(self, inner: Sequence[_Light], columns: Sequence[Tensor]) -> Tensor:
+        light = torch.cat([view.black for view in inner])
+        for number, mine in enumerate(columns):
+            gain = torch.cat([view.gains[number] for view in inner])
+            light = light + products([view.matrices[number] for view in inner], mine) * gain
+        parts = light.split([len(view.black) for view in inner])  # type: ignore[no-untyped-call]
+        return torch.cat([view.shown(part) for view, part in zip(inner, parts, strict=True)])
 
     @property
     def _renderer(self) -> str:
@@ -85,43 +92,48 @@ class TransportCompositor(Pasting):
             reach[_crop(probe)] |= (probe.black != probe.white).any(axis=2)
         rows, columns = np.nonzero(reach)
         black = np.zeros((height, width, 3), np.float32)
-        surfaces = []
+        gains = {surface.name: np.zeros_like(black) for surface in sample.record.surfaces}
         for probe in probes:
             black[_crop(probe)] = probe.black
-        for probe in probes:
-            surfaces.append(self._surface(sample, probe, (columns, rows), sizes))
+            gains[probe.surface][_crop(probe)] = probe.white.astype(np.float32) - probe.black
+        lit = [gain[rows, columns] for gain in gains.values()]
         light = _Light(
             black=self._light(black[rows, columns]),
-            surfaces=tuple(surfaces),
-            response=probes[0].response if probes else None,
-            grain=grain_of(self._effects(), sample.record, view, rows, columns, self.device),
+            matrices=tuple(
+                self._matrix(sample, number, view, (columns, rows), gain, sizes[number])
+                for number, gain in enumerate(lit)
+            ),
+            gains=tuple(self._light(gain) for gain in lit),
+            response=probes[0].response if probes else IDENTITY,
+            grain=grain_of(self._effects, sample.record, view, rows, columns, self.device),
         )
         return self._prepare(picture, rows * width + columns, light, light.nbytes)
 
-    def _surface(
-        self, sample: Any, probe: Probe, pixels: tuple[Any, Any], sizes: Sizes
-    ) -> tuple[int, SparseMatrix, Tensor]:
-        record = sample.record
-        number = [surface.name for surface in record.surfaces].index(probe.surface)
-        truth = next(t for t in sample.surfaces if t.name == probe.surface and t.camera == probe.view)
-        camera = record.camera(probe.view)
-        gain = np.zeros((camera.height_px, camera.width_px, 3), np.float32)
-        gain[_crop(probe)] = probe.white.astype(np.float32) - probe.black
+    def _matrix(
+        self, sample: Any, number: int, view: str, pixels: tuple[Any, Any], gain: Any, size: tuple[int, int]
+    ) -> SparseMatrix:
+        """One surface's; rows are empty where it gives no light."""
+        record, pyramid = sample.record, pyramid_of(*size)
+        surface, camera = record.surfaces[number], record.camera(view)
+        lit = np.flatnonzero(gain.any(axis=1))
+        spread = sparse.csr_matrix((np.ones(lit.size, np.float32), (lit, np.arange(lit.size))), (len(gain), lit.size))
+        if not lit.size:
+            return SparseMatrix.of(sparse.csr_matrix((len(gain), pyramid.size), dtype=np.float32), self.device)
+        truth = next(t for t in sample.surfaces if t.name == surface.name and t.camera == view)
         samples = take_samples(
-            Scan.of(self._renderer, self.dataset.plan.content["quality"], self._effects()),
-            unit_from_image(truth, record.surfaces[number], camera),
-            pixels,
+            Scan.of(self._renderer, self.dataset.plan.content["quality"], self._effects),
+            unit_from_image(truth, surface, camera),
+            (pixels[0][lit], pixels[1][lit]),
             rle.decode(truth.mask_rle, camera.height_px, camera.width_px),
             camera,
             record.ego.velocity_world_mps,
         )
-        matrix = warp_matrix(samples, pyramid_of(*sizes[number]))
-        columns, rows = pixels
-        return number, SparseMatrix.of(matrix, self.device), self._light(gain[rows, columns])
+        return SparseMatrix.of((spread @ warp_matrix(samples, pyramid)).tocsr(), self.device)
 
     def _light(self, counts: Any) -> Tensor:
         return torch.from_numpy(counts / np.float32(LINEAR_FULL_SCALE)).to(self.device)
 
+    @property
     def _effects(self) -> CameraEffects:
         return from_json(CameraEffects, self.dataset.plan.content["camera"], "camera")
 
