@@ -27,10 +27,11 @@ def prepare(threads: int = 0) -> None:
     nothing is done.
 
     Args:
-        threads: of torch's own; 0 for one a core that this process may use.
+        threads: of torch's own; 0 for as many as torch would take (`OMP_NUM_THREADS`, or what was set before), but no
+            more than one a core that this process may use.
     """
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    torch.set_num_threads(threads or int(os.environ.get("OMP_NUM_THREADS", cores)))
+    torch.set_num_threads(threads or min(torch.get_num_threads(), cores))
     if not sys.platform.startswith("linux"):
         return
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)

@@ -25,7 +25,8 @@ STRIDE_PX = 8
 LABEL_ID_OF_TRAIN_ID = tuple(
     label.id for label in sorted(LABELS, key=lambda label: label.train_id) if label.train_id != IGNORED_TRAIN_ID
 )
-CLASSES = len(LABEL_ID_OF_TRAIN_ID)
+LABEL_IDS = np.array(LABEL_ID_OF_TRAIN_ID, dtype=np.uint8)
+CLASSES = len(LABEL_IDS)
 
 Losses = Callable[[Mapping[str, Tensor], Sequence[Any]], Mapping[str, Tensor]]
 """Named numbers from outputs and the batch's samples."""
@@ -58,8 +59,6 @@ class SemsegNetwork(Network):
         super().__init__(graph, options, views=(VIEW,))
         self.input_scale = input_scale if options.input_scale is None else options.input_scale
         self.normalise = Normalise().to(self.device).eval()
-        labels = torch.tensor(LABEL_ID_OF_TRAIN_ID, dtype=torch.uint8, device=self.device)
-        self.register_buffer("_label_ids", labels, persistent=False)
         self._losses = losses
 
     def taps(self) -> Mapping[str, nn.Module]:
@@ -82,8 +81,7 @@ class SemsegNetwork(Network):
 
     def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
         """(H, W) uint8 label ids of each picture."""
-        labels: Tensor = self._label_ids  # type: ignore[assignment]
-        return [np.ascontiguousarray(labels[logits.argmax(0)].cpu().numpy()) for logits in outputs[LOGITS]]
+        return [LABEL_IDS[best_class(logits).cpu().numpy()] for logits in outputs[LOGITS]]
 
     def _maps(self, pictures: Tensor, *, auxiliary: bool) -> list[Tensor]:
         """The heads' logits at the picture's size."""
@@ -96,6 +94,19 @@ class SemsegNetwork(Network):
         maps: list[Tensor] = self.graph(self.normalise(pictures), auxiliary=auxiliary)
         align = bool(self.graph.align_corners)
         return [functional.interpolate(m.float(), size=size_px, mode="bilinear", align_corners=align) for m in maps]
+
+
+def best_class(logits: Tensor) -> Tensor:
+    """(H, W) uint8: where (C, H, W) logits are largest, the first of equals.
+
+    The same as `argmax(0)`, which reads memory across its order and takes five times as long on a CPU.
+    """
+    largest = logits[0].clone()
+    best = torch.zeros(logits.shape[1:], dtype=torch.uint8, device=logits.device)
+    for index in range(1, len(logits)):
+        best.masked_fill_(logits[index] > largest, index)
+        torch.maximum(largest, logits[index], out=largest)
+    return best
 
 
 def inner_size(size_px: Sequence[int], scale: float) -> tuple[int, ...]:

@@ -14,7 +14,7 @@ from gear.formats.cityscapes import LABELS
 from gear.losses.semantic import SegmentationLosses
 from gear.nn.network import IMAGENET_MEAN, IMAGENET_STD
 from gear.nn.options import SegmentationOptions
-from gear.nn.semseg import CLASSES, LABEL_ID_OF_TRAIN_ID, SemsegNetwork, inner_size
+from gear.nn.semseg import CLASSES, LABEL_ID_OF_TRAIN_ID, LABEL_IDS, SemsegNetwork, best_class, inner_size
 from gear.nn.weights import write
 from gear.plugins.models.ddrnet23_slim import build
 from gear.values.errors import FieldError, GearError
@@ -114,6 +114,12 @@ def test_what_is_seen_stays_where_it_is(scale: float) -> None:
         assert float((weight * columns).sum() / weight.sum()) == pytest.approx(103.5, abs=1.0)
 
 
+def test_the_best_class_is_the_first_of_the_largest() -> None:
+    logits = torch.randn(19, 33, 17, generator=torch.Generator().manual_seed(1)).round()
+    assert bool((logits == logits.max(0).values).sum(0).max() > 1), "there are ties"
+    assert torch.equal(best_class(logits).long(), logits.argmax(0))
+
+
 def test_predictions_are_label_ids() -> None:
     labels = network().predict({"left": picture(16, 24)})
     assert labels.dtype == np.uint8 and labels.shape == (16, 24)
@@ -128,6 +134,26 @@ def test_many_at_once_are_the_same_as_one_by_one() -> None:
     assert [labels.shape for labels in together] == [(64, 96), (72, 64), (64, 96)]
     assert all(np.mean(a == b) > 0.99 for a, b in zip(together, alone, strict=True))
     assert not np.array_equal(alone[0], alone[2])
+
+
+def test_it_learns() -> None:
+    """Twelve steps on two pictures of coloured stripes teach the stripes' classes."""
+    model = build(SegmentationOptions(weights="none", device="cpu"))
+    labels = np.repeat(np.array([7, 23, 26, 21], dtype=np.uint8), 16)[:, None] * np.ones((1, 64), dtype=np.uint8)
+    colours = derive_rng(6, "stripes").random((34, 3), dtype=np.float32)
+    views = {"left": torch.from_numpy(colours[np.stack([labels, labels[::-1]])]).permute(0, 3, 1, 2).contiguous()}
+    samples = [Labelled(labels), Labelled(np.ascontiguousarray(labels[::-1]))]
+    optimiser = torch.optim.AdamW(model.parameters(), lr=2e-3)
+    model.train()
+    for _ in range(12):
+        optimiser.zero_grad()
+        total = torch.stack(list(model(views, samples).values())).sum()
+        total.backward()
+        optimiser.step()
+    with torch.no_grad():
+        logits = model(views)["logits"]
+    right = LABEL_IDS[logits.argmax(1).numpy()] == np.stack([sample.label_ids for sample in samples])
+    assert right.mean() > 0.9
 
 
 def test_losses_see_all_heads_and_outputs_only_the_main_one() -> None:
