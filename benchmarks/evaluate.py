@@ -55,22 +55,26 @@ def main() -> None:
     player.play([pictures[i] for i in groups[0]], groups[0])
     print(f"{os.cpu_count()} cores, {len(pictures)} samples of {pictures[0]['left'].shape}")
     bare, whole = [], []
+    used = {"bare": 0.0, "whole": 0.0}
     for _ in range(args.rounds):
-        begun = time.perf_counter()
+        begun, worked = time.perf_counter(), time.process_time()
         for group in groups:
             player.play([pictures[i] for i in group], group)
         bare.append((time.perf_counter() - begun) / len(pictures))
+        used["bare"] += time.process_time() - worked
         with tempfile.TemporaryDirectory() as folder:
             scorer = Scorer(dataset, Path(folder), "row", (), model.found)
-            begun = time.perf_counter()
+            begun, worked = time.perf_counter(), time.process_time()
             notes, _ = evaluate_row(dataset, scorer, player, batch=args.batch, workers=args.workers, told=lambda: None)
             scorer.finish(notes)
             whole.append((time.perf_counter() - begun) / len(pictures))
+            used["whole"] += time.process_time() - worked
         print(f"bare {bare[-1]:.3f} s, evaluate {whole[-1]:.3f} s a sample: {whole[-1] / bare[-1]:.3f}", flush=True)
     begun = time.perf_counter()
     gather(scorer.makers[TASK], [note.parts[TASK] for note in notes], draw(len(notes), 1000, 0))
     print(f"1000 resamples: {time.perf_counter() - begun:.2f} s")
     ratios = sorted(w / b for w, b in zip(whole, bare, strict=True))
+    print(f"processor time, which other work on the machine does not change: {used['whole'] / used['bare']:.3f}")
     print(f"ratio: median {ratios[len(ratios) // 2]:.3f} of {args.rounds} (at most 1.1 is the target)")
 
 

@@ -11,8 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from gear.verbs.collect.run import collect
+
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = sorted(DOCS.glob("write-a*.md"))
+TINY = Path(__file__).parents[2] / "gear/testing/data"
 
 
 def blocks(page: Path, language: str) -> list[str]:
@@ -30,6 +33,19 @@ def test_the_python_of_a_page_runs_and_its_tests_pass(page: Path, tmp_path: Path
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--rootdir", str(tmp_path), str(module)]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_python_of_the_page_on_evaluating_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    size = ["options.width_px=128", "options.height_px=64", f"scenes={TINY / 'scenes/tiny.yml'}"]
+    collect(
+        "semseg", town=TINY / "mjcf/towns/tiny.xml", scene="board", split="debug", samples=3, renderer="classic",
+        quality="fast", out=tmp_path / "data", settings=size,
+    )  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    (code,) = blocks(DOCS / "evaluate.md", "python")
+    module = tmp_path / "page.py"
+    module.write_text(code)
+    assert runpy.run_path(str(module))["batch"].indices
 
 
 @pytest.mark.slow

@@ -96,6 +96,31 @@ def test_a_foreign_task_gets_everything(home: Path) -> None:
         assert np.array_equal(filled[~mask], before[~mask]) and not np.array_equal(filled[mask], before[mask])
 
 
+def test_foreign_models_defenses_and_tasks_have_their_rows(home: Path) -> None:
+    """Twins, a network, a third party's defenses; then a third party's task with its model and a defense."""
+    size = ("--set", "options.width_px=256", "--set", "options.height_px=128", "--set", SCENES)
+    common = (*TOWN, "--split", "debug", "--samples", "2", "--renderer", "classic", "--quality", "fast", *size)
+    for task, patch in (("semseg", "none"), ("semseg", "random"), ("panoptic", "random")):
+        gear(home, "collect", "--task", task, *common, "--patch", patch, "--out", f"rows/{task}-{patch}")
+    network = ("--model", "ddrnet23_slim", "--set", "weights=none", "--data", "rows/semseg-none", "rows/semseg-random")
+    found = {}
+    for defense in (None, "jpeg_tv", "jedi"):
+        guard = ("--defense", defense) if defense else ()
+        found[defense] = json.loads(gear(home, "evaluate", *network, *guard, "--resamples", "20", "--json"))
+        assert [row["samples"] for row in found[defense]["rows"]] == [2, 2]
+        assert (home / f"empty/evaluations/semseg/ddrnet23_slim{'+' if defense else ''}{defense or ''}").is_dir()
+    accuracy = {name: one["rows"][1]["figures"]["task"]["pixel_accuracy"]["value"] for name, one in found.items()}
+    assert accuracy["jpeg_tv"] != accuracy[None]
+    assert found["jedi"]["differences"][0]["auroc"] is not None
+    baseline = ("--model", "panoptic_parts", "--set", "weights=none", "--data", "rows/panoptic-random")
+    text = gear(home, "evaluate", *baseline, "--defense", "jedi", "--report", "outside_patch", "--out", "panoptic")
+    assert text.startswith("panoptic: panoptic_parts guarded by jedi\n") and "outside_patch.pq" in text
+    (folder,) = (path for path in (home / "empty/panoptic").iterdir() if path.is_dir())
+    results = json.loads((folder / "predictions/panoptic.json").read_text())["annotations"]
+    assert [one["image_id"] for one in results] == [0, 1]
+    assert all((folder / "predictions/panoptic" / one["file_name"]).is_file() for one in results)
+
+
 TESTED = [path for path in EXAMPLES if path.name != "gear-broken"]
 
 

@@ -11,10 +11,12 @@ from typing import Any, ClassVar
 import cv2
 import numpy as np
 import pytest
+from gear.testing.model_contract import ModelContract
 from gear.testing.task_contract import TaskContract
 
-from gear_task_panoptic import spec
-from gear_task_panoptic.panoptic import id_to_rgb, rgb_to_id, segments_info
+from gear_task_panoptic import parts, spec
+from gear_task_panoptic.baseline import in_parts
+from gear_task_panoptic.panoptic import as_panoptic, id_to_rgb, rgb_to_id, segments_info
 from gear_task_panoptic.quality import Panoptic, QualityEvaluator, Segment, match
 
 
@@ -53,6 +55,20 @@ class TestPanoptic(TaskContract):
         assert result["pq"] == pytest.approx(expected["pq"])
         assert result["pq_things"] == pytest.approx(expected["things"])
         assert result["pq_stuff"] == pytest.approx(expected["stuff"])
+
+
+class TestParts(ModelContract):
+    spec = parts
+    options: ClassVar[dict[str, Any]] = {"weights": "none"}
+
+    def test_parts_are_things_apart(self) -> None:
+        labels = np.full((20, 40), 7, np.uint8)
+        labels[5:15, 2:12] = labels[5:15, 20:34] = 26
+        labels[0, 0] = 26
+        instances = in_parts(labels, least_px=50)
+        assert set(np.unique(instances).tolist()) == {0, 7, 26000, 26001}
+        assert (instances == 26000).sum() == 140 and instances[0, 0] == 0
+        assert {s.category_id for s in as_panoptic(instances).segments} == {7, 26}
 
 
 def read_ids(path: Path) -> np.ndarray:

@@ -19,12 +19,14 @@ NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 TOKEN = re.compile(r"\{\{(\w+)\}\}")
 
 USE: dict[Kind, str] = {
-    "task": "Use it: `gear collect --task {{name}}`, then `gear view` or `gear sheet` on what it wrote.",
-    "model": 'Use it: `gear.plugins.build.build(find("model", "{{name}}"))` in Python, or wherever gear asks for a'
-    " model.",
+    "task": "Use it: `gear collect --task {{name}}`, then `gear view` or `gear sheet` on what it wrote, and"
+    " `gear evaluate` with a model that does it.",
+    "model": "Use it: `gear evaluate --model {{name}} --data DIR` runs it over a dataset of its task; twins of the"
+    " dataset, `--data CLEAN PATCHED`, are compared.",
     "attack": 'Use it: `gear.plugins.build.build(find("attack", "{{name}}"))` in Python, or wherever gear asks for'
     " an attack.",
-    "defense": "Use it: `gear defend DIR --defense {{name}} --out DIR2` cleans a dataset's pictures.",
+    "defense": "Use it: `gear evaluate --model NAME --defense {{name}} --data DIR` is its row in an evaluation;"
+    " `gear defend DIR --defense {{name}} --out DIR2` cleans a dataset's pictures.",
 }
 
 

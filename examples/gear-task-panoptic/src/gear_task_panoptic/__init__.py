@@ -1,4 +1,4 @@
-"""panoptic: panoptic segmentation in the format of COCO panoptic."""
+"""panoptic: panoptic segmentation in the format of COCO panoptic, and a baseline model for it."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from gear.contracts.hookspecs import hookimpl
-from gear.contracts.specs import TaskSpec
+from gear.contracts.models import Model
+from gear.contracts.specs import ModelSpec, TaskSpec
 from gear.contracts.tasks import Task
 from gear.plugins.tasks.common import CameraOptions
+from gear.values.errors import FieldError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,6 +28,41 @@ def build(config: PanopticConfig) -> Task[Any, Any]:
     return PanopticTask(config)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PartsConfig:
+    """Options of panoptic_parts.
+
+    Attributes:
+        model: name of a semantic segmentation network.
+        weights: its option of this name; "" leaves it at its default.
+        least_px: smaller parts are void.
+    """
+
+    model: str = "ddrnet23_slim"
+    weights: str = ""
+    least_px: int = 100
+
+    def __post_init__(self) -> None:
+        if self.least_px < 1:
+            raise FieldError("least_px", f"must be at least 1, got {self.least_px}")
+
+
+def build_parts(config: PartsConfig) -> Model:
+    """Imports what is heavy only when somebody asks for the model."""
+    from gear_task_panoptic.baseline import Parts
+
+    return Parts(config)
+
+
+parts: ModelSpec[PartsConfig] = ModelSpec(
+    name="panoptic_parts",
+    summary="A baseline: connected parts of what a semantic segmentation network sees.",
+    config=PartsConfig,
+    build=build_parts,
+    tasks=("panoptic",),
+    views=("left",),
+)
+
 spec: TaskSpec[PanopticConfig] = TaskSpec(
     name="panoptic",
     summary="Panoptic segmentation: Cityscapes classes in the format of COCO panoptic.",
@@ -40,3 +77,9 @@ spec: TaskSpec[PanopticConfig] = TaskSpec(
 def gear_tasks() -> list[TaskSpec[PanopticConfig]]:
     """Found by gear through the entry point in pyproject.toml."""
     return [spec]
+
+
+@hookimpl
+def gear_models() -> list[ModelSpec[PartsConfig]]:
+    """The baseline."""
+    return [parts]

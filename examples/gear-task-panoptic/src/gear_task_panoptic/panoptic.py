@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+from gear.contracts.evaluation import Masks
 from gear.contracts.tasks import Encoded, Sample, Sidecar, SplitInfo
 from gear.formats.cityscapes import INSTANCE_FACTOR, LABELS, colour_map
 from gear.formats.png import encode_rgb
@@ -111,6 +112,37 @@ class PanopticTask:
     def evaluator(self) -> QualityEvaluator:
         """Panoptic quality."""
         return QualityEvaluator(THINGS)
+
+    def without(self, sample: PanopticSample, masks: Masks) -> PanopticSample:
+        """Void inside the mask; segments that lie there altogether are gone."""
+        ids = np.where(masks[VIEW], np.int32(VOID), sample.panoptic.ids)
+        left = set(np.unique(ids).tolist())
+        segments = tuple(segment for segment in sample.panoptic.segments if segment.id in left)
+        return replace(sample, panoptic=Panoptic(ids=ids, segments=segments))
+
+    def encode_prediction(self, sample: PanopticSample, prediction: Panoptic, info: SplitInfo) -> Encoded:
+        """The ids as colours; their segments wait in the facts for the split's one file."""
+        segments = [[one.id, one.category_id, int(one.is_crowd)] for one in prediction.segments]
+        path = f"panoptic/{sample.record.index:06d}.png"
+        return Encoded(files={path: encode_rgb(id_to_rgb(prediction.ids))}, facts={"segments": segments})
+
+    def decode_prediction(self, root: Path, sample: PanopticSample, facts: Any, info: SplitInfo) -> Panoptic:
+        """The inverse."""
+        ids = rgb_to_id(read_rgb(root, f"panoptic/{sample.record.index:06d}.png"))
+        segments = tuple(Segment(id=i, category_id=c, is_crowd=bool(crowd)) for i, c, crowd in facts["segments"])
+        return Panoptic(ids=ids, segments=segments)
+
+    def finalise_predictions(self, facts: Sequence[tuple[SceneRecord, Any]], info: SplitInfo) -> Mapping[str, bytes]:
+        """COCO panoptic's results file."""
+        annotations = [
+            {
+                "image_id": record.index,
+                "file_name": f"{record.index:06d}.png",
+                "segments_info": [{"id": i, "category_id": category} for i, category, _ in one["segments"]],
+            }
+            for record, one in facts
+        ]
+        return {"panoptic.json": (json.dumps({"annotations": annotations}, indent=1) + "\n").encode()}
 
     def preview(self, sample: PanopticSample) -> Mapping[str, UInt8Image]:
         """The classes' colours over the picture, borders between segments in white."""
