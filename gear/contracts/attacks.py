@@ -76,7 +76,7 @@ class Watch(Protocol):
             done: steps so far.
             figures: what is worth a curve: terms, losses, norms.
             patches: gives the patches as they are now; called only when they are wanted.
-            state: gives the state to resume from, likewise.
+            state: gives the state to resume from, likewise; empty where the attack cannot be resumed.
         """
         ...
 

@@ -6,14 +6,14 @@ class TestMyAttack(AttackContract):
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from gear.contracts.attacks import Attack, Budget, Patch
+from gear.contracts.attacks import Attack, Budget, Patch, State, Watch
 from gear.contracts.specs import AttackSpec, ModelSpec, TaskSpec
 from gear.plugins.manager import catalogue
 from gear.testing.compare import difference, freeze
@@ -52,6 +52,33 @@ class Counted:
         """The model's."""
         taps: Mapping[str, torch.nn.Module] = self.network.taps()
         return taps
+
+
+class Watching:
+    """A watch that remembers what it is told, and may start from a state."""
+
+    def __init__(self, start: State | None = None) -> None:
+        self.start = start
+        self.told: list[int] = []
+        self.states: list[State] = []
+
+    def resume(self) -> State | None:
+        """The state that it was made with."""
+        return self.start
+
+    def step(
+        self,
+        done: int,
+        figures: Mapping[str, float],
+        patches: Callable[[], tuple[Patch, ...]],
+        state: Callable[[], State],
+    ) -> bool:
+        """Remembers; never asks to end."""
+        self.told.append(done)
+        self.states.append(state())
+        assert all(isinstance(value, float) for value in figures.values())
+        assert all(isinstance(patch, Patch) for patch in patches())
+        return False
 
 
 class AttackContract:
@@ -94,11 +121,19 @@ class AttackContract:
         """So many steps; for attacks without gradients as many queries as they may take."""
         return Budget(steps=steps, queries=None if self.spec.needs_gradients else steps * self.passes_per_step)
 
-    def attack(self, model: Counted, dataset: Sequence[Any], *, steps: int = 2, seed: int = SEED) -> tuple[Patch, ...]:
+    def attack(
+        self,
+        model: Counted,
+        dataset: Sequence[Any],
+        *,
+        steps: int = 2,
+        seed: int = SEED,
+        watch: Watch | None = None,
+    ) -> tuple[Patch, ...]:
         """A fresh attack, run once."""
         compositor = TinyCompositor(dataset)
         rng = derive_rng(seed, "attack")
-        return self.make().optimise(model, dataset, compositor, budget=self.budget(steps), rng=rng)
+        return self.make().optimise(model, dataset, compositor, budget=self.budget(steps), rng=rng, watch=watch)
 
     def harm(self, model: Counted, dataset: Sequence[Any], patches: Sequence[Patch]) -> float:
         """What the attack wants to be large; override for attacks that want something else than a large loss."""
@@ -137,6 +172,17 @@ class AttackContract:
         dataset = self.dataset()
         self.attack(self.model(), dataset)
         assert not difference(dataset, self.dataset(), "dataset")
+
+    def test_it_can_be_watched(self) -> None:
+        """A watch changes nothing; what it is told is in order, and a state that it was given can be resumed from."""
+        dataset, plain = self.dataset(), self.attack(self.model(), self.dataset(), steps=4)
+        watch = Watching()
+        found = self.attack(self.model(), dataset, steps=4, watch=watch)
+        assert not difference(found, plain, "patches")
+        assert watch.told == sorted(set(watch.told))
+        if len(watch.states) > 1 and watch.states[0]:
+            resumed = self.attack(self.model(), dataset, steps=4, watch=Watching(watch.states[0]))
+            assert not difference(resumed, plain, "patches after a resumed run")
 
     def test_the_same_generator_gives_the_same_patch(self) -> None:
         """All chance comes from `rng`, and running before leaves no trace."""

@@ -26,7 +26,9 @@ class Ascent:
     def __init__(self, config: Config) -> None:
         self.config = config
 
-    def optimise(self, model: Any, dataset: Any, compositor: Any, *, budget: Any, rng: np.random.Generator) -> Any:
+    def optimise(
+        self, model: Any, dataset: Any, compositor: Any, *, budget: Any, rng: np.random.Generator, watch: Any = None
+    ) -> Any:
         side = self.config.side_px
         start = rng.uniform(0.4, 0.6, (len(dataset[0].record.surfaces), 3, side, 2 * side)).astype(np.float32)
         patches = torch.from_numpy(start)
@@ -46,7 +48,9 @@ ascent = AttackSpec(name="ascent", summary="Sign gradient ascent.", config=Confi
 class Search(Ascent):
     """Random search, without gradients."""
 
-    def optimise(self, model: Any, dataset: Any, compositor: Any, *, budget: Any, rng: np.random.Generator) -> Any:
+    def optimise(
+        self, model: Any, dataset: Any, compositor: Any, *, budget: Any, rng: np.random.Generator, watch: Any = None
+    ) -> Any:
         assert budget.queries is not None
         best, best_loss = None, -np.inf
         for _ in range(budget.queries):

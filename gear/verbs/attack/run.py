@@ -102,6 +102,7 @@ def attack(
     config = read_node(found.spec.config, options, "")
     surfaces = len(datasets[0].sidecar(0).record.surfaces)
     check_attack(found, chosen, task, surfaces, queries)
+    product = build(found, options)
     plan: Json = {
         "attack": {
             "name": found.spec.name,
@@ -130,7 +131,6 @@ def attack(
     device = str(getattr(network, "device", "cpu"))
     seen, held = (Scenes(group, compositor, device) for group in (datasets, validation))
     before = weights_digest(network)
-    product = build(found, options)
     objective = (
         product.objective(seen.samples[0]) if hasattr(product, "objective") else default_objective(seen.samples[0])
     )

@@ -107,10 +107,12 @@ class Recorder:
         return bool(self.stopped)
 
     def save(self, done: int, state: State) -> None:
-        """Writes the checkpoint, whole or not at all."""
+        """Writes the checkpoint, whole or not at all; nothing for an attack that keeps no state."""
         self._saved = time.monotonic()
+        if not state:
+            return
         self.clock()
-        arrays: dict[str, Any] = {f"state/{name}": np.ascontiguousarray(value) for name, value in state.items()}
+        arrays: dict[str, Any] = {f"state/{name}": np.array(value, order="C") for name, value in state.items()}
         arrays |= {f"best/{patch.name}": np.ascontiguousarray(patch.rgb) for patch in self.best or ()}
         notes = {
             "key": self.key,

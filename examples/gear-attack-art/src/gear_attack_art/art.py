@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from art.attacks.evasion import MomentumIterativeMethod, ProjectedGradientDescent
 from art.estimators import BaseEstimator, LossGradientsMixin
-from gear.contracts.attacks import Budget, Compositor, Patch
+from gear.contracts.attacks import Budget, Compositor, Patch, Watch
 from gear.contracts.models import Model
 
 if TYPE_CHECKING:
@@ -65,9 +65,16 @@ class ArtAttack:
         self.config = config
 
     def optimise(
-        self, model: Model, dataset: Sequence[Any], compositor: Compositor, *, budget: Budget, rng: np.random.Generator
+        self,
+        model: Model,
+        dataset: Sequence[Any],
+        compositor: Compositor,
+        *,
+        budget: Budget,
+        rng: np.random.Generator,
+        watch: Watch | None = None,
     ) -> tuple[Patch, ...]:
-        """One patch a surface, from random values; the toolbox itself draws nothing."""
+        """One patch a surface, from random values; the toolbox itself draws nothing and tells nothing on its way."""
         config, count = self.config, len(dataset[0].record.surfaces)
         start = rng.uniform(0, 1, (count, 3, config.height_px, config.width_px)).astype(np.float32)
         attack = METHODS[config.method](

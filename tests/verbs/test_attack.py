@@ -1,0 +1,283 @@
+"""`gear attack` on a tiny town and tiny networks: files, resuming, several models, defenses, and what is refused."""
+
+from __future__ import annotations
+
+import json
+import sys
+import types
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from importlib.metadata import EntryPoint
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from safetensors.numpy import load_file
+
+import gear
+from gear.cli.main import main
+from gear.contracts.attacks import Patch
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.specs import AttackSpec, ModelSpec
+from gear.plugins import build as building
+from gear.plugins.manager import discover
+from gear.testing.compare import difference
+from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_depth, tiny_segmenter
+from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
+from gear.values.errors import DatasetError, GearError, PluginError
+from gear.verbs.attack.run import attack
+from gear.verbs.attack.watch import CHECKPOINT, Recorder
+from gear.verbs.collect.run import collect
+from tests.verbs.conftest import size_settings
+
+SMALL = ["height_px=12", "width_px=24", "batch=1"]
+other_segmenter = ModelSpec(
+    name="other_segmenter",
+    summary="The tiny one with other weights.",
+    config=TinyConfig,
+    build=lambda config: TinySegmenter(TinyConfig(seed=config.seed + 7, width=config.width)),
+    tasks=("semseg",),
+    views=("left",),
+    taps=("stem", "trunk"),
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Nothing:
+    """No options."""
+
+
+class Bad:
+    """Returns, or does, what it must not."""
+
+    def __init__(self, what: str) -> None:
+        self.what = what
+
+    def optimise(self, model: Any, dataset: Any, compositor: Any, **rest: Any) -> Any:
+        if self.what == "changes the model":
+            next(model.parameters()).data.add_(1.0)
+        rgb = np.full((4, 8, 3), 2.0 if self.what == "leaves the range" else 0.5, np.float32)
+        return (Patch(name="poster" if self.what == "misnames" else "patch_0", rgb=rgb),)
+
+
+def bad(what: str) -> AttackSpec[Any]:
+    return AttackSpec(name="bad", summary="Bad.", config=Nothing, build=lambda config: Bad(what))
+
+
+@pytest.fixture
+def install(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
+    def put(*specs: Any) -> None:
+        module = types.ModuleType("odd_attacks")
+        for hook, kind in (("gear_models", ModelSpec), ("gear_attacks", AttackSpec)):
+            chosen = [spec for spec in specs if isinstance(spec, kind)]
+            setattr(module, hook, hookimpl(lambda chosen=chosen: chosen, specname=hook))
+        sys.modules["odd_attacks"] = module
+        found = discover([EntryPoint(name="odd", value="odd_attacks", group="gear")])
+        monkeypatch.setattr(building, "catalogue", lambda: found)
+
+    put(tiny_segmenter, tiny_depth, other_segmenter)
+    yield put
+    sys.modules.pop("odd_attacks", None)
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """Datasets with probes, which tests share and only read."""
+    made: dict[tuple[Any, ...], Path] = {}
+
+    def root(task: str = "semseg", scene: str = "board", split: str = "train", probes: bool = True) -> Path:
+        key = (task, scene, split, probes)
+        if key not in made:
+            made[key] = tmp_path_factory.mktemp("data") / f"{task}-{scene}-{split}"
+            collect(
+                task, town=TINY_TOWN, scene=scene, split=split, samples=2, renderer="classic", quality="fast",
+                probes=probes, out=made[key], settings=[f"scenes={TINY_SCENES}", *size_settings(task)],
+            )  # fmt: skip
+        return made[key]
+
+    return root
+
+
+Small = Callable[..., Path]
+Install = Callable[..., None]
+
+
+def test_a_patch_folder_is_whole(small: Small, install: Install, tmp_path: Path) -> None:
+    data, out = small(), tmp_path / "patches"
+    report = attack(data, model="tiny_segmenter", out=out, steps=4, settings=SMALL)
+    assert report.made and [patch.name for patch in report.patches] == ["patch_0"]
+    picture = cv2.imread(str(out / "patch_0.png"))[..., ::-1]
+    exact = load_file(out / "patch.safetensors")["patch_0"]
+    assert exact.shape == (12, 24, 3) and exact.dtype == np.float32
+    assert np.array_equal(picture, np.floor(exact * 255 + 0.5).astype(np.uint8))
+    notes = json.loads((out / "attack.json").read_text())
+    assert notes["models"][0]["name"] == "tiny_segmenter" and len(notes["weights_sha256"]) == 64
+    assert notes["steps_done"] == 4 and all(len(curve) == 4 for curve in notes["curves"].values())
+    assert notes["gradient"]["least"] > 0 and notes["gradient"]["zero_steps"] == 0
+    assert notes["masking"]["kept"] == pytest.approx(notes["masking"]["promised"], rel=0.5)
+    assert cv2.imread(str(out / "figures" / "curves.png")).shape[0] > 100
+    assert cv2.imread(str(out / "figures" / "samples.png")).shape == (2 * 160, 2 * 320, 3)
+    assert not (out / CHECKPOINT).exists()
+    assert "4 steps" in report.summary()
+
+
+def test_what_is_there_is_not_made_again(small: Small, install: Install, tmp_path: Path) -> None:
+    data, out = small(), tmp_path / "patches"
+    first = attack(data, model="tiny_segmenter", out=out, steps=2, settings=SMALL)
+    stamp = (out / "patch_0.png").stat().st_mtime_ns
+    again = attack(data, model="tiny_segmenter", out=out, steps=2, settings=SMALL)
+    assert not again.made and (out / "patch_0.png").stat().st_mtime_ns == stamp
+    assert not difference(first.patches, again.patches, "patches")
+    with pytest.raises(DatasetError, match="made otherwise"):
+        attack(data, model="tiny_segmenter", out=out, steps=3, settings=SMALL)
+    assert attack(data, model="tiny_segmenter", out=out, steps=3, settings=SMALL, force=True).made
+
+
+def test_a_killed_attack_goes_on(
+    small: Small, install: Install, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = attack(small(), model="tiny_segmenter", out=tmp_path / "whole", steps=5, settings=SMALL)
+    monkeypatch.setattr("gear.verbs.attack.watch.SECONDS_BETWEEN", 0.0)
+
+    def killed(done: int, total: int) -> None:
+        if done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        attack(small(), model="tiny_segmenter", out=tmp_path / "cut", steps=5, settings=SMALL, progress=killed)
+    assert (tmp_path / "cut" / CHECKPOINT).exists() and not (tmp_path / "cut" / "attack.json").exists()
+    with pytest.raises(DatasetError, match="unfinished attack with other settings"):
+        attack(small(), model="tiny_segmenter", out=tmp_path / "cut", steps=6, settings=SMALL)
+    seen: list[int] = []
+    resumed = attack(
+        small(), model="tiny_segmenter", out=tmp_path / "cut", steps=5, settings=SMALL,
+        progress=lambda done, total: seen.append(done),
+    )  # fmt: skip
+    assert min(done for done in seen if done) == 3, "steps that were done are not done again"
+    assert not difference(resumed.patches, whole.patches, "patches")
+    assert resumed.facts["curves"] == whole.facts["curves"]
+
+
+def test_double_boards_get_a_patch_each(small: Small, install: Install, tmp_path: Path) -> None:
+    report = attack(small(scene="double"), model="tiny_segmenter", out=tmp_path, steps=2, settings=SMALL)
+    assert [patch.name for patch in report.patches] == ["patch_0", "patch_1"]
+    assert not np.array_equal(report.patches[0].rgb, report.patches[1].rgb)
+
+
+def test_depth_too(small: Small, install: Install, tmp_path: Path) -> None:
+    report = attack(small("depth"), model="tiny_depth", out=tmp_path, steps=2, settings=[*SMALL, "direction=farther"])
+    assert set(report.facts["curves"]) == {"farther", "gradient", "smoothness"}
+
+
+def test_several_models_and_scenes_at_once(small: Small, install: Install, tmp_path: Path) -> None:
+    report = attack(
+        [small(), small(scene="truck")], model=["tiny_segmenter", "other_segmenter"], out=tmp_path, steps=3,
+        settings=SMALL,
+    )  # fmt: skip
+    names = set(report.facts["curves"])
+    assert any(name.startswith("tiny_segmenter/") for name in names)
+    assert any(name.startswith("other_segmenter/") for name in names)
+    assert [one["scene"] for one in report.facts["data"]] == ["tiny/board", "tiny/truck"]
+
+
+def test_a_defense_is_looked_through(small: Small, install: Install, tmp_path: Path) -> None:
+    plain = attack(small(), model="tiny_segmenter", out=tmp_path / "plain", steps=2, settings=SMALL)
+    aware = attack(small(), model="tiny_segmenter", out=tmp_path / "aware", steps=2, settings=SMALL, defense="gaussian")
+    assert aware.facts["defense"]["name"] == "gaussian"
+    assert not np.array_equal(plain.patches[0].rgb, aware.patches[0].rgb)
+
+
+def test_the_best_on_validation_is_kept(small: Small, install: Install, tmp_path: Path) -> None:
+    report = attack(
+        small(), model="tiny_segmenter", out=tmp_path, steps=6, settings=SMALL, val=small(split="val"), every=2
+    )
+    assert [step for step, _ in report.facts["validation_harm"]] == [2, 4, 6]
+
+
+def test_patience_ends_it(tmp_path: Path) -> None:
+    harms = iter([1.0, 3.0, 2.0, 2.5, 2.9])
+    patches = [(Patch(name="patch_0", rgb=np.full((2, 2, 3), n, np.float32)),) for n in range(5)]
+    recorder = Recorder(root=tmp_path, key="k", steps=9, judge=lambda _: next(harms), every=1, patience=2)
+    asked = [recorder.step(n + 1, {"a": n}, lambda n=n: patches[n], dict) for n in range(4)]  # type: ignore[misc]
+    assert asked == [False, False, False, True] and "validation" in recorder.stopped
+    assert recorder.best is patches[1]
+
+
+def test_homography_needs_no_probes(small: Small, install: Install, tmp_path: Path) -> None:
+    data = small(probes=False)
+    with pytest.raises(DatasetError, match="probes"):
+        attack(data, model="tiny_segmenter", out=tmp_path / "a", steps=1, settings=SMALL)
+    assert attack(
+        data, model="tiny_segmenter", out=tmp_path / "b", steps=1, settings=SMALL, compositor="homography"
+    ).made
+
+
+@pytest.mark.parametrize("what", ["changes the model", "leaves the range", "misnames"])
+def test_an_attack_that_breaks_its_promise_is_named(small: Small, install: Install, tmp_path: Path, what: str) -> None:
+    install(tiny_segmenter, bad(what))
+    with pytest.raises(PluginError, match="bad"):
+        attack(small(), model="tiny_segmenter", out=tmp_path, attack="bad", steps=1)
+    assert not list(tmp_path.glob("*.png")) and not (tmp_path / "attack.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"model": "tiny_depth"}, "is a semseg dataset"),
+        ({"model": "tiny_segmentor"}, "tiny_segmenter"),
+        ({"model": ["tiny_segmenter", "tiny_segmenter"]}, "twice"),
+        ({"attack": "scene_spesific"}, "scene_specific"),
+        ({"steps": 0}, "at least 1"),
+        ({"defense": "bit_dept"}, "bit_depth"),
+        ({"compositor": "glue"}, "transport"),
+        ({"settings": ["learning_rate=-1"]}, "learning_rate"),
+    ],
+)
+def test_bad_wishes_get_a_line(
+    small: Small, install: Install, tmp_path: Path, changes: Mapping[str, Any], message: str
+) -> None:
+    wishes: dict[str, Any] = {"model": "tiny_segmenter", "steps": 1, "settings": SMALL, **changes}
+    with pytest.raises(GearError, match=message):
+        attack(small(), out=tmp_path / "out", **wishes)
+
+
+def test_test_splits_and_empty_scenes_are_refused(small: Small, install: Install, tmp_path: Path) -> None:
+    with pytest.raises(GearError, match="tested on"):
+        attack(small(split="test"), model="tiny_segmenter", out=tmp_path, steps=1)
+    with pytest.raises(DatasetError, match="no patch surface"):
+        attack(small(scene="no_billboard", probes=False), model="tiny_segmenter", out=tmp_path, steps=1)
+    with pytest.raises(DatasetError, match="no dataset"):
+        attack(tmp_path, model="tiny_segmenter", out=tmp_path / "x", steps=1)
+
+
+def test_on_the_command_line(
+    small: Small, install: Install, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = [
+        "attack",
+        "--model",
+        "tiny_segmenter",
+        "--data",
+        str(small()),
+        "--steps",
+        "2",
+        "--out",
+        str(tmp_path / "p"),
+    ]
+    assert main([*words, *(f"--set={text}" for text in SMALL), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["steps_done"] == 2
+    assert main([*words, "--set", "batch=0"]) == 2
+    line = capsys.readouterr().err.strip()
+    assert "\n" not in line and "batch" in line
+
+
+def test_the_patch_goes_back_into_the_world(small: Small, install: Install, tmp_path: Path) -> None:
+    attack(small(), model="tiny_segmenter", out=tmp_path / "p", steps=2, settings=SMALL)
+    collect(
+        "semseg", town=TINY_TOWN, scene="board", split="train", samples=2, renderer="classic", quality="fast",
+        patch=str(tmp_path / "p"), out=tmp_path / "patched",
+        settings=[f"scenes={TINY_SCENES}", *size_settings("semseg")],
+    )  # fmt: skip
+    assert len(gear.open_twins(small(), tmp_path / "patched")) == 2
