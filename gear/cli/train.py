@@ -52,6 +52,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--precision", choices=("float32", "bfloat16"), help="of the training steps (float32)")
     parser.add_argument("--device", choices=("auto", "cpu", "cuda"), help="where it runs (auto)")
     parser.add_argument("--workers", type=positive, metavar="N", help="threads that read; change nothing but time (2)")
+    parser.add_argument(
+        "--adversarial", metavar="ATTACK", help="show patches that this attack makes against the network on the way"
+    )
     parser.add_argument("--allow-test-data", action="store_true", help="learn from test splits, too")
     parser.add_argument(
         "--set",
@@ -83,6 +86,7 @@ def run(args: argparse.Namespace) -> int:
             precision=args.precision,
             device=args.device,
             workers=args.workers,
+            adversarial=args.adversarial,
             settings=args.settings,
             allow_test_data=args.allow_test_data,
             watch=bar,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from gear.augment.apply import Augmentation, Framing
 from gear.config.dump import to_yaml
@@ -16,6 +16,38 @@ from gear.contracts.models import Recipe
 from gear.values.errors import FieldError
 
 SHARES = ("warm_up", "final_rate", "validation_share")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Adversarial:
+    """Training on pictures that show patches which were made against the network on the way.
+
+    Attributes:
+        attack: name of an attack plugin; "" for none.
+        share: how often a sample with surfaces shows patches of the pool.
+        pool: sets of patches that are kept.
+        steps: of the attack, for one set.
+        samples: that one set is made on, of one scene.
+        compositor: `transport` needs data that were collected with probes, `homography` none.
+        options: the attack's own (`gear plugins show ATTACK`).
+    """
+
+    SHORTHAND: ClassVar[str] = "attack"
+
+    attack: str = ""
+    share: float = 0.5
+    pool: int = 8
+    steps: int = 30
+    samples: int = 16
+    compositor: Literal["transport", "homography"] = "transport"
+    options: Node = field(default_factory=lambda: MappingNode({}, Place("defaults")))
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.share <= 1:
+            raise FieldError("share", f"is a share of the samples, 0 to 1, got {self.share:g}")
+        for name in ("pool", "steps", "samples"):
+            if getattr(self, name) < 1:
+                raise FieldError(name, f"must be at least 1, got {getattr(self, name)}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,6 +70,7 @@ class TrainConfig(Recipe):
         workers: threads that decode and augment; they change nothing but time.
         cache_gb: memory for decoded samples; what does not fit is decoded again. Changes nothing but time.
         augmentation: of training samples.
+        adversarial: patches that are made against the network while it learns.
         options: the network's own (`gear plugins show MODEL`).
     """
 
@@ -55,6 +88,7 @@ class TrainConfig(Recipe):
     workers: int = 2
     cache_gb: float = 4.0
     augmentation: Augmentation = field(default_factory=Augmentation)
+    adversarial: Adversarial = field(default_factory=Adversarial)
     options: Node = field(default_factory=lambda: MappingNode({}, Place("defaults")))
 
     def __post_init__(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -99,7 +99,7 @@ class Feed:
         self._size = min(config.batch, len(samples))
         self.batches = len(samples) // self._size
 
-    def from_position(self, position: Position) -> Iterator[Batch]:
+    def from_position(self, position: Position) -> Generator[Batch]:
         """Batches of this pass and all that follow; close the iterator to end its threads."""
         pool = ThreadPoolExecutor(self._config.workers, thread_name_prefix="gear-train")
         ahead: deque[tuple[tuple[int, ...], list[Future[Any]]]] = deque()

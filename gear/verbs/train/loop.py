@@ -21,6 +21,7 @@ from gear.values.errors import GearError
 from gear.values.rng import derive_rng
 from gear.values.serial import Json
 from gear.verbs.train import checkpoint
+from gear.verbs.train.adversary import Adversary
 from gear.verbs.train.checkpoint import Progress
 from gear.verbs.train.config import TrainConfig
 from gear.verbs.train.feed import Feed
@@ -51,6 +52,7 @@ class Parts:
         views: cameras that it looks at.
         validation: held-out samples.
         feed: training batches.
+        adversary: makes patches before every pass; None for none.
         root: folder of the results.
         plan: what a checkpoint must have been begun with.
     """
@@ -62,6 +64,7 @@ class Parts:
     views: Sequence[str]
     validation: Sequence[Any]
     feed: Feed
+    adversary: Adversary | None
     root: Path
     plan: Json
 
@@ -88,7 +91,9 @@ class Training:
         self._device = device_of(config.device)
         self._broken = 0
         found = checkpoint.load(parts.root, parts.plan, self._module, self._mean, self._optimiser)
-        self.progress, _ = found or (Progress(), {})
+        self.progress, extra = found or (Progress(), {})
+        if parts.adversary is not None:
+            parts.adversary.restore(extra)
         self._saved_s = self.progress.elapsed_s
 
     @property
@@ -101,25 +106,42 @@ class Training:
     def run(self) -> Progress:
         """Trains to the end."""
         _train_mode(self._parts.model, True)
-        batches = self._parts.feed.from_position(self.progress.position)
-        with contextlib.closing(batches):  # type: ignore[type-var]
-            while self.share < 1 and not self._has_enough:
-                with self._timed():
-                    self._step(next(batches))
-                if self._is_time_to_validate:
-                    self._validate()
-                elif self.progress.elapsed_s - self._saved_s > CHECKPOINT_EVERY_S:
-                    self._save()
-                if self._watch is not None:
-                    self._watch(self.progress, self.share, None)
+        while not self._is_over:
+            self._make_patches()
+            with contextlib.closing(self._parts.feed.from_position(self.progress.position)) as batches:
+                self._passes(batches)
         if not self.progress.validations or self.progress.validations[-1]["step"] != self.progress.step:
             self._validate()
         _train_mode(self._parts.model, False)
         return self.progress
 
+    def _passes(self, batches: Iterator[Batch]) -> None:
+        """Steps until the end; with an adversary until the end of a pass, because the next one shows other patches."""
+        while not self._is_over:
+            with self._timed():
+                self._step(next(batches))
+            if self._is_time_to_validate:
+                self._validate()
+            elif self.progress.elapsed_s - self._saved_s > CHECKPOINT_EVERY_S:
+                self._save()
+            if self._watch is not None:
+                self._watch(self.progress, self.share, None)
+            if self._parts.adversary is not None and self.progress.position.batch == 0:
+                return
+
+    def _make_patches(self) -> None:
+        """Against the mean weights, at the beginning of a pass."""
+        adversary, position = self._parts.adversary, self.progress.position
+        if adversary is None or position.batch:
+            return
+        with self._timed(), seeded(int(derive_rng(self._config.seed, "patches", position.epoch).integers(2**31))):
+            self._parts.twin.module().load_state_dict(self._mean.state)
+            adversary.refresh(self._parts.twin, position.epoch)
+
     @property
-    def _has_enough(self) -> bool:
-        return bool(self._config.patience) and self.progress.worse >= self._config.patience
+    def _is_over(self) -> bool:
+        has_enough = bool(self._config.patience) and self.progress.worse >= self._config.patience
+        return self.share >= 1 or has_enough
 
     @property
     def _is_time_to_validate(self) -> bool:
@@ -183,8 +205,9 @@ class Training:
             self._watch(progress, self.share, figures)
 
     def _save(self) -> None:
+        extra = self._parts.adversary.state() if self._parts.adversary is not None else {}
         checkpoint.save(
-            self._parts.root, self._parts.plan, self.progress, self._module, self._mean, self._optimiser, {}
+            self._parts.root, self._parts.plan, self.progress, self._module, self._mean, self._optimiser, extra
         )
         self._saved_s = self.progress.elapsed_s
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,12 +11,14 @@ from typing import Any
 from gear.config.dump import to_plain
 from gear.contracts.specs import ModelSpec, TaskSpec
 from gear.dataset.files import clear_scratch, explained
-from gear.nn.runtime import prepare
+from gear.dataset.layout import GEAR
+from gear.nn.runtime import device_of, prepare
 from gear.plugins.build import blamed, find
 from gear.plugins.catalogue import Found
 from gear.values.errors import GearError
 from gear.values.serial import Json
 from gear.verbs.look import look_of
+from gear.verbs.train.adversary import Adversary
 from gear.verbs.train.config import TrainConfig, read_config
 from gear.verbs.train.curves import write_curves
 from gear.verbs.train.data import TRAINING, VALIDATION, Samples, all_of, keep_some, open_all, spread
@@ -79,6 +82,7 @@ def train(
     precision: str | None = None,
     device: str | None = None,
     workers: int | None = None,
+    adversarial: str | None = None,
     settings: Iterable[str] = (),
     allow_test_data: bool = False,
     watch: Watch | None = None,
@@ -96,6 +100,7 @@ def train(
         val: data to validate on; by default some sequences of `data` are kept for it.
         epochs, time_budget_s, batch, lr, seed, init, precision, device, workers: as in `TrainConfig`, where `lr` is
             `learning_rate`; what is not given is as the network's recipe says.
+        adversarial: name of an attack; see `Adversarial`.
         settings: further `KEY=VALUE` texts for any key of `TrainConfig`, such as `augmentation.flip=0`; the network's
             own options are `options.KEY`.
         allow_test_data: whether `test` splits may be learnt from.
@@ -110,6 +115,8 @@ def train(
         "init": init, "precision": precision, "device": device, "workers": workers,
     }  # fmt: skip
     settings = tuple(settings)
+    if adversarial is not None:
+        settings = (f"adversarial.attack={adversarial}", *settings)
     found, task_found = find("model", model), find("task", task)
     recipe = trainable(found, task)
     config = read_config(recipe, given, settings)
@@ -143,6 +150,9 @@ def train(
     progress = training_run.run()
     write_curves(root, spec, progress, f"{found.spec.name} on {task}")
     write_history(root, origin, progress)
+    clear_scratch(root)
+    with contextlib.suppress(OSError):
+        (root / GEAR).rmdir()
     best = next(entry for entry in progress.validations if entry["step"] == progress.best_step)
     return TrainReport(
         root=root,
@@ -181,6 +191,15 @@ def _parts(found: Found, spec: TaskSpec[Any], origin: Origin, root: Path) -> Par
     training = Cache(origin.training, limit)
     with blamed(found, "module"):
         twin.module()
+    adversary = None
+    if config.adversarial.attack:
+        adversary = Adversary(
+            origin.training,
+            config.adversarial,
+            task=origin.task,
+            seed=config.seed,
+            device=device_of(config.device),
+        )
     return Parts(
         spec=spec,
         task=origin.training.datasets[0].task,
@@ -188,7 +207,8 @@ def _parts(found: Found, spec: TaskSpec[Any], origin: Origin, root: Path) -> Par
         twin=twin,
         views=views,
         validation=validation,
-        feed=Feed(training, config, views),
+        feed=Feed(training, config, views, None if adversary is None else adversary.change),
+        adversary=adversary,
         root=root,
         plan=_plan(origin),
     )

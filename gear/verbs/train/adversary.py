@@ -1,0 +1,125 @@
+"""Adversarial patch training: part of the pictures show patches that an attack has just made against the network.
+
+A pool of patches is kept, as in adversarial training with a pool of universal patches (Metzen et al., "Meta Adversarial
+Training against Universal Patches", 2021): one new set after every pass, the oldest one leaves. Patches are put into
+pictures by a compositor before augmentation, so that they are cropped, mirrored and recoloured like everything else.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import threading
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from gear.compositor.opening import open_compositor
+from gear.contracts.attacks import Budget
+from gear.contracts.specs import AttackSpec
+from gear.plugins.build import blamed, build, find
+from gear.values.errors import GearError
+from gear.values.rng import derive_rng
+from gear.verbs.train.config import Adversarial
+from gear.verbs.train.data import Samples
+
+CACHE_BYTES = 256 << 20
+"""Of each scene's compositor."""
+
+
+class Adversary:
+    """Makes patches against the network, and puts them into samples."""
+
+    def __init__(self, samples: Samples, config: Adversarial, *, task: str, seed: int, device: torch.device) -> None:
+        """Args:
+            samples: to train on; those of scenes with surfaces (and probes, for `transport`) are attacked.
+            config: which attack, how often, how long.
+            task: that the attack must be able to attack.
+            seed: of everything drawn here.
+            device: of the compositor.
+
+        Raises:
+            GearError: the attack cannot attack the task, or no sample has what the compositor needs.
+            DatasetError: a scene lacks probes.
+        """
+        self._samples, self._config, self._seed = samples, config, seed
+        self._found = find("attack", config.attack)
+        spec = self._found.spec
+        assert isinstance(spec, AttackSpec)
+        if spec.tasks and task not in spec.tasks:
+            raise GearError(f"attack {spec.name!r} is for {', '.join(spec.tasks)}, not {task}")
+        self._attack = build(self._found, config.options)
+        places = [samples.places[index] for index in range(len(samples))]
+        used = sorted({dataset for dataset, _ in places})
+        with_surfaces = [number for number in used if samples.datasets[number].sidecar(0).record.surfaces]
+        if not with_surfaces:
+            raise GearError("no training scene has a surface for a patch; collect some around a billboard")
+        self._compositors = {
+            number: open_compositor(config.compositor, samples.datasets[number], device=device, cache_bytes=CACHE_BYTES)
+            for number in with_surfaces
+        }
+        self._indices = {number: [i for dataset, i in places if dataset == number] for number in with_surfaces}
+        self._pool: list[tuple[Tensor, ...]] = []
+        self._lock = threading.Lock()
+
+    def refresh(self, model: Any, epoch: int) -> None:
+        """Makes one more set of patches, against the model as it is, in a scene that is drawn."""
+        rng = derive_rng(self._seed, "adversary", epoch)
+        number = sorted(self._compositors)[int(rng.integers(len(self._compositors)))]
+        there = self._indices[number]
+        chosen = [there[i] for i in sorted(rng.permutation(len(there))[: self._config.samples])]
+        dataset = self._samples.datasets[number]
+        with blamed(self._found, "optimise"):
+            patches = self._attack.optimise(
+                model,
+                [dataset[index] for index in chosen],
+                _Chosen(self._compositors[number], chosen),
+                budget=Budget(steps=self._config.steps),
+                rng=rng,
+            )
+        tensors = tuple(torch.from_numpy(patch.rgb).permute(2, 0, 1).contiguous() for patch in patches)
+        self._pool = [*self._pool, tensors][-self._config.pool :]
+
+    def change(self, sample: Any, index: int, rng: np.random.Generator) -> Any:
+        """The sample, perhaps with patches of the pool on its surfaces. Threads may share it."""
+        dataset, place = self._samples.places[index]
+        if dataset not in self._compositors or not self._pool or rng.random() >= self._config.share:
+            return sample
+        patches = self._pool[int(rng.integers(len(self._pool)))]
+        wanted = len(sample.record.surfaces)
+        shown = [patches[number % len(patches)] for number in range(wanted)]
+        with self._lock, torch.no_grad():
+            images = {
+                view: _picture(self._compositors[dataset].compose(shown, [place], view)[0]) for view in sample.images
+            }
+        return dataclasses.replace(sample, images=images)
+
+    def state(self) -> dict[str, Tensor]:
+        """The pool, for a checkpoint."""
+        return {f"{n:04d}.{k:02d}": patch for n, patches in enumerate(self._pool) for k, patch in enumerate(patches)}
+
+    def restore(self, state: Mapping[str, Tensor]) -> None:
+        """The inverse."""
+        sets: dict[str, list[Tensor]] = {}
+        for key in sorted(state):
+            sets.setdefault(key.partition(".")[0], []).append(state[key])
+        self._pool = [tuple(patches) for patches in sets.values()]
+
+
+class _Chosen:
+    """A compositor for some samples of a split, numbered from 0."""
+
+    def __init__(self, compositor: Any, indices: Sequence[int]) -> None:
+        self._compositor, self._indices = compositor, tuple(indices)
+
+    def compose(self, patches: Sequence[Tensor], samples: Sequence[int], view: str) -> Tensor:
+        composed: Tensor = self._compositor.compose(patches, [self._indices[index] for index in samples], view)
+        return composed
+
+
+def _picture(composed: Tensor) -> np.ndarray:
+    """(3, H, W) in 0..1 to (H, W, 3) uint8."""
+    levels = (composed * 255).round().clamp(0, 255).to(torch.uint8)
+    return np.ascontiguousarray(levels.permute(1, 2, 0).cpu().numpy())

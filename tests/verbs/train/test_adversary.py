@@ -1,0 +1,137 @@
+"""Adversarial patch training on a tiny dataset with probes, with an attack that makes what it is told."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+import gear
+from gear.contracts.attacks import Budget, Patch
+from gear.contracts.specs import AttackSpec
+from gear.plugins import build as building
+from gear.plugins.catalogue import Catalogue, Found, Owner
+from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
+from gear.values.errors import GearError
+from gear.values.rng import derive_rng
+from gear.verbs.collect.run import collect
+from gear.verbs.train import loop
+from gear.verbs.train.adversary import Adversary
+from gear.verbs.train.checkpoint import Progress
+from gear.verbs.train.config import Adversarial
+from gear.verbs.train.data import all_of, open_all
+from gear.verbs.train.run import train
+
+
+@dataclass(frozen=True, kw_only=True)
+class Config:
+    level: float = -1.0
+
+
+class Painter:
+    """Patches of one level, or of drawn ones; looks at the network as a real attack does."""
+
+    def __init__(self, config: Config) -> None:
+        self.config = config
+
+    def optimise(
+        self, model: Any, dataset: Any, compositor: Any, *, budget: Budget, rng: Any, watch: Any = None
+    ) -> Any:
+        torch.rand(1)  # attacks may draw from torch's own generator
+        grey = torch.full((3, 8, 16), 0.5, requires_grad=True)
+        pictures = compositor.compose([grey], range(len(dataset)), "left")
+        model.forward({"left": pictures}, dataset)["loss"].backward()
+        assert float(grey.grad.abs().sum()) > 0  # type: ignore[union-attr]
+        level = rng.random() if self.config.level < 0 else self.config.level
+        return (Patch(name="patch_0", rgb=np.full((8, 16, 3), level, np.float32)),)
+
+
+@pytest.fixture
+def painter(install: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    spec = AttackSpec(name="painter", summary="Paints.", config=Config, build=Painter, tasks=("semseg",))
+    found = building.catalogue()
+    more = Found(kind="attack", spec=spec, owner=Owner(plugin="p", package="painter", version="1"))
+    monkeypatch.setattr(building, "catalogue", lambda: Catalogue((*found.found, more)))
+
+
+@pytest.fixture(scope="module")
+def probed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("probed")
+    collect(
+        "semseg", out=root, town=TINY_TOWN, scene="board", split="train", samples=4, renderer="classic",
+        quality="fast", probes=True,
+        settings=[f"scenes={TINY_SCENES}", "options.width_px=128", "options.height_px=64"],
+    )  # fmt: skip
+    return root
+
+
+def adversary_of(root: Path, **changes: Any) -> Adversary:
+    samples = all_of(open_all([root], "semseg", names=("train",)))
+    config = Adversarial(attack="painter", **changes)
+    return Adversary(samples, config, task="semseg", seed=0, device=torch.device("cpu"))
+
+
+class Model:
+    def forward(self, views: Any, targets: Any) -> Any:
+        return {"loss": views["left"].sum()}
+
+
+def test_patches_of_the_pool_are_put_on_the_board(probed: Path, painter: None) -> None:
+    adversary, sample = adversary_of(probed, share=1.0, pool=2), gear.open_dataset(probed)[0]
+    assert adversary.change(sample, 0, derive_rng(0, "x")) is sample
+    for epoch in range(3):
+        adversary.refresh(Model(), epoch)
+    assert len(adversary.state()) == 2
+    changed = adversary.change(sample, 0, derive_rng(0, "x"))
+    differs = (changed.images["left"] != sample.images["left"]).any(axis=2)
+    assert 0 < differs.mean() < 0.5 and changed.label_ids is sample.label_ids
+    again = adversary_of(probed, share=1.0, pool=2)
+    again.restore(adversary.state())
+    assert np.array_equal(again.change(sample, 0, derive_rng(0, "x")).images["left"], changed.images["left"])
+    never = adversary_of(probed, share=0.0)
+    never.restore(adversary.state())
+    assert never.change(sample, 0, derive_rng(0, "x")) is sample
+
+
+class StopError(Exception):
+    """A power cut."""
+
+
+@pytest.mark.parametrize("stop_at", [1, 2, 3])
+def test_training_against_patches_is_taken_up_again(
+    probed: Path, painter: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stop_at: int
+) -> None:
+    monkeypatch.setattr(loop, "CHECKPOINT_EVERY_S", 0.0)
+
+    def run(out: str, watch: Any = None) -> Path:
+        settings = ["adversarial.share=1", "adversarial.samples=2"]
+        return train(
+            "semseg", "tiny_segmenter", probed, out=tmp_path / out, epochs=3, batch=2, adversarial="painter",
+            settings=settings, watch=watch,
+        ).weights  # fmt: skip
+
+    def stop(progress: Progress, share: float, figures: Any) -> None:
+        if progress.step == stop_at:
+            raise StopError
+
+    whole = run("whole")
+    with pytest.raises(StopError):
+        run("parts", stop)
+    assert run("parts").read_bytes() == whole.read_bytes()
+    plain = train("semseg", "tiny_segmenter", probed, out=tmp_path / "plain", epochs=3, batch=2).weights
+    assert plain.read_bytes() != whole.read_bytes()
+    config = json.loads((tmp_path / "whole" / "train.json").read_text())["config"]
+    assert config["adversarial"]["attack"] == "painter"
+
+
+def test_what_is_missing_is_said(street: Callable[..., Path], painter: None, tmp_path: Path) -> None:
+    with pytest.raises(GearError, match="probes"):
+        train("semseg", "tiny_segmenter", street("semseg"), out=tmp_path / "a", adversarial="painter", epochs=1)
+    with pytest.raises(GearError, match="'painter' is for semseg, not depth"):
+        train("depth", "tiny_depth", street("depth"), out=tmp_path / "b", adversarial="painter")
