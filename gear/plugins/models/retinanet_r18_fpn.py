@@ -1,0 +1,108 @@
+"""RetinaNets that gear trains: with ResNet-18, and with EfficientNet-Lite0, which may start from ImageNet."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.models import Recipe
+from gear.contracts.specs import ModelSpec
+from gear.nn.detectors_options import ReferenceDetectorOptions
+
+if TYPE_CHECKING:
+    from gear.nn.detectors_retinanet import RetinaNetDetector
+
+R18, LITE0 = "retinanet_r18_fpn", "retinanet_lite0_fpn"
+
+CATEGORIES = (1, 2, 3, 4, 6, 8, 10, 11, 13, 14, 15)
+"""COCO's ids of what there is in gear's towns: person, bicycle, car, motorcycle, bus, truck, traffic light, fire
+hydrant, stop sign, parking meter, bench."""
+
+INPUT_SCALE = 0.5
+
+LITE_MEAN, LITE_STD = (127 / 255,) * 3, (128 / 255,) * 3
+"""What EfficientNet-Lite0 was trained with."""
+
+RECIPE = Recipe(learning_rate=1e-3, weight_decay=1e-2, batch=8, epochs=24, gradient_norm=10.0)
+
+
+def build_r18(options: ReferenceDetectorOptions) -> RetinaNetDetector:
+    """The network with ResNet-18 and its weights."""
+    from gear.nn.detectors import Sizing, scaled
+    from gear.nn.detectors_graphs import retinanet_r18_fpn
+    from gear.nn.detectors_retinanet import RetinaNetDetector
+    from gear.nn.weights import build_graph
+
+    return RetinaNetDetector(
+        build_graph(lambda: retinanet_r18_fpn(len(CATEGORIES), options.least_score), options, R18),
+        options,
+        sizing=Sizing(inner_px=scaled(scale_of(options, R18)), smooth=True),
+        categories=CATEGORIES,
+    )
+
+
+def build_lite0(options: ReferenceDetectorOptions) -> RetinaNetDetector:
+    """The network with EfficientNet-Lite0 and its weights."""
+    from gear.nn.detectors import Sizing, scaled
+    from gear.nn.detectors_graphs import retinanet_lite0_fpn
+    from gear.nn.detectors_retinanet import LiteRetinaNetDetector
+    from gear.nn.weights import build_graph
+
+    return LiteRetinaNetDetector(
+        build_graph(lambda: retinanet_lite0_fpn(len(CATEGORIES), options.least_score), options, LITE0),
+        options,
+        sizing=Sizing(inner_px=scaled(scale_of(options, LITE0)), smooth=True, mean=LITE_MEAN, std=LITE_STD),
+        categories=CATEGORIES,
+    )
+
+
+def scale_of(options: ReferenceDetectorOptions, name: str) -> float:
+    """The input's scale: what the options say, or else the weights, or else one half."""
+    from gear.nn.shipped import trained_option
+
+    if options.input_scale is not None:
+        return options.input_scale
+    return trained_option(options.weights, name, "input_scale") or INPUT_SCALE
+
+
+def start_from_imagenet(model: Any) -> None:
+    """See `gear.nn.detectors_official.start_from_imagenet`."""
+    from gear.nn.detectors_official import start_from_imagenet
+
+    start_from_imagenet(model)
+
+
+retinanet_r18: ModelSpec[ReferenceDetectorOptions] = ModelSpec(
+    name=R18,
+    summary="RetinaNet with ResNet-18, a pyramid of 128 channels and group normalisation: trains on CPUs.",
+    config=ReferenceDetectorOptions,
+    build=build_r18,
+    tasks=("detect2d",),
+    views=("left",),
+    taps=("layer1", "layer2", "layer3", "layer4"),
+    recipe=RECIPE,
+    normalisation="RGB in 0..1, less ImageNet's mean, over its standard deviation",
+    parameters=13_366_855,
+    needs=("torchvision",),
+)
+
+retinanet_lite0: ModelSpec[ReferenceDetectorOptions] = ModelSpec(
+    name=LITE0,
+    summary="RetinaNet with EfficientNet-Lite0, which `gear train --init imagenet` takes from an installed package.",
+    config=ReferenceDetectorOptions,
+    build=build_lite0,
+    tasks=("detect2d",),
+    views=("left",),
+    taps=("layer1", "layer2", "layer3", "layer4"),
+    recipe=RECIPE,
+    normalisation="RGB in 0..255, less 127, over 128",
+    parameters=5_094_919,
+    needs=("torchvision", "timm"),
+    starts={"imagenet": start_from_imagenet},
+)
+
+
+@hookimpl
+def gear_models() -> list[ModelSpec[ReferenceDetectorOptions]]:
+    """These networks."""
+    return [retinanet_r18, retinanet_lite0]

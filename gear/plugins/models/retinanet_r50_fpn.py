@@ -1,0 +1,68 @@
+"""RetinaNet with ResNet-50 and a feature pyramid, a network of the paper: 2D detection."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.models import PublishedWeights, Recipe
+from gear.contracts.specs import ModelSpec
+from gear.nn.detectors_options import OfficialDetectorOptions
+
+if TYPE_CHECKING:
+    from gear.nn.detectors_retinanet import RetinaNetDetector
+
+NAME = "retinanet_r50_fpn"
+
+
+def build(options: OfficialDetectorOptions) -> RetinaNetDetector:
+    """The network with its weights."""
+    from gear.nn.detectors import OFFICIAL_CATEGORIES, Sizing, fitted
+    from gear.nn.detectors_graphs import retinanet_r50_fpn
+    from gear.nn.detectors_retinanet import RetinaNetDetector
+    from gear.nn.weights import build_graph
+
+    return RetinaNetDetector(
+        build_graph(lambda: retinanet_r50_fpn(options.least_score), options, NAME),
+        options,
+        sizing=Sizing(inner_px=fitted(options.min_size_px, options.max_size_px)),
+        categories=OFFICIAL_CATEGORIES,
+    )
+
+
+def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
+    """See `gear.nn.detectors_official.from_official`."""
+    from gear.nn.detectors_official import from_official
+
+    return from_official(state)
+
+
+retinanet: ModelSpec[OfficialDetectorOptions] = ModelSpec(
+    name=NAME,
+    summary="RetinaNet with ResNet-50 and a feature pyramid (Lin et al., 2017; torchvision's): boxes in one stage.",
+    config=OfficialDetectorOptions,
+    build=build,
+    tasks=("detect2d",),
+    views=("left",),
+    taps=("layer1", "layer2", "layer3", "layer4"),
+    recipe=Recipe(optimiser="sgd", learning_rate=2.5e-3, weight_decay=1e-4, batch=4, epochs=12, gradient_norm=10.0),
+    published=(
+        PublishedWeights(
+            data="COCO 2017, 91 outputs (box mAP 36.4)",
+            source="download.pytorch.org/models/retinanet_resnet50_fpn_coco-eeacb38b.pth",
+            licence="none stated for the weights; code BSD-3, COCO's annotations CC BY 4.0",
+            size_mb=130.3,
+        ),
+    ),
+    normalisation="RGB in 0..1, less ImageNet's mean, over its standard deviation",
+    parameters=34_014_999,
+    needs=("torchvision",),
+    convert=convert,
+)
+
+
+@hookimpl
+def gear_models() -> list[ModelSpec[OfficialDetectorOptions]]:
+    """This network."""
+    return [retinanet]
