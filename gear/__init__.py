@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from gear.verbs.evaluate.report import EvaluateReport
     from gear.verbs.evaluate.run import evaluate
     from gear.verbs.train.run import TrainReport, train
+    from gear.verbs.models import ModelFacts, list_models
+    from gear.verbs.weights.convert import ConvertReport, convert_weights
     from gear.view.write import ViewReport, write_view
 
 __all__ = [
@@ -38,8 +40,10 @@ __all__ = [
     "ViewReport",
     "attack",
     "collect",
+    "convert_weights",
     "defend",
     "evaluate",
+    "list_models",
     "open_dataset",
     "open_twins",
     "train",
@@ -49,17 +53,21 @@ __all__ = [
 _HOME = {
     "AttackReport": "gear.verbs.attack.report",
     "CollectReport": "gear.verbs.collect.run",
+    "ConvertReport": "gear.verbs.weights.convert",
     "Dataset": "gear.opening",
     "DefendReport": "gear.verbs.defend",
     "EvaluateReport": "gear.verbs.evaluate.report",
     "GearError": "gear.values.errors",
+    "ModelFacts": "gear.verbs.models",
     "TrainReport": "gear.verbs.train.run",
     "Twins": "gear.opening",
     "ViewReport": "gear.view.write",
     "attack": "gear.verbs.attack.run",
     "collect": "gear.verbs.collect.run",
+    "convert_weights": "gear.verbs.weights.convert",
     "defend": "gear.verbs.defend",
     "evaluate": "gear.verbs.evaluate.run",
+    "list_models": "gear.verbs.models",
     "open_dataset": "gear.opening",
     "open_twins": "gear.opening",
     "train": "gear.verbs.train.run",
