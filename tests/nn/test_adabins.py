@@ -16,6 +16,7 @@ from gear.nn.depth_options import AdaBinsOptions
 from gear.nn.runtime import seeded
 from gear.nn.weights import build_graph, mismatches
 from gear.values.errors import FieldError
+from tests.nn.glpdepth_reference import random_state
 
 SMALL = AdaBinsOptions(
     encoder="tf_efficientnet_b0", features=64, queries=7, bins=16, weights="none", device="cpu", seed=3
@@ -108,19 +109,16 @@ def decoder_and_bins(
 
 
 def test_the_graph_computes_what_the_paper_says() -> None:
-    with seeded(1):
-        graph = AdaBinsGraph(SMALL).eval()
-        with torch.no_grad():
-            for name, tensor in graph.state_dict().items():
-                if tensor.dim() == 1 and not name.startswith("encoder"):
-                    tensor.add_(0.1 * torch.rand_like(tensor))
-    picture = torch.randn((2, 3, 96, 130), generator=torch.Generator().manual_seed(2))
+    graph = AdaBinsGraph(SMALL).eval()
+    graph.load_state_dict(random_state({name: tuple(one.shape) for name, one in graph.state_dict().items()}, 1))
+    graph.double()  # random weights make sharp attention, which blows up what float32 rounds
+    picture = torch.randn((2, 3, 96, 130), generator=torch.Generator().manual_seed(2)).double()
     with torch.no_grad():
         depth_m, centres_m = graph(picture)
         expected = decoder_and_bins(graph.state_dict(), graph.encoder(picture), 7, (1e-3, 80.0))
     assert depth_m.shape == (2, 1, 48, 65) and centres_m.shape == (2, 16)
-    assert float(expected.std()) > 1e-3
-    torch.testing.assert_close(depth_m, expected, atol=1e-3, rtol=1e-4)
+    assert float(expected.std()) > 1
+    torch.testing.assert_close(depth_m.double(), expected, atol=1e-4, rtol=0)
     assert bool((centres_m.diff(dim=1) > 0).all()) and bool((centres_m > 0).all()) and bool((centres_m < 80).all())
 
 

@@ -35,7 +35,7 @@ spec = ModelSpec(
     tasks=("depth",),
     views=("left",),
     taps=("rb1", "rb2", "rbb1", "rbb2"),
-    recipe=Recipe(learning_rate=1e-3, batch=8, epochs=40),
+    recipe=Recipe(learning_rate=1e-3, batch=8, epochs=40, scales=(0.8, 1.25)),
     normalisation="ImageNet's mean and deviation, at half the picture's sides unless input_scale says otherwise",
     parameters=5_694_817,
 )

@@ -33,7 +33,7 @@ spec = ModelSpec(
     tasks=("depth",),
     views=("left",),
     taps=("stem", "trunk", "decoder"),
-    recipe=Recipe(learning_rate=5e-4, batch=8, epochs=40, gradient_norm=1.0),
+    recipe=Recipe(learning_rate=5e-4, batch=8, epochs=40, scales=(0.8, 1.25), gradient_norm=1.0),
     normalisation="RGB in 0..1 as it is; sides are mirrored out to multiples of 32",
     parameters=3_414_807,
     needs=("transformers",),
