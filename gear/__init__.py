@@ -23,18 +23,20 @@ if TYPE_CHECKING:
     from gear.verbs.defend import DefendReport, defend
     from gear.verbs.evaluate.report import EvaluateReport
     from gear.verbs.evaluate.run import evaluate
-    from gear.verbs.train.run import TrainReport, train
     from gear.verbs.models import ModelFacts, list_models
+    from gear.verbs.train.run import TrainReport, train
     from gear.verbs.weights.convert import ConvertReport, convert_weights
     from gear.view.write import ViewReport, write_view
 
 __all__ = [
     "AttackReport",
     "CollectReport",
+    "ConvertReport",
     "Dataset",
     "DefendReport",
     "EvaluateReport",
     "GearError",
+    "ModelFacts",
     "TrainReport",
     "Twins",
     "ViewReport",
