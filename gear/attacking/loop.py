@@ -4,60 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from gear.attacking.appearance import Appearance
+from gear.attacking.appearance import vary
 from gear.attacking.borrowed import frozen
 from gear.attacking.group import members_of
 from gear.attacking.objectives import Objective
 from gear.attacking.regularisers import non_printability, smoothness
+from gear.attacking.settings import Settings
 from gear.contracts.attacks import Budget, Compositor, Patch, State, Watch
 from gear.contracts.models import Model
-from gear.values.errors import FieldError, GearError
+from gear.values.errors import GearError
 from gear.values.rng import derive_rng
 
 BETAS, EPSILON = (0.9, 0.999), 1e-8
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Settings:
-    """How textures are optimised; all in unit space.
-
-    Attributes:
-        height_px, width_px: of every patch.
-        batch: samples a step.
-        learning_rate: of Adam, at its highest, one number or one a channel.
-        decay: whether it falls to 0 with a cosine.
-        smoothness: length of the smoothness term's gradient beside the objective's, which is 1.
-        printability: likewise of non-printability.
-        appearance: what is varied, anew for every sample of every step.
-        per_term: whether every term's gradient is brought to unit length by itself; one backward pass a term.
-    """
-
-    height_px: int = 150
-    width_px: int = 300
-    batch: int = 2
-    learning_rate: float | tuple[float, float, float] = 0.06
-    decay: bool = True
-    smoothness: float = 0.1
-    printability: float = 0.0
-    appearance: Appearance = field(default_factory=Appearance)
-    per_term: bool = True
-
-    def __post_init__(self) -> None:
-        for name in ("height_px", "width_px"):
-            if not 2 <= getattr(self, name) <= 4096:
-                raise FieldError(name, f"must be 2 to 4096, got {getattr(self, name)}")
-        if not 1 <= self.batch <= 4096:
-            raise FieldError("batch", f"must be 1 to 4096, got {self.batch}")
-        for name in ("smoothness", "printability"):
-            if not 0 <= getattr(self, name) <= 100:
-                raise FieldError(name, f"must be 0 to 100, got {getattr(self, name):g}")
 
 
 class TextureOptimiser:
@@ -198,7 +162,7 @@ def compose(
     looks = []
     for index in indexes:
         rng = derive_rng(optimiser.seed, "appearance", optimiser.done, index)
-        looks.append([settings.appearance.vary(texture, rng) for texture in textures])
+        looks.append([vary(settings.appearance, texture, rng) for texture in textures])
     batches = [torch.stack(textures) for textures in zip(*looks, strict=True)]
     return {view: compositor.compose(batches, indexes, view) for view in samples[0].images}
 

@@ -10,9 +10,10 @@ import pytest
 import torch
 from torch import Tensor
 
-from gear.attacking.appearance import Appearance
-from gear.attacking.loop import Settings, batch_of, optimise
+from gear.attacking.appearance import vary
+from gear.attacking.loop import batch_of, optimise
 from gear.attacking.objectives import SemsegObjective, train_labels
+from gear.attacking.settings import Appearance, Settings
 from gear.contracts.attacks import Budget, Patch, State
 from gear.plugins.attacks.scene_specific import scene_specific
 from gear.testing.attack_contract import AttackContract
@@ -121,13 +122,13 @@ def test_a_model_that_passes_no_gradient_is_told_of() -> None:
 
 def test_looks_differ_and_have_gradients() -> None:
     patch = torch.full((3, 8, 8), 0.5, requires_grad=True)
-    looks = [Appearance().vary(patch, derive_rng(1, "look", n)) for n in range(3)]
+    looks = [vary(Appearance(), patch, derive_rng(1, "look", n)) for n in range(3)]
     assert not torch.equal(looks[0], looks[1])
-    assert torch.equal(looks[2], Appearance().vary(patch, derive_rng(1, "look", 2)))
+    assert torch.equal(looks[2], vary(Appearance(), patch, derive_rng(1, "look", 2)))
     (gradient,) = torch.autograd.grad(looks[0].sum(), patch)
     assert (gradient > 0).any()
     plain = Appearance(noise=0, brightness=0, contrast=0, blur_px=0)
-    assert torch.equal(plain.vary(patch, derive_rng(1, "look", 0)), patch)
+    assert torch.equal(vary(plain, patch, derive_rng(1, "look", 0)), patch)
 
 
 def test_labels_follow_the_channels() -> None:

@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from gear.attacking.settings import Appearance, Settings
 from gear.contracts.attacks import Budget, Compositor, Patch, Watch
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
@@ -33,6 +34,9 @@ class CarlaGearConfig:
 
     height_px: int = 150
     width_px: int = 300
+
+    def __post_init__(self) -> None:
+        Settings(height_px=self.height_px, width_px=self.width_px)
 
 
 class CarlaGear:
@@ -56,8 +60,7 @@ class CarlaGear:
         The paper's budget is 51 passes over 100 samples: 2550 steps for segmentation, which takes two samples a step,
         5100 for the others.
         """
-        from gear.attacking.appearance import Appearance
-        from gear.attacking.loop import Settings, optimise
+        from gear.attacking.loop import optimise
         from gear.attacking.objectives import DepthObjective, LossObjective, Objective, SemsegObjective
 
         task = task_of(dataset[0])

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from gear.attacking.settings import Appearance, Settings
 from gear.contracts.attacks import Budget, Compositor, Patch, Watch
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
@@ -23,23 +24,6 @@ if TYPE_CHECKING:
     from gear.attacking.objectives import Objective
 
 LABEL_IDS: Mapping[str, int] = {label.name: label.id for label in LABELS if label.is_evaluated}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AppearanceOptions:
-    """What is varied on the patch before every picture, in unit space; 0 for nothing.
-
-    Attributes:
-        noise: standard deviation of noise on every value.
-        brightness: standard deviation of one number added to all values.
-        contrast: standard deviation of one factor around 1.
-        blur_px: largest side of a box blur, from 3 on.
-    """
-
-    noise: float = 0.02
-    brightness: float = 0.05
-    contrast: float = 0.1
-    blur_px: int = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,11 +59,10 @@ class SceneSpecificConfig:
     target: str = ""
     direction: Literal["any", "farther", "nearer"] = "any"
     losses: dict[str, str] = field(default_factory=dict)
-    appearance: AppearanceOptions = field(default_factory=AppearanceOptions)
+    appearance: Appearance = field(default_factory=Appearance)
 
     def __post_init__(self) -> None:
-        if not 0 < self.learning_rate <= 10:
-            raise FieldError("learning_rate", f"must be above 0, up to 10, got {self.learning_rate:g}")
+        self.optimisation()
         if self.gamma > 1:
             raise FieldError("gamma", f"must be 0 to 1, or below 0, got {self.gamma:g}")
         for name in ("attacked", "target"):
@@ -92,6 +75,23 @@ class SceneSpecificConfig:
             if sign not in SIGNS:
                 raise FieldError(f"losses.{name}", f"must be one of {', '.join(SIGNS)}, got {sign!r}")
 
+    def optimisation(self) -> Settings:
+        """What of it the optimiser needs.
+
+        Raises:
+            FieldError: a value is out of range.
+        """
+        return Settings(
+            height_px=self.height_px,
+            width_px=self.width_px,
+            batch=self.batch,
+            learning_rate=self.learning_rate,
+            smoothness=self.smoothness,
+            printability=self.printability,
+            per_term=self.per_term,
+            appearance=self.appearance,
+        )
+
 
 SIGNS = {"+": 1.0, "-": -1.0, "0": 0.0}
 
@@ -100,23 +100,7 @@ class SceneSpecific:
     """Adam on all surfaces' textures at once."""
 
     def __init__(self, config: SceneSpecificConfig) -> None:
-        from gear.attacking.appearance import Appearance
-        from gear.attacking.loop import Settings
-
-        look = config.appearance
         self._config = config
-        self._settings = Settings(
-            height_px=config.height_px,
-            width_px=config.width_px,
-            batch=config.batch,
-            learning_rate=config.learning_rate,
-            smoothness=config.smoothness,
-            printability=config.printability,
-            per_term=config.per_term,
-            appearance=Appearance(
-                noise=look.noise, brightness=look.brightness, contrast=look.contrast, blur_px=look.blur_px
-            ),
-        )
 
     def optimise(
         self,
@@ -132,7 +116,9 @@ class SceneSpecific:
         from gear.attacking.loop import optimise
 
         objective = self.objective(dataset[0])
-        return optimise(self._settings, objective, model, dataset, compositor, budget=budget, rng=rng, watch=watch)
+        return optimise(
+            self._config.optimisation(), objective, model, dataset, compositor, budget=budget, rng=rng, watch=watch
+        )
 
     def objective(self, sample: Any) -> Objective:
         """What is made large, by the task that the sample is of."""
