@@ -59,3 +59,33 @@ class StereoCentreOptions(StereoOptions):
             raise FieldError("input_scale", f"must be 0.05 to 2, got {self.input_scale:g}")
         if not 0 <= self.least_score <= 1:
             raise FieldError("least_score", f"must be 0 to 1, got {self.least_score:g}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StereoRcnnOptions(StereoOptions):
+    """Options of Stereo R-CNN.
+
+    Attributes:
+        short_side_px: to which the pictures are enlarged.
+        considered: anchors, the best ones, that proposals are made of; twice as many in training.
+        proposals: pairs of boxes that the second stage looks at.
+        least_score: below which nothing is reported.
+        aligns: whether depth is aligned on the pictures; without, it is what the boxes and the keypoint say.
+        aligned_bias_px: added to every aligned disparity. The authors add 0.5; geometry asks for none.
+    """
+
+    short_side_px: int = 600
+    considered: int = 6000
+    proposals: int = 300
+    least_score: float = 0.05
+    aligns: bool = True
+    aligned_bias_px: float = 0.0
+
+    def __post_init__(self) -> None:
+        StereoOptions.__post_init__(self)
+        if not 32 <= self.short_side_px <= 4096:
+            raise FieldError("short_side_px", f"must be 32 to 4096, got {self.short_side_px}")
+        if not 1 <= self.proposals <= self.considered:
+            raise FieldError("proposals", f"must be 1 to the {self.considered} considered, got {self.proposals}")
+        if not 0 <= self.least_score <= 1:
+            raise FieldError("least_score", f"must be 0 to 1, got {self.least_score:g}")

@@ -13,6 +13,7 @@ BUILTINS: tuple[str, ...] = (
     "gear.plugins.models.glpn_b0",
     "gear.plugins.models.adabins",
     "gear.plugins.models.ddrnet23_slim_depth",
+    "gear.plugins.models.stereo_rcnn",
     "gear.plugins.models.stereo_centre",
     "gear.plugins.models.fasterrcnn_r50_fpn",
     "gear.plugins.models.retinanet_r50_fpn",

@@ -1,0 +1,54 @@
+"""Boxes as the first Faster R-CNN had them: right and bottom are the last pixels inside, so a side is right - left + 1.
+
+All boxes are (…, 4): left, top, right, bottom.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+MOST_GROWTH = 4.135
+"""Logarithm of how many times an anchor can grow: 1000 / 16, as later networks have it."""
+
+
+def sides(boxes: Tensor) -> Tensor:
+    """(…, 2) width and height."""
+    return boxes[..., 2:] - boxes[..., :2] + 1
+
+
+def encode(boxes: Tensor, anchors: Tensor) -> Tensor:
+    """(…, 4) shift of the middle in sides of the anchor, x and y, and logarithm of the growth, width and height."""
+    own, wanted = sides(anchors), sides(boxes)
+    middle, target = anchors[..., :2] + own / 2, boxes[..., :2] + wanted / 2
+    return torch.cat([(target - middle) / own, (wanted / own).log()], dim=-1)
+
+
+def decode(codes: Tensor, anchors: Tensor) -> Tensor:
+    """The boxes of codes; not quite the inverse of `encode`, as ever: right and bottom come out a pixel larger."""
+    own = sides(anchors)
+    middle = anchors[..., :2] + own / 2 + codes[..., :2] * own
+    half = codes[..., 2:].clamp(max=MOST_GROWTH).exp() * own / 2
+    return torch.cat([middle - half, middle + half], dim=-1)
+
+
+def clip(boxes: Tensor, size_px: tuple[int, int]) -> Tensor:
+    """Inside a picture of (height, width)."""
+    most = boxes.new_tensor([size_px[1] - 1, size_px[0] - 1] * 2)
+    return torch.minimum(boxes.clamp(min=0), most)
+
+
+def overlaps(a: Tensor, b: Tensor) -> Tensor:
+    """(N, M) intersection over union of (N, 4) and (M, 4)."""
+    low = torch.maximum(a[:, None, :2], b[None, :, :2])
+    high = torch.minimum(a[:, None, 2:], b[None, :, 2:])
+    shared = (high - low + 1).clamp(min=0).prod(dim=-1)
+    return shared / (sides(a).prod(dim=-1)[:, None] + sides(b).prod(dim=-1)[None] - shared)
+
+
+def left_and_right(six: Tensor) -> tuple[Tensor, Tensor]:
+    """(…, 6) x, y, width, height of the left box, x and width of the right one, to two (…, 4) codes.
+
+    A pair is rectified, so both boxes have the same rows.
+    """
+    return six[..., :4], six[..., [4, 1, 5, 3]]

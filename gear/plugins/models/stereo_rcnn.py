@@ -1,0 +1,54 @@
+"""Stereo R-CNN, as the paper attacks it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.models import Model, PublishedWeights, Recipe
+from gear.contracts.specs import ModelSpec
+from gear.nn.stereo_options import LEFT, RIGHT, StereoRcnnOptions
+
+
+def build(options: StereoRcnnOptions) -> Model:
+    """The network with its weights."""
+    from gear.nn.stereo_rcnn_network import StereoRcnnNetwork
+
+    return StereoRcnnNetwork(options)
+
+
+def from_official(state: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The authors' keys are the graph's own; the variances of the losses are added where they are missing."""
+    from gear.nn.stereo_rcnn_graph import from_official
+
+    return from_official(state)
+
+
+stereo_rcnn: ModelSpec[StereoRcnnOptions] = ModelSpec(
+    name="stereo_rcnn",
+    summary="Stereo R-CNN R101-FPN: paired proposals, keypoints, box solver and dense alignment; cars only.",
+    config=StereoRcnnOptions,
+    build=build,
+    tasks=("stereo3d",),
+    views=(LEFT, RIGHT),
+    taps=("layer1", "layer2", "layer3", "layer4"),
+    recipe=Recipe(optimiser="sgd", learning_rate=1e-3, weight_decay=5e-4, batch=1, epochs=12, gradient_norm=10.0),
+    published=(
+        PublishedWeights(
+            data="KITTI object, cars",
+            source="github.com/HKUST-Aerial-Robotics/Stereo-RCNN: stereo_rcnn_12_6477.pth, linked in its README",
+            licence="code MIT; trained on KITTI, CC BY-NC-SA 3.0",
+            size_mb=848.0,
+        ),
+    ),
+    normalisation="BGR 0..255 less (102.98, 115.95, 122.77), short side 600",
+    parameters=105_891_452,
+    convert=from_official,
+)
+
+
+@hookimpl
+def gear_models() -> list[ModelSpec[StereoRcnnOptions]]:
+    """This network."""
+    return [stereo_rcnn]
