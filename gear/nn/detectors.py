@@ -1,6 +1,8 @@
 """What gear's 2D detectors share: the picture's size, ground truth, answers.
 
 Their outputs are in the pictures' own pixels, whatever size the network runs at, so whoever uses them need not know it.
+Losses are in the graph's pixels, as torchvision's are: anchors that contain an object wholly tie there, and all of them
+learn it; in other units rounding would break the ties.
 """
 
 from __future__ import annotations
@@ -20,6 +22,9 @@ from gear.nn.network import IMAGENET_MEAN, IMAGENET_STD, Network, Normalise
 VIEW = "left"
 DIVISOR_PX = 32
 """Sides of what the graph sees are multiples of this, as torchvision pads them."""
+
+ANCHORS, PICTURE = "anchors", "picture_px"
+"""What losses are given beside the heads' outputs: (B, N, 4) in the graph's pixels; (B, 2) height and width."""
 
 MOSTLY = 0.5
 """Background of which this share lies in ignored objects is not learnt."""
@@ -46,7 +51,7 @@ class Sizing:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Targets:
-    """What there is to find in one picture, in its edge pixels.
+    """What there is to find in one picture, in the graph's pixels.
 
     Attributes:
         boxes: (N, 4) float32 left, top, right, bottom.
@@ -108,31 +113,32 @@ class Detector(Network):
         return height + -height % DIVISOR_PX, width + -width % DIVISOR_PX
 
     def anchors(self, picture_px: Size, grids: Sequence[Size]) -> Tensor:
-        """(N, 4) anchors in the picture's pixels, for feature maps of these sizes."""
+        """(N, 4) anchors in the graph's pixels, for feature maps of these sizes."""
         from torchvision.models.detection.image_list import ImageList
 
         shape = self.seen_px(picture_px)
         seen = torch.empty((1, 0, *shape), device=self.device)
         maps = [torch.empty((1, 0, *grid), device=self.device) for grid in grids]
-        inner: Tensor = self.graph.get_submodule(self.generator)(ImageList(seen, [shape]), maps)[0]
-        return inner / self.shrinkage(picture_px)
+        found: Tensor = self.graph.get_submodule(self.generator)(ImageList(seen, [shape]), maps)[0]
+        return found
 
     def shrinkage(self, picture_px: Size) -> Tensor:
         """(4,): what coordinates in the picture are multiplied with for what the graph sees."""
         height, width = self.sizing.inner_px(picture_px)
-        across, down = width / picture_px[1], height / picture_px[0]
-        return torch.tensor([across, down, across, down], device=self.device)
+        inner = torch.tensor([width, height] * 2, dtype=torch.float32, device=self.device)
+        return inner / torch.tensor([picture_px[1], picture_px[0]] * 2, dtype=torch.float32, device=self.device)
 
-    def targets(self, sample: Any) -> Targets:
+    def targets(self, sample: Any, picture_px: Size) -> Targets:
         """What a sample of 2D detection asks for; objects that the network has no class for count as ignored."""
+        shrinkage = self.shrinkage(picture_px)
         number = {category: index for index, category in enumerate(self.categories) if category is not None}
         wanted = [thing for thing in sample.objects if not thing.is_ignored and thing.category_id in number]
         others = [thing for thing in sample.objects if thing.is_ignored or thing.category_id not in number]
         labels = [number[thing.category_id] for thing in wanted]
         return Targets(
-            boxes=self._boxes(wanted),
+            boxes=self._boxes(wanted) * shrinkage,
             labels=torch.tensor(labels, dtype=torch.int64, device=self.device),
-            ignored=self._boxes(others),
+            ignored=self._boxes(others) * shrinkage,
         )
 
     def detections(self, found: Mapping[str, Tensor]) -> tuple[Detection, ...]:
@@ -157,6 +163,12 @@ OFFICIAL_CATEGORIES = tuple(number if number in CATEGORY_NAMES else None for num
 def size_of(pictures: Tensor) -> Size:
     """Height and width of (..., H, W) pictures."""
     return int(pictures.shape[-2]), int(pictures.shape[-1])
+
+
+def picture_size(outputs: Mapping[str, Tensor]) -> Size:
+    """The size of a batch's pictures, from what losses are given."""
+    height, width = outputs[PICTURE][0].tolist()
+    return int(height), int(width)
 
 
 def fitted(min_size_px: int, max_size_px: int) -> Callable[[Size], Size]:

@@ -11,12 +11,11 @@ from torch import Tensor
 from torch.nn import functional
 
 from gear.formats.coco import Detection
-from gear.nn.detectors import MOSTLY, VIEW, Detector, Size, Targets, share_inside, size_of
+from gear.nn.detectors import ANCHORS, MOSTLY, PICTURE, VIEW, Detector, Targets, picture_size, share_inside, size_of
 from gear.nn.runtime import autocast, seeded
 
-OBJECTNESS, RPN_DELTAS, ANCHORS = "objectness", "rpn_bbox_regression", "anchors_px"
+OBJECTNESS, RPN_DELTAS, ANCHORS_PX = "objectness", "rpn_bbox_regression", "anchors_px"
 PROPOSALS, LOGITS, DELTAS = "proposals_px", "class_logits", "box_regression"
-PICTURE = "picture_px"
 
 MAPS = ("0", "1", "2", "3", "pool")
 """Feature maps at 1/4 to 1/64 of what the graph sees, as torchvision names them."""
@@ -53,14 +52,18 @@ class FasterRcnnDetector(Detector):
         missing = graph.rpn.post_nms_top_n() - len(proposals)
         nothing = torch.zeros_like(logits[:1])
         nothing[:, 0] = SURE_BACKGROUND
-        return {name: trunk[name] for name in (OBJECTNESS, RPN_DELTAS, ANCHORS)} | {
-            PROPOSALS: torch.cat([proposals, torch.zeros(missing, 4, device=self.device)])[None],
+        shrinkage = self.shrinkage(size_of(picture))
+        return {
+            OBJECTNESS: trunk[OBJECTNESS],
+            RPN_DELTAS: trunk[RPN_DELTAS],
+            ANCHORS_PX: trunk[ANCHORS] / shrinkage,
+            PROPOSALS: torch.cat([proposals / shrinkage, torch.zeros(missing, 4, device=self.device)])[None],
             LOGITS: torch.cat([logits, nothing.expand(missing, -1)])[None],
             DELTAS: functional.pad(deltas, (0, 0, 0, missing))[None],
         }
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The feature maps, what the proposals' head says of them, and the picture's size."""
+        """Feature maps, what the proposals' head says of them, anchors in the graph's pixels, the picture's size."""
         from torchvision.models.detection.rpn import concat_box_prediction_layers
 
         graph: Any = self.graph
@@ -82,7 +85,7 @@ class FasterRcnnDetector(Detector):
         Which anchors and proposals take part is drawn: from `options.seed`, the same ones every time, unless the
         network is in training mode, where torch's own generator draws.
         """
-        wanted = [self.targets(sample) for sample in targets]
+        wanted = [self.targets(sample, picture_size(outputs)) for sample in targets]
         graph: Any = self.graph
         with _as_in_training(graph.rpn):
             proposals = self._proposals(outputs)
@@ -103,7 +106,7 @@ class FasterRcnnDetector(Detector):
         return answers
 
     def _proposals(self, outputs: Mapping[str, Tensor]) -> list[Tensor]:
-        """(R, 4) boxes of each picture, in its pixels, surest first; no gradient passes them."""
+        """(R, 4) boxes of each picture in the graph's pixels, surest first; no gradient passes them."""
         rpn: Any = self.graph.get_submodule("rpn")
         anchors = outputs[ANCHORS]
         boxes = rpn.box_coder.decode(outputs[RPN_DELTAS].detach(), list(anchors)).view(anchors.shape)
@@ -111,18 +114,17 @@ class FasterRcnnDetector(Detector):
         counts = [
             outputs[name].shape[-2] * outputs[name].shape[-1] * count for name, count in zip(MAPS, each, strict=True)
         ]
-        sizes = [self._picture_px(outputs)] * len(anchors)
+        sizes = [self.sizing.inner_px(picture_size(outputs))] * len(anchors)
         proposals: list[Tensor] = rpn.filter_proposals(boxes, outputs[OBJECTNESS], sizes, counts)[0]
         return proposals
 
     def _box_heads(self, outputs: Mapping[str, Tensor], proposals: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
         """Class logits and box deltas of all proposals of all pictures, one after another, in float32."""
         heads: Any = self.graph.get_submodule("roi_heads")
-        size = self._picture_px(outputs)
-        inner = [each * self.shrinkage(size) for each in proposals]
+        sizes = [self.sizing.inner_px(picture_size(outputs))] * len(proposals)
         maps = {name: outputs[name] for name in MAPS}
         with autocast(self.device, self.options.precision):
-            pooled = heads.box_roi_pool(maps, inner, [self.sizing.inner_px(size)] * len(inner))
+            pooled = heads.box_roi_pool(maps, list(proposals), sizes)
             logits, deltas = heads.box_predictor(heads.box_head(pooled))
         return logits.float(), deltas.float()
 
@@ -153,10 +155,6 @@ class FasterRcnnDetector(Detector):
         logits, deltas = self._box_heads(outputs, kept)
         classifier, box_reg = fastrcnn_loss(logits, deltas, labels, heads.box_coder.encode(truth, kept))
         return {"loss_classifier": classifier, "loss_box_reg": box_reg}
-
-    def _picture_px(self, outputs: Mapping[str, Tensor]) -> Size:
-        height, width = outputs[PICTURE][0].tolist()
-        return int(height), int(width)
 
 
 def _without_ignored(labels: Sequence[Tensor], boxes: Sequence[Tensor], wanted: Sequence[Targets]) -> list[Tensor]:

@@ -9,9 +9,9 @@ import torch
 from torch import Tensor, nn
 
 from gear.formats.coco import Detection
-from gear.nn.detectors import MOSTLY, VIEW, Detector, Size, share_inside, size_of
+from gear.nn.detectors import ANCHORS, MOSTLY, PICTURE, VIEW, Detector, Size, picture_size, share_inside, size_of
 
-LOGITS, DELTAS, ANCHORS = "cls_logits", "bbox_regression", "anchors_px"
+LOGITS, DELTAS, ANCHORS_PX = "cls_logits", "bbox_regression", "anchors_px"
 
 LITE_TAPS = (1, 2, 4, 6)
 
@@ -29,15 +29,25 @@ class RetinaNetDetector(Detector):
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """The heads' outputs, and where they stand."""
-        seen = self.seen(pictures[VIEW])
-        features = list(self.graph.get_submodule("backbone")(seen).values())
+        outputs = self.run_for_losses(pictures)
+        anchors_px = outputs[ANCHORS] / self.shrinkage(picture_size(outputs))
+        return {LOGITS: outputs[LOGITS], DELTAS: outputs[DELTAS], ANCHORS_PX: anchors_px}
+
+    def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        """The heads' outputs, the anchors in the graph's pixels, and the picture's size."""
+        picture = pictures[VIEW]
+        features = list(self.graph.get_submodule("backbone")(self.seen(picture)).values())
         outputs: dict[str, Tensor] = dict(self.graph.get_submodule("head")(features))
-        anchors = self.anchors(size_of(pictures[VIEW]), [size_of(each) for each in features])
-        return outputs | {ANCHORS: anchors.expand(len(seen), -1, -1)}
+        anchors = self.anchors(size_of(picture), [size_of(each) for each in features])
+        size = torch.tensor(size_of(picture), device=self.device)
+        return outputs | {
+            ANCHORS: anchors.expand(len(picture), -1, -1),
+            PICTURE: size.expand(len(picture), -1),
+        }
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
         """torchvision's; anchors of background that lie mostly in ignored objects take no part in them."""
-        wanted = [self.targets(sample) for sample in targets]
+        wanted = [self.targets(sample, picture_size(outputs)) for sample in targets]
         graph: Any = self.graph
         matches = []
         for anchors, target in zip(outputs[ANCHORS], wanted, strict=True):
@@ -56,7 +66,7 @@ class RetinaNetDetector(Detector):
         size = (size_px[0], size_px[1])
         counts = self._counts(size)
         levels = {name: list(outputs[name].split_with_sizes(counts, dim=1)) for name in (LOGITS, DELTAS)}
-        anchors = [list(each.split_with_sizes(counts)) for each in outputs[ANCHORS]]
+        anchors = [list(each.split_with_sizes(counts)) for each in outputs[ANCHORS_PX]]
         found = graph.postprocess_detections(levels, anchors, [size] * len(anchors))
         return [self.detections(each) for each in found]
 
