@@ -48,7 +48,8 @@ class TaskSpec(Spec[ConfigT, Task[Any, Any]]):
         views: names of the cameras of its default rig, the reference first.
         layout: one line on the files that it writes.
         original_name: what CARLA-GeAR calls it in its configs and JSON, or "" if it does not know it.
-        figure: the evaluator's figure by which training chooses among checkpoints; "" chooses by the loss.
+        figure: the evaluator's figure by which training chooses among checkpoints, or one of a report's as
+            `<report>.<figure>`; "" chooses by the loss.
         less_is_better: whether that figure is an error.
     """
 
@@ -103,12 +104,14 @@ class AttackSpec(Spec[ConfigT, Attack]):
         needs_gradients: whether the model must have gradients.
         needs_probes: whether the dataset must carry the probes of the exact compositor.
         max_surfaces: how many surfaces it can optimise jointly.
+        is_control: whether it looks at no model: attacks are measured against it.
     """
 
     tasks: tuple[str, ...] = ()
     needs_gradients: bool = True
     needs_probes: bool = True
     max_surfaces: int = 16
+    is_control: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

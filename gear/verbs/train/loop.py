@@ -70,7 +70,7 @@ class Parts:
 
 
 Watch = Callable[[Progress, float, dict[str, float] | None], None]
-"""Told of the progress, the share that is over, and the figures where a validation has just ended."""
+"""Told of the progress, the share that is over, and the figures where a validation has just ended, the task's first."""
 
 Keep = Callable[[dict[str, torch.Tensor], Progress], None]
 """Told of the mean weights whenever they are the best so far."""
@@ -202,7 +202,8 @@ class Training:
             self._keep({key: value.detach().cpu().clone() for key, value in self._mean.state.items()}, progress)
         self._save()
         if self._watch is not None:
-            self._watch(progress, self.share, figures)
+            chosen = {name: figures[name] for name in (parts.spec.figure,) if name in figures}
+            self._watch(progress, self.share, chosen | figures)
 
     def _save(self) -> None:
         extra = self._parts.adversary.state() if self._parts.adversary is not None else {}

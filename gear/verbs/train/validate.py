@@ -8,6 +8,7 @@ from typing import Any
 
 import torch
 
+from gear.contracts.evaluation import Reports
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Task
 from gear.readers import as_pictures, picture_tensor
@@ -16,16 +17,29 @@ LOSS = "loss"
 
 
 def validate(model: Any, task: Task[Any, Any], samples: Sequence[Any], views: Sequence[str]) -> dict[str, float]:
-    """The evaluator's figures over the samples, and `loss`, the mean of the summed losses, in eval mode."""
-    evaluator, losses = task.evaluator(), []
+    """Figures over the samples, with the model in eval mode.
+
+    Those of the task's evaluator, those of its reports as `<report>.<figure>`, and `loss`, the mean of summed losses.
+    """
+    evaluators = {"": task.evaluator()}
+    if isinstance(task, Reports):
+        evaluators |= {f"{name}.": evaluator for name, evaluator in task.reports().items()}
+    losses = []
     for index in range(len(samples)):
         sample = samples[index]
         pictures = {name: sample.images[name] for name in views}
         batch = as_pictures({name: picture_tensor(picture)[None] for name, picture in pictures.items()})
         with torch.no_grad():
             losses.append(float(total(model.forward(batch, [sample]))))
-        evaluator.update(sample, model.predict(pictures))
-    return {**evaluator.result(), LOSS: math.fsum(losses) / len(losses)}
+        prediction = model.predict(pictures)
+        for evaluator in evaluators.values():
+            evaluator.update(sample, prediction)
+    figures = {
+        f"{prefix}{name}": value
+        for prefix, evaluator in evaluators.items()
+        for name, value in evaluator.result().items()
+    }
+    return {**figures, LOSS: math.fsum(losses) / len(losses)}
 
 
 def total(losses: Mapping[str, torch.Tensor]) -> torch.Tensor:
