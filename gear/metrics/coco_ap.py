@@ -8,9 +8,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Generic, TypeVar
 
+import numpy as np
+
 from gear.contracts.evaluation import Draws, Spread
 from gear.formats.coco import CATEGORY_NAMES, Annotation, Detection, Picture, dataset_json, results_json
 from gear.metrics.coco_curves import known_mean, matches, resampled
+from gear.metrics.single_picture import boxes, single_figures
 from gear.values.serial import Json
 
 SampleT = TypeVar("SampleT", contravariant=True)
@@ -29,7 +32,9 @@ class CocoEvaluator(Generic[SampleT]):
         self.detections: list[tuple[Detection, ...]] = []
 
     def update(self, sample: SampleT, prediction: Sequence[Detection]) -> Mapping[str, float]:
-        """Takes the detections of one sample; average precision has no meaning for a single picture.
+        """Takes the detections of one sample; returns `found_share` and `false_alarms`.
+
+        See `gear.metrics.single_picture`; average precision has no meaning for a single picture.
 
         Raises:
             ValueError: a detection has an unknown category or a box turned inside out.
@@ -40,9 +45,15 @@ class CocoEvaluator(Generic[SampleT]):
                 raise ValueError(f"category_id must be one of COCO's, got {found.category_id}")
             if not (right >= left and bottom >= top):
                 raise ValueError(f"box_px must be left, top, right, bottom, got {found.box_px}")
-        self.pictures.append(self._as_picture(sample))
+        picture = self._as_picture(sample)
+        self.pictures.append(picture)
         self.detections.append(tuple(prediction))
-        return {}
+        edges = [(_edges(item.box_xywh), item) for item in picture.annotations]
+        return single_figures(
+            boxes([(box, item.category_id, 1.0) for box, item in edges if not item.is_crowd]),
+            boxes([(one.box_px, one.category_id, one.score) for one in prediction]),
+            np.array([box for box, item in edges if item.is_crowd]).reshape(-1, 4),
+        )
 
     def merge(self, other: Any) -> None:
         """Takes in the pictures of another one."""
@@ -119,6 +130,11 @@ def coco_eval(truth: Json, found: list[Json]) -> Any:
     evaluation.params.catIds = sorted(CATEGORY_NAMES)
     evaluation.params.imgIds = [picture["id"] for picture in truth["images"]]
     return evaluation
+
+
+def _edges(box_xywh: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+    left, top, width, height = box_xywh
+    return (left, top, left + width, top + height)
 
 
 def _labelled(pictures: Sequence[Picture]) -> list[Annotation]:

@@ -14,7 +14,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from gear.contracts.evaluation import Draws, Spread
-from gear.formats.kitti_object import KittiLabel
+from gear.formats.kitti_object import TYPES, KittiLabel
 from gear.metrics.kitti_match import (
     DIFFICULTIES,
     NEIGHBOURS,
@@ -29,6 +29,7 @@ from gear.metrics.kitti_match import (
     matched_scores,
     picture_boxes,
 )
+from gear.metrics.single_picture import boxes, single_figures
 from gear.values.geometry import Array
 
 SampleT = TypeVar("SampleT", contravariant=True)
@@ -46,15 +47,25 @@ class KittiEvaluator(Generic[SampleT]):
         self.pictures: list[PictureBoxes] = []
 
     def update(self, sample: SampleT, prediction: Sequence[KittiLabel]) -> Mapping[str, float]:
-        """Takes the detections of one sample; average precision has no meaning for a single picture.
+        """Takes the detections of one sample; returns `found_share` and `false_alarms`, of boxes in the picture.
+
+        See `gear.metrics.single_picture`; average precision has no meaning for a single picture.
 
         Raises:
             ValueError: a detection has no score.
         """
         if any(found.score is None for found in prediction):
             raise ValueError("every detection needs a score")
-        self.pictures.append(picture_boxes(self._labels_of(sample), prediction))
-        return {}
+        labels = self._labels_of(sample)
+        self.pictures.append(picture_boxes(labels, prediction))
+        wanted = [label for label in labels if label.type in NEIGHBOURS]
+        return single_figures(
+            boxes([(label.box_px, TYPES.index(label.type), 1.0) for label in wanted]),
+            boxes(
+                [(one.box_px, TYPES.index(one.type), one.score or 0.0) for one in prediction if one.type in NEIGHBOURS]
+            ),
+            np.array([label.box_px for label in labels if label.type not in NEIGHBOURS]).reshape(-1, 4),
+        )
 
     def merge(self, other: Any) -> None:
         """Takes in the pictures of another one."""

@@ -211,3 +211,31 @@ def test_near_depth_is_eigens_without_a_crop() -> None:
     clipped = np.minimum(said[known].astype(float), 80)
     assert figures["rmse_m"] == pytest.approx(np.sqrt(np.mean((clipped - truth[known]) ** 2)))
     assert single["d1"] == figures["d1"] and 0.2 < figures["d1"] < 1
+
+
+def test_a_single_picture_says_what_was_found_and_what_was_made_up() -> None:
+    shown = Picture(
+        id=0, file_name="", height_px=100, width_px=200,
+        annotations=tuple(
+            Annotation(category_id=c, box_xywh=(x, 0.0, 20.0, 20.0), area_px=400, rle="", is_crowd=crowd, extras={})
+            for c, x, crowd in ((3, 0.0, False), (3, 50.0, False), (1, 100.0, False), (3, 150.0, True))
+        ),
+    )  # fmt: skip
+
+    def det(category: int, left: float, score: float) -> Detection:
+        return Detection(category_id=category, box_px=(left, 0, left + 20, 20), score=score)
+
+    found = (
+        det(3, 2, 0.9),  # the first car
+        det(3, 0, 0.8),  # it again: made up
+        det(3, 52, 0.4),  # not sure enough
+        det(3, 100, 0.7),  # a person is no car: made up
+        det(1, 104, 0.6),  # the person
+        det(3, 151, 0.9),  # ignored
+    )
+    assert CocoEvaluator(same).update(shown, found) == {"found_share": pytest.approx(2 / 3), "false_alarms": 2}
+    assert NearCars(lambda one: one.labels).update(Lines((car(20),)), (car(20, score=0.7),)) == {
+        "found_share": 1, "false_alarms": 0,
+    }  # fmt: skip
+    empty = CocoEvaluator(same).update(replace(shown, annotations=()), ())
+    assert np.isnan(empty["found_share"]) and empty["false_alarms"] == 0

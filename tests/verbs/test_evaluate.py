@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import copy
 import hashlib
+import importlib
+import io
 import json
 import sys
 import types
@@ -176,6 +180,27 @@ def test_it_is_taken_up_again_and_predicts_nothing_twice(
     assert timeless(folder) == timeless(tmp_path / "whole")
     with pytest.raises(DatasetError, match=r"something else \(seed: 0 there, 1 now\)"):
         evaluate(data, model="odd", out=folder, seed=1)
+
+
+def test_the_official_script_finds_the_predictions_and_agrees(
+    tmp_path: Path, small: Small, install: Install, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data = small("semseg")
+    monkeypatch.setenv("CITYSCAPES_DATASET", str(data))
+    tool = importlib.import_module("cityscapesscripts.evaluation.evalPixelLevelSemanticLabeling")
+    helpers = importlib.import_module("cityscapesscripts.helpers.labels")
+    install(tiny_segmenter)
+    (row,) = evaluate(data, model="tiny_segmenter", out=tmp_path / "out", resamples=0).rows
+    truths = sorted(str(path) for path in data.glob("gtFine/debug/*/*_gtFine_labelIds.png"))
+    args = copy.copy(tool.args)
+    args.evalLabels = [label.id for label in helpers.labels if label.id >= 0]
+    args.JSONOutput, args.quiet, args.evalInstLevelScore = False, True, False
+    args.predictionPath, args.predictionWalk = str(tmp_path / "out" / row.name / "predictions"), None
+    with contextlib.redirect_stdout(io.StringIO()):
+        found = [tool.getPrediction(args, truth) for truth in truths]
+        scores = tool.evaluateImgLists(found, truths, args)
+    assert row.figures["task"]["miou"].value == pytest.approx(scores["averageScoreClasses"])
+    assert 0 < row.figures["task"]["category_miou"].value == pytest.approx(scores["averageScoreCategories"])
 
 
 def test_batches_and_threads_change_nothing(tmp_path: Path, small: Small, install: Install) -> None:
