@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from gear.verbs.defend import DefendReport, defend
     from gear.verbs.evaluate.report import EvaluateReport
     from gear.verbs.evaluate.run import evaluate
+    from gear.verbs.gap.report import GapReport
+    from gear.verbs.gap.run import gap
     from gear.verbs.models import ModelFacts, list_models
     from gear.verbs.train.run import TrainReport, train
     from gear.verbs.weights.convert import ConvertReport, convert_weights
@@ -35,6 +37,7 @@ __all__ = [
     "Dataset",
     "DefendReport",
     "EvaluateReport",
+    "GapReport",
     "GearError",
     "ModelFacts",
     "TrainReport",
@@ -45,6 +48,7 @@ __all__ = [
     "convert_weights",
     "defend",
     "evaluate",
+    "gap",
     "list_models",
     "open_dataset",
     "open_twins",
@@ -59,6 +63,7 @@ _HOME = {
     "Dataset": "gear.opening",
     "DefendReport": "gear.verbs.defend",
     "EvaluateReport": "gear.verbs.evaluate.report",
+    "GapReport": "gear.verbs.gap.report",
     "GearError": "gear.values.errors",
     "ModelFacts": "gear.verbs.models",
     "TrainReport": "gear.verbs.train.run",
@@ -69,6 +74,7 @@ _HOME = {
     "convert_weights": "gear.verbs.weights.convert",
     "defend": "gear.verbs.defend",
     "evaluate": "gear.verbs.evaluate.run",
+    "gap": "gear.verbs.gap.run",
     "list_models": "gear.verbs.models",
     "open_dataset": "gear.opening",
     "open_twins": "gear.opening",

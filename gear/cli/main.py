@@ -16,6 +16,7 @@ COMMANDS: dict[str, str] = {
     "view": "one self-contained HTML page of a dataset",
     "train": "train a network on collected data",
     "attack": "make adversarial patches for a scene's surfaces and a model",
+    "gap": "hold digital patches against the same patches rendered",
     "defend": "write a dataset's pictures as a defense cleans them",
     "evaluate": "run a model, with or without a defense, over datasets: metrics, predictions, twins compared",
     "export": "write a dataset in another layout",

@@ -1,0 +1,56 @@
+"""`gear gap`."""
+
+from __future__ import annotations
+
+import argparse
+
+EXAMPLE = """examples:
+  gear gap data/train --twin data/train-patched
+  gear gap data/train --patch patches/ --out gap/
+  gear gap data/test --twin data/test-patched --model ddrnet23_slim --json
+
+The dataset must have been collected with --probes. With --patch the twin is rendered into OUT/twin first.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the command's flags."""
+    from gear.cli.collect import positive
+
+    parser.epilog = EXAMPLE
+    parser.add_argument("dataset", help="root of a dataset with probes")
+    parser.add_argument("--twin", metavar="DIR", help="its twin with patches, rendered")
+    parser.add_argument("--patch", help="a patch folder or picture, or random: its twin is rendered")
+    parser.add_argument("--split", help="its split, where it has several")
+    parser.add_argument("--model", metavar="NAME", help="also what the patches do to a model, digitally and rendered")
+    parser.add_argument(
+        "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings", help="an option of the model"
+    )
+    parser.add_argument("--compositor", action="append", dest="compositors", help="transport, homography (both)")
+    parser.add_argument("--samples", type=positive, metavar="N", help="the first N samples only")
+    parser.add_argument("--out", metavar="DIR", help="folder for gap.json and gap.txt")
+    parser.add_argument("--json", action="store_true", help="print the report as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Compares and prints."""
+    from gear.cli.progress import ProgressBar
+    from gear.dataset.sidecar import dump_json
+    from gear.verbs.gap.run import gap
+
+    given = {} if args.compositors is None else {"compositors": tuple(args.compositors)}
+    with ProgressBar() as progress:
+        report = gap(
+            args.dataset,
+            twin=args.twin,
+            patch=args.patch,
+            split=args.split,
+            model=args.model,
+            settings=args.settings,
+            samples=args.samples,
+            out=args.out,
+            progress=progress,
+            **given,
+        )
+    print(dump_json(report.as_json()).decode().rstrip() if args.json else report.table())
+    return 0
