@@ -15,6 +15,7 @@ from torch.nn import functional
 
 from gear.formats.kitti_object import Calibration
 from gear.groundtruth.boxes import Box3d
+from gear.losses.stereo_surface import FOOT_SHARE, MOST_OCCLUDED, SOLID, depth_of_box
 from gear.values.geometry import Array
 from gear.values.truth import BoxPx
 
@@ -90,6 +91,7 @@ class CentreTargets:
         weight: (N,) of these; an object's sum to 1.
         values: (N, 14): sides (4), centre (2), size (3), heading (4) as the outputs are named, and the hidden share.
         disparity_px: (N,) of the middle of the object in space.
+        surface_px: (B, h, w) disparity of what is seen of vehicles; NaN elsewhere.
     """
 
     heat: Tensor
@@ -98,6 +100,7 @@ class CentreTargets:
     weight: Tensor
     values: Tensor
     disparity_px: Tensor
+    surface_px: Tensor
 
 
 def centre_targets(samples: Sequence[LabelledPair], kinds: Sequence[str], grid: Grid) -> CentreTargets:
@@ -146,7 +149,28 @@ def centre_targets(samples: Sequence[LabelledPair], kinds: Sequence[str], grid: 
         weight=torch.from_numpy(_joined(weights, (0,))).float(),
         values=torch.from_numpy(_joined(values, (0, 14))).float(),
         disparity_px=torch.from_numpy(_joined(disparities, (0,))).float(),
+        surface_px=torch.from_numpy(np.stack([_surface_px(sample, grid) for sample in samples])).float(),
     )
+
+
+def _surface_px(sample: LabelledPair, grid: Grid) -> Array:
+    """(h, w) disparity where the lower half of a vehicle is seen well enough, the nearer one before the farther."""
+    lens, reach = sample.calibration.intrinsics, sample.calibration.intrinsics.focal_px * sample.calibration.baseline_m
+    surface = np.full((grid.height, grid.width), np.nan)
+    for thing in sorted(sample.objects, key=lambda each: -each.box.bottom_m[2]):
+        left, top, right, bottom = thing.box_px
+        box_px = (left, (top + bottom) / 2, right, bottom - FOOT_SHARE * (bottom - top))
+        inside = _inside(box_px, grid)
+        rows, columns = (np.arange(grid.height)[inside[0]], np.arange(grid.width)[inside[1]])
+        middles = np.stack(np.meshgrid(columns, rows), axis=-1)
+        u_px, v_px = ((middles[..., i] + 0.5) * grid.cell_px[i] - 0.5 for i in (0, 1))
+        depth_m = depth_of_box(thing.box, lens.unproject(np.stack([u_px, v_px], axis=-1), np.ones(u_px.shape)))
+        is_seen = thing.kitti_type in SOLID and not thing.is_ignored and thing.occluded_fraction <= MOST_OCCLUDED
+        part = surface[rows[:, None], columns[None]]
+        surface[rows[:, None], columns[None]] = np.where(
+            np.isfinite(depth_m), reach / depth_m if is_seen else np.nan, part
+        )
+    return surface
 
 
 def middle_of(box: Box3d) -> Array:
@@ -205,7 +229,9 @@ def centre_losses(
 
     `heat` is CenterNet's focal loss; `disparity` is the negative logarithm of a Laplace density over the disparity's
     logarithm (Kendall and Gal, NeurIPS 2017), so that one unit is one relative error of depth wherever the object
-    stands, with the cross-entropy of the bins, the target shared between the two next to it.
+    stands, with the cross-entropy of the bins, the target shared between the two next to it. `surface` is the same
+    cross-entropy for the disparities that the volume alone says of every cell on a vehicle: what makes the features
+    match.
 
     Args:
         outputs: as `gear.nn.stereo_centre.StereoCentre` names them, lengths in pixels of the picture.
@@ -238,6 +264,7 @@ def centre_losses(
         "heading": mean((at("heading") - heading).abs().mean(dim=1)),
         "hidden": 0.2 * mean(functional.binary_cross_entropy_with_logits(at("hidden"), hidden, reduction="none")[:, 0]),
         "disparity": 0.5 * mean(error * (-spread).exp() + spread) + 5 * mean(error),
+        "surface": 0.5 * _surface_entropy(outputs["surface_logits"], targets.surface_px.to(device), bins_px.to(device)),
         "disparity_bins": 0.5 * mean(_bin_entropy(at("disparity_logits"), wanted_px, bins_px.to(device))),
     }
 
@@ -249,6 +276,13 @@ def _focal(logits: Tensor, heat: Tensor, is_counted: Tensor) -> Tensor:
     hit = functional.logsigmoid(logits) * (1 - chance) ** FOCAL_POWER * is_centre
     empty = functional.logsigmoid(-logits) * chance**FOCAL_POWER * (1 - heat) ** BUMP_POWER * ~is_centre * is_counted
     return -(hit.sum() + empty.sum()) / is_centre.sum().clamp_min(1)
+
+
+def _surface_entropy(logits: Tensor, wanted_px: Tensor, bins_px: Tensor) -> Tensor:
+    is_known = torch.isfinite(wanted_px)
+    if not bool(is_known.any()):
+        return logits.sum() * 0
+    return _bin_entropy(logits.permute(0, 2, 3, 1)[is_known], wanted_px[is_known], bins_px).mean()
 
 
 def _bin_entropy(logits: Tensor, wanted_px: Tensor, bins_px: Tensor) -> Tensor:

@@ -7,7 +7,6 @@ pictures decides.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,15 +16,13 @@ from torch.nn import functional
 
 from gear.formats.kitti_object import Calibration
 from gear.groundtruth.boxes import Box3d
+from gear.losses.stereo_surface import FOOT_SHARE, depth_of_box
 from gear.nn.stereo_box_solver import Measured
 from gear.values.geometry import Array
 
 UPSAMPLED = 2
 MOST_SAMPLES = 56
 """Rows, and columns, of a box that are looked at; the box is sampled more sparsely where it has more."""
-
-FOOT_SHARE = 0.1
-"""Of the box's height, left out at the bottom: there is the road."""
 
 COARSE_STEPS, COARSE_M = 50, 0.5
 FINE_STEPS, FINE_M = 20, 0.05
@@ -91,24 +88,6 @@ def _surface(pair: Pair, box: Box3d, measured: Measured, calibration: Calibratio
     depth_m = depth_of_box(box, calibration.intrinsics.unproject(original, np.ones(len(original))))
     is_hit = np.isfinite(depth_m)
     return pixels[is_hit], depth_m[is_hit] - box.bottom_m[2]
-
-
-def depth_of_box(box: Box3d, rays: Array) -> Array:
-    """(P,) z at which rays from the camera enter a box; NaN where they miss it.
-
-    Args:
-        box: in the camera's frame.
-        rays: (P, 3) with z = 1.
-    """
-    c, s = math.cos(box.rotation_y_rad), math.sin(box.rotation_y_rad)
-    box_from_camera = np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])
-    half = np.array([box.length_m, box.height_m, box.width_m]) / 2
-    start = box_from_camera @ -(np.array(box.bottom_m) - (0.0, box.height_m / 2, 0.0))
-    along = rays @ box_from_camera.T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        one, two = (-half - start) / along, (half - start) / along
-    enter, leave = np.fmin(one, two).max(axis=-1), np.fmax(one, two).min(axis=-1)
-    return np.asarray(np.where((enter < leave) & (enter > 0), enter, np.nan))
 
 
 def _differences(pair: Pair, pixels: Array, behind_m: Array, depths_m: Array, calibration: Calibration) -> Array:

@@ -134,6 +134,7 @@ class StereoCentre(nn.Module):
         self.match_coarse = nn.Conv2d(stages[0], width, 1)
         self.match = nn.Sequential(_conv_relu(width, width, 3), nn.Conv2d(width, width, 1))
         self.volume = nn.Sequential(_conv_relu(shape.disparities, 2 * width, 3, 2), _conv_relu(2 * width, 2 * width, 3))
+        self.surface = nn.Conv2d(2 * width, shape.bins, 1)
         self.fuse = _conv_relu(stages[0] + 2 * width, stages[0], 1)
         self.layer2 = _stage(stages[0], stages[1])
         self.layer3 = _stage(stages[1], stages[2])
@@ -170,6 +171,7 @@ class StereoCentre(nn.Module):
             `hidden`: 1, logit of the share that other things cover.
             `disparity_logits`: a channel a bin.
             `disparity_px`: 1, above 0, of the middle of the object in space.
+            `surface_logits`: a channel a bin, of the disparity of what is seen in the cell, from the volume alone.
             `disparity_spread`: 1, logarithm of the mean absolute error expected of the disparity's logarithm.
         """
         coarse, matching = self.features(torch.cat([left, right]))
@@ -181,7 +183,12 @@ class StereoCentre(nn.Module):
         for index in (2, 1, 0):
             up = functional.interpolate(level, scale_factor=2, mode="nearest")
             level = self.smooth[index](self.lateral[index](stages[index]) + up)
-        return {"heat": self.heat(level), **self._where(level), **self._disparity(torch.cat([level, volume], dim=1))}
+        return {
+            "heat": self.heat(level),
+            **self._where(level),
+            **self._disparity(torch.cat([level, volume], dim=1)),
+            "surface_logits": self.surface(volume),
+        }
 
     def _where(self, level: Tensor) -> dict[str, Tensor]:
         place, body = self.place(level).float(), self.body(level).float()

@@ -66,6 +66,7 @@ def perfect(targets: CentreTargets) -> dict[str, torch.Tensor]:
         "heading": spread_out(heading, 0.0),
         "hidden": spread_out(torch.logit(hidden, eps=1e-6), 0.0),
         "disparity_logits": torch.zeros(shape[0], len(BINS_PX), *shape[1:]),
+        "surface_logits": torch.zeros(shape[0], len(BINS_PX), *shape[1:]),
         "disparity_px": spread_out(disparity_px, 1.0),
         "disparity_spread": spread_out(torch.full_like(disparity_px, -6.0), 0.0),
     }
@@ -174,3 +175,30 @@ def test_the_bins_learn_the_two_beside_the_disparity() -> None:
     batch, row, column = targets.where[0]
     expected = (logits[batch, :, row, column].softmax(dim=0) * BINS_PX.log()).sum().exp()
     assert float(expected.detach()) == pytest.approx(float(targets.disparity_px[0]), rel=0.02)
+
+
+def test_surfaces_are_where_the_rays_meet_the_boxes() -> None:
+    """A car head-on, wall-like from behind: its back, not its middle; a nearer one stands before it."""
+    box = replace(car(0.0, 10.0).box, rotation_y_rad=-math.pi / 2)
+    targets = centre_targets([Pair(objects=(Thing(box=box, occluded_fraction=0.0),))], KINDS, GRID)
+    seen = targets.surface_px[0][torch.isfinite(targets.surface_px[0])]
+    assert len(seen) > 3 and torch.allclose(seen, torch.tensor(128 * 0.5 / (10.0 - 2.1)), rtol=1e-5)
+    nearer = Thing(box=replace(box, bottom_m=(0.0, 1.6, 6.0)), occluded_fraction=0.0)
+    both = centre_targets([Pair(objects=(nearer, Thing(box=box, occluded_fraction=0.9)))], KINDS, GRID)
+    seen = both.surface_px[0][torch.isfinite(both.surface_px[0])]
+    assert torch.allclose(seen, torch.tensor(128 * 0.5 / (6.0 - 2.1)), rtol=1e-5)
+
+
+def test_people_are_no_surfaces() -> None:
+    targets = centre_targets([Pair(objects=(replace(car(), kitti_type="Pedestrian"),))], KINDS, GRID)
+    assert not torch.isfinite(targets.surface_px).any()
+
+
+def test_the_volume_learns_the_surfaces() -> None:
+    targets = centre_targets([Pair(objects=(car(),))], KINDS, GRID)
+    outputs = perfect(targets)
+    bins = (targets.surface_px.log() - BINS_PX[0].log()) / (BINS_PX[1] / BINS_PX[0]).log()
+    right = torch.nn.functional.one_hot(bins.nan_to_num(0).round().long(), len(BINS_PX)).permute(0, 3, 1, 2) * 3.0
+    assert float(losses(outputs | {"surface_logits": right}, targets)["surface"]) < float(
+        losses(outputs, targets)["surface"]
+    )

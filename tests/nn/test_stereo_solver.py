@@ -12,7 +12,8 @@ import torch
 from gear.formats.kitti_object import Calibration, clip_box
 from gear.groundtruth.boxes import Box3d, project_box
 from gear.losses.stereo_rcnn import ground_corners
-from gear.nn.stereo_alignment import Pair, align, depth_of_box
+from gear.losses.stereo_surface import depth_of_box
+from gear.nn.stereo_alignment import Pair, align
 from gear.nn.stereo_box_solver import Measured, solve_box
 from gear.values.geometry import Array, Intrinsics, wrap_angle_rad
 

@@ -1,0 +1,36 @@
+"""Disparity of what is seen of vehicles: their boxes stand for their surfaces."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gear.groundtruth.boxes import Box3d
+from gear.values.geometry import Array
+
+SOLID = ("Car", "Van", "Truck")
+"""Kinds that fill the lower half of their box."""
+
+FOOT_SHARE = 0.1
+"""Of a box's height, at the bottom: there is the road between the wheels."""
+
+MOST_OCCLUDED = 0.3
+
+
+def depth_of_box(box: Box3d, rays: Array) -> Array:
+    """(…) z at which rays from the camera enter a box; NaN where they miss it.
+
+    Args:
+        box: in the camera's frame.
+        rays: (…, 3) with z = 1.
+    """
+    c, s = math.cos(box.rotation_y_rad), math.sin(box.rotation_y_rad)
+    box_from_camera = np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])
+    half = np.array([box.length_m, box.height_m, box.width_m]) / 2
+    start = box_from_camera @ -(np.array(box.bottom_m) - (0.0, box.height_m / 2, 0.0))
+    along = rays @ box_from_camera.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        one, two = (-half - start) / along, (half - start) / along
+    enter, leave = np.fmin(one, two).max(axis=-1), np.fmax(one, two).min(axis=-1)
+    return np.asarray(np.where((enter < leave) & (enter > 0), enter, np.nan))
