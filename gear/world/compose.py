@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +48,7 @@ class Composition:
     Attributes:
         xml: the whole of it as MJCF.
         assets: files that it refers to, by name.
+        folder: where those of them lie that are no longer in `assets`.
         town: path of the town's MJCF.
         slots: the pool.
         faces: what takes patches, in patch order.
@@ -58,6 +59,13 @@ class Composition:
     town: Path
     slots: tuple[Slot, ...]
     faces: tuple[FaceName, ...]
+    folder: Path | None = None
+
+    def laid_out(self, folder: Path) -> Composition:
+        """The same with its files written into a folder: MuJoCo copies what is in memory, all of it at once."""
+        for name, content in self.assets.items():
+            (folder / name).write_bytes(content)
+        return replace(self, assets={}, folder=folder)
 
 
 def compose(

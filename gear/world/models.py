@@ -163,6 +163,8 @@ def _compile(
 ) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
     try:
         spec = mujoco.MjSpec.from_string(ET.tostring(tree, encoding="unicode"), assets=dict(assets))
+        if composition.folder is not None:
+            spec.meshdir = spec.texturedir = str(composition.folder)
         return spec, spec.compile()
     except ValueError as error:
         raise TownError(composition.town, f"MuJoCo cannot compile it: {error}") from error
