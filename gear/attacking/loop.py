@@ -1,9 +1,10 @@
-"""The optimisation of the scene-specific attack: Adam on the textures, one unit gradient a term."""
+"""The optimisation of textures: Adam along an ascent direction that the attack chooses."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -62,41 +63,105 @@ class TextureOptimiser:
         return {**arrays, "done": np.int64(self.done), "seed": np.int64(self.seed)}
 
 
-def optimise(
-    settings: Settings,
-    objective: Objective,
-    model: Model,
-    dataset: Sequence[Any],
-    compositor: Compositor,
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Problem:
+    """What is attacked, with what, seen how.
+
+    Attributes:
+        model, dataset, compositor: as `Attack.optimise` is given them.
+        settings: of the optimisation.
+    """
+
+    model: Model
+    dataset: Sequence[Any]
+    compositor: Compositor
+    settings: Settings
+
+    def surfaces(self) -> int:
+        """How many patches there are.
+
+        Raises:
+            GearError: none, so there is nothing to attack.
+        """
+        count = len(self.dataset[0].record.surfaces) if len(self.dataset) else 0
+        if not count:
+            raise GearError("nothing to attack: the dataset has no sample with a patch surface")
+        return count
+
+    def seen(self, textures: Tensor, indexes: Sequence[int], step: int, seed: int) -> Seen:
+        """Pictures of some samples; both eyes see the same look of a patch, every sample another one."""
+        samples = [self.dataset[index] for index in indexes]
+        looks = []
+        for index in indexes:
+            rng = derive_rng(seed, "appearance", step, index)
+            looks.append([vary(self.settings.appearance, texture, rng) for texture in textures])
+        batches = [torch.stack(patches) for patches in zip(*looks, strict=True)]
+        views = {view: self.compositor.compose(batches, indexes, view) for view in samples[0].images}
+        return Seen(views=views, samples=samples, indexes=indexes)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Seen:
+    """A batch with the patches in it.
+
+    Attributes:
+        views: (B, 3, H, W) pictures by camera name, differentiable to the textures.
+        samples: their samples.
+        indexes: their numbers in the data set.
+    """
+
+    views: Mapping[str, Tensor]
+    samples: Sequence[Any]
+    indexes: Sequence[int]
+
+
+Ascend = Callable[[Tensor, Seen], tuple[Tensor, dict[str, float]]]
+"""From (S, 3, h, w) textures that ask for gradients and a batch with them in it: the direction to go, and figures,
+among them `gradient`, the length of the objective's gradient, unless nothing is left to be harmed."""
+
+
+def climb(
+    problem: Problem,
+    ascend: Ascend,
     *,
     budget: Budget,
     rng: np.random.Generator,
     watch: Watch | None = None,
+    before: Callable[[int], None] | None = None,
 ) -> tuple[Patch, ...]:
     """Textures for every surface of the data set, optimised jointly.
+
+    Args:
+        problem: what is attacked.
+        ascend: says where to go.
+        budget: how many steps.
+        rng: where all chance comes from.
+        watch: told of every step.
+        before: called with the number of steps done before each.
 
     Raises:
         GearError: no gradient of the objective reaches the textures, or there is nothing to attack.
     """
-    surfaces = len(dataset[0].record.surfaces) if len(dataset) else 0
-    if not surfaces:
-        raise GearError("nothing to attack: the dataset has no sample with a patch surface")
+    settings, count = problem.settings, len(problem.dataset)
     saved = watch.resume() if watch is not None else None
-    optimiser = TextureOptimiser(surfaces, settings, rng, saved)
+    optimiser = TextureOptimiser(problem.surfaces(), settings, rng, saved)
     silent = 0
-    with frozen(model):
+    with frozen(problem.model):
         while optimiser.done < budget.steps:
             done = optimiser.done
-            indexes = batch_of(done, len(dataset), settings.batch, optimiser.seed)
-            ascent, figures = _gradient(settings, objective, model, dataset, compositor, optimiser, indexes)
+            if before is not None:
+                before(done)
+            indexes = batch_of(done, count, settings.batch, optimiser.seed)
+            textures = optimiser.textures.clone().requires_grad_(True)
+            direction, figures = ascend(textures, problem.seen(textures, indexes, done, optimiser.seed))
             silent = silent + 1 if figures.get("gradient") == 0 else 0
-            if silent * settings.batch >= 2 * len(dataset) + settings.batch:
+            if silent * settings.batch >= 2 * count + settings.batch:
                 raise GearError(
                     "no gradient reaches the patch: it is seen in no sample, or the model passes none "
                     "(gear plugins show MODEL says whether it has gradients)"
                 )
             share = 0.5 * (1 + math.cos(math.pi * done / budget.steps)) if settings.decay else 1.0
-            optimiser.step(ascent, share)
+            optimiser.step(direction, share)
             if watch is not None and watch.step(optimiser.done, figures, optimiser.patches, optimiser.state):
                 break
     return optimiser.patches()
@@ -111,60 +176,49 @@ def batch_of(step: int, count: int, size: int, seed: int) -> list[int]:
     return [int(index) for index in order[place * size : (place + 1) * size]]
 
 
-def _gradient(
-    settings: Settings,
-    objective: Objective,
-    model: Model,
-    dataset: Sequence[Any],
-    compositor: Compositor,
-    optimiser: TextureOptimiser,
-    indexes: Sequence[int],
-) -> tuple[Tensor, dict[str, float]]:
-    """The direction to go, and the step's figures."""
-    textures = optimiser.textures.clone().requires_grad_(True)
-    samples = [dataset[index] for index in indexes]
-    views = compose(settings, compositor, textures, samples, indexes, optimiser)
-    terms = {
-        prefix + name: term
-        for prefix, member in members_of(model).items()
-        for name, term in objective.terms(member, views, samples, indexes).items()
-    }
-    figures = {name: float(term.value.detach()) for name, term in terms.items()}
-    ascent = torch.zeros_like(textures)
-    if settings.per_term:
-        for number, term in enumerate(terms.values()):
-            ascent += term.weight * unit(_to_textures(term.value, textures, keep=number + 1 < len(terms)))
-    elif terms:
-        ascent += _to_textures(torch.stack([t.weight * t.value for t in terms.values()]).sum(), textures, keep=False)
-    if terms:
-        figures["gradient"] = float(ascent.norm())
-    ascent = unit(ascent)
-    for name, weight in (("smoothness", settings.smoothness), ("printability", settings.printability)):
-        if weight:
-            penalty = torch.stack([REGULARISERS[name](one) for one in textures]).sum()
-            figures[name] = float(penalty.detach())
-            ascent -= weight * unit(torch.autograd.grad(penalty, textures)[0])
-    return ascent, figures
+def unit_gradients(problem: Problem, objective: Objective) -> Ascend:
+    """The scene-specific attack's direction: one gradient a term, each of unit length, less the regularisers'."""
+    settings = problem.settings
+
+    def ascend(textures: Tensor, seen: Seen) -> tuple[Tensor, dict[str, float]]:
+        terms = {
+            prefix + name: term
+            for prefix, member in members_of(problem.model).items()
+            for name, term in objective.terms(member, seen.views, seen.samples, seen.indexes).items()
+        }
+        figures = {name: float(term.value.detach()) for name, term in terms.items()}
+        total = torch.zeros_like(textures)
+        if settings.per_term:
+            for number, term in enumerate(terms.values()):
+                total += term.weight * unit(gradient_to(term.value, textures, keep=number + 1 < len(terms)))
+        elif terms:
+            total += gradient_to(torch.stack([t.weight * t.value for t in terms.values()]).sum(), textures)
+        if terms:
+            figures["gradient"] = float(total.norm())
+        total = unit(total)
+        for name, weight in (("smoothness", settings.smoothness), ("printability", settings.printability)):
+            if weight:
+                penalty = torch.stack([REGULARISERS[name](one) for one in textures]).sum()
+                figures[name] = float(penalty.detach())
+                total -= weight * unit(gradient_to(penalty, textures))
+        return total, figures
+
+    return ascend
 
 
 REGULARISERS = {"smoothness": smoothness, "printability": non_printability}
 
 
-def compose(
-    settings: Settings,
-    compositor: Compositor,
-    textures: Tensor,
-    samples: Sequence[Any],
-    indexes: Sequence[int],
-    optimiser: TextureOptimiser,
-) -> Mapping[str, Tensor]:
-    """Pictures with the textures in them; both eyes see the same look of a patch, every sample another."""
-    looks = []
-    for index in indexes:
-        rng = derive_rng(optimiser.seed, "appearance", optimiser.done, index)
-        looks.append([vary(settings.appearance, texture, rng) for texture in textures])
-    batches = [torch.stack(textures) for textures in zip(*looks, strict=True)]
-    return {view: compositor.compose(batches, indexes, view) for view in samples[0].images}
+def one_gradient(value: Callable[[Tensor, Seen], Mapping[str, Tensor]]) -> Ascend:
+    """The direction of attacks that add everything up: the gradient of the sum of named numbers, as it is."""
+
+    def ascend(textures: Tensor, seen: Seen) -> tuple[Tensor, dict[str, float]]:
+        parts = value(textures, seen)
+        gradient = gradient_to(torch.stack(list(parts.values())).sum(), textures)
+        figures = {name: float(part.detach()) for name, part in parts.items()}
+        return gradient, {**figures, "gradient": float(gradient.norm())}
+
+    return ascend
 
 
 def unit(gradient: Tensor) -> Tensor:
@@ -173,7 +227,8 @@ def unit(gradient: Tensor) -> Tensor:
     return gradient / norm if norm > 0 else gradient
 
 
-def _to_textures(value: Tensor, textures: Tensor, *, keep: bool) -> Tensor:
+def gradient_to(value: Tensor, textures: Tensor, *, keep: bool = False) -> Tensor:
+    """The gradient of a number; zeros where none flows."""
     if not value.requires_grad:
         return torch.zeros_like(textures)
     (gradient,) = torch.autograd.grad(value, textures, retain_graph=keep, allow_unused=True)

@@ -25,4 +25,10 @@ BUILTINS: tuple[str, ...] = (
     "gear.plugins.defenses.bit_depth",
     "gear.plugins.attacks.scene_specific",
     "gear.plugins.attacks.carla_gear",
+    "gear.plugins.attacks.eot",
+    "gear.plugins.attacks.nes",
+    "gear.plugins.attacks.square",
+    "gear.plugins.attacks.rp2",
+    "gear.plugins.attacks.thys",
+    "gear.plugins.attacks.control",
 )

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from gear.attacking.appearance import vary
-from gear.attacking.loop import batch_of, optimise
+from gear.attacking.loop import Problem, batch_of, climb, unit_gradients
 from gear.attacking.objectives import SemsegObjective, train_labels
 from gear.attacking.settings import Appearance, Settings
 from gear.contracts.attacks import Budget, Patch, State
@@ -56,16 +56,9 @@ class Watching:
 def run(watch: Watching, steps: int = 6) -> tuple[Patch, ...]:
     contract = Contract()
     dataset = contract.dataset()
-    return optimise(
-        SETTINGS,
-        SemsegObjective(),
-        contract.model(),
-        dataset,
-        TinyCompositor(dataset),
-        budget=Budget(steps=steps),
-        rng=derive_rng(3, "attack"),
-        watch=watch,
-    )
+    problem = Problem(model=contract.model(), dataset=dataset, compositor=TinyCompositor(dataset), settings=SETTINGS)
+    ascend = unit_gradients(problem, SemsegObjective())
+    return climb(problem, ascend, budget=Budget(steps=steps), rng=derive_rng(3, "attack"), watch=watch)
 
 
 def test_an_epoch_shows_every_sample_once() -> None:
@@ -109,15 +102,8 @@ def test_a_model_that_passes_no_gradient_is_told_of() -> None:
             return {}
 
     with pytest.raises(GearError, match="no gradient reaches the patch"):
-        optimise(
-            SETTINGS,
-            SemsegObjective(),
-            Opaque(),
-            dataset,
-            TinyCompositor(dataset),
-            budget=Budget(steps=50),
-            rng=derive_rng(3, "attack"),
-        )
+        problem = Problem(model=Opaque(), dataset=dataset, compositor=TinyCompositor(dataset), settings=SETTINGS)
+        climb(problem, unit_gradients(problem, SemsegObjective()), budget=Budget(steps=50), rng=derive_rng(3, "attack"))
 
 
 def test_looks_differ_and_have_gradients() -> None:

@@ -60,7 +60,7 @@ class CarlaGear:
         The paper's budget is 51 passes over 100 samples: 2550 steps for segmentation, which takes two samples a step,
         5100 for the others.
         """
-        from gear.attacking.loop import optimise
+        from gear.attacking.loop import Problem, climb, unit_gradients
         from gear.attacking.objectives import DepthObjective, LossObjective, Objective, SemsegObjective
 
         task = task_of(dataset[0])
@@ -78,7 +78,8 @@ class CarlaGear:
             objective = SemsegObjective(gamma=1.0)
         elif task == "depth":
             objective = DepthObjective(gamma=0.8)
-        return optimise(settings, objective, model, dataset, compositor, budget=budget, rng=rng, watch=watch)
+        problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=settings)
+        return climb(problem, unit_gradients(problem, objective), budget=budget, rng=rng, watch=watch)
 
 
 LEARNING_RATES: dict[PaperTask, float | tuple[float, float, float]] = {

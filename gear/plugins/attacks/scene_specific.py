@@ -113,12 +113,11 @@ class SceneSpecific:
         watch: Watch | None = None,
     ) -> tuple[Patch, ...]:
         """One patch a surface."""
-        from gear.attacking.loop import optimise
+        from gear.attacking.loop import Problem, climb, unit_gradients
 
         objective = self.objective(dataset[0])
-        return optimise(
-            self._config.optimisation(), objective, model, dataset, compositor, budget=budget, rng=rng, watch=watch
-        )
+        problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=self._config.optimisation())
+        return climb(problem, unit_gradients(problem, objective), budget=budget, rng=rng, watch=watch)
 
     def objective(self, sample: Any) -> Objective:
         """What is made large, by the task that the sample is of."""

@@ -69,7 +69,7 @@ def check_attack(
         assert isinstance(model.found.spec, ModelSpec)
         if spec.needs_gradients and not model.found.spec.has_gradients:
             raise GearError(f"attack {spec.name!r} needs gradients; model {model.found.spec.name!r} gives none")
-    if not spec.needs_gradients and queries is None:
+    if not spec.needs_gradients and not spec.is_control and queries is None:
         raise GearError(f"attack {spec.name!r} is counted in forward passes: say how many with --queries N")
     return spec
 

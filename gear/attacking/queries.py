@@ -1,0 +1,70 @@
+"""Attacks without gradients see numbers: the objective of patches on some samples, counted by forward passes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import torch
+
+from gear.attacking.group import members_of
+from gear.attacking.objectives import DepthObjective, Objective
+from gear.contracts.attacks import Budget, Compositor, Patch
+from gear.contracts.models import Model
+from gear.values.errors import GearError
+
+Textures = npt.NDArray[np.float32]
+"""(S, 3, h, w) in 0..1."""
+
+
+class Oracle:
+    """Answers how much harm textures do; a question about a batch costs one query a model.
+
+    Objectives that compare with the answer to the clean picture cost one more for every sample not seen before.
+
+    Attributes:
+        left: queries that may still be asked.
+    """
+
+    def __init__(
+        self, model: Model, dataset: Sequence[Any], compositor: Compositor, objective: Objective, budget: Budget
+    ) -> None:
+        self._model, self._dataset, self._compositor, self._objective = model, dataset, compositor, objective
+        if budget.queries is None:
+            raise GearError("an attack without gradients is counted in forward passes: say how many with --queries N")
+        self.left = budget.queries
+        self._seen: set[int] = set()
+
+    def cost(self, indexes: Sequence[int]) -> int:
+        """Queries of one question about these samples."""
+        unseen = len(set(indexes) - self._seen) if isinstance(self._objective, DepthObjective) else 0
+        return len(members_of(self._model)) * (1 + unseen)
+
+    def harm(self, textures: Textures, indexes: Sequence[int]) -> float:
+        """The objective's weighted terms, summed. Only forward passes, without gradients.
+
+        Raises:
+            RuntimeError: there are no queries left.
+        """
+        cost = self.cost(indexes)
+        if self.left < cost:
+            raise RuntimeError("no queries left")
+        self.left -= cost
+        self._seen.update(indexes)
+        patches = [torch.from_numpy(np.ascontiguousarray(texture)) for texture in textures]
+        samples = [self._dataset[index] for index in indexes]
+        with torch.no_grad():
+            views = {view: self._compositor.compose(patches, indexes, view) for view in samples[0].images}
+            return sum(
+                float(term.weight * term.value)
+                for member in members_of(self._model).values()
+                for term in self._objective.terms(member, views, samples, indexes).values()
+            )
+
+
+def as_patches(textures: Textures) -> tuple[Patch, ...]:
+    """One patch a texture."""
+    rgb = np.ascontiguousarray(textures.transpose(0, 2, 3, 1), np.float32)
+    return tuple(Patch(name=f"patch_{n}", rgb=one) for n, one in enumerate(rgb))

@@ -1,0 +1,138 @@
+"""Controls, against which an attack is measured: noise, one colour, and noise with another patch's statistics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.contracts.attacks import Budget, Compositor, Patch, Watch
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.models import Model
+from gear.contracts.specs import AttackSpec
+from gear.values.errors import FieldError, GearError
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ControlConfig:
+    """Options.
+
+    Attributes:
+        kind: `noise` draws every value evenly; `solid` is one colour; `matched` is noise with the mean colour, the
+            colours' covariance and the power spectrum of the patches in `like`: as smooth, as colourful, but made
+            against nothing.
+        height_px, width_px: of every patch; those of `like` for `matched`.
+        rgb: of `solid`, sRGB in 0..1.
+        like: for `matched`, a patch folder.
+    """
+
+    kind: Literal["noise", "solid", "matched"] = "noise"
+    height_px: int = 150
+    width_px: int = 300
+    rgb: tuple[float, float, float] = (0.5, 0.5, 0.5)
+    like: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("height_px", "width_px"):
+            if not 2 <= getattr(self, name) <= 4096:
+                raise FieldError(name, f"must be 2 to 4096, got {getattr(self, name)}")
+        if not all(0 <= value <= 1 for value in self.rgb):
+            raise FieldError("rgb", f"must be three numbers of 0 to 1, got {self.rgb}")
+        if (self.kind == "matched") != bool(self.like):
+            raise FieldError("like", "must name a patch folder for kind=matched, and only there")
+
+
+class Control:
+    """Asks the model nothing."""
+
+    def __init__(self, config: ControlConfig) -> None:
+        self._config = config
+
+    def optimise(
+        self,
+        model: Model,
+        dataset: Sequence[Any],
+        compositor: Compositor,
+        *,
+        budget: Budget,
+        rng: np.random.Generator,
+        watch: Watch | None = None,
+    ) -> tuple[Patch, ...]:
+        """One patch a surface.
+
+        Raises:
+            GearError: the folder of `like` has too few patches.
+        """
+        config, count = self._config, len(dataset[0].record.surfaces)
+        size = (config.height_px, config.width_px, 3)
+        if config.kind == "matched":
+            originals = read_exact(Path(config.like))
+            if len(originals) < count:
+                raise GearError(f"{config.like}: has {len(originals)} patches; the scene has {count} surfaces")
+            made = [matched(original, rng) for original in originals[:count]]
+        elif config.kind == "solid":
+            made = [np.broadcast_to(np.asarray(config.rgb), size) for _ in range(count)]
+        else:
+            made = [rng.uniform(0, 1, size) for _ in range(count)]
+        return tuple(Patch(name=f"patch_{n}", rgb=np.array(rgb, np.float32, order="C")) for n, rgb in enumerate(made))
+
+
+def matched(original: Floats, rng: np.random.Generator) -> Floats:
+    """Noise with a picture's statistics: its Fourier magnitudes with random phases, the same for all channels, so that
+    colours vary together as they did (random phase noise; Galerne et al., 2011); mean and spread are set again after
+    values outside 0..1 were cut off.
+
+    Args:
+        original: (H, W, 3) in 0..1.
+        rng: of the phases.
+    """
+    phases = np.angle(np.fft.fft2(rng.standard_normal(original.shape[:2])))
+    mean, spread = original.mean(axis=(0, 1)), original.std(axis=(0, 1))
+    spectrum = np.fft.fft2(original - mean, axes=(0, 1)) * np.exp(1j * phases)[..., None]
+    noise = np.real(np.fft.ifft2(spectrum, axes=(0, 1))) + mean
+    for _ in range(10):
+        noise = np.clip(noise, 0, 1)
+        noise = (noise - noise.mean(axis=(0, 1))) * (spread / np.maximum(noise.std(axis=(0, 1)), 1e-9)) + mean
+    return np.asarray(np.clip(noise, 0, 1))
+
+
+def read_exact(folder: Path) -> list[Floats]:
+    """The exact patches of a folder that `gear attack` wrote, in order, (H, W, 3) in 0..1.
+
+    Raises:
+        GearError: there are none.
+    """
+    from safetensors import SafetensorError
+    from safetensors.numpy import load_file
+
+    path = folder / "patch.safetensors"
+    if not path.is_file():
+        raise GearError(f"{path}: there is no such file; name a folder that gear attack wrote")
+    try:
+        arrays = load_file(path)
+    except SafetensorError as error:
+        raise GearError(f"{path}: not a safetensors file ({error})") from error
+    return [arrays[name].astype(np.float64) for name in sorted(arrays, key=lambda n: int(n.rpartition("_")[2]))]
+
+
+control: AttackSpec[ControlConfig] = AttackSpec(
+    name="control",
+    summary="No attack: noise, one colour, or noise with another patch's statistics, to measure attacks against.",
+    config=ControlConfig,
+    build=Control,
+    needs_gradients=False,
+    needs_probes=False,
+    is_control=True,
+)
+
+
+@hookimpl
+def gear_attacks() -> list[AttackSpec[ControlConfig]]:
+    """This control."""
+    return [control]

@@ -1,0 +1,128 @@
+"""The attack that knows no scene: patches pasted upright at random sizes and places (EOT), the paper's baseline.
+
+Athalye et al. (ICML 2018) over the transforms of Rossolini et al. (WACV 2022): scale, shift, noise, brightness,
+contrast. Where the board stands, how it is lit and what is in front of it never enters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gear.attacking.settings import Appearance, Settings
+from gear.contracts.attacks import Budget, Compositor, Patch, Watch
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.models import Model
+from gear.contracts.specs import AttackSpec
+from gear.values.errors import FieldError
+
+if TYPE_CHECKING:
+    from gear.attacking.objectives import Objective
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EotConfig:
+    """Options.
+
+    Attributes:
+        height_px, width_px: of every patch.
+        share: width of a pasted patch as a share of the picture's, before scaling.
+        least_scale, most_scale: of that width.
+        shift: how far its middle lies from the picture's middle at most, as a share of the patch's own size.
+        batch: samples a step.
+        learning_rate: of Adam in unit space; it falls to 0 with a cosine.
+        smoothness: length of the smoothness gradient beside the objective's, which is 1.
+        appearance: what is varied on the patch.
+    """
+
+    height_px: int = 150
+    width_px: int = 300
+    share: float = 0.15
+    least_scale: float = 0.8
+    most_scale: float = 1.2
+    shift: float = 0.5
+    batch: int = 2
+    learning_rate: float = 0.06
+    smoothness: float = 0.1
+    appearance: Appearance = field(default_factory=lambda: Appearance(noise=0.1))
+
+    def __post_init__(self) -> None:
+        self.optimisation()
+        if not 0.01 <= self.share <= 1:
+            raise FieldError("share", f"must be 0.01 to 1, got {self.share:g}")
+        if not 0 < self.least_scale <= self.most_scale <= 10:
+            raise FieldError("least_scale", f"must be above 0 and at most most_scale, got {self.least_scale:g}")
+
+    def optimisation(self) -> Settings:
+        """What of it the optimiser needs.
+
+        Raises:
+            FieldError: a value is out of range.
+        """
+        return Settings(
+            height_px=self.height_px,
+            width_px=self.width_px,
+            batch=self.batch,
+            learning_rate=self.learning_rate,
+            smoothness=self.smoothness,
+            appearance=self.appearance,
+        )
+
+
+class Eot:
+    """Never asks the compositor: the patch's place is made up."""
+
+    def __init__(self, config: EotConfig) -> None:
+        self._config = config
+
+    def optimise(
+        self,
+        model: Model,
+        dataset: Sequence[Any],
+        compositor: Compositor,
+        *,
+        budget: Budget,
+        rng: np.random.Generator,
+        watch: Watch | None = None,
+    ) -> tuple[Patch, ...]:
+        """One patch a surface, all pasted into every picture."""
+        from gear.attacking.loop import Problem, climb, unit_gradients
+        from gear.attacking.upright import Upright
+
+        config = self._config
+        seed = int(rng.integers(2**62))
+        scenes = Upright(
+            dataset,
+            seed=seed,
+            aspect=config.height_px / config.width_px,
+            share=config.share,
+            scales=(config.least_scale, config.most_scale),
+            shift=config.shift,
+        )
+        problem = Problem(model=model, dataset=scenes, compositor=scenes, settings=config.optimisation())
+        ascend = unit_gradients(problem, self.objective(dataset[0]))
+        return climb(problem, ascend, budget=budget, rng=rng, watch=watch, before=scenes.begin)
+
+    def objective(self, sample: Any) -> Objective:
+        """Untargeted harm."""
+        from gear.attacking.objectives import default_objective
+
+        return default_objective(sample)
+
+
+eot: AttackSpec[EotConfig] = AttackSpec(
+    name="eot",
+    summary="Patches pasted upright at random places and sizes, without the scene's geometry: the baseline.",
+    config=EotConfig,
+    build=Eot,
+    needs_probes=False,
+)
+
+
+@hookimpl
+def gear_attacks() -> list[AttackSpec[EotConfig]]:
+    """This attack."""
+    return [eot]

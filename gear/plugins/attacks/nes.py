@@ -1,0 +1,143 @@
+"""Black-box: gradients estimated from differences of the objective (NES; Ilyas et al., ICML 2018), or SPSA's.
+
+The estimate is made on a coarse grid that is spread over the patch: fewer numbers to learn from the same queries.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from gear.contracts.attacks import Budget, Compositor, Patch, Watch
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.models import Model
+from gear.contracts.specs import AttackSpec
+from gear.values.errors import FieldError
+from gear.values.rng import derive_rng
+
+if TYPE_CHECKING:
+    from gear.attacking.objectives import Objective
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NesConfig:
+    """Options.
+
+    Attributes:
+        height_px, width_px: of every patch.
+        grid_px: patch pixels to a side of one number that is estimated.
+        draws: normal numbers (`nes`), or signs (`spsa`).
+        pairs: antithetic pairs of queries for one step.
+        spread: size of the changes that are tried, of 0..1.
+        step: how far every number moves, of 0..1.
+        batch: samples that a query looks at.
+    """
+
+    height_px: int = 150
+    width_px: int = 300
+    grid_px: int = 10
+    draws: Literal["nes", "spsa"] = "nes"
+    pairs: int = 10
+    spread: float = 0.1
+    step: float = 0.05
+    batch: int = 2
+
+    def __post_init__(self) -> None:
+        for name in ("height_px", "width_px", "grid_px", "pairs", "batch"):
+            if not 1 <= getattr(self, name) <= 4096:
+                raise FieldError(name, f"must be 1 to 4096, got {getattr(self, name)}")
+        for name in ("spread", "step"):
+            if not 0 < getattr(self, name) <= 1:
+                raise FieldError(name, f"must be above 0, up to 1, got {getattr(self, name):g}")
+
+
+class Nes:
+    """Signed steps along the estimate."""
+
+    def __init__(self, config: NesConfig) -> None:
+        self._config = config
+
+    def optimise(
+        self,
+        model: Model,
+        dataset: Sequence[Any],
+        compositor: Compositor,
+        *,
+        budget: Budget,
+        rng: np.random.Generator,
+        watch: Watch | None = None,
+    ) -> tuple[Patch, ...]:
+        """One patch a surface."""
+        from gear.attacking.loop import batch_of
+        from gear.attacking.queries import Oracle, as_patches
+
+        config, count = self._config, len(dataset[0].record.surfaces)
+        oracle = Oracle(model, dataset, compositor, self.objective(dataset[0]), budget)
+        rows, columns = -(-config.height_px // config.grid_px), -(-config.width_px // config.grid_px)
+        saved = watch.resume() if watch is not None else None
+        grid = rng.uniform(0, 1, (count, 3, rows, columns)).astype(np.float32)
+        seed, done = int(rng.integers(2**62)), 0
+        if saved is not None:
+            grid, seed, done, oracle.left = (
+                saved["grid"].copy(),
+                int(saved["seed"]),
+                int(saved["done"]),
+                int(saved["left"]),
+            )
+        while done < budget.steps:
+            draws = derive_rng(seed, "draws", done)
+            indexes = batch_of(done, len(dataset), config.batch, seed)
+            slope, seen = np.zeros_like(grid), list[float]()
+            for _ in range(config.pairs):
+                if oracle.left < 2 * oracle.cost(indexes):
+                    break
+                change = self._change(draws, grid.shape)
+                ahead = oracle.harm(self._spread_out(np.clip(grid + change, 0, 1)), indexes)
+                behind = oracle.harm(self._spread_out(np.clip(grid - change, 0, 1)), indexes)
+                slope += (ahead - behind) * change
+                seen += [ahead, behind]
+            if not seen:
+                break
+            grid = np.clip(grid + config.step * np.sign(slope), 0, 1).astype(np.float32)
+            done += 1
+            figures = {"harm": float(np.mean(seen)), "queries_left": float(oracle.left)}
+            state = {"grid": grid, "seed": np.int64(seed), "done": np.int64(done), "left": np.int64(oracle.left)}
+            made = partial(as_patches, self._spread_out(grid))
+            if watch is not None and watch.step(done, figures, made, partial(dict, state)):
+                break
+        return as_patches(self._spread_out(grid))
+
+    def objective(self, sample: Any) -> Objective:
+        """Untargeted harm."""
+        from gear.attacking.objectives import default_objective
+
+        return default_objective(sample)
+
+    def _change(self, draws: np.random.Generator, shape: tuple[int, ...]) -> np.ndarray:
+        if self._config.draws == "nes":
+            return (self._config.spread * draws.standard_normal(shape)).astype(np.float32)
+        return (self._config.spread * draws.choice([-1.0, 1.0], shape)).astype(np.float32)
+
+    def _spread_out(self, grid: np.ndarray) -> np.ndarray:
+        config = self._config
+        wide = grid.repeat(config.grid_px, axis=2).repeat(config.grid_px, axis=3)
+        return np.ascontiguousarray(wide[:, :, : config.height_px, : config.width_px])
+
+
+nes: AttackSpec[NesConfig] = AttackSpec(
+    name="nes",
+    summary="Black-box: gradients estimated from differences of the objective, NES or SPSA, counted in queries.",
+    config=NesConfig,
+    build=Nes,
+    needs_gradients=False,
+)
+
+
+@hookimpl
+def gear_attacks() -> list[AttackSpec[NesConfig]]:
+    """This attack."""
+    return [nes]

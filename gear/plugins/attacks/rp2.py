@@ -1,0 +1,154 @@
+"""Robust physical perturbations (RP2; Eykholt et al., CVPR 2018) on a billboard: everything added up in one loss.
+
+A perturbation of a base colour is kept small in the 2-norm and printable, while the mean loss over varied pictures is
+driven: to a target class for segmentation, away from the truth otherwise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gear.attacking.settings import Appearance, Settings
+from gear.contracts.attacks import Budget, Compositor, Patch, Watch
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.models import Model
+from gear.contracts.specs import AttackSpec
+from gear.formats.cityscapes import LABELS
+from gear.values.errors import FieldError
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from gear.attacking.loop import Seen
+    from gear.attacking.objectives import Objective
+
+LABEL_IDS: Mapping[str, int] = {label.name: label.id for label in LABELS if label.is_evaluated}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rp2Config:
+    """Options; the constants are those of the published code's GTSRB run.
+
+    Attributes:
+        height_px, width_px: of every patch; few, as the perturbation is coarse.
+        base: grey value that the perturbation is added to, 0 to 1.
+        norm_weight: of the perturbation's 2-norm.
+        printability_weight: of non-printability, a mean over pixels.
+        smoothness_weight: of the smoothness term, a mean over pixels.
+        batch: samples a step.
+        learning_rate: of Adam, constant.
+        attacked, target: semantic segmentation: as in scene_specific.
+        appearance: what is varied on the patch.
+    """
+
+    height_px: int = 32
+    width_px: int = 64
+    base: float = 0.5
+    norm_weight: float = 1e-3
+    printability_weight: float = 0.1
+    smoothness_weight: float = 1e-3
+    batch: int = 2
+    learning_rate: float = 0.25
+    attacked: str = ""
+    target: str = ""
+    appearance: Appearance = field(default_factory=lambda: Appearance(brightness=0.1, contrast=0.3, blur_px=0))
+
+    def __post_init__(self) -> None:
+        self.optimisation()
+        if not 0 <= self.base <= 1:
+            raise FieldError("base", f"must be 0 to 1, got {self.base:g}")
+        for name in ("attacked", "target"):
+            value = getattr(self, name)
+            if value and value not in LABEL_IDS:
+                raise FieldError(name, f"must be one of {', '.join(LABEL_IDS)}, got {value!r}")
+
+    def optimisation(self) -> Settings:
+        """What of it the optimiser needs.
+
+        Raises:
+            FieldError: a value is out of range.
+        """
+        return Settings(
+            height_px=self.height_px,
+            width_px=self.width_px,
+            batch=self.batch,
+            learning_rate=self.learning_rate,
+            decay=False,
+            appearance=self.appearance,
+        )
+
+
+class Rp2:
+    """Adam on one sum."""
+
+    def __init__(self, config: Rp2Config) -> None:
+        self._config = config
+
+    def optimise(
+        self,
+        model: Model,
+        dataset: Sequence[Any],
+        compositor: Compositor,
+        *,
+        budget: Budget,
+        rng: np.random.Generator,
+        watch: Watch | None = None,
+    ) -> tuple[Patch, ...]:
+        """One patch a surface."""
+        from gear.attacking.loop import Problem, climb, one_gradient
+
+        problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=self._config.optimisation())
+        objective = self.objective(dataset[0])
+
+        def value(textures: Tensor, seen: Seen) -> Mapping[str, Tensor]:
+            return self._value(problem.model, objective, textures, seen)
+
+        return climb(problem, one_gradient(value), budget=budget, rng=rng, watch=watch)
+
+    def objective(self, sample: Any) -> Objective:
+        """To the target class, or untargeted."""
+        from gear.attacking.objectives import SemsegObjective, default_objective, kind_of
+
+        config = self._config
+        if kind_of(sample) == "semseg" and config.target:
+            return SemsegObjective(attacked=LABEL_IDS.get(config.attacked), target=LABEL_IDS[config.target])
+        return default_objective(sample)
+
+    def _value(self, model: Model, objective: Objective, textures: Tensor, seen: Seen) -> Mapping[str, Tensor]:
+        import torch
+
+        from gear.attacking.group import members_of
+        from gear.attacking.regularisers import non_printability, smoothness
+
+        config, pixels = self._config, textures[:, 0].numel()
+        terms = [
+            term.weight * term.value
+            for member in members_of(model).values()
+            for term in objective.terms(member, seen.views, seen.samples, seen.indexes).values()
+        ]
+        return {
+            "harm": torch.stack(terms).sum() if terms else textures.sum() * 0,
+            "norm": -config.norm_weight * (textures - config.base).norm(),
+            "printability": -config.printability_weight
+            * torch.stack([non_printability(t) for t in textures]).sum()
+            / pixels,
+            "smoothness": -config.smoothness_weight * torch.stack([smoothness(t) for t in textures]).sum() / pixels,
+        }
+
+
+rp2: AttackSpec[Rp2Config] = AttackSpec(
+    name="rp2",
+    summary="Robust physical perturbations: a small printable perturbation, one summed loss.",
+    config=Rp2Config,
+    build=Rp2,
+)
+
+
+@hookimpl
+def gear_attacks() -> list[AttackSpec[Rp2Config]]:
+    """This attack."""
+    return [rp2]

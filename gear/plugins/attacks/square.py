@@ -1,0 +1,146 @@
+"""Black-box: random search with squares, kept where they do more harm.
+
+Square attack (Andriushchenko et al., ECCV 2020) in the form of Sparse-RS for universal patches (Croce et al., AAAI
+2022): every colour is a corner of the colour cube, the squares' side shrinks along a schedule of the queries spent.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gear.contracts.attacks import Budget, Compositor, Patch, Watch
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.models import Model
+from gear.contracts.specs import AttackSpec
+from gear.values.errors import FieldError
+from gear.values.rng import derive_rng
+
+if TYPE_CHECKING:
+    from gear.attacking.objectives import Objective
+
+SCHEDULE = ((0.001, 1), (0.005, 2), (0.02, 4), (0.05, 8), (0.1, 16), (0.2, 32), (0.4, 64), (0.6, 128), (0.8, 256))
+"""Share of the queries spent, and by what the squares' area is divided until then."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SquareConfig:
+    """Options.
+
+    Attributes:
+        height_px, width_px: of every patch.
+        area: of the first squares, as a share of the patch's.
+        batch: samples that a query looks at.
+        turns: how often other samples are drawn over the whole budget.
+    """
+
+    height_px: int = 150
+    width_px: int = 300
+    area: float = 0.3
+    batch: int = 2
+    turns: int = 10
+
+    def __post_init__(self) -> None:
+        for name in ("height_px", "width_px", "batch", "turns"):
+            if not 1 <= getattr(self, name) <= 4096:
+                raise FieldError(name, f"must be 1 to 4096, got {getattr(self, name)}")
+        if not 0 < self.area <= 1:
+            raise FieldError("area", f"must be above 0, up to 1, got {self.area:g}")
+
+
+class Square:
+    """One square of one colour at a time."""
+
+    def __init__(self, config: SquareConfig) -> None:
+        self._config = config
+
+    def optimise(
+        self,
+        model: Model,
+        dataset: Sequence[Any],
+        compositor: Compositor,
+        *,
+        budget: Budget,
+        rng: np.random.Generator,
+        watch: Watch | None = None,
+    ) -> tuple[Patch, ...]:
+        """One patch a surface."""
+        from gear.attacking.loop import batch_of
+        from gear.attacking.queries import Oracle, as_patches
+
+        config, count = self._config, len(dataset[0].record.surfaces)
+        oracle = Oracle(model, dataset, compositor, self.objective(dataset[0]), budget)
+        saved = watch.resume() if watch is not None else None
+        textures = self._first(rng, count)
+        seed, done, best, whole = int(rng.integers(2**62)), 0, -math.inf, oracle.left
+        if saved is not None:
+            textures, seed, done = saved["textures"].copy(), int(saved["seed"]), int(saved["done"])
+            best, oracle.left = float(saved["best"]), int(saved["left"])
+        turn = max(1, min(budget.steps, whole) // config.turns)
+        while done < budget.steps:
+            indexes = batch_of(done // turn, len(dataset), config.batch, seed)
+            if oracle.left < oracle.cost(indexes):
+                break
+            if done % turn == 0:
+                best = oracle.harm(textures, indexes)
+            if oracle.left >= oracle.cost(indexes):
+                tried = self._with_square(textures, derive_rng(seed, "square", done), 1 - oracle.left / whole)
+                harm = oracle.harm(tried, indexes)
+                if harm > best:
+                    textures, best = tried, harm
+            done += 1
+            figures = {"harm": best, "queries_left": float(oracle.left)}
+            state = {
+                "textures": textures,
+                "seed": np.int64(seed),
+                "done": np.int64(done),
+                "best": np.float64(best),
+                "left": np.int64(oracle.left),
+            }
+            if watch is not None and watch.step(done, figures, partial(as_patches, textures), partial(dict, state)):
+                break
+        return as_patches(textures)
+
+    def objective(self, sample: Any) -> Objective:
+        """Untargeted harm."""
+        from gear.attacking.objectives import default_objective
+
+        return default_objective(sample)
+
+    def _first(self, rng: np.random.Generator, count: int) -> np.ndarray:
+        """Vertical stripes of random corners of the colour cube."""
+        config = self._config
+        stripes = rng.integers(0, 2, (count, 3, 1, config.width_px)).astype(np.float32)
+        return np.ascontiguousarray(np.broadcast_to(stripes, (count, 3, config.height_px, config.width_px)))
+
+    def _with_square(self, textures: np.ndarray, rng: np.random.Generator, spent: float) -> np.ndarray:
+        config = self._config
+        divisor = next((by for until, by in SCHEDULE if spent < until), 512)
+        area_px = config.area / divisor * config.height_px * config.width_px
+        side = max(1, min(round(math.sqrt(area_px)), config.height_px, config.width_px))
+        top = int(rng.integers(0, config.height_px - side + 1))
+        left = int(rng.integers(0, config.width_px - side + 1))
+        tried = textures.copy()
+        colour = rng.integers(0, 2, 3).astype(np.float32)
+        tried[int(rng.integers(len(textures))), :, top : top + side, left : left + side] = colour[:, None, None]
+        return tried
+
+
+square: AttackSpec[SquareConfig] = AttackSpec(
+    name="square",
+    summary="Black-box: random search with squares of full colours, counted in queries.",
+    config=SquareConfig,
+    build=Square,
+    needs_gradients=False,
+)
+
+
+@hookimpl
+def gear_attacks() -> list[AttackSpec[SquareConfig]]:
+    """This attack."""
+    return [square]

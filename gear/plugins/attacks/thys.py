@@ -1,0 +1,148 @@
+"""The objectness attack of Thys et al. (CVPR workshops 2019) from a billboard: nothing shall be detected any more.
+
+Loss = mean over pictures of the highest objectness + 0.01 NPS + max(2.5 TV, 0.1), as published; Adam with learning rate
+0.03 from mid-grey noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gear.attacking.settings import Appearance, Settings
+from gear.contracts.attacks import Budget, Compositor, Patch, Watch
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.models import Model
+from gear.contracts.specs import AttackSpec
+from gear.values.errors import GearError
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from gear.attacking.loop import Seen
+
+SCORES = ("objectness", "cls_logits")
+"""Raw outputs of detectors that a sigmoid makes scores of."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ThysConfig:
+    """Options, with the published constants.
+
+    Attributes:
+        height_px, width_px: of every patch.
+        batch: samples a step.
+        learning_rate: of Adam; it falls to 0 with a cosine.
+        printability_weight: of non-printability, a mean over pixels.
+        variation_weight: of total variation, a mean over pixels.
+        least_variation: below this, total variation costs nothing more.
+        appearance: what is varied on the patch.
+    """
+
+    height_px: int = 150
+    width_px: int = 300
+    batch: int = 2
+    learning_rate: float = 0.03
+    printability_weight: float = 0.01
+    variation_weight: float = 2.5
+    least_variation: float = 0.1
+    appearance: Appearance = field(default_factory=lambda: Appearance(noise=0.06, brightness=0.06, contrast=0.12))
+
+    def __post_init__(self) -> None:
+        self.optimisation()
+
+    def optimisation(self) -> Settings:
+        """What of it the optimiser needs.
+
+        Raises:
+            FieldError: a value is out of range.
+        """
+        return Settings(
+            height_px=self.height_px,
+            width_px=self.width_px,
+            batch=self.batch,
+            learning_rate=self.learning_rate,
+            appearance=self.appearance,
+        )
+
+
+class Thys:
+    """Lowers the surest detection of every picture."""
+
+    def __init__(self, config: ThysConfig) -> None:
+        self._config = config
+
+    def optimise(
+        self,
+        model: Model,
+        dataset: Sequence[Any],
+        compositor: Compositor,
+        *,
+        budget: Budget,
+        rng: np.random.Generator,
+        watch: Watch | None = None,
+    ) -> tuple[Patch, ...]:
+        """One patch a surface.
+
+        Raises:
+            GearError: the model has no output of objectness.
+        """
+        from gear.attacking.loop import Problem, climb, one_gradient
+
+        problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=self._config.optimisation())
+
+        def value(textures: Tensor, seen: Seen) -> Mapping[str, Tensor]:
+            return self._value(problem.model, textures, seen)
+
+        return climb(problem, one_gradient(value), budget=budget, rng=rng, watch=watch)
+
+    def _value(self, model: Model, textures: Tensor, seen: Seen) -> Mapping[str, Tensor]:
+        import torch
+
+        from gear.attacking.group import members_of
+        from gear.attacking.regularisers import non_printability
+
+        config, pixels = self._config, textures[:, 0].numel()
+        sure = torch.stack([surest(member.forward(seen.views)).mean() for member in members_of(model).values()]).sum()
+        down = (textures[:, :, 1:] - textures[:, :, :-1]).abs().sum()
+        right = (textures[:, :, :, 1:] - textures[:, :, :, :-1]).abs().sum()
+        variation = config.variation_weight * (down + right) / textures.numel()
+        return {
+            "objectness": -sure,
+            "printability": -config.printability_weight
+            * torch.stack([non_printability(t) for t in textures]).sum()
+            / pixels,
+            "variation": -variation.clamp_min(config.least_variation),
+        }
+
+
+def surest(outputs: Mapping[str, Tensor]) -> Tensor:
+    """(B,) the highest score of each picture, 0 to 1.
+
+    Raises:
+        GearError: no output is of objectness.
+    """
+    for name in SCORES:
+        if name in outputs:
+            return outputs[name].flatten(1).max(dim=1).values.sigmoid()
+    raise GearError(
+        f"attack thys needs a detector with one of the outputs {', '.join(SCORES)}; got {', '.join(outputs)}"
+    )
+
+
+thys: AttackSpec[ThysConfig] = AttackSpec(
+    name="thys",
+    summary="Objectness: lowers the surest detection of every picture (after Thys et al.).",
+    config=ThysConfig,
+    build=Thys,
+    tasks=("detect2d",),
+)
+
+
+@hookimpl
+def gear_attacks() -> list[AttackSpec[ThysConfig]]:
+    """This attack."""
+    return [thys]

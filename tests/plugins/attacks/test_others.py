@@ -1,0 +1,210 @@
+"""The attacks beside the scene-specific one: through the contract, and what each is for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+import torch
+from safetensors.numpy import save_file
+
+from gear.attacking.objectives import default_objective
+from gear.attacking.upright import Upright
+from gear.contracts.attacks import Budget
+from gear.formats import rle
+from gear.plugins.attacks.control import ControlConfig, control, matched
+from gear.plugins.attacks.eot import EotConfig, eot
+from gear.plugins.attacks.nes import NesConfig, nes
+from gear.plugins.attacks.rp2 import Rp2Config, rp2
+from gear.plugins.attacks.square import SquareConfig, square
+from gear.plugins.attacks.thys import ThysConfig, surest, thys
+from gear.testing.attack_contract import AttackContract, Counted
+from gear.testing.tiny_compositor import TinyCompositor
+from gear.testing.tiny_networks import TinyConfig, TinySegmenter
+from gear.values.errors import FieldError, GearError
+from gear.values.rng import derive_rng
+
+Options = Mapping[str, Any]
+SMALL: Options = {"height_px": 16, "width_px": 32}
+
+
+class Beside(AttackContract):
+    """The contract, with harm measured where these attacks do it: beside the patch."""
+
+    def harm(self, model: Counted, dataset: Any, patches: Any) -> float:
+        tensors = [torch.from_numpy(patch.rgb.copy()).permute(2, 0, 1) for patch in patches]
+        pictures = TinyCompositor(dataset).compose(tensors, [0, 1], "left")
+        with torch.no_grad():
+            terms = default_objective(dataset[0]).terms(model, {"left": pictures}, dataset, [0, 1])
+        return sum(float(term.weight * term.value) for term in terms.values())
+
+
+class TestEot(AttackContract):
+    spec = eot
+    options: ClassVar[Options] = {**SMALL, "share": 0.3}
+    steps = 40
+
+    def harm(self, model: Counted, dataset: Any, patches: Any) -> float:
+        """Where the attack believes its patches to be: it knows of no board."""
+        scenes = Upright(dataset, seed=3, aspect=0.5, share=0.3, scales=(1.0, 1.0), shift=0.5)
+        tensors = [torch.from_numpy(patch.rgb.copy()).permute(2, 0, 1) for patch in patches]
+        with torch.no_grad():
+            return float(sum(model.forward({"left": scenes.compose(tensors, [0, 1], "left")}, dataset).values()))
+
+
+class TestNes(Beside):
+    spec = nes
+    options: ClassVar[Options] = {**SMALL, "grid_px": 4, "pairs": 4, "batch": 1, "step": 0.2}
+    steps = 60
+    passes_per_step = 10
+
+
+class TestSpsa(Beside):
+    spec = nes
+    options: ClassVar[Options] = {**SMALL, "grid_px": 8, "pairs": 4, "draws": "spsa", "batch": 1, "step": 0.2}
+    steps = 60
+    passes_per_step = 10
+
+
+class TestSquare(Beside):
+    spec = square
+    options: ClassVar[Options] = {**SMALL, "batch": 2, "turns": 2}
+    steps = 40
+    passes_per_step = 3
+
+
+class TestSquareOnDepth(TestSquare):
+    task = "depth"
+
+
+class TestRp2(Beside):
+    spec = rp2
+    options: ClassVar[Options] = {"height_px": 8, "width_px": 16}
+    steps = 40
+
+
+class TestControl(AttackContract):
+    spec = control
+    options: ClassVar[Options] = SMALL
+
+
+class TestSolid(AttackContract):
+    spec = control
+    options: ClassVar[Options] = {**SMALL, "kind": "solid", "rgb": (0.1, 0.2, 0.9)}
+
+
+class Detector(TinySegmenter):
+    """A tiny network whose outputs are named as a detector's."""
+
+    def outputs(self, raw: torch.Tensor) -> Mapping[str, torch.Tensor]:
+        return {"cls_logits": raw.flatten(2).permute(0, 2, 1)}
+
+
+def test_thys_hides_what_was_surest() -> None:
+    contract = AttackContract()
+    dataset, model = contract.dataset(), Detector(TinyConfig())
+    compositor = TinyCompositor(dataset)
+
+    def sure(patches: Any) -> float:
+        tensors = [torch.from_numpy(patch.rgb.copy()).permute(2, 0, 1) for patch in patches]
+        with torch.no_grad():
+            return float(surest(model.forward({"left": compositor.compose(tensors, [0, 1], "left")})).mean())
+
+    def run(steps: int) -> Any:
+        attack = thys.build(ThysConfig(**SMALL))
+        return attack.optimise(model, dataset, compositor, budget=Budget(steps=steps), rng=derive_rng(1, "thys"))
+
+    grey = [Patch(name="patch_0", rgb=np.full((4, 8, 3), 0.5, np.float32))]
+    assert sure(run(40)) <= min(sure(run(1)), sure(grey)) + 1e-6
+
+
+def test_thys_needs_a_detector() -> None:
+    with pytest.raises(GearError, match="needs a detector"):
+        surest({"logits": torch.zeros(1, 2, 3, 3)})
+
+
+def test_places_are_inside_and_change_with_every_step() -> None:
+    dataset = AttackContract().dataset(boards=2)
+    scenes = Upright(dataset, seed=3, aspect=0.5, share=0.4, scales=(0.8, 1.2), shift=2.0)
+    height, width = dataset[0].images["left"].shape[:2]
+    seen = set()
+    for step in range(20):
+        scenes.begin(step)
+        for top, left, rows, columns in scenes.places(0):
+            assert top >= 0 and left >= 0 and top + rows <= height and left + columns <= width
+            seen.add((top, left, rows, columns))
+    assert len(seen) > 20
+
+
+def test_what_is_pasted_is_where_the_sample_says() -> None:
+    dataset = AttackContract().dataset()
+    scenes = Upright(dataset, seed=3, aspect=0.5, share=0.4, scales=(0.8, 1.2), shift=0.2)
+    red = torch.zeros(3, 4, 8)
+    red[0] = 1.0
+    picture = scenes.compose([red], [1], "left")[0]
+    (truth,) = scenes[1].surfaces
+    mask = rle.decode(truth.mask_rle, *dataset[1].images["left"].shape[:2])
+    assert mask.sum() == truth.visible_px > 50
+    assert (torch.tensor([1.0, 0.0, 0.0]) == picture[:, mask].T).all()
+    stored = torch.from_numpy(dataset[1].images["left"].copy()).permute(2, 0, 1) / 255
+    assert torch.equal(picture[:, ~mask], stored[:, ~mask])
+
+
+def test_queries_are_counted_not_steps() -> None:
+    contract = TestSquare()
+    model, dataset = contract.model(), contract.dataset()
+    attack = square.build(SquareConfig(**contract.options))
+    attack.optimise(
+        model, dataset, TinyCompositor(dataset), budget=Budget(steps=10_000, queries=17), rng=derive_rng(1, "q")
+    )
+    assert 15 <= model.passes <= 17
+    with pytest.raises(GearError, match="--queries"):
+        nes.build(NesConfig(**SMALL)).optimise(
+            model, dataset, TinyCompositor(dataset), budget=Budget(steps=3), rng=derive_rng(1, "q")
+        )
+
+
+def test_matched_noise_is_like_the_patch_and_not_the_patch(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    x = np.linspace(0, 6, 64)
+    waves = 0.5 + 0.2 * np.sin(x)[None, :, None] * np.array([1.0, 0.6, 0.2]) + 0.03 * rng.standard_normal((32, 64, 3))
+    patch = np.clip(waves, 0, 1)
+    noise = matched(patch, rng)
+    assert noise.shape == patch.shape and noise.min() >= 0 and noise.max() <= 1
+    np.testing.assert_allclose(noise.mean(axis=(0, 1)), patch.mean(axis=(0, 1)), atol=0.02)
+    np.testing.assert_allclose(noise.std(axis=(0, 1)), patch.std(axis=(0, 1)), rtol=0.15)
+
+    def roughness(image: Any) -> float:
+        return float(np.abs(np.diff(image, axis=1)).mean())
+
+    assert roughness(noise) == pytest.approx(roughness(patch), rel=0.35)
+    assert abs(np.corrcoef(noise[..., 0].ravel(), patch[..., 0].ravel())[0, 1]) < 0.9
+    save_file({"patch_0": patch.astype(np.float32)}, tmp_path / "patch.safetensors")
+    contract = AttackContract()
+    (made,) = control.build(ControlConfig(kind="matched", like=str(tmp_path))).optimise(
+        contract.model(), contract.dataset(), TinyCompositor(contract.dataset()), budget=Budget(steps=1), rng=rng
+    )
+    assert made.rgb.shape == (32, 64, 3)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: EotConfig(share=0.0),
+        lambda: EotConfig(least_scale=2.0),
+        lambda: NesConfig(pairs=0),
+        lambda: NesConfig(spread=0.0),
+        lambda: SquareConfig(area=0.0),
+        lambda: Rp2Config(base=2.0),
+        lambda: Rp2Config(target="rode"),
+        lambda: ThysConfig(batch=0),
+        lambda: ControlConfig(kind="matched"),
+        lambda: ControlConfig(rgb=(0.0, 0.0, 2.0)),
+    ],
+)
+def test_bad_options_are_refused(make: Any) -> None:
+    with pytest.raises(FieldError, match="must"):
+        make()
