@@ -13,7 +13,7 @@ from safetensors.numpy import save_file
 
 from gear.attacking.objectives import default_objective
 from gear.attacking.upright import Upright
-from gear.contracts.attacks import Budget
+from gear.contracts.attacks import Budget, Patch
 from gear.formats import rle
 from gear.plugins.attacks.control import ControlConfig, control, matched
 from gear.plugins.attacks.eot import EotConfig, eot
