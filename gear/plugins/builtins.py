@@ -18,6 +18,7 @@ BUILTINS: tuple[str, ...] = (
     "gear.plugins.models.fasterrcnn_r50_fpn",
     "gear.plugins.models.retinanet_r50_fpn",
     "gear.plugins.models.retinanet_r18_fpn",
+    "gear.plugins.models.huggingface",
     "gear.plugins.defenses.lgs",
     "gear.plugins.defenses.jpeg",
     "gear.plugins.defenses.median",

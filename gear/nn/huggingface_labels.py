@@ -1,0 +1,37 @@
+"""Names of classes as others write them, brought to the names that Cityscapes and COCO have."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+SYNONYMS = {
+    "aeroplane": "airplane", "auto": "car", "automobile": "car", "bike": "bicycle",
+    "diningtable": "dining table", "grass": "terrain", "hair dryer": "hair drier", "minibike": "motorcycle",
+    "motorbike": "motorcycle", "pavement": "sidewalk", "pedestrian": "person", "plant": "vegetation",
+    "pottedplant": "potted plant", "route": "road", "signboard": "traffic sign", "sofa": "couch", "tree": "vegetation",
+    "tvmonitor": "tv", "van": "car",
+}  # fmt: skip
+"""Of Pascal VOC, ADE20K and their kin. Used where the name itself is unknown."""
+
+
+def match(names: Mapping[int, str], known: Mapping[str, int]) -> tuple[dict[int, int], tuple[str, ...]]:
+    """Which of a network's classes are which of ours.
+
+    A name may list several, divided by commas or semicolons, as ADE20K's do; the first that is known counts.
+
+    Args:
+        names: of the network's classes, by number.
+        known: our numbers by name, in lower case.
+
+    Returns:
+        Our numbers by the network's, and the names that have none, in the network's order.
+    """
+    found = {}
+    for index, name in names.items():
+        words = [word.strip().casefold().replace("_", " ") for word in re.split("[,;]", name)]
+        numbers = [known[word] for word in words if word in known]
+        numbers += [known[SYNONYMS[word]] for word in words if SYNONYMS.get(word) in known]
+        if numbers:
+            found[index] = numbers[0]
+    return found, tuple(name for index, name in names.items() if index not in found)
