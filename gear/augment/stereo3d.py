@@ -10,11 +10,14 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 
-from gear.augment.geometry import Geometry, Window, cut_picture, flip_array
+from gear.augment.geometry import Geometry, Window, cut_box, cut_picture, flip_array
 from gear.formats.kitti_object import Calibration, clip_box, truncation
 from gear.groundtruth.boxes import Box3d, project_box
 from gear.plugins.tasks.stereo3d import LEFT, RIGHT, Object3d, Stereo3dSample
 from gear.values.geometry import Intrinsics, wrap_angle_rad
+from gear.values.truth import BoxPx
+
+EVERYWHERE: BoxPx = (-math.inf, -math.inf, math.inf, math.inf)
 
 
 def flip(sample: Stereo3dSample) -> Stereo3dSample:
@@ -51,17 +54,29 @@ def cut(sample: Stereo3dSample, window: Window) -> Stereo3dSample:
         images={name: cut_picture(picture, window) for name, picture in sample.images.items()},
         surfaces=(),
         calibration=Calibration(intrinsics=intrinsics, baseline_m=sample.calibration.baseline_m),
-        objects=tuple(_projected(boxes, intrinsics)),
+        objects=tuple(_projected(boxes, intrinsics, _shown(window, width, height))),
     )
 
 
-def _projected(boxes: list[tuple[Object3d, Box3d]], intrinsics: Intrinsics) -> Iterator[Object3d]:
+def _shown(window: Window, width: int, height: int) -> BoxPx:
+    """Where the picture lies in the window, in index pixels; the rest of the window is padding."""
+    left, top, right, bottom = cut_box((0.0, 0.0, float(width), float(height)), window)
+    return (left, top, right - 1, bottom - 1)
+
+
+def _projected(
+    boxes: list[tuple[Object3d, Box3d]], intrinsics: Intrinsics, shown: BoxPx = EVERYWHERE
+) -> Iterator[Object3d]:
     """The objects at their new places; those that fall outside the picture are left out."""
     for thing, box in boxes:
         whole = project_box(box.corners_m, intrinsics)
-        clipped = None if whole is None else clip_box(whole, intrinsics)
+        clipped = None if whole is None else clip_box(_common(whole, shown), intrinsics)
         if whole is not None and clipped is not None:
             yield replace(thing, box=box, box_px=clipped, truncated=truncation(whole, clipped))
+
+
+def _common(one: BoxPx, two: BoxPx) -> BoxPx:
+    return (max(one[0], two[0]), max(one[1], two[1]), min(one[2], two[2]), min(one[3], two[3]))
 
 
 GEOMETRY: Geometry[Stereo3dSample] = Geometry(flip=flip, cut=cut, is_centred=True)

@@ -150,6 +150,15 @@ def test_a_window_of_a_pair_keeps_metres_and_has_its_own_calibration() -> None:
         moved(sample, window(40, 24, 96, 48))
 
 
+def test_boxes_of_a_pair_end_where_its_picture_ends() -> None:
+    sample = sample_of("stereo3d")
+    result = moved(sample, window(-32, -16, 256, 128))
+    assert len(result.objects) == len(sample.objects)
+    for one, two in zip(sample.objects, result.objects, strict=True):
+        assert np.allclose(np.add(one.box_px, (32, 16, 32, 16)), two.box_px)
+        assert two.truncated == pytest.approx(one.truncated)
+
+
 @pytest.mark.parametrize("scale", [0.5, 0.9, 1.0, 1.7])
 @pytest.mark.parametrize("centred", [False, True])
 def test_windows_are_drawn_inside_or_around(scale: float, centred: bool) -> None:
