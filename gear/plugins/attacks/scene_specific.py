@@ -18,11 +18,13 @@ from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec
 from gear.formats.cityscapes import LABELS
-from gear.values.errors import FieldError
+from gear.formats.coco import CATEGORY_NAMES
+from gear.values.errors import FieldError, GearError
 
 if TYPE_CHECKING:
     from gear.attacking.objectives import Objective
 
+CATEGORY_IDS = {name: number for number, name in CATEGORY_NAMES.items()}
 LABEL_IDS: Mapping[str, int] = {label.name: label.id for label in LABELS if label.is_evaluated}
 
 
@@ -42,6 +44,8 @@ class SceneSpecificConfig:
         attacked, target: semantic segmentation: Cityscapes classes; pixels of `attacked` (all where empty) are pushed
             to `target`; untargeted where `target` is empty.
         direction: depth: push it anywhere, farther or nearer.
+        goal: 2D detection: any harm, or make everything vanish, or make an object appear on the patch.
+        appears: COCO category of what appears.
         losses: detectors and stereo networks: sign of a loss by name, `+` and `-` to make it large or small, e.g.
             `bbox_regression=-`; names that are left out are made large.
         appearance: what is varied on the patch.
@@ -58,6 +62,8 @@ class SceneSpecificConfig:
     attacked: str = ""
     target: str = ""
     direction: Literal["any", "farther", "nearer"] = "any"
+    goal: Literal["harm", "vanish", "appear"] = "harm"
+    appears: str = "person"
     losses: dict[str, str] = field(default_factory=dict)
     appearance: Appearance = field(default_factory=Appearance)
 
@@ -69,6 +75,8 @@ class SceneSpecificConfig:
             value = getattr(self, name)
             if value and value not in LABEL_IDS:
                 raise FieldError(name, f"must be one of {', '.join(LABEL_IDS)}, got {value!r}")
+        if self.appears not in CATEGORY_IDS:
+            raise FieldError("appears", f"must be a COCO category such as person or car, got {self.appears!r}")
         if self.attacked and not self.target:
             raise FieldError("target", "must say what the attacked class is to become")
         for name, sign in self.losses.items():
@@ -120,7 +128,11 @@ class SceneSpecific:
         return climb(problem, unit_gradients(problem, objective), budget=budget, rng=rng, watch=watch)
 
     def objective(self, sample: Any) -> Objective:
-        """What is made large, by the task that the sample is of."""
+        """What is made large, by the task that the sample is of.
+
+        Raises:
+            GearError: the goal is one of 2D detection, and the sample is of another task.
+        """
         from gear.attacking.objectives import DepthObjective, LossObjective, SemsegObjective, kind_of
 
         config, kind = self._config, kind_of(sample)
@@ -132,7 +144,18 @@ class SceneSpecific:
             )
         if kind == "depth":
             return DepthObjective(gamma=0.8 if config.gamma < 0 else config.gamma, direction=config.direction)
+        if config.goal != "harm":
+            return self._detection_goal(sample)
         return LossObjective(signs={name: SIGNS[sign] for name, sign in config.losses.items()})
+
+    def _detection_goal(self, sample: Any) -> Objective:
+        from gear.plugins.attacks.detection_goals import DetectionGoal
+        from gear.plugins.tasks.detect2d import Detect2dSample
+
+        config = self._config
+        if config.goal == "harm" or not isinstance(sample, Detect2dSample):
+            raise GearError(f"goal={config.goal} is for 2D detection; these are other samples")
+        return DetectionGoal(goal=config.goal, category_id=CATEGORY_IDS[config.appears])
 
 
 scene_specific: AttackSpec[SceneSpecificConfig] = AttackSpec(

@@ -1,0 +1,74 @@
+"""Targeted harm to detectors: objects that vanish, and one that appears where the patch is.
+
+Both are what the detector would be trained to see in other labels, so its own losses are lowered with the labels
+rewritten (Lee and Kolter's and DPatch's way; Liu et al., 2019).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from torch import Tensor
+
+from gear.attacking.objectives import Term
+from gear.contracts.models import Model
+from gear.formats import rle
+from gear.plugins.tasks.detect2d import Detect2dSample, Object2d
+
+Goal = Literal["vanish", "appear"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DetectionGoal:
+    """An objective for `detect2d`.
+
+    Attributes:
+        goal: nothing is to be seen any more, or the patch is to be seen as an object.
+        category_id: COCO's, of what appears.
+    """
+
+    goal: Goal
+    category_id: int = 0
+
+    def terms(
+        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
+    ) -> Mapping[str, Term]:
+        """The losses against the rewritten labels, each to be made small."""
+        wanted = [self.rewritten(sample) for sample in samples]
+        return {name: Term(value=-loss) for name, loss in model.forward(views, wanted).items()}
+
+    def rewritten(self, sample: Detect2dSample) -> Detect2dSample:
+        """The sample as the detector is to see it: empty, or with one object a visible surface."""
+        objects = self._on_surfaces(sample) if self.goal == "appear" else ()
+        return dataclasses.replace(sample, objects=objects)
+
+    def _on_surfaces(self, sample: Detect2dSample) -> tuple[Object2d, ...]:
+        found = []
+        for number, surface in enumerate(sample.surfaces):
+            if not surface.visible_px:
+                continue
+            height, width = sample.images[surface.camera].shape[:2]
+            mask = rle.decode(surface.mask_rle, height, width)
+            rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+            box = (float(columns[0]), float(rows[0]), float(columns[-1] + 1), float(rows[-1] + 1))
+            found.append(
+                Object2d(
+                    object_id=-1 - number,
+                    label="",
+                    category_id=self.category_id,
+                    is_ignored=False,
+                    box_px=box,
+                    amodal_box_px=box,
+                    area_px=surface.visible_px,
+                    rle=surface.mask_rle,
+                    visible_fraction=1.0,
+                    occluded_fraction=0.0,
+                    truncated_fraction=0.0,
+                    distance_m=surface.distance_m,
+                )
+            )
+        return tuple(found)
