@@ -16,10 +16,9 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from gear.camera.response import encode_srgb
 from gear.contracts.rendering import Quality, RawView, RendererInfo, Stage
 from gear.render.culling import Mask, bounding_spheres, in_beam, in_frustum
-from gear.render.display import SHADOW_REACH_M, displayed_model
+from gear.render.display import SHADOW_REACH_M, displayed_colour, displayed_model
 from gear.render.faces import checked_faces
 from gear.render.glcontext import choose_backend, driver_and_device, open_context
 from gear.render.occlusion import openness, shade
@@ -181,7 +180,7 @@ class ClassicRenderer:
             if not casts[index]:
                 geom.category = mujoco.mjtCatBit.mjCAT_DECOR
             if index in stage.paint_rgb:
-                geom.rgba[:3] = encode_srgb(stage.paint_rgb[index])
+                geom.rgba[:3] = displayed_colour(stage.paint_rgb[index])
             elif index in stage.faces:
                 geom.rgba[:3] = 1.0
 

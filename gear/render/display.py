@@ -6,6 +6,7 @@ import copy
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 
 from gear.camera.response import encode_srgb
 
@@ -14,6 +15,13 @@ SHADOW_REACH_M = 50.0
 
 SHADOW_MAP_PX = 2048
 """Side of its shadow map: five centimetres a texel. Twice as many cost a tenth of a frame."""
+
+LIFT = 2.4
+"""How much the darkest colours are lifted: what a road camera's tone curve does to Filament's frames.
+
+Display values cannot be brightened by more light: white, such as that of a patch, would clip. Colours of the town are
+lifted instead; what a face shows is left as it is.
+"""
 
 _DEFAULT_RGBA = np.array([0.5, 0.5, 0.5, 1.0], np.float32)
 
@@ -31,16 +39,21 @@ def displayed_model(model: mujoco.MjModel) -> mujoco.MjModel:
     """A copy whose colours are display values.
 
     OpenGL would decode a texture that is marked sRGB, light it, and show the linear result as it is: far too dark. In
-    the copy such textures are not marked, and linear colours of geoms and materials are encoded. Lights of the
-    kind `image`, which OpenGL does not have, are off, and of the headlight only its ambient light remains.
+    the copy such textures are not marked, linear colours of geoms and materials are encoded, and both are lifted.
+    Lights of the kind `image`, which OpenGL does not have, are off, and of the headlight only its ambient light stays.
     """
     shown = copy.copy(model)
     shown.tex_colorspace[:] = mujoco.mjtColorSpace.mjCOLORSPACE_LINEAR
     if has_linear_colours(model):
-        shown.mat_rgba[:, :3] = encode_srgb(shown.mat_rgba[:, :3])
+        pictures = model.mat_texid[:, mujoco.mjtTextureRole.mjTEXROLE_RGB]
+        sky = np.flatnonzero(model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX)
+        _lift_textures(shown, np.union1d(pictures[pictures >= 0], sky))
+        bare = pictures < 0
+        shown.mat_rgba[~bare, :3] = encode_srgb(shown.mat_rgba[~bare, :3])
+        shown.mat_rgba[bare, :3] = displayed_colour(shown.mat_rgba[bare, :3])
         # A geom with a material and this very colour shows the material's, so it must keep it.
         own = (shown.geom_matid < 0) | (shown.geom_rgba != _DEFAULT_RGBA).any(axis=1)
-        shown.geom_rgba[own, :3] = encode_srgb(shown.geom_rgba[own, :3])
+        shown.geom_rgba[own, :3] = displayed_colour(shown.geom_rgba[own, :3])
         strength = np.maximum(shown.light_diffuse.max(axis=1, keepdims=True), 1e-6)
         shown.light_diffuse[:] = strength * encode_srgb(shown.light_diffuse / strength)
     shown.light_active[shown.light_type == mujoco.mjtLightType.mjLIGHT_IMAGE] = 0
@@ -49,3 +62,21 @@ def displayed_model(model: mujoco.MjModel) -> mujoco.MjModel:
     shown.vis.map.shadowclip = SHADOW_REACH_M / shown.stat.extent
     shown.vis.quality.shadowsize = min(int(shown.vis.quality.shadowsize), SHADOW_MAP_PX)
     return shown
+
+
+def displayed_colour(albedo: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Linear albedo 0..1 as classic is to show it in full light, elementwise."""
+    return _lifted(encode_srgb(albedo))
+
+
+def _lift_textures(model: mujoco.MjModel, textures: npt.NDArray[np.integer]) -> None:
+    table = np.floor(_lifted(np.arange(256) / 255) * 255 + 0.5).astype(np.uint8)
+    for texture in textures:
+        if model.tex_nchannel[texture] == 3:
+            begin = int(model.tex_adr[texture])
+            texels = model.tex_data[begin : begin + 3 * int(model.tex_width[texture]) * int(model.tex_height[texture])]
+            texels[:] = table[texels]
+
+
+def _lifted(value: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    return np.asarray(value * LIFT / (1 + (LIFT - 1) * value))

@@ -19,6 +19,7 @@ RADII_M = (0.2, 0.6)
 STRENGTH = 0.55
 _DIRECTIONS = 6
 _COARSE_WIDTH_PX = 700
+_BAND_ROWS = 64
 _MAX_REACH = 0.06
 """Samples are taken no farther away than this share of the picture's width."""
 
@@ -71,4 +72,9 @@ def _pair(
 
 def shade(linear_rgb: UInt16Image, share: npt.NDArray[np.float32]) -> UInt16Image:
     """(H, W, 3) uint16 light times (H, W) shares, rounded."""
-    return np.asarray(cv2.multiply(linear_rgb, cv2.merge([share, share, share]), dtype=cv2.CV_16U), dtype=np.uint16)
+    shaded = np.empty_like(linear_rgb)
+    # In bands, since the shares of a whole picture, once for each colour, take more memory than the picture.
+    for top in range(0, len(share), _BAND_ROWS):
+        band = slice(top, top + _BAND_ROWS)
+        cv2.multiply(linear_rgb[band], cv2.merge([share[band]] * 3), dst=shaded[band], dtype=cv2.CV_16U)
+    return shaded

@@ -8,6 +8,8 @@ import numpy.typing as npt
 
 from gear.values.frames import FloatImage, IdImage, UInt8Image, UInt16Image
 
+_BAND_ROWS = 64
+
 EDGE_DEPTH_STEP = 0.02
 """A pixel lies on an edge where the inverse depth of its neighbours bends by more than this share of its own."""
 
@@ -15,11 +17,13 @@ EDGE_DEPTH_STEP = 0.02
 def sum_2x2(samples: UInt8Image) -> UInt16Image:
     """(2H, 2W, 3) uint8 samples to (H, W, 3) uint16: the sum of each block of four."""
     height, width = samples.shape[0] // 2, samples.shape[1] // 2
-    rows = np.empty((height, 2 * width * 3), np.uint16)
-    pairs = samples.reshape(height, 2, 2 * width * 3)
-    np.add(pairs[:, 0], pairs[:, 1], out=rows, dtype=np.uint16)
-    columns = rows.reshape(height, width, 2, 3)
-    return np.asarray(columns[:, :, 0] + columns[:, :, 1])
+    sums = np.empty((height, width, 3), np.uint16)
+    # In bands: between the two sums lies a frame as large as the samples.
+    for top in range(0, height, _BAND_ROWS):
+        pairs = samples[2 * top : 2 * (top + _BAND_ROWS)].reshape(-1, 2, 2 * width * 3)
+        columns = np.add(pairs[:, 0], pairs[:, 1], dtype=np.uint16).reshape(-1, width, 2, 3)
+        np.add(columns[:, :, 0], columns[:, :, 1], out=sums[top : top + _BAND_ROWS])
+    return sums
 
 
 def four_times(samples: UInt8Image) -> UInt16Image:

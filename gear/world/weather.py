@@ -21,7 +21,7 @@ WET_LABELS = frozenset({"road", "road_marking", "sidewalk", "parking", "ground"}
 _WET_DARKENING = 0.45
 _WET_SMOOTHING = 0.7
 _CLASSIC_WHITE = 1.1
-_CLASSIC_SKY_SHARE = (0.4, 0.95)
+_CLASSIC_SKY_SHARE = (0.48, 0.95)
 _CLASSIC_TINT = 0.2
 
 
