@@ -6,7 +6,7 @@ every machine writes the same bytes. Lengths are metres, angles degrees, faces c
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -247,27 +247,59 @@ def smooth_normals(mesh: Mesh, crease_deg: float = 40.0) -> Mesh:
     return Mesh(mesh.vertices[chosen], inverse.reshape(-1, 3).astype(np.int64), mesh.uvs[chosen], normals[first])
 
 
-def write_obj(path: Path, mesh: Mesh) -> None:
-    """Writes an OBJ: positions to 1 mm, texture coordinates to 1e-4, normals to 1e-3; empty faces are left out."""
+def write_obj(path: Path, mesh: Mesh, *, is_patchwork: bool = False) -> None:
+    """Writes an OBJ: positions to 1 mm, texture coordinates to 1e-4, normals to 1e-3; empty faces are left out.
+
+    Args:
+        path: of the file.
+        mesh: what to write.
+        is_patchwork: whether it is many small pieces rather than a few skins. Each corner is then written before the
+            first face that uses it, and faces count backwards: pieces that are alike read alike, and pack smaller.
+    """
     if mesh.normals is None:
         mesh = smooth_normals(mesh)
     assert mesh.normals is not None
     columns = [(mesh.vertices, 1e3, "v", 3), (mesh.uvs, 1e4, "vt", 4), (mesh.normals, 1e3, "vn", 3)]
-    lines, index = [], []
     quantised = np.floor(mesh.vertices * 1e3 + 0.5 + _TIE_BREAK)
     corners = quantised[mesh.faces]
     area = np.abs(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])).sum(axis=1)
     faces = mesh.faces[area > 0]
     used = np.unique(faces)
+    texts, index = [], []
     for values, scale, tag, digits in columns:
         whole = np.floor(values * scale + 0.5 + _TIE_BREAK)
         kept, inverse = np.unique(whole[used], axis=0, return_inverse=True)
         full = np.zeros(len(values), dtype=np.int64)
         full[used] = inverse.reshape(-1) + 1
         index.append(full[faces])
-        lines += [tag + " " + " ".join(_number(n / scale, digits) for n in row) for row in kept]
-    lines += ["f " + " ".join("/".join(map(str, corner)) for corner in face) for face in np.stack(index, -1).tolist()]
+        texts.append([tag + " " + " ".join(_number(n / scale, digits) for n in row) for row in kept])
+    table = np.stack(index, -1).tolist()
+    if is_patchwork:
+        lines = list(_as_needed(texts, table))
+    else:
+        lines = [line for text in texts for line in text]
+        lines += ["f " + " ".join("/".join(map(str, corner)) for corner in face) for face in table]
     path.write_text("\n".join(lines) + "\n", encoding="ascii", newline="\n")
+
+
+def _as_needed(texts: list[list[str]], faces: list[list[list[int]]]) -> Iterator[str]:
+    """Lines of an OBJ, each entry before its first face, faces counting back from the newest entry.
+
+    Args:
+        texts: lines of positions, texture coordinates and normals.
+        faces: for each corner of each face the numbers, from 1, of its position, texture coordinates and normal.
+    """
+    places: list[dict[int, int]] = [{} for _ in texts]
+    for face in faces:
+        for corner in face:
+            for number, text, place in zip(corner, texts, places, strict=True):
+                if number not in place:
+                    place[number] = len(place)
+                    yield text[number - 1]
+        yield "f " + " ".join(
+            "/".join(str(place[number] - len(place)) for number, place in zip(corner, places, strict=True))
+            for corner in face
+        )
 
 
 def _number(value: float, digits: int) -> str:

@@ -8,7 +8,7 @@ Materials are named as in `authoring.materials.MATERIALS`; `authoring.materials.
     parts = building(style="brick_apartment", width_m=18, depth_m=12, floors=5, rng=rng, sides=("front", "right"))
     parts += place(tree("broad", 8.0, rng), x_m=4, y_m=-9)
     for part in merge(parts):
-        write_obj(folder / f"{part.label}_{part.material}.obj", part.mesh)
+        write_obj(folder / f"{part.label}_{part.material}.obj", part.mesh, is_patchwork=True)
 """
 
 from __future__ import annotations

@@ -159,12 +159,21 @@ def balcony(facade: Facade, u0: float, u1: float, v: float, depth_m: float, *, r
             facade.box("grey_glass", u, (v + 0.06, v + height - 0.05), (0.0, d0), skip="but")
         return
     facade.box("anthracite", (u0, u1), (v + 0.08, v + 0.11), (d0, d1), skip="lr")
-    bars = max(4, int((u1 - u0) / 0.13))
+    bars = max(4, int((u1 - u0) / 0.14))
     for u in np.linspace(u0 + 0.02, u1 - 0.02, bars):
-        facade.box("anthracite", (u - 0.009, u + 0.009), (v, v + height - 0.05), (d0 + 0.01, d0 + 0.028), skip="utb")
-    for d in np.linspace(0.1, d0 - 0.1, max(2, int(depth_m / 0.13))):
+        _bar(facade, u, d0 + 0.01, v, v + height - 0.05)
+    for d in np.linspace(0.1, d0 - 0.1, max(2, int(depth_m / 0.14))):
         for end in (u0 + 0.02, u1 - 0.02):
-            facade.box("anthracite", (end - 0.009, end + 0.009), (v, v + height - 0.05), (d, d + 0.018), skip="utb")
+            _bar(facade, end, d, v, v + height - 0.05)
+
+
+def _bar(facade: Facade, u: float, d: float, v0: float, v1: float) -> None:
+    """A square bar that shows the street an edge: two faces, where a flat front would need three."""
+    half = 0.0127
+    left, tip, right = ((u - half, d), (u, d + half), (u + half, d))
+    for (ua, da), (ub, db) in ((left, tip), (tip, right)):
+        corners = (facade.at(ua, v0, da), facade.at(ub, v0, db), facade.at(ub, v1, db), facade.at(ua, v1, da))
+        facade.surface("anthracite", corners)
 
 
 def _awning(facade: Facade, u0: float, u1: float, v: float, index: int) -> None:

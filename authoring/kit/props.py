@@ -81,7 +81,7 @@ def write_prop(name: str, folder: Path) -> None:
     meshes.mkdir(parents=True, exist_ok=True)
     classes = {part: f"{part.label}.{part.material}" for part in parts}
     for part in parts:
-        write_obj(meshes / f"{part.label}_{part.material}.obj", part.mesh)
+        write_obj(meshes / f"{part.label}_{part.material}.obj", part.mesh, is_patchwork=True)
     centre, half = _solid(parts)
     lines = [
         f'<mujoco model="{name}">',

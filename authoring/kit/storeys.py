@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -142,8 +143,9 @@ def _plain_side(facade: Facade, style: Style, floors: int, top_m: float, *, rng:
                 low = style.ground_m + (floor - 1) * style.floor_m + 0.9
                 openings.append(Opening(centre - 0.5, low, centre + 0.5, low + 1.4))
     facade.wall(style.wall, 0.0, 0.0, width, top_m, openings)
+    bare = replace(style.window, surround=None, lintel=None, shutters=None)
     for opening in openings:
-        window(facade, opening, style.window, rng=rng)
+        window(facade, opening, bare, rng=rng)
 
 
 def _ornament(

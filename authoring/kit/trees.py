@@ -165,7 +165,7 @@ def _crown(habit: Species, height_m: float, rng: np.random.Generator, *, lumps: 
 
 
 def _wood(sink: Sink, habit: Species, height_m: float, centres: Array, *, near: bool, rng: np.random.Generator) -> None:
-    segments = 9 if near else 4
+    segments = 8 if near else 4
     top = habit.centre * height_m + habit.crown[1] * height_m * 0.4
     levels = np.array([0.0, 0.04, 0.2, 0.5, 0.8, 1.0]) if near else np.array([0.0, 1.0])
     sway = rng.uniform(-1, 1, (len(levels), 2)) * habit.trunk * height_m * np.minimum(levels * 3, 1)[:, None]
@@ -181,7 +181,7 @@ def _wood(sink: Sink, habit: Species, height_m: float, centres: Array, *, near: 
         start = np.array([0.0, 0.0, min(start_z, top * 0.95)])
         middle = start * 0.5 + centre * 0.5 + (0, 0, -0.06 * height_m * 0.5)
         thick = habit.trunk * height_m * 0.42
-        _bark_tube(sink, np.stack([start, middle, centre]), np.array([thick, thick * 0.6, thick * 0.2]), 5)
+        _bark_tube(sink, np.stack([start, middle, centre]), np.array([thick, thick * 0.6, thick * 0.2]), 4)
 
 
 def _bark_tube(sink: Sink, path: Array, radii: Array, segments: int) -> None:

@@ -65,14 +65,16 @@ def _strips(name: str, rim: Array, reach_m: float) -> Iterator[Solid]:
     rim = np.asarray(LineString(rim).simplify(0.02).coords)
     steps = np.diff(rim, axis=0)
     lengths = np.linalg.norm(steps, axis=1)
+    is_ring = bool(np.allclose(rim[0], rim[-1]))
     for index in np.flatnonzero(lengths > 0.05):
         start, along = rim[index], steps[index] / lengths[index]
         inward = np.array([-along[1], along[0]])
         low, high = 0.0, float(lengths[index])
-        if index + 1 < len(steps) and (along[0] * steps[index + 1, 1] - along[1] * steps[index + 1, 0]) < 0:
-            high += min(STRIP_M * _half_turn(steps[index], steps[index + 1]) * 2, 2.5)
-        if index > 0 and (steps[index - 1, 0] * along[1] - steps[index - 1, 1] * along[0]) < 0:
-            low -= min(STRIP_M * _half_turn(steps[index - 1], steps[index]) * 2, 2.5)
+        before, after = steps[index - 1], steps[(index + 1) % len(steps)]
+        if (is_ring or index + 1 < len(steps)) and along[0] * after[1] - along[1] * after[0] < 0:
+            high += min(STRIP_M * _half_turn(steps[index], after) * 2, 2.5)
+        if (is_ring or index > 0) and before[0] * along[1] - before[1] * along[0] < 0:
+            low -= min(STRIP_M * _half_turn(before, steps[index]) * 2, 2.5)
         while high - low > 0.02:
             piece = min(high - low, 60.0)
             centre = start + along * (low + piece / 2) + inward * STRIP_M / 2

@@ -105,11 +105,11 @@ def _write(folder: Path, sink: Sink, props: Props, regions: Regions, lanes: dict
     shutil.rmtree(meshes, ignore_errors=True)
     meshes.mkdir(parents=True)
     for chunk in chunked(sink.parts(), cell_m=CELL_M):
-        write_obj(meshes / f"{chunk.name}.obj", chunk.mesh)
+        write_obj(meshes / f"{chunk.name}.obj", chunk.mesh, is_patchwork=True)
         document.meshes.append(chunk.name)
         document.geoms.append(Geom(mesh=chunk.name, material=chunk.material, label=chunk.label))
     for name, mesh in props.meshes.items():
-        write_obj(meshes / f"{name}.obj", mesh)
+        write_obj(meshes / f"{name}.obj", mesh, is_patchwork=True)
         document.meshes.append(name)
     document.geoms.extend(props.geoms)
     document.bodies.extend(props.bodies)

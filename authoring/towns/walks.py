@@ -55,13 +55,15 @@ def sidewalks(regions: Regions, bounds: tuple[float, float, float, float]) -> It
 
 
 def crosswalks(regions: Regions) -> Iterator[Walk]:
-    """Every zebra crossing from kerb to kerb."""
+    """Every zebra crossing from kerb to kerb, but for streets that lead out of the town, where nobody drives."""
     network = regions.network
     for street in network.streets.values():
+        if not street.end:
+            continue
         line = network.lines[street.name]
         half = street.profile.half_width_m - 0.3
-        for at_start in (True, False) if street.end else (True,):
-            node = network.nodes[street.start if at_start else street.end or ""]
+        for at_start in (True, False):
+            node = network.nodes[street.start if at_start else street.end]
             if node.control == "yield" and len(network.arms(node.name)) <= 3:
                 continue
             back = network.mouths[street.name, at_start] - STOP_LINE_GAP_M - CROSSING_M / 2

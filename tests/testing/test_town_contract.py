@@ -29,9 +29,10 @@ class TestTown10(TownContract):
     # tests/world/test_town10_scenes.py plans all of them, for the rigs of all tasks.
     planned_scenes: ClassVar = ("billboard01", "truck")
 
-    @pytest.mark.xfail(raises=AssertionError, reason="1.5 m of sidewalk.block8_0_0 have no collision geom below")
-    def test_people_can_walk(self) -> None:
-        super().test_people_can_walk()
+
+@pytest.mark.slow
+class TestHarbour(TownContract):
+    town = "harbour"
 
 
 @pytest.fixture
