@@ -20,7 +20,7 @@ from gear.values.errors import FieldError, GearError
 
 def sample() -> Detect2dSample:
     task = Detect2dTask(Detect2dConfig(width_px=384, height_px=192))
-    car = Thing(parts=(box_part("car", 4.0, 2.0, 1.5),), position_m=(9.0, -3.0, 0.0))
+    car = Thing(parts=(box_part("car", 4.0, 2.0, 1.5),), position_m=(9.0, -4.5, 0.0), object_id=2, role="npc")
     return task.ground_truth(*synthetic_frame(task.rig(), [board(11.0, 2.0), car]))
 
 
