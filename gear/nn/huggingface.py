@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -181,15 +182,18 @@ class FolderDetector(FolderNetwork):
             scores = self._scores(logits)
             edges = torch.cat([boxes[:, :2] - boxes[:, 2:] / 2, boxes[:, :2] + boxes[:, 2:] / 2], dim=1) * scale
             edges = edges.clamp(min=0).minimum(scale)
-            queries, classes = (scores >= self.options.least_score).nonzero(as_tuple=True)
+            surest, places = scores.flatten().topk(len(scores))  # as many as there are queries, whatever their class
             found = [
                 Detection(category_id=self._categories[index], box_px=(box[0], box[1], box[2], box[3]), score=score)
-                for index, box, score in zip(
-                    classes.tolist(), edges[queries].tolist(), scores[queries, classes].tolist(), strict=True
+                for score, index, box in zip(
+                    surest.tolist(),
+                    (places % scores.shape[1]).tolist(),
+                    edges[places // scores.shape[1]].tolist(),
+                    strict=True,
                 )
-                if index in self._categories
+                if index in self._categories and score >= self.options.least_score and score > 0
             ]
-            answers.append(tuple(sorted(found, key=lambda one: -one.score)))
+            answers.append(tuple(found))
         return answers
 
     def _scores(self, logits: Tensor) -> Tensor:
@@ -228,17 +232,32 @@ def open_folder(options: FolderOptions, auto: str) -> nn.Module:
 
     kind: Any = getattr(transformers, auto)
     try:
-        if options.weights == FOLDER:
-            graph: nn.Module = kind.from_pretrained(folder, local_files_only=True, use_safetensors=True)
-            return graph
-        with seeded(options.seed):
-            graph = kind.from_config(transformers.AutoConfig.from_pretrained(folder, local_files_only=True))
+        with _without_bars():
+            if options.weights == FOLDER:
+                graph: nn.Module = kind.from_pretrained(folder, local_files_only=True, use_safetensors=True)
+                return graph
+            with seeded(options.seed):
+                graph = kind.from_config(transformers.AutoConfig.from_pretrained(folder, local_files_only=True))
     except (OSError, ValueError) as error:
         wanted = auto.removeprefix("AutoModelFor")
         raise GearError(f"{folder}: no network for {wanted}: {str(error).splitlines()[0]}") from error
     if options.weights != NONE:
         load_into(graph, options.weights)
     return graph
+
+
+@contextlib.contextmanager
+def _without_bars() -> Iterator[None]:
+    """Inside, transformers draws no progress bars: reading a file takes no time that is worth one."""
+    from transformers.utils import logging as settings
+
+    was = settings.is_progress_bar_enabled()
+    settings.disable_progress_bar()
+    try:
+        yield
+    finally:
+        if was:
+            settings.enable_progress_bar()
 
 
 def resized(maps: Tensor, pictures: Tensor) -> Tensor:
