@@ -1,0 +1,131 @@
+"""What a run of `gap` found, as JSON and as a table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from gear.values.serial import Json, to_json
+from gear.verbs.gap.effect import CLEAN, RENDERED, Figures
+from gear.verbs.gap.figures import PictureGap
+
+UNMOVED = 1e-9
+"""Changes of a metric below this are none; no share of them is taken."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SampleGap:
+    """One picture that shows a patch.
+
+    Attributes:
+        index, view: which picture.
+        visible_px: pixels that show a patch.
+        distance_m: to the nearest surface that is seen.
+        incidence_deg: the largest slant of those.
+        gaps: by compositor.
+    """
+
+    index: int
+    view: str
+    visible_px: int
+    distance_m: float
+    incidence_deg: float
+    gaps: Mapping[str, PictureGap]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GapReport:
+    """Digital against rendered.
+
+    Attributes:
+        dataset, twin: roots.
+        split, patch, renderer, quality: of both.
+        samples: pictures that show a patch; others have no gap.
+        effect: the task's metric by `clean`, compositor and `rendered`; empty without a model.
+        model: whose effect it is.
+    """
+
+    dataset: str
+    twin: str
+    split: str
+    patch: str
+    renderer: str
+    quality: str
+    samples: tuple[SampleGap, ...]
+    effect: Mapping[str, Figures]
+    model: str | None
+
+    def median_db(self, compositor: str) -> float:
+        """Over all pictures; NaN where none shows a patch."""
+        values = [sample.gaps[compositor].psnr_db for sample in self.samples]
+        return float(np.median(values)) if values else math.nan
+
+    @property
+    def compositors(self) -> tuple[str, ...]:
+        """Their names."""
+        return tuple(self.samples[0].gaps) if self.samples else ()
+
+    def kept(self, compositor: str) -> dict[str, float]:
+        """Rendered change of each figure as a share of the digital one; figures that the patch does not move lack."""
+        if not self.effect:
+            return {}
+        clean, digital, rendered = self.effect[CLEAN], self.effect[compositor], self.effect[RENDERED]
+        return {
+            name: (rendered[name] - clean[name]) / (digital[name] - clean[name])
+            for name in clean
+            if name in digital and name in rendered and abs(digital[name] - clean[name]) > UNMOVED
+        }
+
+    def as_json(self) -> Json:
+        """Everything; figures that are not finite become null."""
+        content = to_json(self)
+        content["median_psnr_db"] = {name: self.median_db(name) for name in self.compositors}
+        content["rendered_share_of_digital_effect"] = {name: self.kept(name) for name in self.compositors}
+        return _finite(content)
+
+    def table(self) -> str:
+        """For a person."""
+        names = self.compositors
+        lines = [f"{self.dataset} {self.split}: {self.patch}, {self.renderer} {self.quality}; PSNR inside the patch"]
+        head = f"{'sample':>6} {'view':8}{'pixels':>8}{'m':>6}{'slant':>6}"
+        lines.append(head + "".join(f"{name + ' dB':>16}{'worst':>7}{'outside':>9}" for name in names))
+        for s in self.samples:
+            row = f"{s.index:6} {s.view:8}{s.visible_px:8}{s.distance_m:6.1f}{s.incidence_deg:6.0f}"
+            lines.append(row + "".join(_cells(s.gaps[name]) for name in names))
+        if names:
+            lines.append(f"{'median':34}" + "".join(f"{self.median_db(name):16.1f}{'':16}" for name in names))
+        else:
+            lines.append("no picture shows a patch")
+        return "\n".join(lines + self._effect_lines())
+
+    def _effect_lines(self) -> list[str]:
+        if not self.effect:
+            return []
+        columns = list(self.effect)
+        lines = ["", f"{self.model or '':28}" + "".join(f"{name:>14}" for name in columns) + "   rendered / digital"]
+        shares = {name: self.kept(name) for name in self.compositors}
+        for figure in self.effect[CLEAN]:
+            values = "".join(f"{self.effect[name].get(figure, math.nan):14.4f}" for name in columns)
+            share = "".join(f"  {name} {share[figure]:.2f}" for name, share in shares.items() if figure in share)
+            lines.append(f"{figure:28}{values}{share}")
+        return lines
+
+    def summary(self) -> str:
+        """One line for a person."""
+        found = ", ".join(f"{name} {self.median_db(name):.1f} dB" for name in self.compositors)
+        return f"{len(self.samples)} pictures with a patch: {found or 'none'}"
+
+
+def _cells(gap: PictureGap) -> str:
+    return f"{gap.psnr_db:16.1f}{gap.worst:7}{gap.outside_worst:9}"
+
+
+def _finite(value: Json) -> Json:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

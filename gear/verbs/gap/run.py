@@ -1,0 +1,171 @@
+"""`gear.gap`: how far digital patches are from the same patches rendered, and whether they do as much.
+
+Nothing here asks a patch to be adversarial: a gap is a fact about pictures. With a model, the task's metric is taken on
+the untouched pictures, on the composed ones and on the rendered ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gear.dataset.files import clear_scratch, inside, write_whole
+from gear.dataset.layout import patch_path
+from gear.dataset.reading import Dataset, Twins
+from gear.dataset.sidecar import dump_json
+from gear.opening import open_dataset
+from gear.values.errors import DatasetError
+from gear.values.frames import UInt8Image
+from gear.verbs.collect.patches import read_patch
+from gear.verbs.gap.effect import Effect
+from gear.verbs.gap.figures import PictureGap, picture_gap, visible_mask
+from gear.verbs.gap.report import GapReport, SampleGap
+from gear.verbs.gap.twin import checked_twin, collect_twin
+
+if TYPE_CHECKING:
+    from gear.compositor.pasting import Pasting
+
+Progress = Callable[[int, int], None]
+"""Called with (samples finished, samples)."""
+
+REPORT = "gap.json"
+TABLE = "gap.txt"
+
+
+def gap(
+    dataset: str | Path,
+    *,
+    patch: str | Path | None = None,
+    twin: str | Path | None = None,
+    split: str | None = None,
+    model: str | None = None,
+    settings: Iterable[str] = (),
+    compositors: Sequence[str] = ("transport", "homography"),
+    samples: int | None = None,
+    out: str | Path | None = None,
+    progress: Progress | None = None,
+) -> GapReport:
+    """Holds digital patches against rendered ones.
+
+    Args:
+        dataset: root of a split that was collected with probes.
+        patch: what to show, as for `gear.collect`; its twin is collected into `out/twin`, or taken up again.
+        twin: root of a twin that is there already; instead of `patch`.
+        split: of the dataset; may be left out where there is only one.
+        model: a model plugin for the task's metric; none for pictures alone.
+        settings: `KEY=VALUE` texts for the model's options.
+        compositors: names of compositors.
+        samples: so many of the split's first samples; all unless given.
+        out: folder for `gap.json` and `gap.txt`; needed with `patch`.
+        progress: told after every sample.
+
+    Raises:
+        GearError: anything that the user can put right; its text is one line.
+    """
+    from gear.compositor.opening import open_compositor
+
+    clean = open_dataset(dataset, split)
+    if (patch is None) == (twin is None):
+        raise DatasetError(clean.root, "say one of: --twin DIR, a rendered twin; or --patch PATCH, to render one")
+    if patch is not None:
+        if out is None:
+            raise DatasetError(clean.root, "a twin has to be rendered: say where to with --out DIR")
+        collect_twin(clean, patch, Path(out) / "twin")
+        twin = Path(out) / "twin"
+    assert twin is not None
+    pairs = checked_twin(clean, open_dataset(twin, clean.plan.info.split))
+    count = min(len(pairs), samples or len(pairs))
+    images = shown_patches(pairs.second, len(clean.sidecar(0).record.surfaces))
+    engines = {name: open_compositor(name, clean, rounding=True) for name in compositors}
+    effect = None if model is None else Effect.of(model, settings, clean, tuple(compositors))
+    found: list[SampleGap] = []
+    if progress is not None:
+        progress(0, count)
+    for index in range(count):
+        found += sample_gaps(pairs, engines, images, index, effect)
+        if progress is not None:
+            progress(index + 1, count)
+    report = GapReport(
+        dataset=str(clean.root),
+        twin=str(pairs.second.root),
+        split=clean.plan.info.split,
+        patch=pairs.second.plan.patch["label"],
+        renderer=str(clean.manifest["renderer"]["name"]),
+        quality=str(clean.plan.content["quality"]),
+        samples=tuple(found),
+        effect={} if effect is None else effect.result(),
+        model=model,
+    )
+    if out is not None:
+        root = Path(out)
+        root.mkdir(parents=True, exist_ok=True)
+        write_whole(root, REPORT, dump_json(report.as_json()))
+        write_whole(root, TABLE, (report.table() + "\n").encode())
+        clear_scratch(root)
+    return report
+
+
+def sample_gaps(
+    pairs: Twins[Any],
+    engines: Mapping[str, Pasting],
+    images: Sequence[UInt8Image],
+    index: int,
+    effect: Effect | None,
+) -> list[SampleGap]:
+    """The figures of each view of one sample that shows a patch."""
+    clean, rendered = pairs[index]
+    composed: dict[str, dict[str, UInt8Image]] = {name: dict(clean.images) for name in engines}
+    found = []
+    for view, picture in rendered.images.items():
+        mask = visible_mask(rendered.surfaces, view, *picture.shape[:2])
+        if not mask.any():
+            continue
+        gaps: dict[str, PictureGap] = {}
+        for name, engine in engines.items():
+            composed[name][view] = composed_picture(engine, images, index, view)
+            gaps[name] = picture_gap(composed[name][view], picture, mask)
+        seen = [s for s in rendered.surfaces if s.camera == view and s.visible_px]
+        found.append(
+            SampleGap(
+                index=index,
+                view=view,
+                visible_px=int(mask.sum()),
+                distance_m=min(s.distance_m for s in seen),
+                incidence_deg=max(s.incidence_deg for s in seen),
+                gaps=gaps,
+            )
+        )
+    if effect is not None:
+        shown = {name: replace(clean, images=pictures) for name, pictures in composed.items()}
+        effect.update(clean, {**shown, "rendered": rendered})
+    return found
+
+
+def composed_picture(engine: Pasting, images: Sequence[UInt8Image], index: int, view: str) -> UInt8Image:
+    """(H, W, 3) uint8 of one sample with patches, through a compositor that rounds."""
+    import torch
+
+    patches = [torch.from_numpy(image.copy()).permute(2, 0, 1).float() / 255 for image in images]
+    with torch.no_grad():
+        values = engine.compose(patches, [index], view)[0].permute(1, 2, 0).cpu().numpy()
+    return np.asarray(np.rint(values * 255), dtype=np.uint8)
+
+
+def shown_patches(twin: Dataset[Any], surfaces: int) -> list[UInt8Image]:
+    """The patches that a twin shows, from the copy that it keeps.
+
+    Raises:
+        DatasetError: it shows none, or fewer than there are surfaces.
+    """
+    label = twin.plan.patch["label"]
+    paths = [inside(twin.root, patch_path(label, f"patch_{i}.png")) for i in range(surfaces)]
+    there = [path for path in paths if path.is_file()]
+    if len(there) < surfaces:
+        raise DatasetError(
+            twin.root, f"shows {len(there)} patches on {surfaces} surfaces; collect the twin with one for each"
+        )
+    return [read_patch(path) for path in there]

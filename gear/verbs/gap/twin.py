@@ -1,0 +1,56 @@
+"""The rendered twin of a split: found, or collected from what its manifest says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from gear.config.collection import CollectionConfig
+from gear.config.nodes import parse_text
+from gear.config.reader import read_node
+from gear.dataset.reading import Dataset, Twins, pair_twins
+from gear.values.errors import ConfigError, DatasetError, UnknownNameError
+from gear.verbs.collect.job import resolve
+from gear.verbs.collect.run import run_job
+
+
+def checked_twin(clean: Dataset[Any], twin: Dataset[Any]) -> Twins[Any]:
+    """Both as pairs.
+
+    Raises:
+        DatasetError: they are no twins, or the first one shows a patch itself.
+    """
+    pairs = pair_twins(clean, twin)
+    if clean.plan.auxiliary == () and twin.plan.auxiliary:
+        raise DatasetError(clean.root, f"has no probes, its twin {twin.root} has; name them the other way around")
+    return pairs
+
+
+def collect_twin(clean: Dataset[Any], patch: str | Path, root: Path) -> None:
+    """Collects a split's twin with a patch, or completes it.
+
+    Raises:
+        PatchError: the patch cannot be used.
+        DatasetError: the manifest does not say enough to make the same scenes again: a town or a scene library was
+            given by path, or versions differ.
+    """
+    content = clean.plan.content
+    config: dict[str, Any] = {
+        **clean.manifest["config"],
+        "town": content["town"],
+        "samples": clean.plan.samples // content["frames"],
+        "patch": str(patch),
+        "root": str(root),
+        "probes": False,
+    }
+    remedy = f"collect the twin yourself, as the dataset was but with --patch {patch}, and name it with --twin DIR"
+    try:
+        node = parse_text(yaml.safe_dump(config, sort_keys=False), f"{clean.root} manifest")
+        job = resolve(read_node(CollectionConfig, node))
+    except (UnknownNameError, ConfigError) as error:
+        raise DatasetError(clean.root, f"cannot be collected again ({error}); {remedy}") from error
+    if job.plan.twin_key != clean.plan.twin_key:
+        raise DatasetError(clean.root, f"this gear would not make the same scenes again; {remedy}")
+    run_job(job)

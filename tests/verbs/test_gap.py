@@ -1,0 +1,111 @@
+"""`gear gap`: the figures, the report, the effect on a model, and what bad input gets."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import gear
+from gear.cli.main import main
+from gear.testing.tiny_networks import tiny_segmenter
+from gear.values.errors import DatasetError, GearError
+from gear.verbs.collect.run import CollectReport
+from gear.verbs.gap import effect
+from gear.verbs.gap.figures import PERFECT_DB, picture_gap
+
+Collect = Callable[..., CollectReport]
+
+
+@pytest.fixture
+def pair(tmp_path: Path, collect_small: Collect) -> tuple[Path, Path]:
+    """A split with probes and its twin."""
+    collect_small("semseg", tmp_path / "clean", probes=True)
+    collect_small("semseg", tmp_path / "twin", patch="random")
+    return tmp_path / "clean", tmp_path / "twin"
+
+
+def test_figures_tell_inside_from_outside() -> None:
+    rng = np.random.default_rng(1)
+    rendered = rng.integers(0, 200, (8, 10, 3), dtype=np.uint8)
+    mask = np.zeros((8, 10), bool)
+    mask[2:5, 3:7] = True
+    assert picture_gap(rendered, rendered, mask).psnr_db == PERFECT_DB
+    digital = rendered.copy()
+    digital[mask] += 10
+    digital[0, 0, 1] += 4
+    gap = picture_gap(digital, rendered, mask)
+    assert gap.psnr_db == pytest.approx(20 * np.log10(255 / 10))
+    assert (gap.worst, gap.outside_worst, gap.outside_px) == (10, 4, 1)
+    assert gap.outside_rms == pytest.approx(np.sqrt(16 / (68 * 3)))
+
+
+def test_a_gap_is_reported_and_written(pair: tuple[Path, Path], tmp_path: Path) -> None:
+    clean, twin = pair
+    seen: list[tuple[int, int]] = []
+    report = gear.gap(clean, twin=twin, out=tmp_path / "gap", progress=lambda *done: seen.append(done))
+    assert seen == [(0, 2), (1, 2), (2, 2)]
+    assert report.median_db("transport") > 40 > report.median_db("homography") + 6
+    written = json.loads((tmp_path / "gap/gap.json").read_text())
+    assert written["median_psnr_db"]["transport"] == report.median_db("transport")
+    assert len(written["samples"]) == len(report.samples) == 2
+    assert "transport dB" in (tmp_path / "gap/gap.txt").read_text()
+    assert report.effect == {}
+
+
+def test_a_models_figures_are_taken_digitally_and_rendered(
+    pair: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    owner = SimpleNamespace(package="mujoco-gear", version="0")
+    monkeypatch.setattr(effect, "find", lambda kind, name: SimpleNamespace(spec=tiny_segmenter, owner=owner))
+    clean, twin = pair
+    report = gear.gap(clean, twin=twin, model="tiny", compositors=("transport",), samples=1)
+    assert set(report.effect) == {"clean", "transport", "rendered"}
+    assert report.effect["clean"].keys() == report.effect["rendered"].keys()
+    figures: Any = report.as_json()["rendered_share_of_digital_effect"]["transport"]
+    assert all(value is None or isinstance(value, float) for value in figures.values())
+    assert "rendered / digital" in report.table()
+
+
+def test_the_command_prints_a_table_or_json(pair: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+    clean, twin = pair
+    assert main(["gap", str(clean), "--twin", str(twin), "--compositor", "transport"]) == 0
+    assert "median" in capsys.readouterr().out
+    assert main(["gap", str(clean), "--twin", str(twin), "--json", "--samples", "1"]) == 0
+    assert json.loads(capsys.readouterr().out)["median_psnr_db"]["transport"] > 40
+
+
+def test_what_cannot_be_compared_is_refused(pair: tuple[Path, Path], tmp_path: Path, collect_small: Collect) -> None:
+    clean, twin = pair
+    with pytest.raises(DatasetError, match="say one of: --twin DIR"):
+        gear.gap(clean)
+    with pytest.raises(DatasetError, match="say where to with --out"):
+        gear.gap(clean, patch="random")
+    with pytest.raises(DatasetError, match="shows 0 patches"):
+        gear.gap(clean, twin=clean)
+    with pytest.raises(DatasetError, match="the other way around"):
+        gear.gap(twin, twin=clean)
+    with pytest.raises(DatasetError, match="collect the twin yourself"):
+        gear.gap(clean, patch="random", out=tmp_path / "gap")
+    collect_small("semseg", tmp_path / "other", patch="random", seed=9)
+    with pytest.raises(DatasetError, match="is no twin"):
+        gear.gap(clean, twin=tmp_path / "other")
+    with pytest.raises(GearError, match="this is a semseg dataset"):
+        gear.gap(clean, twin=twin, model="glpdepth")
+
+
+@pytest.mark.slow
+def test_the_twin_of_a_shipped_town_is_rendered_on_demand(tmp_path: Path) -> None:
+    settings = ["options.width_px=256", "options.height_px=128"]
+    gear.collect(
+        "semseg", split="train", samples=1, renderer="classic", quality="fast", probes=True, settings=settings,
+        out=tmp_path / "clean",
+    )  # fmt: skip
+    report = gear.gap(tmp_path / "clean", patch="random", out=tmp_path / "gap")
+    assert report.patch == "random" and (tmp_path / "gap/twin/gear/train/manifest.json").is_file()
+    assert report.median_db("transport") > 40
