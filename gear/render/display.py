@@ -46,8 +46,7 @@ def displayed_model(model: mujoco.MjModel) -> mujoco.MjModel:
     shown.tex_colorspace[:] = mujoco.mjtColorSpace.mjCOLORSPACE_LINEAR
     if has_linear_colours(model):
         pictures = model.mat_texid[:, mujoco.mjtTextureRole.mjTEXROLE_RGB]
-        sky = np.flatnonzero(model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX)
-        _lift_textures(shown, np.union1d(pictures[pictures >= 0], sky))
+        _lift_textures(shown, np.unique(pictures[pictures >= 0]))
         bare = pictures < 0
         shown.mat_rgba[~bare, :3] = encode_srgb(shown.mat_rgba[~bare, :3])
         shown.mat_rgba[bare, :3] = displayed_colour(shown.mat_rgba[bare, :3])
