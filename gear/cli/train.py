@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 EXAMPLE = """examples:
   gear train --task semseg --model ddrnet23_slim --data data/training/semseg --time-budget 10m --out runs/semseg
   gear train --task depth --model glpdepth --data data/a data/b:finetuning --val data/c:val --epochs 25 --out runs/depth
-  gear train --task detect2d --model retinanet_r18 --data data/det --init imagenet --precision bfloat16 --out runs/det
+  gear train --task detect2d --model retinanet_lite0_fpn --data data/det --init imagenet --out runs/det
   gear train --task semseg --model ddrnet23_slim --data data/ss --set augmentation.flip=0 --set crop_px='[512, 512]' \\
       --out runs/ss
 

@@ -235,6 +235,11 @@ def _samples(
     training = all_of(open_all(data, task, names=TRAINING, allow_tests=allow_tests))
     if val:
         held_out = all_of(open_all(val, task, names=VALIDATION, allow_tests=allow_tests))
+        shared = {one.plan.content_key for one in training.datasets} & {
+            one.plan.content_key for one in held_out.datasets
+        }
+        if shared:
+            raise GearError("--data and --val hold the same samples; give --val another split, or leave it out")
     else:
         training, held_out = keep_some(training, config.validation_share, config.seed)
     return training, spread(held_out, config.validation_samples)

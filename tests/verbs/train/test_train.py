@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -184,6 +184,8 @@ def test_what_cannot_be_trained_is_said_in_a_line(street: Street, tmp_path: Path
         quick(street, out, init="imagenet")
     with pytest.raises(GearError, match="no such file"):
         quick(street, out, init="nothing.safetensors")
+    with pytest.raises(GearError, match="hold the same samples"):
+        quick(street, out, val=street("semseg"))
     with pytest.raises(GearError, match="too few to keep some"):
         train("semseg", "tiny_segmenter", street("semseg", "train", 1), out=out)
     install(replace(tiny_segmenter, recipe=None))
@@ -204,6 +206,37 @@ def test_it_begins_with_what_it_is_told(street: Street, tmp_path: Path, install:
     report = quick(street, tmp_path / "third", epochs=1, lr=1e-9, init="nothing")
     with safe_open(str(report.weights), framework="pt") as opened:
         assert float(opened.get_tensor("stem.weight").abs().max()) < 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScaledConfig(TinyConfig):
+    """Runs at a share of its pictures' size."""
+
+    input_scale: float | None = None
+
+
+def test_weights_say_at_which_share_of_the_tasks_own_pictures_they_work(
+    street: Street, tmp_path: Path, install: Any
+) -> None:
+    seen: list[float | None] = []
+
+    def build(config: ScaledConfig) -> TinySegmenter:
+        seen.append(config.input_scale)
+        return TinySegmenter(config)
+
+    install(replace(tiny_segmenter, config=ScaledConfig, build=build))
+
+    def options(out: str, **changes: Any) -> dict[str, Any]:
+        report = quick(street, tmp_path / out, epochs=1, **changes)
+        with safe_open(str(report.weights), framework="pt") as opened:
+            found: dict[str, Any] = json.loads(opened.metadata()["options"])
+        return found
+
+    assert options("a") == {"input_scale": 128 / 2048} and set(seen) == {1.0}
+    assert options("b", settings=["options.input_scale=0.5", "options.width=4"]) == {
+        "input_scale": 0.5 * 128 / 2048,
+        "width": 4,
+    }
 
 
 class Overflowing(TinySegmenter):
