@@ -91,10 +91,15 @@ class FolderSegmenter(FolderNetwork):
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """At the picture's size."""
-        theirs = self.graph(pixel_values=self.seen(pictures)).logits.float()
+        theirs = self.their_logits(self.seen(pictures)).float()
         nothing = torch.full_like(theirs[:, 0], UNKNOWN_LOGIT)
         ours = [theirs[:, indexes].logsumexp(1) if indexes else nothing for indexes in self._indexes]
         return {LOGITS: resized(torch.stack(ours, dim=1), pictures[VIEW])}
+
+    def their_logits(self, seen: Tensor) -> Tensor:
+        """(B, classes, h, w) over the network's own classes, for pictures as it wants them."""
+        logits: Tensor = self.graph(pixel_values=seen).logits
+        return logits
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
         """Cross-entropy over the pixels whose class the network knows."""

@@ -51,7 +51,7 @@ def test_all_are_found_and_the_broken_ones_are_named(home: Path) -> None:
         ("defense", "jpeg_tv", "gear-defense-jpeg-tv"),
         ("defense", "jedi", "gear-defense-jedi"),
         ("task", "panoptic", "gear-task-panoptic"),
-        ("model", "transformers_semseg", "gear-model-transformers"),
+        ("model", "transformers_universal", "gear-model-transformers"),
         ("attack", "art", "gear-attack-art"),
         ("task", "semseg", "mujoco-gear"),
     } <= names

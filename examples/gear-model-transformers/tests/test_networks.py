@@ -1,94 +1,76 @@
-"""Every promise of a model, for tiny networks with random weights in temporary folders."""
+"""Every promise of a model, for a tiny network with random weights in a temporary folder."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 import torch
-import transformers
 from gear.contracts.models import Model
+from gear.nn.huggingface_options import FolderOptions
+from gear.nn.vision import prepare
 from gear.testing.model_contract import ModelContract
 from gear.values.errors import GearError
 
-from gear_model_transformers import FolderConfig, depth, detect2d, semseg
+from gear_model_transformers import universal
 
-CITY = {0: "road", 1: "sidewalk", 2: "car", 3: "sky"}
-COCO = {0: "person", 1: "car", 2: "banana"}
-SIZES: dict[str, Any] = {
-    "num_encoder_blocks": 4,
-    "depths": [1, 1, 1, 1],
-    "hidden_sizes": [8, 8, 16, 16],
-    "num_attention_heads": [1, 1, 2, 2],
-    "decoder_hidden_size": 16,
-}
+prepare()  # before transformers: torchvision may not fit this torch
+
+import transformers  # noqa: E402
+
+CITY = {0: "road", 1: "sidewalk", 2: "car", 3: "sky", 4: "banana"}
 
 
-def tiny(kind: str) -> Any:
+def mask2former() -> Any:
+    backbone = transformers.SwinConfig(
+        image_size=64, embed_dim=8, depths=[1, 1, 1, 1], num_heads=[1, 1, 1, 1], window_size=4,
+        out_features=["stage1", "stage2", "stage3", "stage4"],
+    )  # fmt: skip
+    config = transformers.Mask2FormerConfig(
+        backbone_config=backbone, feature_size=32, mask_feature_size=32, hidden_dim=32, encoder_feedforward_dim=16,
+        encoder_layers=1, decoder_layers=2, num_attention_heads=2, dim_feedforward=16, num_queries=6, id2label=CITY,
+    )  # fmt: skip
     torch.manual_seed(3)
-    if kind == "semseg":
-        return transformers.SegformerForSemanticSegmentation(transformers.SegformerConfig(id2label=CITY, **SIZES))
-    if kind == "depth":
-        return transformers.GLPNForDepthEstimation(transformers.GLPNConfig(**SIZES))
-    config = transformers.YolosConfig(
-        hidden_size=16,
-        num_hidden_layers=1,
-        num_attention_heads=2,
-        intermediate_size=16,
-        image_size=[64, 128],
-        num_detection_tokens=5,
-        use_mid_position_embeddings=False,
-        id2label=COCO,
-    )
-    return transformers.YolosForObjectDetection(config)
+    return transformers.Mask2FormerForUniversalSegmentation(config)
 
 
-class FolderContract(ModelContract):
-    kind = "semseg"
-    folder: Path
+class TestMask2Former(ModelContract):
+    spec = universal
+    tolerance = 1e-3
+    folder: ClassVar[Path]
 
     @pytest.fixture(autouse=True)
-    def saved(self, tmp_path: Path) -> Iterator[None]:
+    def saved(self, tmp_path: Path) -> None:
         type(self).folder = tmp_path
-        tiny(self.kind).save_pretrained(tmp_path)
-        yield
+        mask2former().save_pretrained(tmp_path)
 
     def make(self) -> Model:
-        return self.spec.build(FolderConfig(folder=str(self.folder), least_score=0.0))
+        return universal.build(FolderOptions(folder=str(self.folder), device="cpu"))
 
-
-class TestSegformer(FolderContract):
-    spec = semseg
-
-    def test_classes_go_by_name(self) -> None:
+    def test_pixels_go_to_the_class_that_the_processor_gives_them(self) -> None:
+        model: Any = self.make()
         sample = self.samples("semseg")[0]
-        assert set(self.make().predict(self.views(sample)).flat) <= {7, 8, 26, 23}
+        assert model.unmatched == ("banana",)
+        with torch.no_grad():
+            seen = model.seen(self.batch([sample]))
+            mine = model.their_logits(seen)
+            theirs = model.graph(pixel_values=seen)
+            processor = transformers.Mask2FormerImageProcessor()
+            small = mine.shape[2:]
+            (wanted,) = processor.post_process_semantic_segmentation(theirs, target_sizes=[(384, 384)])
+            large = torch.nn.functional.interpolate(mine.exp(), (384, 384), mode="bilinear", align_corners=False)
+        assert small[0] > 1 and (large[0].argmax(0) == wanted).float().mean() > 0.97
+        assert set(model.predict(self.views(sample)).flat) <= {7, 8, 26, 23}
 
 
-class TestGlpn(FolderContract):
-    spec = depth
-    kind = "depth"
-
-
-class TestYolos(FolderContract):
-    spec = detect2d
-    kind = "detect2d"
-    tolerance = 1e-3
-
-    def test_what_coco_does_not_call_by_that_name_is_kept_apart(self) -> None:
-        found = self.make().predict(self.views(self.samples("detect2d")[0]))
-        assert found and {one.category_id for one in found} <= {1, 3, 52}
-
-
-@pytest.mark.parametrize("folder", ["", "nowhere"])
-def test_a_missing_folder_gets_one_line(folder: str) -> None:
+def test_a_missing_folder_gets_one_line() -> None:
     with pytest.raises(GearError, match="save_pretrained"):
-        semseg.build(FolderConfig(folder=folder))
+        universal.build(FolderOptions(folder="nowhere"))
 
 
 def test_a_folder_of_another_kind_gets_one_line(tmp_path: Path) -> None:
-    tiny("depth").save_pretrained(tmp_path)
-    with pytest.raises(GearError, match="not a detect2d network"):
-        detect2d.build(FolderConfig(folder=str(tmp_path)))
+    sizes: dict[str, Any] = {"depths": [1] * 4, "hidden_sizes": [8, 8, 16, 16], "num_attention_heads": [1, 1, 2, 2]}
+    transformers.GLPNForDepthEstimation(transformers.GLPNConfig(**sizes)).save_pretrained(tmp_path)
+    with pytest.raises(GearError, match="no network for UniversalSegmentation"):
+        universal.build(FolderOptions(folder=str(tmp_path)))
