@@ -11,8 +11,11 @@ from dataclasses import replace
 import numpy as np
 
 from gear.augment.geometry import Geometry, Window, cut_map, cut_picture, flip_array
-from gear.nn.depth_cutdepth import vertical_cutdepth
 from gear.plugins.tasks.depth import DepthSample
+from gear.values.frames import FloatImage, UInt8Image
+
+WHITE_FROM_M = 80.0
+"""Depth that CutDepth paints white."""
 
 
 def flip(sample: DepthSample) -> DepthSample:
@@ -37,12 +40,24 @@ def cut(sample: DepthSample, window: Window) -> DepthSample:
 
 
 def cut_depth(sample: DepthSample, rng: np.random.Generator) -> DepthSample:
-    """Vertical CutDepth: a band of columns of the picture becomes its depth. See `vertical_cutdepth`."""
-    images = {
-        name: vertical_cutdepth(picture, sample.depth_m, rng, probability=1.0)
-        for name, picture in sample.images.items()
-    }
+    """Vertical CutDepth: the true depth, as grey, in place of a band of columns of the picture.
+
+    Kim et al., "Global-Local Path Networks for Monocular Depth Estimation with Vertical CutDepth", 2022, §3.3: the
+    band reaches from top to bottom, because depth changes most along columns. At most three quarters of the width.
+    """
+    width = sample.depth_m.shape[1]
+    left = int(rng.integers(0, width))
+    right = left + max(1, int((width - left) * 0.75 * rng.random()))
+    images = {name: _with_band(picture, sample.depth_m, left, right) for name, picture in sample.images.items()}
     return replace(sample, images=images)
+
+
+def _with_band(picture: UInt8Image, depth_m: FloatImage, left: int, right: int) -> UInt8Image:
+    band_m = depth_m[:, left:right]
+    grey = np.clip(np.where(np.isfinite(band_m), band_m, WHITE_FROM_M) / WHITE_FROM_M, 0, 1) * 255
+    painted = picture.copy()
+    painted[:, left:right] = np.rint(grey).astype(np.uint8)[..., None]
+    return painted
 
 
 GEOMETRY: Geometry[DepthSample] = Geometry(flip=flip, cut=cut)
