@@ -61,7 +61,7 @@ def autocast(device: torch.device, precision: Literal["float32", "bfloat16"]) ->
 
 @contextlib.contextmanager
 def seeded(seed: int) -> Iterator[None]:
-    """Layers made inside draw their first weights from `seed`; torch's own generator is as before afterwards."""
-    with torch.random.fork_rng(devices=[]):
+    """Layers made inside draw their first weights from `seed`; torch's own generators are as before afterwards."""
+    with torch.random.fork_rng(devices=range(torch.cuda.device_count())):
         torch.manual_seed(seed)
         yield

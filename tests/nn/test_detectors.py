@@ -242,6 +242,18 @@ def test_a_sure_anchor_is_a_detection_in_the_pictures_pixels(
     assert one.box_px == pytest.approx(anchors[chosen].tolist(), abs=1e-3)
 
 
+def test_half_precision_gives_nearly_the_same() -> None:
+    batch = as_batch([sample.images for sample in street_samples(WIDTH_PX, HEIGHT_PX)], ["left"])
+    with torch.no_grad():
+        full, half = (
+            build_r18(ReferenceDetectorOptions(weights="none", device="cpu", precision=precision))(batch)
+            for precision in ("float32", "bfloat16")
+        )
+    assert all(tensor.dtype == torch.float32 for tensor in half.values())
+    assert torch.equal(full["anchors_px"], half["anchors_px"])
+    assert 0 < float((full["cls_logits"] - half["cls_logits"]).abs().max()) < 0.2
+
+
 def test_anchors_fit_the_objects() -> None:
     """At half size, everything of at least 32 px height at 1333 x 800 has an anchor that it can be learnt with."""
     model = build_r18(ReferenceDetectorOptions(weights="none", device="cpu"))
