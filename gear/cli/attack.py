@@ -10,6 +10,7 @@ EXAMPLE = """examples:
   gear attack --model ddrnet23_slim --data data/b01 --set target=sky --set attacked=road --out patches/road_to_sky
   gear attack --model glpn_b0 --attack carla_gear --steps 5100 --data data/depth --out patches/paper
   gear attack --model ddrnet23_slim --model bisenet_x39 --data data/b01 --data data/b02 --out patches/universal
+  gear attack --model ddrnet23_slim --data data/b01 --out patches/b01 --verify data/b01-val
   gear collect --task semseg --scene billboard01 --split test --patch patches/b01 --out data/b01-patched
 
 The folder holds patch_0.png, …, patch.safetensors, attack.json and figures/.
@@ -38,6 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--every", type=int, default=25, metavar="N", help="steps between two looks at it (25)")
     parser.add_argument("--patience", type=int, default=0, metavar="N", help="looks without a better one until it ends")
+    parser.add_argument(
+        "--verify", metavar="DIR", help="dataset with probes on which the patches are rendered and compared afterwards"
+    )
     parser.add_argument("--compositor", default="transport", metavar="NAME", help="transport, or homography")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of everything that is drawn (0)")
     parser.add_argument("--allow-test-data", action="store_true", help="optimise on test splits too")
@@ -74,4 +78,11 @@ def run(args: argparse.Namespace) -> int:
             progress=progress,
         )
     print(json.dumps(report.facts, indent=2) if args.json else report.summary())
+    if args.verify is not None:
+        from gear.verbs.attack.verify import verify
+
+        with ProgressBar() as progress:
+            reports = verify(args.out, args.verify, models=args.model, settings=args.model_set, progress=progress)
+        for name, found in reports.items():
+            print(json.dumps({name: found.as_json()}, indent=2) if args.json else found.table())
     return 0

@@ -281,3 +281,27 @@ def test_the_patch_goes_back_into_the_world(small: Small, install: Install, tmp_
         settings=[f"scenes={TINY_SCENES}", *size_settings("semseg")],
     )  # fmt: skip
     assert len(gear.open_twins(small(), tmp_path / "patched")) == 2
+
+
+def test_the_rendered_check(
+    small: Small,
+    install: Install,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def collect_tiny_twin(clean: Any, patch: Any, out: Path) -> None:
+        collect(
+            "semseg", town=TINY_TOWN, scene="board", split="val", samples=2, renderer="classic", quality="fast",
+            patch=str(patch), out=out, settings=[f"scenes={TINY_SCENES}", *size_settings("semseg")],
+        )  # fmt: skip
+
+    # A town given by its path cannot be found again by its name.
+    monkeypatch.setattr("gear.verbs.gap.run.collect_twin", collect_tiny_twin)
+    words = ["attack", "--model=tiny_segmenter", f"--data={small()}", "--steps=2", f"--out={tmp_path / 'p'}"]
+    assert main([*words, *(f"--set={text}" for text in SMALL), f"--verify={small(split='val')}"]) == 0
+    table = capsys.readouterr().out
+    assert "PSNR inside the patch" in table and "rendered / digital" in table
+    report = json.loads((tmp_path / "p" / "verify" / "tiny_segmenter" / "gap.json").read_text())
+    assert report["median_psnr_db"]["transport"] > 35 > report["median_psnr_db"]["homography"]
+    assert (tmp_path / "p" / "patch_0.png").exists(), "the check leaves the patch folder as it was"
