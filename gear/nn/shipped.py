@@ -143,3 +143,13 @@ def _read(text: str) -> Json:
         return json.loads(text)
     except ValueError:
         return text
+
+
+def shipped_patches() -> dict[str, Path]:
+    """Pre-computed patch folders by name, of the installed weights packages."""
+    return {
+        path.name: path
+        for folder in reversed(shipped_folders())
+        for path in sorted((folder / "patches").glob("*"))
+        if (path / "patch_0.png").is_file()
+    }

@@ -83,3 +83,17 @@ def test_what_is_no_patch_is_refused_in_one_line(tmp_path: Path, picture: np.nda
     (tmp_path / "bare").mkdir()
     with pytest.raises(PatchError, match=r"has no patch_0\.png"):
         resolve_patch(str(tmp_path / "bare"), surfaces=2, seed=0)
+
+
+def test_shipped_patches_are_found_by_name(
+    tmp_path: Path, picture: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "patches" / "semseg-billboard01"
+    folder.mkdir(parents=True)
+    save(folder / "patch_0.png", picture)
+    monkeypatch.setattr("gear.nn.shipped.shipped_folders", lambda: (tmp_path,))
+    found = resolve_patch("semseg-billboard01", surfaces=1, seed=0)
+    assert np.array_equal(found.images[0], picture[..., ::-1])
+    assert found.label.startswith("semseg-billboard01-")
+    with pytest.raises(PatchError, match="did you mean semseg-billboard01"):
+        resolve_patch("semseg-bilboard01", surfaces=1, seed=0)

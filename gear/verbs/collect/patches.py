@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import hashlib
 import re
 from collections.abc import Mapping
@@ -11,6 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from gear.nn.shipped import shipped_patches
 from gear.values.errors import PatchError
 from gear.values.frames import UInt8Image
 from gear.values.rng import derive_rng
@@ -50,7 +52,8 @@ def resolve_patch(patch: str, *, surfaces: int, seed: int) -> PatchSet:
     """Finds the patches that `--patch` asks for.
 
     Args:
-        patch: `none`, `random`, a picture, or a folder with `patch_0.png`, `patch_1.png`, … (or `<anything>_0.png`).
+        patch: `none`, `random`, a picture, a folder with `patch_0.png`, `patch_1.png`, … (or `<anything>_0.png`), or
+            the name of a pre-computed patch of an installed weights package.
         surfaces: how many the scene has.
         seed: of random patches.
 
@@ -63,11 +66,17 @@ def resolve_patch(patch: str, *, surfaces: int, seed: int) -> PatchSet:
         images = tuple(random_patch(seed, i) for i in range(surfaces))
         return _patch_set("random", images, "random", is_hashed=False)
     path = Path(patch)
+    if not path.exists() and path.name == patch:
+        path = shipped_patches().get(patch, path)
     if path.is_dir():
         found = _numbered(path)
         return _patch_set(path.resolve().name, tuple(read_patch(p) for p in found[: max(1, surfaces)]), patch)
     if not path.exists():
-        raise PatchError(patch, "is not there; say none, random, a picture, or a folder with patch_0.png")
+        near = difflib.get_close_matches(patch, shipped_patches(), n=1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise PatchError(
+            patch, f"is not there; say none, random, a picture, a folder with patch_0.png, or a shipped patch{hint}"
+        )
     return _patch_set(path.stem, (read_patch(path),), patch)
 
 
