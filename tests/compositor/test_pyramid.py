@@ -1,0 +1,105 @@
+"""Faces and mip levels as matrices of the patch."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from gear.compositor.cache import Cache
+from gear.compositor.pyramid import axis_matrices, halving_matrix, pyramid_of
+from gear.compositor.sampling import Samples
+from gear.compositor.sparse import SparseMatrix, stacked_product
+from gear.compositor.warp import warp_matrix
+from gear.values.geometry import Array
+from gear.world.faces import resample_linear
+
+SIZES = [(150, 300), (37, 50), (600, 1200), (700, 1300), (4, 4)]
+
+
+def noise(height: int, width: int) -> Array:
+    return np.random.default_rng(height * width).random((height, width, 3))
+
+
+def levels_of(patch: Array) -> list[Array]:
+    """The slow way: the face, then its levels, one after the other."""
+    levels = [resample_linear(patch)]
+    while max(levels[-1].shape[:2]) > 1:
+        last = levels[-1]
+        rows, columns = halving_matrix(last.shape[0]), halving_matrix(last.shape[1])
+        levels.append(np.einsum("ih,hwc,jw->ijc", rows, last, columns, optimize=True))
+    return levels
+
+
+def at(u: float, v: float, level: float) -> Samples:
+    one = np.ones((1, 1))
+    return Samples(u=u * one, v=v * one, level=level * one, weight=one, coverage=np.ones(1))
+
+
+@pytest.mark.parametrize("size", [1, 2, 37, 75, 1200])
+def test_halving_averages(size: int) -> None:
+    matrix = halving_matrix(size)
+    assert matrix.shape == (max(1, size // 2), size)
+    assert matrix.sum(axis=1) == pytest.approx(1)
+    if size % 2 == 0:
+        assert matrix @ np.arange(size) == pytest.approx(np.arange(size // 2) * 2 + 0.5)
+
+
+def test_levels_end_at_one_texel() -> None:
+    assert [m.shape[0] for m in axis_matrices(300, 1200)] == [1200, 600, 300, 150, 75, 37, 18, 9, 4, 2, 1]
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("level", [0.0, 0.6, 1.0, 2.3, 3.5, 4.5, 7.0, 10.0])
+def test_a_sample_reads_what_the_face_would_show(size: tuple[int, int], level: float) -> None:
+    """Folded levels, chained levels and those made from the patch are all the same as a face made in full."""
+    patch = noise(*size)
+    pyramid = pyramid_of(*size)
+    columns = pyramid.spread(torch.from_numpy(patch).permute(2, 0, 1).float())
+    assert columns.shape == (pyramid.size, 3)
+    slow = levels_of(patch)
+    for u, v in ((0.31, 0.77), (0.0, 1.0), (0.5, 0.001)):
+        wanted = np.zeros(3)
+        low = min(int(level), len(slow) - 1)
+        for number, share in ((low, 1 - (level - low)), (min(low + 1, len(slow) - 1), level - low)):
+            texels = slow[number]
+            x, y = u * texels.shape[1] - 0.5, v * texels.shape[0] - 0.5
+            for dy in (0, 1):
+                for dx in (0, 1):
+                    i, j = int(np.floor(y)) + dy, int(np.floor(x)) + dx
+                    weight = (1 - abs(y - i)) * (1 - abs(x - j))
+                    wanted += share * weight * texels[i % texels.shape[0], j % texels.shape[1]]
+        found = warp_matrix(at(u, v, level), pyramid) @ columns.numpy()
+        assert found[0] == pytest.approx(wanted, abs=2e-5)
+
+
+def test_products_carry_gradients_back() -> None:
+    from scipy import sparse
+
+    dense = [sparse.random(5, 7, 0.4, "csr", np.float32, np.random.default_rng(n)) for n in range(2)]
+    matrices = [SparseMatrix.of(matrix, torch.device("cpu")) for matrix in dense]
+    columns = torch.rand((7, 3), generator=torch.Generator().manual_seed(1), requires_grad=True)
+    product = stacked_product(matrices, columns)
+    both = np.concatenate([matrix.toarray() for matrix in dense])
+    assert product.detach().numpy() == pytest.approx(both @ columns.detach().numpy(), abs=1e-6)
+    weights = torch.rand((10, 3), generator=torch.Generator().manual_seed(2))
+    (product * weights).sum().backward()
+    assert columns.grad is not None
+    assert columns.grad.numpy() == pytest.approx(both.T @ weights.numpy(), abs=1e-6)
+
+
+def test_a_cache_is_bounded_and_forgets_the_oldest() -> None:
+    class Thing:
+        nbytes = 40
+
+    cache: Cache[Thing] = Cache(100)
+    made: list[str] = []
+
+    def make(name: str) -> Thing:
+        made.append(name)
+        return Thing()
+
+    for name in ("a", "b", "a", "c", "a", "b"):
+        cache.get(name, lambda name=name: make(name))  # type: ignore[misc]
+    assert made == ["a", "b", "c", "b"]
+    assert (len(cache), cache.nbytes) == (2, 80)
