@@ -21,8 +21,8 @@ from gear.values.frames import UInt8Image
 Sizes = tuple[tuple[int, int], ...]
 """Height and width of each patch."""
 
-CACHE_BYTES = 1 << 30
-"""What a compositor keeps of samples that it has seen: at 512x256 some 3 MB each, at 2048x1024 some 30."""
+CACHE_BYTES = 4 << 30
+"""What a compositor keeps of samples that it has seen: at 512x256 some 2 MB each, at 2048x1024 some 20."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
