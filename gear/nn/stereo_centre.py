@@ -48,7 +48,7 @@ class StereoCentreShape:
 
 
 class Block(nn.Module):
-    """ResNet's basic block."""
+    """ResNet's basic block; its shortcut averages before it projects (ResNet-D, He et al., CVPR 2019)."""
 
     def __init__(self, inputs: int, outputs: int, stride: int) -> None:
         super().__init__()
@@ -56,7 +56,9 @@ class Block(nn.Module):
         self.bn1 = nn.BatchNorm2d(outputs)
         self.conv2 = nn.Conv2d(outputs, outputs, 3, 1, 1, bias=False)
         self.bn2 = nn.BatchNorm2d(outputs)
-        self.skip = nn.Identity() if stride == 1 and inputs == outputs else _conv(inputs, outputs, 1, stride)
+        self.skip: nn.Module = nn.Identity()
+        if stride != 1 or inputs != outputs:
+            self.skip = nn.Sequential(nn.AvgPool2d(stride), _conv(inputs, outputs, 1))
 
     def forward(self, features: Tensor) -> Tensor:
         """(B, C, H, W) to (B, C', H / stride, W / stride)."""

@@ -30,7 +30,7 @@ class StereoCentreNetwork(Network):
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """The graph's maps."""
-        # With channels last, torch 2.13's convolutions on the CPU write past their memory where channels are few.
+        # Pictures come with channels last; in float32 and with few channels the CPU is slow at that.
         pair = [self.normalise(pictures[name].contiguous()) for name in (LEFT, RIGHT)]
         left, ratio = fit_to_network(pair[0], self.options.input_scale)
         right, _ = fit_to_network(pair[1], self.options.input_scale)
