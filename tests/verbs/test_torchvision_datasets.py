@@ -1,0 +1,76 @@
+"""torchvision's own dataset classes read what gear writes."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gear
+from gear.nn.vision import prepare
+from gear.verbs.collect.run import CollectReport
+from gear.verbs.export import export
+
+Collect = Callable[..., CollectReport]
+
+pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
+"""It leaves its files open."""
+
+
+@pytest.fixture(autouse=True)
+def collected_here() -> Iterator[None]:
+    """What it left open is closed while that is still forgiven."""
+    yield
+    gc.collect()
+
+
+def test_cityscapes(collect_small: Collect, tmp_path: Path) -> None:
+    prepare()
+    from torchvision.datasets import Cityscapes
+
+    collect_small("semseg", tmp_path, split="val")
+    read = Cityscapes(str(tmp_path), split="val", mode="fine", target_type=["semantic", "instance", "color", "polygon"])
+    ours = gear.open_dataset(tmp_path)
+    assert len(read) == len(ours) == 2
+    for index, sample in enumerate(ours):
+        picture, (labels, instances, _, polygon) = read[index]
+        assert np.array_equal(np.asarray(picture), sample.images["left"])
+        assert np.array_equal(np.asarray(labels), sample.label_ids)
+        assert np.array_equal(np.asarray(instances), sample.instance_ids)
+        assert polygon["imgWidth"] == 320 and polygon["objects"]
+
+
+def test_coco(collect_small: Collect, tmp_path: Path) -> None:
+    prepare()
+    from torchvision.datasets import CocoDetection
+
+    collect_small("detect2d", tmp_path, split="val")
+    ours = gear.open_dataset(tmp_path)
+    read = CocoDetection(str(tmp_path / "images" / "val"), str(tmp_path / "annotations" / "instances_val.json"))
+    assert len(read) == 2
+    for index, sample in enumerate(ours):
+        picture, annotations = read[index]
+        assert np.array_equal(np.asarray(picture), sample.images["left"])
+        assert len(annotations) == len(sample.objects)
+        for annotation, found in zip(annotations, sample.objects, strict=True):
+            left, top, width, height = annotation["bbox"]
+            assert np.allclose((left, top, left + width, top + height), found.box_px)
+
+
+def test_kitti(collect_small: Collect, tmp_path: Path) -> None:
+    prepare()
+    from torchvision.datasets import Kitti
+
+    collect_small("stereo3d", tmp_path / "data", split="val")
+    ours = gear.open_dataset(tmp_path / "data")
+    export(tmp_path / "data", layout="kitti", out=tmp_path / "Kitti" / "raw")
+    read = Kitti(str(tmp_path), train=True)
+    assert len(read) == 2
+    for number, path in enumerate(read.images):  # in the order of the folder, which is none
+        sample = ours[int(Path(path).stem)]
+        picture, target = read[number]
+        assert np.array_equal(np.asarray(picture), sample.images["left"])
+        assert [one["type"] for one in target] == [found.label().type for found in sample.objects]
