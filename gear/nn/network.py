@@ -107,7 +107,6 @@ class Normalise(nn.Module):
 
 def as_batch(samples: Sequence[Mapping[str, UInt8Image]], views: Sequence[str]) -> dict[str, Tensor]:
     """Pictures of one size as `Model.forward` takes them: (B, 3, H, W) float32 in 0..1 by camera name."""
-    return {
-        name: torch.from_numpy(np.stack([sample[name] for sample in samples])).permute(0, 3, 1, 2).float() / 255
-        for name in views
-    }
+    # Channels first in memory too: torch's CPU backward pass of small strided convolutions fails on channels last.
+    stacked = {name: np.stack([sample[name] for sample in samples]).transpose(0, 3, 1, 2) for name in views}
+    return {name: torch.from_numpy(np.ascontiguousarray(one)).float() / 255 for name, one in stacked.items()}

@@ -42,10 +42,8 @@ class TinyConfig:
 
 def as_batch(views: Sequence[Mapping[str, UInt8Image]]) -> dict[str, Tensor]:
     """Pictures of several samples as `Model.forward` takes them: (B, 3, H, W) float32 in 0..1 by camera name."""
-    return {
-        name: torch.from_numpy(np.stack([sample[name] for sample in views])).permute(0, 3, 1, 2).float() / 255
-        for name in views[0]
-    }
+    stacked = {name: np.stack([sample[name] for sample in views]).transpose(0, 3, 1, 2) for name in views[0]}
+    return {name: torch.from_numpy(np.ascontiguousarray(one)).float() / 255 for name, one in stacked.items()}
 
 
 class TinyNetwork(nn.Module, ABC):

@@ -14,6 +14,7 @@ import cv2
 import mujoco
 import numpy as np
 
+from gear.camera.response import response_for
 from gear.config.collection import CollectionConfig, SplitConfig, WeatherConfig
 from gear.config.dump import to_plain
 from gear.config.load import load_simulation, split_of
@@ -99,6 +100,7 @@ def resolve(config: CollectionConfig) -> Job:
         town=library.town_name, scene=config.scene, split=config.split, seed=split.seed, patch_label=patch.label
     )
     renderer = renderer_info(config.renderer)
+    response = response_for(renderer.name, weather)
     content: Json = {
         "town": library.town_name,
         "scene_name": config.scene,
@@ -111,6 +113,7 @@ def resolve(config: CollectionConfig) -> Job:
         "renderer": to_json(renderer),
         "quality": config.quality,
         "camera": to_json(config.camera),
+        "response": {"exposure": response.exposure, "contrast": response.contrast, "encoding": response.encoding},
         "assets": assets_digest(library),
         "versions": versions(),
     }
