@@ -11,6 +11,8 @@ from contextlib import ExitStack, contextmanager
 
 _CHATTER = re.compile(
     r"Using 'soft' CircularBuffer|FEngine |Backend feature level|Vulkan device driver|Selected physical device"
+    # Small frames follow each other faster than it measures them.
+    r"|FrameInfo's circular queue is full"
     # A large world outgrows Filament's pool of handles; it says so with a stack trace and takes them from the heap.
     r"|^PanicLog$|in allocateHandleSlow|HandleAllocator arena is full|^#\d+\s.*(_render_filament|libc|libstdc|unknown)"
 )

@@ -19,8 +19,8 @@ from gear.camera.response import response_for
 from gear.dataset.plan import Plan
 from gear.values.errors import FieldError, GearError
 from gear.values.serial import Json, from_json, to_json
-from gear.verbs.collect.job import assets_digest
 from gear.world.assets import AssetLibrary
+from gear.world.digest import assets_digest
 from gear.world.light import lighting_of
 from gear.world.weather import PRESETS
 

@@ -95,25 +95,32 @@ def compose(
         path = library.path("surface", board.asset)
         body = _new_body(root, library.town, f"board_{index}", **_placed(board))
         faces.append(parts.add_bearer(path, body, is_carried=False))
-    slots: list[Slot] = []
-    for actor, count in _merged(pool):
-        for index in range(count):
-            body = _new_body(root, library.town, f"{actor.name}_{index}", mocap=True)
-            parts.add_instance(actor.path, body)
-            slots.append(Slot(body=body.name, actor=actor))
-    if carrier is not None:
-        body = _new_body(root, library.town, "carrier", mocap=True)
-        faces.append(parts.add_bearer(carrier.path, body, is_carried=True))
-        slots.append(Slot(body="carrier", actor=carrier, bears_surface=True))
+    slots = slots_of(pool, carrier)
+    for slot in slots:
+        body = _new_body(root, library.town, slot.body, mocap=True)
+        if slot.bears_surface:
+            faces.append(parts.add_bearer(slot.actor.path, body, is_carried=True))
+        else:
+            parts.add_instance(slot.actor.path, body)
     parts.drop_templates()
     apply_weather(root, weather)
     return Composition(
         xml=root.to_xml_string(),
         assets=root.get_assets(),
         town=library.town,
-        slots=tuple(slots),
+        slots=slots,
         faces=tuple(faces),
     )
+
+
+def slots_of(pool: Sequence[tuple[ActorFacts, int]], carrier: ActorFacts | None) -> tuple[Slot, ...]:
+    """The slots of a pool, and of the actor that bears a surface besides."""
+    slots = [
+        Slot(body=f"{actor.name}_{index}", actor=actor) for actor, count in _merged(pool) for index in range(count)
+    ]
+    if carrier is not None:
+        slots.append(Slot(body="carrier", actor=carrier, bears_surface=True))
+    return tuple(slots)
 
 
 def _new_body(root: mjcf.RootElement, town: Path, name: str, **attributes: Any) -> Any:

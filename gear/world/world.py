@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import tempfile
 from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -19,12 +18,11 @@ from gear.values.scene import ActorRecord, SceneRecord, SurfaceRecord, Vec3, Wea
 from gear.world.assets import AssetLibrary
 from gear.world.catalogue import ActorType, StaticObjects, actor_types, static_objects, visible_geoms
 from gear.world.classes import GeomClasses
-from gear.world.compose import PARKED_DEPTH_M, Composition, Slot, compose
+from gear.world.compiled import Compiled, compile_world
+from gear.world.compose import PARKED_DEPTH_M, Slot
 from gear.world.faces import SurfaceAlbedo, SurfaceAlbedos
 from gear.world.lanes import LaneGraph
-from gear.world.memory import keep_no_assets, release_memory
-from gear.world.models import placement_model, render_model
-from gear.world.pool import plan_pool
+from gear.world.memory import release_memory
 from gear.world.scene_spec import SceneSpec
 from gear.world.surfaces import Face, find_faces
 
@@ -105,19 +103,33 @@ class World:
             UnknownNameError: there is no such town, board or truck.
             TownError: a file breaks the conventions.
         """
-        keep_no_assets()
         library = AssetLibrary.for_town(town)
-        carrier = None
-        if scene.truck is not None:
-            library.path("vehicle", scene.truck.asset)
-            carrier = library.vehicles[scene.truck.asset]
-        with tempfile.TemporaryDirectory(prefix="gear-") as folder:
-            composition = compose(library, scene.boards, plan_pool(scene, library), carrier, weather)
-            composition = composition.laid_out(Path(folder))
-            release_memory()
-            model, classes = render_model(composition)
-            release_memory()
-        world = _assemble(library, scene_name, scene, weather, composition, model, classes)
+        return World.of(library, scene_name, scene, weather, compile_world(library, scene, weather))
+
+    @staticmethod
+    def of(library: AssetLibrary, scene_name: str, scene: SceneSpec, weather: Weather, compiled: Compiled) -> World:
+        """What was compiled of a scene, measured.
+
+        Raises:
+            TownError: a file breaks the conventions.
+        """
+        model, classes, slots = compiled.model, compiled.classes, compiled.slots
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        world = World(
+            library=library,
+            scene_name=scene_name,
+            scene=scene,
+            weather=weather,
+            model=model,
+            placement_model=compiled.placement_model,
+            classes=classes,
+            slots=slots,
+            types=actor_types(model, data, classes, slots),
+            faces=find_faces(model, data, compiled.faces, library.town),
+            statics=static_objects(model, data, classes, slots, library.town),
+            lanes=LaneGraph.from_model(compiled.placement_model, library.town),
+        )
         release_memory()
         return world
 
@@ -241,33 +253,3 @@ class World:
                 self._shown.popitem(last=False)
         self._shown.move_to_end((face.name, key))
         return self._shown[face.name, key]
-
-
-def _assemble(
-    library: AssetLibrary,
-    scene_name: str,
-    scene: SceneSpec,
-    weather: Weather,
-    composition: Composition,
-    model: mujoco.MjModel,
-    classes: GeomClasses,
-) -> World:
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    slots = composition.slots
-    types = actor_types(model, data, classes, slots)
-    felt = placement_model(composition, {slot.body: types[slot.actor.name].stance for slot in slots})
-    return World(
-        library=library,
-        scene_name=scene_name,
-        scene=scene,
-        weather=weather,
-        model=model,
-        placement_model=felt,
-        classes=classes,
-        slots=slots,
-        types=types,
-        faces=find_faces(model, data, composition.faces, library.town),
-        statics=static_objects(model, data, classes, slots, library.town),
-        lanes=LaneGraph.from_model(felt, library.town),
-    )

@@ -7,9 +7,9 @@ from typing import Any
 from gear.contracts.tasks import SplitInfo
 from gear.dataset.plan import Plan
 from gear.values.serial import to_json
-from gear.verbs.collect.job import assets_digest
 from gear.verbs.look import Look, light_digest, look_now, look_of, read_look
 from gear.world.assets import AssetLibrary
+from gear.world.digest import assets_digest
 
 LOOK = Look(assets={"a": "1", "b": "2"}, renderers=("filament",), light="3", mujoco="4.0")
 

@@ -31,13 +31,12 @@ from gear.values.scene import Weather
 from gear.values.serial import Json, to_json
 from gear.verbs.collect.patches import PatchSet, resolve_patch
 from gear.world.assets import AssetLibrary
+from gear.world.digest import assets_digest
 from gear.world.scene_spec import SceneLibrary, SceneSpec
 from gear.world.weather import PRESETS
 
 ROOMY_FACTOR = 100
 """Scenes without a board take so many times the vehicles, as in the original: they are not bound to one corner."""
-
-ASSET_SUFFIXES = (".xml", ".obj", ".msh", ".stl", ".png")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -228,21 +227,3 @@ def _version(distribution: str) -> str:
         return importlib.metadata.version(distribution)
     except importlib.metadata.PackageNotFoundError:
         return "source"
-
-
-def assets_digest(library: AssetLibrary) -> str:
-    """sha256 over every MJCF file, mesh and texture that a town's pictures can show."""
-    own = data_dir("mjcf")
-    roots = [library.town, library.town.with_suffix("")]
-    roots += [library.folder("vehicle"), library.folder("pedestrian"), library.folder("surface")]
-    if any(root.is_relative_to(own) for root in roots):
-        roots.append(own / "textures")
-    files: dict[str, Path] = {}
-    for root in roots:
-        for path in root.rglob("*") if root.is_dir() else [root]:
-            if path.suffix.lower() in ASSET_SUFFIXES and path.is_file():
-                files[f"{root.name}/{path.relative_to(root).as_posix()}"] = path
-    digest = hashlib.sha256()
-    for name in sorted(files):
-        digest.update(f"{name}\0{hashlib.sha256(files[name].read_bytes()).hexdigest()}\n".encode())
-    return digest.hexdigest()

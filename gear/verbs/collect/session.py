@@ -19,8 +19,9 @@ from gear.values.scene import SceneRecord
 from gear.verbs.collect.job import Job
 from gear.verbs.collect.probes import ProbeShot, develop_probes, shoot_probes
 from gear.world.air import darkroom_of
-from gear.world.memory import forget_search_trees, forget_shown, release_memory
+from gear.world.memory import forget_search_trees, forget_shown, map_large_buffers, release_memory
 from gear.world.planner import ScenePlanner
+from gear.world.shelf import ready_world
 from gear.world.world import World
 
 
@@ -89,11 +90,12 @@ class Session:
 @contextlib.contextmanager
 def open_session(job: Job) -> Iterator[Session]:
     """Builds a worker's world and renderer, and closes the renderer at the end."""
+    map_large_buffers()
     plugin = find("task", job.config.task)
     task: Task[Any, Any] = build(plugin, job.config.options)
     with blamed(plugin, "rig"):
         rig = task.rig()
-    world = World.build(town=job.config.town, scene_name=job.config.scene, scene=job.scene, weather=job.weather)
+    world = ready_world(town=job.config.town, scene_name=job.config.scene, scene=job.scene, weather=job.weather)
     forget_search_trees(world.model)
     renderer = open_renderer(job.config.renderer, world.model, quality=job.config.quality)
     forget_shown(world.model)

@@ -1,0 +1,50 @@
+"""The process that compiles a world for others to load."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+from gear.values.scene import Weather
+from gear.values.serial import from_json
+from gear.world.assets import AssetLibrary
+from gear.world.compiled import compile_world
+from gear.world.digest import asset_files
+from gear.world.scene_spec import SceneSpec
+from gear.world.shelf import MAY_KEEP, order_of
+
+_CODE_SUFFIXES = (".py", ".pyc", ".so")
+
+
+def main(folder: str) -> None:
+    """Compiles the order on standard input into a folder, and says there whether the order covers all that was read.
+
+    It does not where a town refers to files far from it, or where somebody edited one meanwhile.
+    """
+    order = json.load(sys.stdin)
+    library = AssetLibrary(Path(order["town"]))
+    scene, weather = from_json(SceneSpec, order["scene"]), from_json(Weather, order["weather"])
+    known = {os.path.realpath(path) for path in asset_files(library).values()}
+    heard = _watched()
+    compiled = compile_world(library, scene, weather)
+    is_covered = heard <= known
+    compiled.save(Path(folder))
+    if is_covered and order_of(library, scene, weather) == order:
+        (Path(folder) / MAY_KEEP).touch()
+
+
+def _watched() -> set[str]:
+    """Real paths of the files that Python opens to read from now on, code left out."""
+    read: set[str] = set()
+
+    def hear(event: str, details: tuple[Any, ...]) -> None:
+        if event == "open" and isinstance(details[0], str) and str(details[1] or "").startswith("r"):
+            path = os.path.realpath(details[0])
+            if not path.endswith(_CODE_SUFFIXES):
+                read.add(path)
+
+    sys.addaudithook(hear)
+    return read

@@ -1,0 +1,130 @@
+"""What compiling a world leaves, in memory and on disk."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from gear.values.scene import Weather
+from gear.values.serial import from_json, to_json
+from gear.world.assets import ActorFacts, AssetLibrary
+from gear.world.catalogue import actor_types
+from gear.world.classes import GeomClasses
+from gear.world.compose import Slot, compose, slots_of
+from gear.world.instances import FaceName
+from gear.world.memory import keep_no_assets, release_memory
+from gear.world.models import placement_model, render_model
+from gear.world.pool import plan_pool
+from gear.world.scene_spec import SceneSpec
+
+_SEEN, _FELT, _FACTS = "seen.mjb", "felt.mjb", "facts.json"
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Compiled:
+    """A world's two models and what they do not say of themselves.
+
+    Attributes:
+        model: what is seen.
+        placement_model: what is felt.
+        classes: labels of the geoms of what is seen.
+        slots: the pool.
+        faces: what takes patches, in patch order.
+    """
+
+    model: mujoco.MjModel
+    placement_model: mujoco.MjModel
+    classes: GeomClasses
+    slots: tuple[Slot, ...]
+    faces: tuple[FaceName, ...]
+
+    def save(self, folder: Path) -> None:
+        """Writes it into an empty folder."""
+        mujoco.mj_saveModel(self.model, str(folder / _SEEN), None)
+        mujoco.mj_saveModel(self.placement_model, str(folder / _FELT), None)
+        facts = {
+            "faces": to_json(self.faces),
+            "label_code": self.classes.label_code.tolist(),
+            "is_paint": self.classes.is_paint.tolist(),
+            "is_face": self.classes.is_face.tolist(),
+            "crc32": {name: _crc32(folder / name) for name in (_SEEN, _FELT)},
+        }
+        (folder / _FACTS).write_text(json.dumps(facts), encoding="utf-8")
+
+    @staticmethod
+    def load(folder: Path, library: AssetLibrary, scene: SceneSpec) -> Compiled:
+        """Reads what `save` wrote for the same library and scene.
+
+        Raises:
+            OSError: there is nothing, or it cannot be read.
+            ValueError, KeyError, GearError: something else lies there, or half of it.
+        """
+        facts = json.loads((folder / _FACTS).read_text(encoding="utf-8"))
+        for name in (_SEEN, _FELT):
+            if _crc32(folder / name) != facts["crc32"][name]:
+                raise ValueError(f"{folder / name} is not what was written there")
+        classes = GeomClasses(
+            label_code=np.array(facts["label_code"], np.uint8),
+            is_paint=np.array(facts["is_paint"], np.bool_),
+            is_face=np.array(facts["is_face"], np.bool_),
+        )
+        for array in (classes.label_code, classes.is_paint, classes.is_face):
+            array.setflags(write=False)
+        return Compiled(
+            model=mujoco.MjModel.from_binary_path(str(folder / _SEEN)),
+            placement_model=mujoco.MjModel.from_binary_path(str(folder / _FELT)),
+            classes=classes,
+            slots=slots_of(plan_pool(scene, library), carrier_of(scene, library)),
+            faces=from_json(tuple[FaceName, ...], facts["faces"]),
+        )
+
+
+def compile_world(library: AssetLibrary, scene: SceneSpec, weather: Weather) -> Compiled:
+    """Composes and compiles.
+
+    Raises:
+        UnknownNameError: there is no such board or truck.
+        TownError: a file breaks the conventions.
+    """
+    keep_no_assets()
+    with tempfile.TemporaryDirectory(prefix="gear-") as folder:
+        composition = compose(
+            library, scene.boards, plan_pool(scene, library), carrier_of(scene, library), weather
+        ).laid_out(Path(folder))
+        release_memory()
+        model, classes = render_model(composition)
+        release_memory()
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    types = actor_types(model, data, classes, composition.slots)
+    felt = placement_model(composition, {slot.body: types[slot.actor.name].stance for slot in composition.slots})
+    return Compiled(
+        model=model, placement_model=felt, classes=classes, slots=composition.slots, faces=composition.faces
+    )
+
+
+def carrier_of(scene: SceneSpec, library: AssetLibrary) -> ActorFacts | None:
+    """The actor that bears a scene's surface, if one does.
+
+    Raises:
+        UnknownNameError: there is no such truck.
+    """
+    if scene.truck is None:
+        return None
+    library.path("vehicle", scene.truck.asset)
+    return library.vehicles[scene.truck.asset]
+
+
+def _crc32(path: Path) -> int:
+    """Of a file's content: a power cut may leave one of the right size."""
+    value = 0
+    with path.open("rb") as file:
+        while chunk := file.read(1 << 20):
+            value = zlib.crc32(chunk, value)
+    return value

@@ -1,0 +1,111 @@
+"""Compiled worlds on disk: the same as fresh ones, never stale, never more than may lie there."""
+
+from __future__ import annotations
+
+import dataclasses
+import shutil
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from gear.testing.tiny_town import CLEAR, TINY_TOWN, build_tiny_world, tiny_scenes
+from gear.values.errors import TownError
+from gear.values.scene import Weather
+from gear.world import shelf
+from gear.world.shelf import ready_world
+from gear.world.world import World
+
+SCENE = "truck"
+
+
+@pytest.fixture
+def town(tmp_path: Path) -> Path:
+    """A tiny town that may be edited."""
+    shutil.copytree(TINY_TOWN.parents[1], tmp_path / "mjcf")
+    return tmp_path / "mjcf" / "towns" / TINY_TOWN.name
+
+
+def take(tmp_path: Path, town: Path = TINY_TOWN, weather: Weather = CLEAR) -> World:
+    return ready_world(
+        town=town, scene_name=SCENE, scene=tiny_scenes().scenes[SCENE], weather=weather, shelf=tmp_path / "shelf"
+    )
+
+
+def worlds(tmp_path: Path) -> set[str]:
+    return {path.name for path in (tmp_path / "shelf").iterdir() if path.is_dir()}
+
+
+def never(*_: object) -> bool:
+    raise AssertionError("nothing must be compiled now")
+
+
+def model_bytes(model: mujoco.MjModel) -> bytes:
+    """Everything but where its files lay, which no two compilations share."""
+    content = np.empty(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, content)
+    return content.tobytes().replace(model.paths, bytes(len(model.paths)))
+
+
+def test_a_world_of_the_shelf_is_the_one_that_is_built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    built, made = build_tiny_world(SCENE), take(tmp_path)
+    monkeypatch.setattr(shelf, "_compile_apart", never)
+    for world in (made, take(tmp_path)):
+        assert model_bytes(world.model) == model_bytes(built.model)
+        assert model_bytes(world.placement_model) == model_bytes(built.placement_model)
+        assert world.slots == built.slots and world.surface_records(7) == built.surface_records(7)
+        for name in ("label_code", "is_paint", "is_face"):
+            assert np.array_equal(getattr(world.classes, name), getattr(built.classes, name))
+    assert len(worlds(tmp_path)) == 1
+
+
+def test_an_edit_makes_another_world(tmp_path: Path, town: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = take(tmp_path, town)
+    vehicle = next((town.parents[1] / "vehicles").glob("*.xml"))
+    vehicle.write_text(vehicle.read_text().replace("</mujoco>", "<!-- edited --></mujoco>"))
+    take(tmp_path, town)
+    assert len(worlds(tmp_path)) == 2
+    assert take(tmp_path, town, dataclasses.replace(CLEAR, sun_altitude_deg=20.0)).weather != before.weather
+    assert len(worlds(tmp_path)) == 3
+    monkeypatch.setattr(shelf, "_code_digest", lambda: "newer code")
+    take(tmp_path, town)
+    # The other process has the code as it is, so its world answers no order of newer code.
+    assert len(worlds(tmp_path)) == 3
+
+
+def test_a_world_with_files_from_afar_is_not_kept(tmp_path: Path, town: Path) -> None:
+    part = tmp_path / "part.xml"
+    part.write_text("<mujoco><worldbody/></mujoco>")
+    town.write_text(town.read_text().replace("<worldbody>", '<include file="../../part.xml"/><worldbody>', 1))
+    assert "part.xml" in town.read_text()
+    assert take(tmp_path, town).model.ngeom
+    assert not worlds(tmp_path)
+
+
+def test_half_a_world_is_made_anew(tmp_path: Path) -> None:
+    whole = model_bytes(take(tmp_path).model)
+    (name,) = worlds(tmp_path)
+    seen = tmp_path / "shelf" / name / "seen.mjb"
+    content = seen.read_bytes()
+    middle = len(content) // 2
+    for spoiled in (content[:middle], b"", content[:middle] + bytes(4096) + content[middle + 4096 :]):
+        assert spoiled != content
+        seen.write_bytes(spoiled)
+        assert model_bytes(take(tmp_path).model) == whole
+        assert seen.stat().st_size == len(content)
+
+
+def test_what_was_not_used_for_longest_goes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shelf, "KEPT_BYTES", 1)
+    take(tmp_path)
+    first = worlds(tmp_path)
+    take(tmp_path, weather=dataclasses.replace(CLEAR, sun_altitude_deg=20.0))
+    assert len(worlds(tmp_path)) == 1 and worlds(tmp_path) != first
+
+
+def test_a_broken_town_says_what_is_wrong_with_it(tmp_path: Path, town: Path) -> None:
+    town.write_text(town.read_text().replace("<worldbody>", "<worldbody><nonsense/>", 1))
+    with pytest.raises(TownError, match=r"tiny\.xml"):
+        take(tmp_path, town)
+    assert not worlds(tmp_path)
