@@ -42,9 +42,9 @@ def main() -> None:
     model: Model = build(find("model", args.model), with_overrides(NO_OPTIONS, args.settings))
     scenes = Scenes(open_all([args.data], args.task, names=("train", "debug")), "transport", "cpu")
     config = SceneSpecificConfig(batch=args.batch)
-    problem = Problem(model=model, dataset=scenes.samples, compositor=scenes.compositor, settings=config.optimisation())
+    problem = Problem(model=model, dataset=scenes.samples, compositor=scenes.compositor, settings=config)
     objective = SceneSpecific(config).objective(scenes.samples[0])
-    ascend = unit_gradients(problem, objective)
+    ascend = unit_gradients(problem, objective, config)
     optimiser = TextureOptimiser(problem.surfaces(), problem.settings, derive_rng(0, "benchmark"), None)
 
     def seen(step: int) -> Seen:

@@ -16,7 +16,7 @@ from gear.attacking.borrowed import frozen
 from gear.attacking.group import members_of
 from gear.attacking.objectives import Objective
 from gear.attacking.regularisers import non_printability, smoothness
-from gear.attacking.settings import Settings
+from gear.attacking.settings import Settings, TextureSettings
 from gear.contracts.attacks import Budget, Compositor, Patch, State, Watch
 from gear.contracts.models import Model
 from gear.values.errors import GearError
@@ -28,7 +28,7 @@ BETAS, EPSILON = (0.9, 0.999), 1e-8
 class TextureOptimiser:
     """Textures, Adam's moments and the number of steps done: all that must be kept to go on later."""
 
-    def __init__(self, surfaces: int, settings: Settings, rng: np.random.Generator, saved: State | None) -> None:
+    def __init__(self, surfaces: int, settings: TextureSettings, rng: np.random.Generator, saved: State | None) -> None:
         shape = (surfaces, 3, settings.height_px, settings.width_px)
         self.rate = torch.as_tensor(settings.learning_rate, dtype=torch.float32).reshape(-1, 1, 1)
         if saved is None:
@@ -75,7 +75,7 @@ class Problem:
     model: Model
     dataset: Sequence[Any]
     compositor: Compositor
-    settings: Settings
+    settings: TextureSettings
 
     def surfaces(self) -> int:
         """How many patches there are.
@@ -176,9 +176,8 @@ def batch_of(step: int, count: int, size: int, seed: int) -> list[int]:
     return [int(index) for index in order[place * size : (place + 1) * size]]
 
 
-def unit_gradients(problem: Problem, objective: Objective) -> Ascend:
+def unit_gradients(problem: Problem, objective: Objective, settings: Settings) -> Ascend:
     """The scene-specific attack's direction: one gradient a term, each of unit length, less the regularisers'."""
-    settings = problem.settings
 
     def ascend(textures: Tensor, seen: Seen) -> tuple[Tensor, dict[str, float]]:
         terms = {

@@ -32,18 +32,15 @@ class Appearance:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Settings:
-    """How textures are optimised; all in unit space.
+class TextureSettings:
+    """Textures under Adam, whatever is climbed; all in unit space.
 
     Attributes:
         height_px, width_px: of every patch.
         batch: samples a step.
         learning_rate: of Adam, at its highest, one number or one a channel.
         decay: whether it falls to 0 with a cosine.
-        smoothness: length of the smoothness term's gradient beside the objective's, which is 1.
-        printability: likewise of non-printability.
         appearance: what is varied, anew for every sample of every step.
-        per_term: whether every term's gradient is brought to unit length by itself; one backward pass a term.
     """
 
     height_px: int = 150
@@ -51,10 +48,7 @@ class Settings:
     batch: int = 2
     learning_rate: float | tuple[float, float, float] = 0.06
     decay: bool = True
-    smoothness: float = 0.1
-    printability: float = 0.0
     appearance: Appearance = field(default_factory=Appearance)
-    per_term: bool = True
 
     def __post_init__(self) -> None:
         for name in ("height_px", "width_px"):
@@ -65,6 +59,24 @@ class Settings:
         rates = self.learning_rate if isinstance(self.learning_rate, tuple) else (self.learning_rate,)
         if not all(0 < rate <= 10 for rate in rates):
             raise FieldError("learning_rate", f"must be above 0, up to 10, got {self.learning_rate}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings(TextureSettings):
+    """The same, with the terms' gradients brought to unit length and regularised.
+
+    Attributes:
+        smoothness: length of the smoothness term's gradient beside the objective's, which is 1.
+        printability: likewise of non-printability, over what an offset press can print.
+        per_term: whether every term's gradient is brought to unit length by itself; one backward pass a term.
+    """
+
+    smoothness: float = 0.1
+    printability: float = 0.0
+    per_term: bool = True
+
+    def __post_init__(self) -> None:
+        TextureSettings.__post_init__(self)
         for name in ("smoothness", "printability"):
             if not 0 <= getattr(self, name) <= 100:
                 raise FieldError(name, f"must be 0 to 100, got {getattr(self, name):g}")

@@ -111,7 +111,12 @@ class Head(nn.Module):
         self.hidden = _conv_relu(inputs, hidden, 3)
         self.out = nn.Conv2d(hidden, outputs, 1)
         nn.init.normal_(self.out.weight, std=0.01)
-        nn.init.zeros_(self.out.bias)
+        self.start_at(0.0)
+
+    def start_at(self, value: float) -> None:
+        """What it says of everything before it has learnt anything."""
+        assert self.out.bias is not None
+        nn.init.constant_(self.out.bias, value)
 
     def forward(self, features: Tensor) -> Tensor:
         """(B, C, h, w) to (B, outputs, h, w)."""
@@ -147,7 +152,7 @@ class StereoCentre(nn.Module):
         self.place = Head(pyramid, pyramid, 6)
         self.body = Head(pyramid, pyramid, 8)
         self.disparity = Head(pyramid + 2 * width, pyramid, shape.bins + 2)
-        nn.init.constant_(self.heat.out.bias, PRIOR_HEAT)
+        self.heat.start_at(PRIOR_HEAT)
         nearest, farthest = (math.log(value) for value in shape.disparity_px)
         self.register_buffer("log_bins", torch.linspace(nearest, farthest, shape.bins), persistent=False)
 
@@ -177,7 +182,8 @@ class StereoCentre(nn.Module):
             `disparity_spread`: 1, logarithm of the mean absolute error expected of the disparity's logarithm.
         """
         coarse, matching = self.features(torch.cat([left, right]))
-        volume = self.volume(correlate(*matching.chunk(2), self.shape.disparities))
+        left_features, right_features = matching.chunk(2)
+        volume = self.volume(correlate(left_features, right_features, self.shape.disparities))
         stages = [self.fuse(torch.cat([coarse.chunk(2)[0], volume], dim=1))]
         for layer in (self.layer2, self.layer3, self.layer4):
             stages.append(layer(stages[-1]))

@@ -150,7 +150,7 @@ class StereoRcnn(nn.Module):
         self.RCNN_dim_orien_pred = nn.Linear(hidden, 5 * shape.classes)
         self.kpts_class = nn.Conv2d(pyramid, CORNERS + 2, 1)
         self.loss_log_variances = nn.Parameter(torch.full((len(LOSSES),), FIRST_LOG_VARIANCE))
-        self.register_load_state_dict_pre_hook(_complete)
+        self.register_load_state_dict_pre_hook(_complete)  # type: ignore[no-untyped-call]
         self._draw_weights()
         self._freeze()
 

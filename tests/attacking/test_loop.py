@@ -57,7 +57,7 @@ def run(watch: Watching, steps: int = 6) -> tuple[Patch, ...]:
     contract = Contract()
     dataset = contract.dataset()
     problem = Problem(model=contract.model(), dataset=dataset, compositor=TinyCompositor(dataset), settings=SETTINGS)
-    ascend = unit_gradients(problem, SemsegObjective())
+    ascend = unit_gradients(problem, SemsegObjective(), SETTINGS)
     return climb(problem, ascend, budget=Budget(steps=steps), rng=derive_rng(3, "attack"), watch=watch)
 
 
@@ -103,7 +103,12 @@ def test_a_model_that_passes_no_gradient_is_told_of() -> None:
 
     with pytest.raises(GearError, match="no gradient reaches the patch"):
         problem = Problem(model=Opaque(), dataset=dataset, compositor=TinyCompositor(dataset), settings=SETTINGS)
-        climb(problem, unit_gradients(problem, SemsegObjective()), budget=Budget(steps=50), rng=derive_rng(3, "attack"))
+        climb(
+            problem,
+            unit_gradients(problem, SemsegObjective(), SETTINGS),
+            budget=Budget(steps=50),
+            rng=derive_rng(3, "attack"),
+        )
 
 
 def test_looks_differ_and_have_gradients() -> None:

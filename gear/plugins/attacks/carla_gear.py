@@ -79,7 +79,7 @@ class CarlaGear:
         elif task == "depth":
             objective = DepthObjective(gamma=0.8)
         problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=settings)
-        return climb(problem, unit_gradients(problem, objective), budget=budget, rng=rng, watch=watch)
+        return climb(problem, unit_gradients(problem, objective, settings), budget=budget, rng=rng, watch=watch)
 
 
 LEARNING_RATES: dict[PaperTask, float | tuple[float, float, float]] = {

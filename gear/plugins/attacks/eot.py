@@ -24,52 +24,27 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EotConfig:
+class EotConfig(Settings):
     """Options.
 
     Attributes:
-        height_px, width_px: of every patch.
         share: width of a pasted patch as a share of the picture's, before scaling.
         least_scale, most_scale: of that width.
         shift: how far its middle lies from the picture's middle at most, as a share of the patch's own size.
-        batch: samples a step.
-        learning_rate: of Adam in unit space; it falls to 0 with a cosine.
-        smoothness: length of the smoothness gradient beside the objective's, which is 1.
-        appearance: what is varied on the patch.
     """
 
-    height_px: int = 150
-    width_px: int = 300
     share: float = 0.15
     least_scale: float = 0.8
     most_scale: float = 1.2
     shift: float = 0.5
-    batch: int = 2
-    learning_rate: float = 0.06
-    smoothness: float = 0.1
     appearance: Appearance = field(default_factory=lambda: Appearance(noise=0.1))
 
     def __post_init__(self) -> None:
-        self.optimisation()
+        Settings.__post_init__(self)
         if not 0.01 <= self.share <= 1:
             raise FieldError("share", f"must be 0.01 to 1, got {self.share:g}")
         if not 0 < self.least_scale <= self.most_scale <= 10:
             raise FieldError("least_scale", f"must be above 0 and at most most_scale, got {self.least_scale:g}")
-
-    def optimisation(self) -> Settings:
-        """What of it the optimiser needs.
-
-        Raises:
-            FieldError: a value is out of range.
-        """
-        return Settings(
-            height_px=self.height_px,
-            width_px=self.width_px,
-            batch=self.batch,
-            learning_rate=self.learning_rate,
-            smoothness=self.smoothness,
-            appearance=self.appearance,
-        )
 
 
 class Eot:
@@ -102,8 +77,8 @@ class Eot:
             scales=(config.least_scale, config.most_scale),
             shift=config.shift,
         )
-        problem = Problem(model=model, dataset=scenes, compositor=scenes, settings=config.optimisation())
-        ascend = unit_gradients(problem, self.objective(dataset[0]))
+        problem = Problem(model=model, dataset=scenes, compositor=scenes, settings=config)
+        ascend = unit_gradients(problem, self.objective(dataset[0]), config)
         return climb(problem, ascend, budget=budget, rng=rng, watch=watch, before=scenes.begin)
 
     def objective(self, sample: Any) -> Objective:

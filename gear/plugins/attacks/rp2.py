@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gear.attacking.settings import Appearance, Settings
+from gear.attacking.settings import Appearance, TextureSettings
 from gear.contracts.attacks import Budget, Compositor, Patch, Watch
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
@@ -30,19 +30,15 @@ LABEL_IDS: Mapping[str, int] = {label.name: label.id for label in LABELS if labe
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rp2Config:
+class Rp2Config(TextureSettings):
     """Options; the constants are those of the published code's GTSRB run.
 
     Attributes:
-        height_px, width_px: of every patch; few, as the perturbation is coarse.
         base: grey value that the perturbation is added to, 0 to 1.
         norm_weight: of the perturbation's 2-norm.
         printability_weight: of non-printability, a mean over pixels.
         smoothness_weight: of the smoothness term, a mean over pixels.
-        batch: samples a step.
-        learning_rate: of Adam, constant.
         attacked, target: semantic segmentation: as in scene_specific.
-        appearance: what is varied on the patch.
     """
 
     height_px: int = 32
@@ -51,35 +47,20 @@ class Rp2Config:
     norm_weight: float = 1e-3
     printability_weight: float = 0.1
     smoothness_weight: float = 1e-3
-    batch: int = 2
-    learning_rate: float = 0.25
+    learning_rate: float | tuple[float, float, float] = 0.25
+    decay: bool = False
     attacked: str = ""
     target: str = ""
     appearance: Appearance = field(default_factory=lambda: Appearance(brightness=0.1, contrast=0.3, blur_px=0))
 
     def __post_init__(self) -> None:
-        self.optimisation()
+        TextureSettings.__post_init__(self)
         if not 0 <= self.base <= 1:
             raise FieldError("base", f"must be 0 to 1, got {self.base:g}")
         for name in ("attacked", "target"):
             value = getattr(self, name)
             if value and value not in LABEL_IDS:
                 raise FieldError(name, f"must be one of {', '.join(LABEL_IDS)}, got {value!r}")
-
-    def optimisation(self) -> Settings:
-        """What of it the optimiser needs.
-
-        Raises:
-            FieldError: a value is out of range.
-        """
-        return Settings(
-            height_px=self.height_px,
-            width_px=self.width_px,
-            batch=self.batch,
-            learning_rate=self.learning_rate,
-            decay=False,
-            appearance=self.appearance,
-        )
 
 
 class Rp2:
@@ -101,7 +82,7 @@ class Rp2:
         """One patch a surface."""
         from gear.attacking.loop import Problem, climb, one_gradient
 
-        problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=self._config.optimisation())
+        problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=self._config)
         objective = self.objective(dataset[0])
 
         def value(textures: Tensor, seen: Seen) -> Mapping[str, Tensor]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from gear.attacking.settings import Appearance, Settings
+from gear.attacking.settings import Settings
 from gear.contracts.attacks import Budget, Compositor, Patch, Watch
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
@@ -29,16 +29,10 @@ LABEL_IDS: Mapping[str, int] = {label.name: label.id for label in LABELS if labe
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SceneSpecificConfig:
+class SceneSpecificConfig(Settings):
     """Options.
 
     Attributes:
-        height_px, width_px: of every patch.
-        batch: samples a step.
-        learning_rate: of Adam in unit space; it falls to 0 with a cosine.
-        smoothness: length of the smoothness gradient beside the objective's, which is 1.
-        printability: likewise of non-printability, over what an offset press can print.
-        per_term: bring the gradient of every term of the objective to unit length by itself.
         gamma: semantic segmentation: share of the pixels that are still right, 0 to 1; below 0 for their share of
             all pixels, step by step. Depth: share of the pixels whose error is below half a metre, 0.8 where below 0.
         attacked, target: semantic segmentation: Cityscapes classes; pixels of `attacked` (all where empty) are pushed
@@ -48,16 +42,8 @@ class SceneSpecificConfig:
         appears: COCO category of what appears.
         losses: detectors and stereo networks: sign of a loss by name, `+` and `-` to make it large or small, e.g.
             `bbox_regression=-`; names that are left out are made large.
-        appearance: what is varied on the patch.
     """
 
-    height_px: int = 150
-    width_px: int = 300
-    batch: int = 2
-    learning_rate: float = 0.06
-    smoothness: float = 0.1
-    printability: float = 0.0
-    per_term: bool = True
     gamma: float = -1.0
     attacked: str = ""
     target: str = ""
@@ -65,10 +51,9 @@ class SceneSpecificConfig:
     goal: Literal["harm", "vanish", "appear"] = "harm"
     appears: str = "person"
     losses: dict[str, str] = field(default_factory=dict)
-    appearance: Appearance = field(default_factory=Appearance)
 
     def __post_init__(self) -> None:
-        self.optimisation()
+        Settings.__post_init__(self)
         if self.gamma > 1:
             raise FieldError("gamma", f"must be 0 to 1, or below 0, got {self.gamma:g}")
         for name in ("attacked", "target"):
@@ -82,23 +67,6 @@ class SceneSpecificConfig:
         for name, sign in self.losses.items():
             if sign not in SIGNS:
                 raise FieldError(f"losses.{name}", f"must be one of {', '.join(SIGNS)}, got {sign!r}")
-
-    def optimisation(self) -> Settings:
-        """What of it the optimiser needs.
-
-        Raises:
-            FieldError: a value is out of range.
-        """
-        return Settings(
-            height_px=self.height_px,
-            width_px=self.width_px,
-            batch=self.batch,
-            learning_rate=self.learning_rate,
-            smoothness=self.smoothness,
-            printability=self.printability,
-            per_term=self.per_term,
-            appearance=self.appearance,
-        )
 
 
 SIGNS = {"+": 1.0, "-": -1.0, "0": 0.0}
@@ -124,8 +92,8 @@ class SceneSpecific:
         from gear.attacking.loop import Problem, climb, unit_gradients
 
         objective = self.objective(dataset[0])
-        problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=self._config.optimisation())
-        return climb(problem, unit_gradients(problem, objective), budget=budget, rng=rng, watch=watch)
+        problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=self._config)
+        return climb(problem, unit_gradients(problem, objective, self._config), budget=budget, rng=rng, watch=watch)
 
     def objective(self, sample: Any) -> Objective:
         """What is made large, by the task that the sample is of.

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gear.attacking.settings import Appearance, Settings
+from gear.attacking.settings import Appearance, TextureSettings
 from gear.contracts.attacks import Budget, Compositor, Patch, Watch
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
@@ -29,44 +29,20 @@ SCORES = ("objectness", "cls_logits")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ThysConfig:
+class ThysConfig(TextureSettings):
     """Options, with the published constants.
 
     Attributes:
-        height_px, width_px: of every patch.
-        batch: samples a step.
-        learning_rate: of Adam; it falls to 0 with a cosine.
         printability_weight: of non-printability, a mean over pixels.
         variation_weight: of total variation, a mean over pixels.
         least_variation: below this, total variation costs nothing more.
-        appearance: what is varied on the patch.
     """
 
-    height_px: int = 150
-    width_px: int = 300
-    batch: int = 2
-    learning_rate: float = 0.03
+    learning_rate: float | tuple[float, float, float] = 0.03
     printability_weight: float = 0.01
     variation_weight: float = 2.5
     least_variation: float = 0.1
     appearance: Appearance = field(default_factory=lambda: Appearance(noise=0.06, brightness=0.06, contrast=0.12))
-
-    def __post_init__(self) -> None:
-        self.optimisation()
-
-    def optimisation(self) -> Settings:
-        """What of it the optimiser needs.
-
-        Raises:
-            FieldError: a value is out of range.
-        """
-        return Settings(
-            height_px=self.height_px,
-            width_px=self.width_px,
-            batch=self.batch,
-            learning_rate=self.learning_rate,
-            appearance=self.appearance,
-        )
 
 
 class Thys:
@@ -92,7 +68,7 @@ class Thys:
         """
         from gear.attacking.loop import Problem, climb, one_gradient
 
-        problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=self._config.optimisation())
+        problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=self._config)
 
         def value(textures: Tensor, seen: Seen) -> Mapping[str, Tensor]:
             return self._value(problem.model, textures, seen)
