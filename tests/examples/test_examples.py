@@ -35,7 +35,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     venv.create(home / "env", with_pip=True)
     constraints = ("-c", ROOT / "constraints.txt")
     files = sorted(wheels.glob("*.whl"))
-    call(home / "env/bin/python", "-m", "pip", "install", "-q", *constraints, *files, "pytest", cwd=home)
+    call(home / "env/bin/python", "-m", "pip", "install", "-q", *constraints, *files, "pytest", "cityscapesScripts", cwd=home)
     (home / "empty").mkdir()
     return home
 

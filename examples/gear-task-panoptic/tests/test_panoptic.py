@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import pytest
 from gear.testing.model_contract import ModelContract
-from gear.testing.task_contract import TaskContract
+from gear.testing.task_contract import INFO, TaskContract
 
 from gear_task_panoptic import parts, spec
 from gear_task_panoptic.baseline import in_parts
@@ -40,6 +40,35 @@ class TestPanoptic(TaskContract):
                 assert (ids[y : y + h, x : x + w] == segment["id"]).sum() == segment["area"]
         figures = reference_quality(tmp_path, table, lambda ids: ids)
         assert figures == {"pq": 1.0, "things": 1.0, "stuff": 1.0}
+
+    @pytest.mark.filterwarnings("ignore")
+    def test_cityscapes_own_evaluation_finds_it_perfect(self, tmp_path: Path) -> None:
+        """The official script for panoptic Cityscapes, on COCO panoptic files and this task's own result files."""
+        from cityscapesscripts.evaluation.evalPanopticSemanticLabeling import evaluatePanoptic
+
+        self.write(tmp_path)
+        task: Any = self.task()
+        samples = [self.sample(index) for index in (0, 1)]
+        kept = [task.encode_prediction(sample, task.as_prediction(sample), INFO) for sample in samples]
+        facts = [(sample.record, one.facts) for sample, one in zip(samples, kept, strict=True)]
+        files = dict(task.finalise_predictions(facts, INFO))
+        for one in kept:
+            files |= one.files
+        for path, data in files.items():
+            (tmp_path / "results" / path).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / "results" / path).write_bytes(data)
+        figures = evaluatePanoptic(
+            str(tmp_path / "annotations/panoptic_val.json"),
+            str(tmp_path / "annotations/panoptic_val"),
+            str(tmp_path / "results/panoptic.json"),
+            str(tmp_path / "results/panoptic"),
+            str(tmp_path / "official.json"),
+        )
+        assert {name: figures[name]["pq"] for name in ("All", "Things", "Stuff")} == {
+            "All": 1.0,
+            "Things": 1.0,
+            "Stuff": 1.0,
+        }
 
     def test_the_evaluator_agrees_with_the_published_algorithm(self, tmp_path: Path) -> None:
         self.write(tmp_path)
