@@ -8,7 +8,7 @@ EXAMPLE = """examples:
   gear collect --task stereo3d
   gear collect --task semseg --scene billboard04 --patch patches/ --out data/twin
   gear collect --task semseg --split train --probes --out data/train
-  gear collect --config my.yml --set weather.cloudiness=30 --set options.camera.width_px=1024
+  gear collect --config my.yml --set weather.cloudiness=30 --set options.width_px=1024
 """
 
 
