@@ -35,7 +35,18 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     venv.create(home / "env", with_pip=True)
     constraints = ("-c", ROOT / "constraints.txt")
     files = sorted(wheels.glob("*.whl"))
-    call(home / "env/bin/python", "-m", "pip", "install", "-q", *constraints, *files, "pytest", "cityscapesScripts", cwd=home)
+    call(
+        home / "env/bin/python",
+        "-m",
+        "pip",
+        "install",
+        "-q",
+        *constraints,
+        *files,
+        "pytest",
+        "cityscapesScripts",
+        cwd=home,
+    )
     (home / "empty").mkdir()
     return home
 
@@ -120,6 +131,21 @@ def test_foreign_models_defenses_and_tasks_have_their_rows(home: Path) -> None:
     results = json.loads((folder / "predictions/panoptic.json").read_text())["annotations"]
     assert [one["image_id"] for one in results] == [0, 1]
     assert all((folder / "predictions/panoptic" / one["file_name"]).is_file() for one in results)
+
+
+def test_a_foreign_attack_makes_a_patch_that_goes_back_into_the_world(home: Path) -> None:
+    """Another toolbox's attack through gear's compositor, against a network, and its patch collected."""
+    size = ("--set", "options.width_px=256", "--set", "options.height_px=128", "--set", SCENES)
+    common = (*TOWN, "--split", "debug", "--samples", "2", "--renderer", "classic", "--quality", "fast", *size)
+    gear(home, "collect", "--task", "semseg", *common, "--probes", "--out", "attacked/data")
+    options = ("--set", "height_px=16", "--set", "width_px=32", "--model-set", "weights=none", "--steps", "2")
+    words = ("--attack", "art", "--model", "ddrnet23_slim", *options, "--data", "attacked/data")
+    notes = json.loads(gear(home, "attack", *words, "--out", "attacked/patches", "--json"))
+    assert notes["attack"]["package"] == "gear-attack-art" and notes["compositor"] == "transport"
+    assert (home / "empty/attacked/patches/patch_0.png").is_file()
+    gear(home, "collect", "--task", "semseg", *common, "--patch", "attacked/patches", "--out", "attacked/patched")
+    table = gear(home, "gap", "attacked/data", "--twin", "attacked/patched")
+    assert "PSNR inside the patch" in table
 
 
 TESTED = [path for path in EXAMPLES if path.name != "gear-broken"]
