@@ -32,7 +32,7 @@ from gear.verbs.attack.report import AttackReport
 from gear.verbs.attack.scenes import Scenes
 from gear.verbs.attack.watch import CHECKPOINT, Recorder
 from gear.verbs.evaluate.player import weights_digest
-from gear.verbs.train.data import open_all
+from gear.verbs.train.data import open_all, root_and_split
 
 Progress = Callable[[int, int], None]
 """Called with (steps done, steps in all)."""
@@ -131,14 +131,14 @@ def attack(
     device = str(getattr(network, "device", "cpu"))
     seen, held = (Scenes(group, compositor, device) for group in (datasets, validation))
     before = weights_digest(network)
-    objective = (
-        product.objective(seen.samples[0]) if hasattr(product, "objective") else default_objective(seen.samples[0])
-    )
+    # One each: an objective remembers the clean answers of its samples by their numbers.
+    make = product.objective if hasattr(product, "objective") else default_objective
+    objective, held_objective = make(seen.samples[0]), make(seen.samples[0])
     recorder = Recorder(
         root=root,
         key=_key(plan),
         steps=steps,
-        judge=(lambda patches: held.harm(network, objective, patches)) if validation else None,
+        judge=(lambda patches: held.harm(network, held_objective, patches)) if validation else None,
         every=every,
         patience=patience,
         told=progress,
@@ -251,7 +251,7 @@ def _facts(dataset: Dataset[Any]) -> Json:
 def _task_of(data: str | Path | Sequence[str | Path]) -> str:
     """The task of the first dataset that the paths mean."""
     for path in _list(data):
-        for plan in sorted(Path(str(path).split(":")[0]).glob("**/gear/*/plan.json")):
+        for plan in sorted(root_and_split(path)[0].glob("**/gear/*/plan.json")):
             return str(load_json(plan)["task"]["name"])
     raise DatasetError(str(next(iter(_list(data)), "")), "there is no dataset of gear's here")
 
