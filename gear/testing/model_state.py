@@ -3,23 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
 from typing import Any
 
 import torch
-from torch import nn
 
-
-def networks_of(model: Any) -> Iterator[tuple[str, nn.Module]]:
-    """The torch modules of a model: itself, or its attributes that are modules, and those that it taps."""
-    if isinstance(model, nn.Module):
-        yield "model", model
-        return
-    for name, value in sorted(getattr(model, "__dict__", {}).items()):
-        if isinstance(value, nn.Module):
-            yield name, value
-    for name, tap in sorted(model.taps().items()):
-        yield f"tap {name}", tap
+from gear.attacking.borrowed import networks_of
 
 
 def state_of(model: Any) -> dict[str, str]:

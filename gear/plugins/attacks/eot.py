@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,9 +18,6 @@ from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec
 from gear.values.errors import FieldError
-
-if TYPE_CHECKING:
-    from gear.attacking.objectives import Objective
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,6 +62,7 @@ class Eot:
     ) -> tuple[Patch, ...]:
         """One patch a surface, all pasted into every picture."""
         from gear.attacking.loop import Problem, climb, unit_gradients
+        from gear.attacking.objectives import default_objective
         from gear.attacking.upright import Upright
 
         config = self._config
@@ -78,14 +76,8 @@ class Eot:
             shift=config.shift,
         )
         problem = Problem(model=model, dataset=scenes, compositor=scenes, settings=config)
-        ascend = unit_gradients(problem, self.objective(dataset[0]), config)
+        ascend = unit_gradients(problem, default_objective(dataset[0]), config)
         return climb(problem, ascend, budget=budget, rng=rng, watch=watch, before=scenes.begin)
-
-    def objective(self, sample: Any) -> Objective:
-        """Untargeted harm."""
-        from gear.attacking.objectives import default_objective
-
-        return default_objective(sample)
 
 
 eot: AttackSpec[EotConfig] = AttackSpec(

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -18,9 +18,6 @@ from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec
 from gear.values.errors import FieldError
 from gear.values.rng import derive_rng
-
-if TYPE_CHECKING:
-    from gear.attacking.objectives import Objective
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,10 +70,11 @@ class Nes:
     ) -> tuple[Patch, ...]:
         """One patch a surface."""
         from gear.attacking.loop import batch_of
+        from gear.attacking.objectives import default_objective
         from gear.attacking.queries import Oracle, as_patches
 
         config, count = self._config, len(dataset[0].record.surfaces)
-        oracle = Oracle(model, dataset, compositor, self.objective(dataset[0]), budget)
+        oracle = Oracle(model, dataset, compositor, default_objective(dataset[0]), budget)
         rows, columns = -(-config.height_px // config.grid_px), -(-config.width_px // config.grid_px)
         saved = watch.resume() if watch is not None else None
         grid = rng.uniform(0, 1, (count, 3, rows, columns)).astype(np.float32)
@@ -110,12 +108,6 @@ class Nes:
             if watch is not None and watch.step(done, figures, made, partial(dict, state)):
                 break
         return as_patches(self._spread_out(grid))
-
-    def objective(self, sample: Any) -> Objective:
-        """Untargeted harm."""
-        from gear.attacking.objectives import default_objective
-
-        return default_objective(sample)
 
     def _change(self, draws: np.random.Generator, shape: tuple[int, ...]) -> np.ndarray:
         if self._config.draws == "nes":

@@ -17,7 +17,7 @@ from gear.contracts.attacks import Budget, Compositor, Patch, Watch
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec
-from gear.formats.cityscapes import LABELS
+from gear.plugins.attacks.classes import LABEL_IDS, check_classes
 from gear.values.errors import FieldError
 
 if TYPE_CHECKING:
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
     from gear.attacking.loop import Seen
     from gear.attacking.objectives import Objective
-
-LABEL_IDS: Mapping[str, int] = {label.name: label.id for label in LABELS if label.is_evaluated}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,10 +55,7 @@ class Rp2Config(TextureSettings):
         TextureSettings.__post_init__(self)
         if not 0 <= self.base <= 1:
             raise FieldError("base", f"must be 0 to 1, got {self.base:g}")
-        for name in ("attacked", "target"):
-            value = getattr(self, name)
-            if value and value not in LABEL_IDS:
-                raise FieldError(name, f"must be one of {', '.join(LABEL_IDS)}, got {value!r}")
+        check_classes(self.attacked, self.target)
 
 
 class Rp2:

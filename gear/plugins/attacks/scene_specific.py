@@ -6,7 +6,7 @@ falling learning rate and the intentions of their losses.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -17,15 +17,14 @@ from gear.contracts.attacks import Budget, Compositor, Patch, Watch
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec
-from gear.formats.cityscapes import LABELS
 from gear.formats.coco import CATEGORY_NAMES
+from gear.plugins.attacks.classes import LABEL_IDS, check_classes
 from gear.values.errors import FieldError, GearError
 
 if TYPE_CHECKING:
     from gear.attacking.objectives import Objective
 
 CATEGORY_IDS = {name: number for number, name in CATEGORY_NAMES.items()}
-LABEL_IDS: Mapping[str, int] = {label.name: label.id for label in LABELS if label.is_evaluated}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,14 +55,9 @@ class SceneSpecificConfig(Settings):
         Settings.__post_init__(self)
         if self.gamma > 1:
             raise FieldError("gamma", f"must be 0 to 1, or below 0, got {self.gamma:g}")
-        for name in ("attacked", "target"):
-            value = getattr(self, name)
-            if value and value not in LABEL_IDS:
-                raise FieldError(name, f"must be one of {', '.join(LABEL_IDS)}, got {value!r}")
+        check_classes(self.attacked, self.target)
         if self.appears not in CATEGORY_IDS:
             raise FieldError("appears", f"must be a COCO category such as person or car, got {self.appears!r}")
-        if self.attacked and not self.target:
-            raise FieldError("target", "must say what the attacked class is to become")
         for name, sign in self.losses.items():
             if sign not in SIGNS:
                 raise FieldError(f"losses.{name}", f"must be one of {', '.join(SIGNS)}, got {sign!r}")

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -20,9 +20,6 @@ from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec
 from gear.values.errors import FieldError
 from gear.values.rng import derive_rng
-
-if TYPE_CHECKING:
-    from gear.attacking.objectives import Objective
 
 SCHEDULE = ((0.001, 1), (0.005, 2), (0.02, 4), (0.05, 8), (0.1, 16), (0.2, 32), (0.4, 64), (0.6, 128), (0.8, 256))
 """Share of the queries spent, and by what the squares' area is divided until then."""
@@ -71,10 +68,11 @@ class Square:
     ) -> tuple[Patch, ...]:
         """One patch a surface."""
         from gear.attacking.loop import batch_of
+        from gear.attacking.objectives import default_objective
         from gear.attacking.queries import Oracle, as_patches
 
         config, count = self._config, len(dataset[0].record.surfaces)
-        oracle = Oracle(model, dataset, compositor, self.objective(dataset[0]), budget)
+        oracle = Oracle(model, dataset, compositor, default_objective(dataset[0]), budget)
         saved = watch.resume() if watch is not None else None
         textures = self._first(rng, count)
         seed, done, best, whole = int(rng.integers(2**62)), 0, -math.inf, oracle.left
@@ -105,12 +103,6 @@ class Square:
             if watch is not None and watch.step(done, figures, partial(as_patches, textures), partial(dict, state)):
                 break
         return as_patches(textures)
-
-    def objective(self, sample: Any) -> Objective:
-        """Untargeted harm."""
-        from gear.attacking.objectives import default_objective
-
-        return default_objective(sample)
 
     def _first(self, rng: np.random.Generator, count: int) -> np.ndarray:
         """Vertical stripes of random corners of the colour cube."""

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from gear.verbs.gap.report import GapReport
 from gear.verbs.gap.run import gap
+from gear.verbs.train.data import root_and_split
 
 FOLDER = "verify"
 
@@ -38,10 +39,7 @@ def verify(
     Raises:
         GearError: anything that the user can put right; its text is one line.
     """
-    root, split = Path(data), None
-    if not root.exists() and ":" in str(data):
-        text, _, split = str(data).rpartition(":")
-        root = Path(text)
+    root, split = root_and_split(data)
     place, texts, reports = Path(out) / FOLDER, list(settings), {}
     for number, model in enumerate(models):
         reports[model] = gap(

@@ -92,11 +92,16 @@ def open_all(
     return tuple(found)
 
 
-def _open(path: str | Path, names: Sequence[str]) -> list[Dataset[Any]]:
-    root, split = Path(path), None
-    if not root.exists() and ":" in str(path):
+def root_and_split(path: str | Path) -> tuple[Path, str | None]:
+    """What `DIR` or `DIR:SPLIT` means."""
+    if not Path(path).exists() and ":" in str(path):
         text, _, split = str(path).rpartition(":")
-        root = Path(text)
+        return Path(text), split
+    return Path(path), None
+
+
+def _open(path: str | Path, names: Sequence[str]) -> list[Dataset[Any]]:
+    root, split = root_and_split(path)
     if not root.is_dir():
         raise DatasetError(root, "there is no such folder")
     plans = (plan for depth in range(DEEPEST + 1) for plan in root.glob("*/" * depth + "gear/*/plan.json"))

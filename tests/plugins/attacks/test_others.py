@@ -200,6 +200,7 @@ def test_matched_noise_is_like_the_patch_and_not_the_patch(tmp_path: Path) -> No
         lambda: SquareConfig(area=0.0),
         lambda: Rp2Config(base=2.0),
         lambda: Rp2Config(target="rode"),
+        lambda: Rp2Config(attacked="car"),
         lambda: ThysConfig(batch=0),
         lambda: ControlConfig(kind="matched"),
         lambda: ControlConfig(rgb=(0.0, 0.0, 2.0)),

@@ -1,0 +1,23 @@
+"""Cityscapes classes as options of targeted attacks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from gear.formats.cityscapes import LABELS
+from gear.values.errors import FieldError
+
+LABEL_IDS: Mapping[str, int] = {label.name: label.id for label in LABELS if label.is_evaluated}
+
+
+def check_classes(attacked: str, target: str) -> None:
+    """Whether both are evaluated classes or empty, and an attacked one has a target.
+
+    Raises:
+        FieldError: they are not.
+    """
+    for name, value in (("attacked", attacked), ("target", target)):
+        if value and value not in LABEL_IDS:
+            raise FieldError(name, f"must be one of {', '.join(LABEL_IDS)}, got {value!r}")
+    if attacked and not target:
+        raise FieldError("target", "must say what the attacked class is to become")
