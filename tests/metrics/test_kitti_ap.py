@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 
 from gear.formats.kitti_object import KittiLabel, dont_care, label_corners
 from gear.metrics.kitti_ap import KittiEvaluator, recall_thresholds
-
-shapely = pytest.importorskip("shapely")
 
 LEVELS = {"easy": (40, 0, 0.15), "moderate": (25, 1, 0.3), "hard": (25, 2, 0.5)}
 NEIGHBOUR = {"Car": "Van", "Pedestrian": "Person_sitting", "Cyclist": None}
