@@ -236,6 +236,31 @@ def test_twins_are_compared_and_the_patch_can_be_left_out(tmp_path: Path, small:
     (difference,) = report.differences
     assert (difference.row, difference.against) == (random.name, none.name)
     assert difference.figures["task"]["miou"].value == 0 and difference.auroc is None
+    assert {name: (test["miou"].mean, test["miou"].p) for name, test in difference.paired.items()} == {
+        "task": (0, 1), "outside_patch": (0, 1),
+    }  # fmt: skip
+
+
+def test_twins_are_tested_sample_by_sample(tmp_path: Path, small: Small, install: Install) -> None:
+    """A network that the random patch leads astray by a metre a sample, on the patch alone in one report."""
+    roots = [small("depth", "none", 3), small("depth", "random", 3)]
+    patched = {Oracle.key(sample.images) for sample in gear.open_dataset(roots[1])}
+
+    def astray(sample: Any, prediction: Any) -> Any:
+        far = np.float32(1 + sample.record.index if Oracle.key(sample.images) in patched else 0)
+        return np.where(patch_masks(sample)["left"], prediction, prediction + far)
+
+    install(model_spec(lambda _: Oracle(roots, astray), "depth"))
+    report = evaluate(roots, model="odd", out=tmp_path / "out", reports=["outside_patch"], resamples=0)
+    (difference,) = report.differences
+    test = difference.paired["outside_patch"]["mae_m"]
+    assert (test.mean, test.p, test.pairs) == (pytest.approx(2, abs=1e-4), 2 / 8, 3)
+    assert 0 < difference.paired["task"]["mae_m"].mean < test.mean
+    written = json.loads((tmp_path / "out/results.json").read_text())["differences"][0]["paired"]
+    assert written["outside_patch"]["mae_m"] == test.as_json()
+    assert len(json.loads((tmp_path / "out/results.json").read_text())["rows"][0]["per_sample"][0]["figures"]) == 2
+    line = (tmp_path / "out/table.txt").read_text().splitlines()[-1]
+    assert "minus none: mae_m +" in line and "outside_patch.mae_m +2.000 (p 0.25, 3 pairs)" in line
 
 
 def test_figures_outside_the_patch_do_not_see_it(tmp_path: Path, small: Small, install: Install) -> None:

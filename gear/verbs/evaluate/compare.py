@@ -9,9 +9,9 @@ import numpy as np
 
 from gear.contracts.evaluation import Draws
 from gear.dataset.reading import Dataset
-from gear.verbs.evaluate.report import Difference, Estimate, RowReport
+from gear.verbs.evaluate.report import Difference, Estimate, PairedTest, RowReport
 from gear.verbs.evaluate.scoring import Note, Scorer
-from gear.verbs.evaluate.spread import Figures, auroc, auroc_interval, bounds, draw, gather
+from gear.verbs.evaluate.spread import Figures, auroc, auroc_interval, bounds, draw, gather, paired_p
 
 NONE = "none"
 CONTROLS = (NONE, "random")
@@ -80,6 +80,7 @@ def compared(
                             for report, fresh in scorers[here].makers.items()
                         },
                         auroc=_auroc(*pair, draws),
+                        paired={report: _tested(*pair, report, seed) for report in scorers[here].makers},
                     )
 
 
@@ -91,6 +92,20 @@ def _paired(one: Figures, other: Figures) -> dict[str, Estimate]:
             interval = bounds(one.spread[name] - other.spread[name]) if both else None
             found[name] = Estimate(value=one.overall[name] - other.overall[name], interval=interval)
     return found
+
+
+def _tested(here: list[Note], there: list[Note], report: str, seed: int) -> dict[str, PairedTest]:
+    """Of every figure that a single sample of the report has."""
+    names = list(dict.fromkeys(name for note in here for name in note.figures[report]))
+    ours, theirs = (
+        np.array([[note.figures[report].get(name, np.nan) for name in names] for note in notes], np.float64)
+        for notes in (here, there)
+    )
+    differences = ours - theirs
+    return {
+        name: PairedTest(mean=_known_mean(values), p=float(p), pairs=int(np.isfinite(values).sum()))
+        for name, values, p in zip(names, differences.T, paired_p(differences, seed), strict=True)
+    }
 
 
 def _auroc(here: list[Note], there: list[Note], draws: Draws) -> Estimate | None:

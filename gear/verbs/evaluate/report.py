@@ -76,6 +76,26 @@ class RowReport:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PairedTest:
+    """Whether the samples' own figures differ between twins by more than chance.
+
+    Attributes:
+        mean: of the differences, over the pairs; NaN without any.
+        p: two-sided, by `gear.verbs.evaluate.spread.paired_p`; NaN without pairs.
+        pairs: samples that have a figure in both.
+    """
+
+    mean: float
+    p: float
+    pairs: int
+
+    def as_json(self) -> Json:
+        """null for NaN."""
+        mean, p = (value if value == value else None for value in (self.mean, self.p))
+        return {"mean": mean, "p": p, "pairs": self.pairs}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
     """One dataset against its twin, sample by sample.
 
@@ -83,12 +103,14 @@ class Difference:
         row, against: names of the rows; what is said is `row` minus `against`.
         figures: of the differences.
         auroc: how well the defense's score tells the rows apart, or None without scores.
+        paired: tests of the figures that single samples have, by report, then by figure.
     """
 
     row: str
     against: str
     figures: Figures
     auroc: Estimate | None
+    paired: Mapping[str, Mapping[str, PairedTest]]
 
     def as_json(self) -> Json:
         """As written into results.json."""
@@ -97,6 +119,9 @@ class Difference:
             "against": self.against,
             "figures": figures_json(self.figures),
             "auroc": None if self.auroc is None else self.auroc.as_json(),
+            "paired": {
+                report: {name: one.as_json() for name, one in tests.items()} for report, tests in self.paired.items()
+            },
         }
 
 

@@ -24,7 +24,7 @@ def table(report: EvaluateReport) -> str:
     guarded = report.facts["defense"]
     title = f"{report.facts['task']['name']}: {report.facts['model']['name']}"
     title += f" guarded by {guarded['name']}" if guarded else ""
-    return "\n".join([title, *text, *_absent(report)]) + "\n"
+    return "\n".join([title, *text, *_paired(report), *_absent(report)]) + "\n"
 
 
 def _columns(report: EvaluateReport) -> list[tuple[str, str]]:
@@ -51,6 +51,21 @@ def _difference(one: Difference, report: EvaluateReport, columns: Iterable[tuple
     against = next(row for row in report.rows if row.name == one.against)
     figures = [_estimate(one.figures.get(name, {}).get(figure), is_signed=True) for name, figure in columns]
     return [f"  minus {against.patch}", "", *figures, "", "", "", _estimate(one.auroc)]
+
+
+def _paired(report: EvaluateReport) -> list[str]:
+    """What twins change in single samples, and how often chance alone would change as much."""
+    lines = []
+    for one in report.differences:
+        against = next(row for row in report.rows if row.name == one.against)
+        tests = [
+            f"{_title(name, figure)} {_number(test.mean, is_signed=True)} (p {test.p:.2g}, {test.pairs} pairs)"
+            for name, figures in one.paired.items()
+            for figure, test in list(figures.items())[: COLUMNS if name == TASK else FURTHER]
+            if test.pairs
+        ]
+        lines += [f"  {one.row} minus {against.patch}: {', '.join(tests)}"] if tests else []
+    return ["mean change of a sample (p: how often chance alone changes as much)", *lines] if lines else []
 
 
 def _estimate(one: Estimate | None, *, is_signed: bool = False) -> str:
