@@ -33,6 +33,47 @@ def train_ids(samples: Sequence[SegmentedSample], device: torch.device) -> Tenso
     return torch.from_numpy(ids).to(device).long()
 
 
+STEP_PX = 2
+"""Training compares every second pixel of every second row: maps at 1/8 know little more, in a quarter of the time."""
+
+
+def offsets_px(index: int) -> tuple[int, int]:
+    """Row and column of the first pixel that is compared in a batch's picture; over four pictures, every one is."""
+    return index // STEP_PX % STEP_PX, index % STEP_PX
+
+
+def sampled_logits(maps: Tensor, size_px: Sequence[int], *, align_corners: bool) -> Tensor:
+    """Bilinear interpolation of maps at the pixels that training compares, the same numbers as at the picture's size.
+
+    Args:
+        maps: (B, C, h, w) float.
+        size_px: height and width of the pictures, at least `STEP_PX` each.
+        align_corners: whether the outermost cells lie on the outermost pixels' centres, or share their outer borders.
+
+    Returns:
+        (B, C, H // STEP_PX, W // STEP_PX).
+    """
+    grids = []
+    for index in range(len(maps)):
+        axes = []
+        for side, first in zip(size_px, offsets_px(index), strict=True):
+            pixels = first + STEP_PX * torch.arange(side // STEP_PX, dtype=maps.dtype, device=maps.device)
+            axes.append(pixels * 2 / (side - 1) - 1 if align_corners else (pixels * 2 + 1) / side - 1)
+        rows, columns = torch.meshgrid(*axes, indexing="ij")
+        grids.append(torch.stack([columns, rows], dim=-1))
+    return functional.grid_sample(maps, torch.stack(grids), padding_mode="border", align_corners=align_corners)
+
+
+def sampled_ids(ids: Tensor) -> Tensor:
+    """(B, H // STEP_PX, W // STEP_PX) of (B, H, W) ids: those of the pixels of `sampled_logits`."""
+    height, width = (side // STEP_PX * STEP_PX for side in ids.shape[1:])
+    chosen = []
+    for index, one in enumerate(ids):
+        row, column = offsets_px(index)
+        chosen.append(one[row::STEP_PX, column::STEP_PX][: height // STEP_PX, : width // STEP_PX])
+    return torch.stack(chosen)
+
+
 def hard_cross_entropy(logits: Tensor, ids: Tensor, *, easy: float, least: float) -> Tensor:
     """Cross-entropy over the pixels that the network finds hard: online hard example mining, of pixels.
 
@@ -73,9 +114,11 @@ class SegmentationLosses:
     def __call__(self, outputs: Mapping[str, Tensor], targets: Sequence[SegmentedSample]) -> dict[str, Tensor]:
         """`cross_entropy` of the output `logits`, and, weighed, one loss for each further output by its name.
 
-        Outputs are (B, 19, H, W) at the size of the targets' labels.
+        Outputs are (B, 19, H, W) at the size of the targets' labels, or as `sampled_logits` gives them.
         """
         ids = train_ids(targets, outputs["logits"].device)
+        if outputs["logits"].shape[2:] != ids.shape[1:]:
+            ids = sampled_ids(ids)
         losses = {"cross_entropy": hard_cross_entropy(outputs["logits"], ids, easy=self.easy, least=self.least)}
         for name, logits in outputs.items():
             if name != "logits":

@@ -11,6 +11,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from gear.formats.cityscapes import IGNORED_TRAIN_ID, LABELS
+from gear.losses.semantic import sampled_logits
 from gear.nn.network import Network, Normalise
 from gear.nn.options import SegmentationOptions
 
@@ -71,8 +72,9 @@ class SemsegNetwork(Network):
         return {LOGITS: self._maps(pictures[VIEW], auxiliary=False)[0]}
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The same, and `auxiliary_0` and so on of the same shape."""
-        main, *others = self._maps(pictures[VIEW], auxiliary=True)
+        """The same, and `auxiliary_0` and so on of the same shape; while the graph is being trained, at the pixels of
+        `gear.losses.semantic.sampled_logits` alone."""
+        main, *others = self._maps(pictures[VIEW], auxiliary=True, sampled=self.graph.training)
         return {LOGITS: main} | {f"{AUXILIARY}_{index}": other for index, other in enumerate(others)}
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
@@ -83,8 +85,8 @@ class SemsegNetwork(Network):
         """(H, W) uint8 label ids of each picture."""
         return [LABEL_IDS[best_class(logits).cpu().numpy()] for logits in outputs[LOGITS]]
 
-    def _maps(self, pictures: Tensor, *, auxiliary: bool) -> list[Tensor]:
-        """The heads' logits at the picture's size."""
+    def _maps(self, pictures: Tensor, *, auxiliary: bool, sampled: bool = False) -> list[Tensor]:
+        """The heads' logits at the picture's size, or at some of its pixels."""
         size_px = pictures.shape[2:]
         inner_px = inner_size(size_px, self.input_scale)
         if inner_px != tuple(size_px):
@@ -93,6 +95,8 @@ class SemsegNetwork(Network):
             )
         maps: list[Tensor] = self.graph(self.normalise(pictures), auxiliary=auxiliary)
         align = bool(self.graph.align_corners)
+        if sampled:
+            return [sampled_logits(m.float(), size_px, align_corners=align) for m in maps]
         return [functional.interpolate(m.float(), size=size_px, mode="bilinear", align_corners=align) for m in maps]
 
 

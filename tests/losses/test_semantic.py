@@ -10,7 +10,14 @@ import torch
 from torch.nn import functional
 
 from gear.formats.cityscapes import LABELS
-from gear.losses.semantic import TRAIN_ID_OF_LABEL_ID, SegmentationLosses, hard_cross_entropy, train_ids
+from gear.losses.semantic import (
+    TRAIN_ID_OF_LABEL_ID,
+    SegmentationLosses,
+    hard_cross_entropy,
+    sampled_ids,
+    sampled_logits,
+    train_ids,
+)
 from gear.values.rng import derive_rng
 
 
@@ -91,3 +98,33 @@ def test_heads_are_weighed() -> None:
     assert losses.keys() == {"cross_entropy", "auxiliary_0"}
     assert float(losses["cross_entropy"]) == pytest.approx(math.log(19))
     assert float(losses["auxiliary_0"]) == pytest.approx(0.4 * math.log(19))
+
+
+@pytest.mark.parametrize("align_corners", [False, True])
+@pytest.mark.parametrize("size_px", [(24, 40), (25, 41)])
+def test_sampled_logits_are_those_of_the_whole_picture_at_the_pixels_of_the_sampled_ids(
+    align_corners: bool, size_px: tuple[int, int]
+) -> None:
+    maps = torch.rand(4, 3, 5, 7, generator=torch.Generator().manual_seed(0))
+    whole = torch.nn.functional.interpolate(maps, size=size_px, mode="bilinear", align_corners=align_corners)
+    numbers = torch.arange(size_px[0] * size_px[1]).reshape(1, *size_px).expand(4, -1, -1)
+
+    chosen = sampled_ids(numbers)
+    sampled = sampled_logits(maps, size_px, align_corners=align_corners)
+
+    wanted = whole.flatten(2).gather(2, chosen.flatten(1)[:, None].expand(-1, 3, -1)).reshape(sampled.shape)
+    torch.testing.assert_close(sampled, wanted, atol=1e-5, rtol=0)
+    even = numbers[0, : size_px[0] // 2 * 2, : size_px[1] // 2 * 2]
+    assert set(chosen.flatten().tolist()) == set(even.flatten().tolist()), "four pictures together show every pixel"
+
+
+def test_losses_compare_sampled_logits_with_the_labels_of_their_pixels() -> None:
+    label_ids = np.full((16, 16), 7, dtype=np.uint8)
+    label_ids[0::2, 0::2] = 26  # what the first picture of a batch looks at
+    sample = Labelled(label_ids=label_ids)
+    logits = torch.zeros(2, 19, 8, 8)
+    logits[0, 13], logits[1, 0] = 20, 20  # car, road
+
+    losses = SegmentationLosses(easy=1.0, least=0.0, auxiliary_weight=0.0)({"logits": logits}, [sample, sample])
+
+    assert float(losses["cross_entropy"]) == pytest.approx(0.0, abs=1e-4)
