@@ -87,6 +87,9 @@ LABELS: tuple[CityscapesLabel, ...] = (
 COLOURS: UInt8Image = np.array([label.rgb for label in LABELS], dtype=np.uint8)
 """(34, 3) RGB by label id."""
 
+COLOURS_RGBA: UInt8Image = np.concatenate([COLOURS, np.full((len(COLOURS), 1), 255, dtype=np.uint8)], axis=1)
+"""(34, 4) the same, opaque."""
+
 
 def city_name(town: str) -> str:
     """The town as a city's name: no underscore in it (the official tools split names there), and `aachen` at its end.
@@ -131,9 +134,8 @@ def paths(town: str, split: str, sequence: int, frame: int) -> Paths:
 
 def colour_map(label_ids: npt.NDArray[np.uint8]) -> UInt8Image:
     """(H, W, 4) RGBA picture of a label map, opaque."""
-    table = np.concatenate([COLOURS, np.full((len(COLOURS), 1), 255, dtype=np.uint8)], axis=1)
     # One gather of 32-bit pixels is five times as quick as one of four bytes each.
-    packed = np.ascontiguousarray(table).view(np.uint32)[:, 0]
+    packed = COLOURS_RGBA.view(np.uint32)[:, 0]
     return np.take(packed, label_ids).view(np.uint8).reshape(*label_ids.shape, 4)
 
 

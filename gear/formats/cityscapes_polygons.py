@@ -10,9 +10,9 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage
 
 from gear.formats.cityscapes import INSTANCE_FACTOR, LABELS
+from gear.formats.runs import Runs
 from gear.values.serial import Json
 
 MIN_PIECE_PX = 4
@@ -30,18 +30,13 @@ def polygons_json(instances: npt.NDArray[np.uint16]) -> Json:
         borders. An instance that something cuts into pieces is one polygon a piece.
     """
     height, width = instances.shape
-    values = np.flatnonzero(np.bincount(instances.reshape(-1)))
-    numbers = np.zeros(65536, dtype=np.uint16)
-    numbers[values] = np.arange(1, len(values) + 1)
-    places = ndimage.find_objects(np.take(numbers, instances))
     pieces: list[tuple[float, str, npt.NDArray[np.int32]]] = []
-    for value, (rows, columns) in zip(values.tolist(), places, strict=True):
+    runs = Runs.of(instances)
+    # Unlabelled pixels, value 0, have no box and get no outline.
+    for value, ((left, top, right, bottom), _) in runs.boxes(runs.values).items():
         label = LABELS[value // INSTANCE_FACTOR if value >= INSTANCE_FACTOR else value]
-        if label.id == 0:
-            continue
-        inside = cv2.inRange(instances[rows, columns], value, value)
-        corner = (columns.start, rows.start)
-        outlines, _ = cv2.findContours(inside, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE, offset=corner)
+        inside = cv2.inRange(instances[top:bottom, left:right], value, value)
+        outlines, _ = cv2.findContours(inside, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE, offset=(left, top))
         pieces += [(_enclosed_px(outline), label.name, outline) for outline in outlines]
     kept = [piece for piece in pieces if piece[0] >= MIN_PIECE_PX]
     kept.sort(key=lambda piece: (-piece[0], piece[1], piece[2][0, 0, 0], piece[2][0, 0, 1]))

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.formats.cityscapes import INSTANCE_FACTOR
-from gear.groundtruth.visible import gather
+from gear.formats.runs import STRIP_ROWS, Runs
 from gear.values.frames import GeomTable, IdImage, SceneObject
 from gear.values.labels import LABELS
 
@@ -29,12 +29,12 @@ def instance_map(geom_id: IdImage, geoms: GeomTable, objects: Mapping[int, Scene
         (H, W) uint16. Instances are numbered from 0 for each class, in order of object id, among those that are seen.
         The ego car is `ego vehicle`.
     """
-    counts = np.bincount(geom_id.reshape(-1) + 1, minlength=len(geoms.object_id) + 1)[1:]
+    runs = Runs.of(geom_id)
     table = np.zeros(len(geoms.object_id) + 1, dtype=np.uint16)
     table[-1] = LABELS[0].cityscapes_id
     numbers: dict[tuple[int, int], int] = {}
     used: dict[int, int] = {}
-    seen = np.flatnonzero(counts)
+    seen = np.flatnonzero(np.bincount(runs.values + 1)[1:])
     for geom in seen[np.argsort(geoms.object_id[seen], kind="stable")]:
         label = LABELS[int(geoms.label_code[geom])]
         thing = objects.get(int(geoms.object_id[geom]))
@@ -50,14 +50,18 @@ def instance_map(geom_id: IdImage, geoms: GeomTable, objects: Mapping[int, Scene
                 used[label.cityscapes_id] = numbers[key] + 1
             if numbers[key] < INSTANCE_FACTOR:
                 table[geom] = label.cityscapes_id * INSTANCE_FACTOR + numbers[key]
-    return gather(table, geom_id)  # type: ignore[return-value]
+    # The table's last entry is what -1, nothing, finds.
+    return runs.painted(table[runs.values])
 
 
 def label_map(instances: InstanceImage) -> npt.NDArray[np.uint8]:
     """(H, W) uint8 Cityscapes label ids of an instance map."""
-    table = np.arange(65536)
-    table = np.where(table >= INSTANCE_FACTOR, table // INSTANCE_FACTOR, table).astype(np.uint8)
-    return np.take(table, instances)
+    labels = np.empty(instances.shape, np.uint8)
+    for top in range(0, len(instances), STRIP_ROWS):
+        strip = instances[top : top + STRIP_ROWS]
+        of_instance = strip // np.uint16(INSTANCE_FACTOR)
+        labels[top : top + STRIP_ROWS] = np.where(of_instance > 0, of_instance, strip)
+    return labels
 
 
 def coarsen(instances: InstanceImage, window_px: int) -> InstanceImage:

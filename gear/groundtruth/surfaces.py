@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import cv2
 import numpy as np
 
 from gear.formats import rle
@@ -36,10 +37,13 @@ def _observe(view: View, geoms: GeomTable, record: SceneRecord, index: int, surf
         corners_px = tuple((round(float(x), 6), round(float(y), 6)) for x, y in pixels)
         homography = camera.intrinsics.matrix @ np.stack([right_m, down_m, top_left_m], axis=1)
         image_from_unit = tuple(round(float(v), 9) for v in (homography / homography[2, 2]).reshape(-1))
-    mask = np.zeros(view.geom_id.shape, dtype=np.bool_)
-    for geom in np.flatnonzero(geoms.surface_index == index):
-        mask |= view.geom_id == geom
-    visible_px = int(mask.sum())
+    height, width = view.geom_id.shape
+    mask = np.zeros((height, width), dtype=np.uint8)
+    for geom in np.flatnonzero(geoms.surface_index == index).tolist():
+        mask |= cv2.inRange(view.geom_id, geom, geom)
+    visible_px = cv2.countNonZero(mask)
+    left, top, columns, rows = cv2.boundingRect(mask)
+    seen = mask[top : top + rows, left : left + columns] > 0
     silhouette_px2 = _area_px2(corners_m, view)
     distance_m = float(np.linalg.norm(middle_m))
     # The face looks along -z of its own frame; the camera sits at the origin of the camera frame.
@@ -54,7 +58,7 @@ def _observe(view: View, geoms: GeomTable, record: SceneRecord, index: int, surf
         visible_fraction=round(min(1.0, visible_px / silhouette_px2), 6) if silhouette_px2 > 0 else 0.0,
         distance_m=round(distance_m, 6),
         incidence_deg=round(math.degrees(math.acos(max(-1.0, min(1.0, cosine)))), 6),
-        mask_rle=rle.encode(mask),
+        mask_rle=rle.encode_crop(seen, left, top, height, width),
     )
 
 

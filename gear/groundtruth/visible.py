@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage
 
+from gear.formats.runs import Runs
 from gear.values.frames import GeomTable, IdImage, SceneObject
 
 Mask = npt.NDArray[np.bool_]
@@ -49,22 +49,19 @@ def visible_parts(
         by_label: True tells the labels of an object apart (rider and bicycle); False takes it whole, under its own
             label.
     """
-    counts = np.bincount(geom_id.reshape(-1) + 1, minlength=len(geoms.object_id) + 1)[1:]
+    runs = Runs.of(geom_id)
     keys: dict[PartKey, int] = {}
     table = np.zeros(len(geoms.object_id) + 1, dtype=np.uint16)
-    for geom in np.flatnonzero(counts):
+    for geom in np.flatnonzero(np.bincount(runs.values + 1)[1:]):
         thing = objects.get(int(geoms.object_id[geom]))
         if thing is None or thing.is_ego:
             continue
         label = int(geoms.label_code[geom]) if by_label else thing.label_code
         table[geom] = keys.setdefault((thing.id, label), len(keys) + 1)
-    if not keys:
-        return {}
-    parts = gather(table, geom_id)
-    slices = ndimage.find_objects(parts, max_label=len(keys))
+    boxes = runs.boxes(table[runs.values])
     found: dict[PartKey, VisiblePart] = {}
     for key, number in sorted(keys.items()):
-        rows, columns = slices[number - 1]
-        mask = parts[rows, columns] == number
-        found[key] = VisiblePart(left_px=columns.start, top_px=rows.start, mask=mask, count_px=int(mask.sum()))
+        (left, top, right, bottom), count_px = boxes[number]
+        mask = gather(table, geom_id[top:bottom, left:right]) == number
+        found[key] = VisiblePart(left_px=left, top_px=top, mask=mask, count_px=count_px)
     return found

@@ -19,7 +19,9 @@ from gear.formats import cityscapes, results
 from gear.formats.billboard_info import billboard_info
 from gear.formats.cityscapes_polygons import polygons_json
 from gear.formats.jsontext import dump
-from gear.formats.png import encode_labels, encode_rgb
+from gear.formats.label_png import encode_label_map, encode_painted
+from gear.formats.png import encode_rgb
+from gear.formats.runs import Runs
 from gear.groundtruth.labelmaps import coarsen, instance_map, label_map
 from gear.metrics.semantic import PresentClasses, SemanticEvaluator
 from gear.plugins.tasks.common import CameraOptions, draw_surfaces, images_of, read_plain, read_rgb, surfaces_of
@@ -110,14 +112,14 @@ class SemsegTask:
         camera = cityscapes.camera_json(record.camera(VIEW), world_from_vehicle, baseline_m=0.0)
         files = {
             paths.image: encode_rgb(sample.images[VIEW]),
-            paths.label_ids: encode_labels(sample.label_ids),
-            paths.instance_ids: encode_labels(sample.instance_ids),
-            paths.colour: encode_labels(cityscapes.colour_map(sample.label_ids)),
+            paths.label_ids: encode_label_map(sample.label_ids),
+            paths.instance_ids: encode_label_map(sample.instance_ids),
+            paths.colour: encode_painted(sample.label_ids, cityscapes.COLOURS_RGBA),
             paths.camera: dump(camera),
         }
         if self.config.polygons:
             files[paths.polygons] = dump(polygons_json(sample.instance_ids))
-        counts = np.bincount(sample.label_ids.reshape(-1), minlength=len(cityscapes.LABELS))
+        counts = Runs.of(sample.label_ids).counts(len(cityscapes.LABELS))
         present = {cityscapes.LABELS[i].name: int(counts[i]) for i in np.flatnonzero(counts)}
         return Encoded(files=files, facts={"label_px": present})
 
@@ -163,7 +165,7 @@ class SemsegTask:
     def encode_prediction(self, sample: SemsegSample, prediction: npt.NDArray[np.uint8], info: SplitInfo) -> Encoded:
         """A picture of label ids, as the benchmark's script wants it."""
         path = results.cityscapes_path(info.town, sample.record.sequence, sample.record.frame)
-        return Encoded(files={path: encode_labels(prediction.astype(np.uint8))}, facts={})
+        return Encoded(files={path: encode_label_map(prediction.astype(np.uint8))}, facts={})
 
     def decode_prediction(
         self, root: Path, sample: SemsegSample, facts: Json, info: SplitInfo

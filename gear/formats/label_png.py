@@ -1,0 +1,107 @@
+"""PNG files of label maps, made from the pixels that differ from the one above.
+
+Labels are areas: of two million pixels some twenty thousand differ. Files are as large as a general encoder's, and
+take a fifth of its time.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.formats.byte_runs import compress
+from gear.formats.png import encode_labels
+from gear.formats.runs import STRIP_ROWS, Ints
+from gear.values.frames import UInt8Image
+
+Labels = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
+Bytes = npt.NDArray[np.uint8]
+
+_GREY, _RGBA = 0, 6
+_FROM_LEFT, _FROM_ABOVE = 1, 2
+_BUSY_SHARE = 0.2
+"""Where more pixels than this differ from the one above, a general encoder is quicker."""
+
+
+def encode_label_map(labels: Labels) -> bytes:
+    """(H, W) uint8 or uint16 to a grey PNG of 8 or 16 bits."""
+    if labels.ndim != 2 or labels.dtype not in (np.uint8, np.uint16):
+        raise ValueError(f"labels must have shape (H, W) of uint8 or uint16, got {labels.shape} of {labels.dtype}")
+    places, own, before = _changes(labels)
+    if len(places) > _BUSY_SHARE * labels.size:
+        return encode_labels(labels)
+    return _png(labels.shape, places, _big_endian(own) - _big_endian(before), _GREY)
+
+
+def encode_painted(labels: npt.NDArray[np.uint8], rgba: UInt8Image) -> bytes:
+    """The RGBA PNG of (H, W) uint8 labels in the colours of a (K, 4) table."""
+    places, own, before = _changes(labels)
+    if len(places) > _BUSY_SHARE * labels.size:
+        return encode_labels(rgba[labels])
+    colours = rgba[own] - rgba[before]
+    # Before the first pixel there is none: black that nobody sees, whatever colour label 0 has.
+    colours[0] = rgba[own[0]]
+    return _png(labels.shape, places, colours, _RGBA)
+
+
+def _changes(labels: Labels) -> tuple[Ints, Labels, Labels]:
+    """Pixels that differ from the one above, in the first row from the one to the left, and the picture's first.
+
+    Returns:
+        (N,) their places, counted through the rows, what they hold, and what the other one holds.
+    """
+    height, width = labels.shape
+    first = np.append(0, np.flatnonzero(labels[0, 1:] != labels[0, :-1]) + 1)
+    found = [first]
+    for top in range(1, height, STRIP_ROWS):
+        strip = labels[top - 1 : top + STRIP_ROWS]
+        found.append(np.flatnonzero(strip[1:] != strip[:-1]) + top * width)
+    places = np.concatenate(found)
+    flat = np.ascontiguousarray(labels).reshape(-1)
+    before = flat[np.concatenate([np.maximum(first - 1, 0), places[len(first) :] - width])]
+    before[0] = 0
+    return places, flat[places], before
+
+
+def _big_endian(values: Labels) -> Bytes:
+    """(N,) numbers to (N, 1 or 2) bytes, the highest first."""
+    return values.astype(values.dtype.newbyteorder(">")).view(np.uint8).reshape(len(values), -1)
+
+
+def _png(shape: tuple[int, ...], places: Ints, steps: Bytes, colour_type: int) -> bytes:
+    """A file whose filtered bytes are (N, depth) `steps` at pixels and zero elsewhere."""
+    height, width = shape
+    depth = steps.shape[1]
+    stride = 1 + width * depth
+    row, column = np.divmod(places, width)
+    at = (row * stride + 1 + column * depth)[:, None] + np.arange(depth)
+    filters = np.full(height, _FROM_ABOVE, np.uint8)
+    filters[0] = _FROM_LEFT
+    is_step = steps != 0
+    positions = np.concatenate([np.arange(height) * stride, at[is_step]])
+    values = np.concatenate([filters, steps[is_step]])
+    order = np.argsort(positions, kind="stable")
+    content = compress(*_runs(height * stride, positions[order], values[order]))
+    header = struct.pack(">IIBBBBB", width, height, 16 if depth == 2 else 8, colour_type, 0, 0, 0)
+    chunks = _chunk(b"IHDR", header) + _chunk(b"IDAT", content) + _chunk(b"IEND", b"")
+    return b"\x89PNG\r\n\x1a\n" + chunks
+
+
+def _runs(size: int, positions: Ints, values: Bytes) -> tuple[Bytes, Ints]:
+    """Bytes and lengths of the runs of `size` bytes that are zero but at rising positions."""
+    begins = np.flatnonzero((np.diff(positions, prepend=-2) != 1) | (np.diff(values, prepend=0) != 0))
+    starts, own = positions[begins], np.diff(begins, append=len(positions))
+    # Zeros, a run, zeros, a run, ..., zeros; some zeros are none.
+    all_values, lengths = np.zeros(2 * len(begins) + 1, np.uint8), np.zeros(2 * len(begins) + 1, np.int64)
+    all_values[1::2], lengths[1::2] = values[begins], own
+    lengths[0::2] = np.diff(np.append(0, starts + own), append=size)
+    lengths[0:-1:2] -= own
+    there = lengths > 0
+    return all_values[there], lengths[there]
+
+
+def _chunk(kind: bytes, content: bytes) -> bytes:
+    return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
