@@ -1,9 +1,17 @@
 """How close collecting comes to a bare loop that renders the same passes and writes nothing.
 
+    python benchmarks/collect.py
     python benchmarks/collect.py --tasks semseg --renderers classic --qualities fast --samples 20 --processes 1
 
-Prints seconds a sample of both, measured in alternation in one run, their ratio (the target is at least 0.85), and the
-worker's peak memory. Compiling and the first sample are left out of both.
+The first prints every task with every renderer and quality, with one process and with two.
+
+The bare loop places a scene, renders colour, depth and ids, and has the camera develop them into a picture: air, water
+and response are part of what is seen, and a renderer's linear frame is nothing that anybody would look at. The whole
+loop also plans the scenes, measures, encodes and writes. Both are measured in alternation in one run; compiling and the
+first sample are left out.
+
+Printed are seconds a sample of both, how much of the bare loop's is the camera's, their ratio (the target is at least
+0.85), the same in seconds of processor time, which other work on the machine disturbs less, and a worker's peak memory.
 """
 
 from __future__ import annotations
@@ -15,6 +23,8 @@ import os
 import resource
 import tempfile
 import time
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,22 +37,54 @@ from gear.verbs.collect.session import Session, open_session
 ROUNDS = 3
 
 
-def bare_loop(session: Session, indices: range) -> float:
-    """Seconds for placing and rendering, records known before."""
+@dataclass(frozen=True, slots=True)
+class Spent:
+    """Seconds by the clock, and of processor time of all threads."""
+
+    wall_s: float = 0.0
+    cpu_s: float = 0.0
+
+    @staticmethod
+    def now() -> Spent:
+        return Spent(time.perf_counter(), time.process_time())
+
+    def __add__(self, other: Spent) -> Spent:
+        return Spent(self.wall_s + other.wall_s, self.cpu_s + other.cpu_s)
+
+    def __sub__(self, other: Spent) -> Spent:
+        return Spent(self.wall_s - other.wall_s, self.cpu_s - other.cpu_s)
+
+    def over(self, number: int) -> Spent:
+        return Spent(self.wall_s / number, self.cpu_s / number)
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """What one process measured, a sample."""
+
+    bare: Spent
+    camera: Spent
+    whole: Spent
+    peak_mb: float
+
+
+def bare_loop(session: Session, indices: range) -> tuple[Spent, Spent]:
+    """For placing, rendering and developing, records known before; and for developing alone."""
     records = [session.record(i) for i in indices]
-    begun = time.perf_counter()
+    camera, begun = Spent(), Spent.now()
     for record in records:
-        names = tuple(surface.name for surface in record.surfaces)
-        placed = session.world.place(record, session.job.patch.by_surface(names))
-        session.renderer.render(placed.stage, record.cameras)
-    return time.perf_counter() - begun
+        shot = session.shoot(record)
+        rendered = Spent.now()
+        session.develop(shot)
+        camera += Spent.now() - rendered
+    return Spent.now() - begun, camera
 
 
-def whole_loop(session: Session, store: Store, indices: range) -> float:
-    """Seconds for planning, rendering, measuring, encoding and writing."""
-    begun = time.perf_counter()
+def whole_loop(session: Session, store: Store, indices: range) -> Spent:
+    """For planning, rendering, measuring, encoding and writing."""
+    begun = Spent.now()
     collect_samples(session, store, indices, lambda _: None)
-    return time.perf_counter() - begun
+    return Spent.now() - begun
 
 
 def measure(job: Job, samples: int, root: Path, barrier: Any, answers: Any) -> None:
@@ -52,15 +94,23 @@ def measure(job: Job, samples: int, root: Path, barrier: Any, answers: Any) -> N
         store.open(job.patch.files)
         bare_loop(session, range(1))
         whole_loop(session, store, range(1))
-        bare_s = whole_s = 0.0
+        bare, camera, whole = Spent(), Spent(), Spent()
         for number in range(ROUNDS):
             block = range(number * samples, (number + 1) * samples)
             barrier.wait()
-            bare_s += bare_loop(session, block)
+            one, of_it = bare_loop(session, block)
+            bare, camera = bare + one, camera + of_it
             barrier.wait()
-            whole_s += whole_loop(session, store, block)
+            whole += whole_loop(session, store, block)
     peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    answers.put((bare_s / (ROUNDS * samples), whole_s / (ROUNDS * samples), peak_mb))
+    number = ROUNDS * samples
+    answers.put(Figures(bare.over(number), camera.over(number), whole.over(number), peak_mb))
+
+
+def mean(parts: Iterable[Spent]) -> Spent:
+    """Over processes."""
+    several = list(parts)
+    return sum(several, Spent()).over(len(several))
 
 
 def main() -> None:
@@ -75,7 +125,9 @@ def main() -> None:
     args = parser.parse_args()
     print(f"{os.cpu_count()} cores")
     print(
-        f"{'task':10}{'renderer':10}{'quality':9}{'processes':>9}{'bare s':>9}{'whole s':>9}{'ratio':>7}{'peak MB':>9}"
+        f"{'task':10}{'renderer':10}{'quality':9}{'processes':>9}"
+        f"{'bare s':>9}{'camera s':>10}{'whole s':>9}{'ratio':>7}"
+        f"{'bare cpu':>10}{'whole cpu':>11}{'ratio':>7}{'peak MB':>9}"
     )
     context = multiprocessing.get_context("spawn")
     for task, renderer, quality, processes in itertools.product(
@@ -94,10 +146,12 @@ def main() -> None:
             results = [answers.get() for _ in workers]
             for worker in workers:
                 worker.join()
-        bare_s, whole_s, peak_mb = (sum(values) / processes for values in zip(*results, strict=True))
+        bare, camera, whole = (mean(getattr(r, name) for r in results) for name in ("bare", "camera", "whole"))
         print(
-            f"{task:10}{renderer:10}{quality:9}{processes:9}{bare_s:9.3f}{whole_s:9.3f}"
-            f"{bare_s / whole_s:7.2f}{peak_mb:9.0f}",
+            f"{task:10}{renderer:10}{quality:9}{processes:9}"
+            f"{bare.wall_s:9.3f}{camera.wall_s:10.3f}{whole.wall_s:9.3f}{bare.wall_s / whole.wall_s:7.2f}"
+            f"{bare.cpu_s:10.3f}{whole.cpu_s:11.3f}{bare.cpu_s / whole.cpu_s:7.2f}"
+            f"{max(r.peak_mb for r in results):9.0f}",
             flush=True,
         )
 
