@@ -1,4 +1,4 @@
-"""Collects what the reference weights are trained on and measured with:
+"""Collects what the reference weights are trained on and measured with, and makes the patches against them:
 
     python -m authoring.weights training --task semseg --out data            # into data/training/semseg/…
     python -m authoring.weights held-out --task semseg --out data            # into data/held-out/semseg/…
@@ -8,6 +8,7 @@ Each collection is one `gear collect`, so the same command again goes on where i
 
     gear train --task semseg --model ddrnet23_slim --data data/training/semseg --out runs/semseg
     gear evaluate … --data data/held-out/semseg/…
+    python -m authoring.weights patches --task semseg --model ddrnet23_slim --out runs/patches
 """
 
 from __future__ import annotations
@@ -20,25 +21,44 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from authoring.weights.patches import command as patches
 from authoring.weights.plan import HELD_OUT_SAMPLES, TRAINING_OPTIONS, Collection, held_out, training
+from gear.values.errors import GearError
 
 TRAINING_SAMPLES = 1000
 
 
 def main() -> int:
-    """Runs the collections, some at a time."""
+    """Runs what was asked for; 2 for what the user can put right."""
     parser = argparse.ArgumentParser(
         prog="python -m authoring.weights", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("part", choices=("training", "held-out"))
-    parser.add_argument("--task", required=True, choices=tuple(TRAINING_OPTIONS))
-    parser.add_argument("--out", type=Path, default=Path("data"), help="root; <part>/<task>/ lies in it (data)")
-    parser.add_argument(
-        "--samples", type=int, help=f"in all, about ({TRAINING_SAMPLES} of training, {HELD_OUT_SAMPLES} held out)"
-    )
-    parser.add_argument("--jobs", type=int, default=2, help="collections at a time (2)")
-    parser.add_argument("--list", action="store_true", help="print the commands and do nothing")
+    parts = parser.add_subparsers(dest="part", required=True, metavar="PART")
+    for part in ("training", "held-out"):
+        collections = parts.add_parser(part, help=f"collects the {part} data")
+        collections.add_argument("--task", required=True, choices=tuple(TRAINING_OPTIONS))
+        collections.add_argument(
+            "--out", type=Path, default=Path("data"), help="root; <part>/<task>/ lies in it (data)"
+        )
+        collections.add_argument(
+            "--samples", type=int, help=f"in all, about ({TRAINING_SAMPLES} of training, {HELD_OUT_SAMPLES} held out)"
+        )
+        collections.add_argument("--jobs", type=int, default=2, help="collections at a time (2)")
+        collections.add_argument("--list", action="store_true", help="print the commands and do nothing")
+        collections.set_defaults(run=run)
+    made = parts.add_parser("patches", help="makes a network's patches, scene by scene, and measures them")
+    patches.add_arguments(made)
+    made.set_defaults(run=patches.run)
     args = parser.parse_args()
+    try:
+        return int(args.run(args))
+    except GearError as error:
+        print(f"authoring.weights: {error}", file=sys.stderr)
+        return 2
+
+
+def run(args: argparse.Namespace) -> int:
+    """Runs the collections, some at a time."""
     if args.part == "training":
         plan = training(args.task, args.samples or TRAINING_SAMPLES)
     else:

@@ -94,7 +94,7 @@ def training(task: str, samples: int) -> list[Collection]:
     boards = [place for place in places if place[1].startswith("billboard")]
     trucks = [place for place in places if place[1] == "truck"]
     counts = {kind: round(samples * share) for kind, share in SHARES.items()}
-    result = []
+    result: list[Collection] = []
     for kind, members in (("no_billboard", drives), ("board", boards), ("truck", trucks)):
         for number, (town, scene) in enumerate(members):
             order = len(result)

@@ -1,0 +1,78 @@
+"""What a patch does, gathered from the files of the evaluation, the gap and the attack."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from authoring.weights.patches.plan import OUTSIDE, PatchPlan
+from gear.contracts.specs import TaskSpec
+from gear.dataset.sidecar import load_json
+from gear.plugins.build import find
+from gear.values.serial import Json
+
+TASK = "task"
+
+
+def read_effect(plan: PatchPlan, root: Path, minutes: float) -> Json:
+    """The figures of one scene's patch.
+
+    `metric` holds the task's own figure without a patch, with a random one and with this one; `outside` the mean change
+    of a sample's figure outside the patch against the random one, with its p; `effect` what the patch changes of the
+    metric, digitally and rendered, and the share of the first that the second is (None where there is no effect or the
+    figure is not one of the task's own evaluator). Figures that have nothing to be measured on are None.
+
+    Args:
+        plan: of the scene.
+        root: where its commands wrote.
+        minutes: spent on it.
+
+    Raises:
+        DatasetError: a file cannot be read.
+    """
+    evaluation, gap = load_json(root / "evaluation/results.json"), load_json(root / "gap/gap.json")
+    attack = load_json(root / plan.name / "attack.json")
+    rows = {_kind(row["dataset"]["patch"]): row for row in evaluation["rows"]}
+    spec = find("task", plan.task).spec
+    assert isinstance(spec, TaskSpec)
+    report, _, figure = spec.figure.rpartition(".")
+    change = next(
+        one
+        for one in evaluation["differences"]
+        if (one["row"], one["against"]) == (rows["patched"]["name"], rows["random"]["name"])
+    )
+    where, tested = OUTSIDE[plan.task]
+    return {
+        "patch": plan.name,
+        "task": plan.task,
+        "model": plan.model,
+        "scene": plan.place,
+        "samples": plan.samples,
+        "seeds": {split: plan.seed(split) for split in plan.samples},
+        "weights_sha256": attack["weights_sha256"],
+        "steps": attack["steps_done"],
+        "pictures_with_patch": len(gap["samples"]),
+        "metric": {
+            "figure": spec.figure,
+            **{
+                kind: rows[kind]["figures"][report or TASK].get(figure, {}).get("value")
+                for kind in ("none", "random", "patched")
+            },
+            "patched_minus_random": change["figures"][report or TASK].get(figure),
+        },
+        "outside": {"figure": f"{where}.{tested}", **change["paired"][where][tested]},
+        "effect": _effect(gap, figure),
+        "psnr_db": gap["median_psnr_db"].get("transport"),
+        "minutes": {"attack": round(attack["seconds"] / 60, 2), "all": round(minutes, 2)},
+    }
+
+
+def _effect(gap: Json, figure: str) -> Json:
+    clean, digital, rendered = (gap["effect"][name].get(figure) for name in ("clean", "transport", "rendered"))
+    if clean is None or digital is None or rendered is None:
+        return {"digital": None, "rendered": None, "share": None}
+    share = gap["rendered_share_of_digital_effect"].get("transport", {}).get(figure)
+    return {"digital": digital - clean, "rendered": rendered - clean, "share": share}
+
+
+def _kind(label: str) -> str:
+    return label if label in ("none", "random") else "patched"

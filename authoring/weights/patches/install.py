@@ -1,0 +1,28 @@
+"""Patches into the weights package."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from gear.dataset.files import write_alone
+from gear.dataset.sidecar import dump_json
+from gear.nn.shipped import CHECKOUT
+from gear.values.serial import Json
+
+PATCHES = CHECKOUT / "patches"
+
+
+def install(folder: Path, effect: Json, patches: Path = PATCHES) -> Path:
+    """Puts a patch folder's pictures and `attack.json` beside `effect.json`; returns where.
+
+    The exact values stay behind: pictures are what is printed, and the package is to be small. A patch of this name
+    that was there goes.
+    """
+    target = patches / folder.name
+    target.mkdir(parents=True, exist_ok=True)
+    for old in target.glob("patch_*.png"):
+        old.unlink()
+    for path in (*sorted(folder.glob("patch_*.png")), folder / "attack.json"):
+        write_alone(target / path.name, path.read_bytes())
+    write_alone(target / "effect.json", dump_json(effect))
+    return target

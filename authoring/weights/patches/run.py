@@ -1,0 +1,87 @@
+"""Makes patches: each step is a gear command, so that the same call goes on where it was stopped."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from authoring.weights.patches.effect import read_effect
+from authoring.weights.patches.plan import PatchPlan
+from gear.dataset.files import sha256, write_alone
+from gear.dataset.sidecar import dump_json, load_json
+from gear.nn.options import SHIPPED
+from gear.nn.shipped import resolve
+from gear.plugins.build import find
+from gear.values.errors import GearError
+from gear.values.serial import Json, to_json
+
+EFFECT, MINUTES = "effect.json", "minutes.json"
+
+Gear = Callable[[Sequence[str]], None]
+"""Runs one gear command; raises `GearError` with what went wrong."""
+
+Told = Callable[[str], None]
+"""Called with the name of each step that is done."""
+
+
+def gear_process(jobs: int = 1) -> Gear:
+    """Runs commands in processes of their own, each with its share of the cores."""
+    threads = max(1, (os.cpu_count() or 1) // jobs)
+    environment = {"OMP_NUM_THREADS": str(threads), **os.environ}
+
+    def run(arguments: Sequence[str]) -> None:
+        command = [sys.executable, "-m", "gear.cli.main", *arguments]
+        done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+        if done.returncode:
+            said = done.stderr.strip().splitlines() or [f"ended with {done.returncode}"]
+            raise GearError(f"gear {arguments[0]}: {said[-1].removeprefix('gear: ')}")
+
+    return run
+
+
+def make_patch(plan: PatchPlan, root: Path, gear: Gear, told: Told) -> Json:
+    """One scene's patch with its figures; what is whole already is only read.
+
+    Under `root` lie the pictures, the patch folder, `evaluation`, `gap` and, written last, `effect.json`.
+
+    Raises:
+        GearError: a command failed.
+    """
+    recipe = {"plan": to_json(plan), "weights_sha256": weights_hash(plan)}
+    if (root / EFFECT).is_file():
+        there = load_json(root / EFFECT)
+        if there["recipe"] == recipe:
+            return there["effect"]
+    for step in plan.commands(root):
+        begun = time.monotonic()
+        try:
+            gear(step.arguments)
+        finally:
+            spent = _minutes(root) | {step.name: _minutes(root).get(step.name, 0.0) + (time.monotonic() - begun) / 60}
+            write_alone(root / MINUTES, dump_json(spent))
+        told(step.name)
+    effect = read_effect(plan, root, sum(_minutes(root).values()))
+    write_alone(root / EFFECT, dump_json({"recipe": recipe, "effect": effect}))
+    return effect
+
+
+def weights_hash(plan: PatchPlan) -> str | None:
+    """sha256 of the weights file that the network is used with; None for random weights.
+
+    Raises:
+        GearError: there is no such file.
+    """
+    if not hasattr(find("model", plan.model).spec.config(), "weights"):
+        return None
+    said = dict(text.split("=", 1) for text in plan.model_settings)
+    path = resolve(said.get("weights", SHIPPED), plan.model)
+    return None if path is None else sha256(path.read_bytes())
+
+
+def _minutes(root: Path) -> dict[str, float]:
+    path = root / MINUTES
+    return load_json(path) if path.is_file() else {}
