@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import argparse
+import importlib
 import json
 import sys
 import types
@@ -87,6 +89,20 @@ def test_collections_can_be_made_and_twins_are_twins(task: str) -> None:
     assert "--allow-test-data" not in steps["attack"] and "weights=none" in steps["attack"]
 
 
+@pytest.mark.parametrize("task", MODELS)
+def test_every_command_is_one_that_gear_understands(task: str) -> None:
+    for step in replace(of(task)[0], attack_settings=("batch=1",)).commands(Path("out")):
+        parser = argparse.ArgumentParser(exit_on_error=False)
+        importlib.import_module(f"gear.cli.{step.arguments[0]}").add_arguments(parser)
+        args = parser.parse_args(step.arguments[1:])
+        if step.name == "evaluate":
+            assert args.data == ["out/none", "out/random", "out/patched"] and args.settings == ["weights=none"]
+        if step.name == "attack":
+            assert (args.settings, args.model_set, args.every) == (["batch=1"], ["weights=none"], 25)
+        if step.name == "gap":
+            assert (args.dataset, args.twin, args.compositors) == ("out/none", "out/patched", ["transport"])
+
+
 def test_small_pictures_are_seen_at_the_size_that_the_weights_know(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("authoring.weights.patches.plan.trained_option", lambda *_: 0.5)
     told = model_settings("semseg", "ddrnet23_slim", "net.safetensors", TRAINING_OPTIONS["semseg"])
@@ -107,7 +123,7 @@ def test_what_cannot_be_made_is_refused() -> None:
     with pytest.raises(GearError, match="there is no such weights file"):
         plans("semseg", "ddrnet23_slim", weights="nowhere.safetensors")
     for flags in (["--weights", "none"], ["--set", "quality=fast"]):
-        parser = command.argparse.ArgumentParser()
+        parser = argparse.ArgumentParser()
         command.add_arguments(parser)
         args = parser.parse_args(["--task", "semseg", "--model", "ddrnet23_slim", "--out", "x", "--install", *flags])
         with pytest.raises(GearError, match="--install is for patches"):
