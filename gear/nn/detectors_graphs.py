@@ -34,6 +34,12 @@ LITE0_STAGES = (2, 3, 4)
 
 LITE0_CHANNELS = (40, 112, 320)
 
+LITE0_FROZEN = ("conv_stem", "bn1", "blocks.0", "blocks.1")
+"""What stays as ImageNet left it: what looks at half and a quarter of the picture."""
+
+LITE0_HEAD_DEPTH = 2
+"""Convolutions in each of its heads; RetinaNet has four, in which CPUs would spend half of every step."""
+
 
 def fasterrcnn_r50_fpn(least_score: float) -> nn.Module:
     """As published: FrozenBatchNorm2d with eps 0, 91 classes."""
@@ -79,7 +85,11 @@ def retinanet_r18_fpn(classes: int, least_score: float) -> nn.Module:
 
 def retinanet_lite0_fpn(classes: int, least_score: float) -> nn.Module:
     """EfficientNet-Lite0, trainable throughout; see `reference_retinanet`."""
-    return reference_retinanet(LitePyramid(), classes, least_score)
+    graph = reference_retinanet(LitePyramid(), classes, least_score)
+    heads: Any = graph.head
+    for head in (heads.classification_head, heads.regression_head):
+        head.conv = head.conv[:LITE0_HEAD_DEPTH]
+    return graph
 
 
 def reference_retinanet(backbone: nn.Module, classes: int, least_score: float) -> nn.Module:
@@ -118,6 +128,27 @@ class LitePyramid(nn.Module):
         self.body = timm.create_model(LITE0, pretrained=False, features_only=True, out_indices=LITE0_STAGES)
         extra = LastLevelP6P7(CHANNELS, CHANNELS)
         self.fpn = FeaturePyramidNetwork(LITE0_CHANNELS, CHANNELS, extra_blocks=extra)
+        self.is_frozen = False
+
+    def freeze(self) -> None:
+        """Keeps the early layers' weights, and ImageNet's statistics throughout the body, from here on.
+
+        Detectors train in small batches, whose statistics are worse than those that the body comes with.
+        """
+        self.is_frozen = True
+        for key, parameter in self.body.named_parameters():
+            if key.startswith(tuple(f"{part}." for part in LITE0_FROZEN)):
+                parameter.requires_grad_(False)
+        self.train(self.training)
+
+    def train(self, mode: bool = True) -> LitePyramid:
+        """As ever, but normalisation in a frozen body stays in eval mode."""
+        super().train(mode)
+        if self.is_frozen:
+            for layer in self.body.modules():
+                if isinstance(layer, nn.BatchNorm2d):
+                    layer.eval()
+        return self
 
     def forward(self, pictures: Tensor) -> Mapping[str, Tensor]:
         """Feature maps by number."""

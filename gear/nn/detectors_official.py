@@ -64,7 +64,8 @@ def lite0_from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
 
 
 def start_from_imagenet(model: Detector) -> None:
-    """Puts EfficientNet-Lite0's ImageNet weights of an installed package into a detector's backbone.
+    """Puts EfficientNet-Lite0's ImageNet weights of an installed package into a detector's backbone, and freezes part
+    of it (`LitePyramid.freeze`).
 
     Raises:
         GearError: the package is not installed, or holds other weights.
@@ -82,6 +83,8 @@ def start_from_imagenet(model: Detector) -> None:
     if problems:
         raise GearError(f"{path}: not EfficientNet-Lite0's weights: {'; '.join(problems)}")
     body.load_state_dict(dict(state))
+    pyramid: Any = model.graph.get_submodule("backbone")
+    pyramid.freeze()
 
 
 def _renamed(key: str) -> str:

@@ -298,6 +298,12 @@ def test_imagenet_comes_from_an_installed_package() -> None:
     before = stem.clone()
     start_from_imagenet(model)
     assert not torch.equal(before, stem) and float(stem.std()) > float(before.std())
+    module = model.module().train()
+    frozen = {key.split(".")[2] for key, value in module.named_parameters() if not value.requires_grad}
+    assert frozen == {"conv_stem", "bn1", "blocks"}
+    assert all(value.requires_grad for key, value in module.named_parameters() if "body.blocks.2" in key)
+    layers = [each for each in module.backbone.body.modules() if isinstance(each, nn.BatchNorm2d)]
+    assert layers and not any(each.training for each in layers) and module.backbone.fpn.training
     r18 = build_r18(ReferenceDetectorOptions(weights="none", device="cpu"))
     with pytest.raises(GearError, match="not EfficientNet-Lite0's weights"):
         start_from_imagenet(r18)

@@ -96,7 +96,7 @@ retinanet_lite0: ModelSpec[ReferenceDetectorOptions] = ModelSpec(
     taps=("layer1", "layer2", "layer3", "layer4"),
     recipe=RECIPE,
     normalisation="RGB in 0..255, less 127, over 128",
-    parameters=5_094_919,
+    parameters=4_504_071,
     needs=("torchvision", "timm"),
     starts={"imagenet": start_from_imagenet},
 )
