@@ -62,7 +62,9 @@ def test_all_are_found_and_the_broken_ones_are_named(home: Path) -> None:
         ("defense", "jpeg_tv", "gear-defense-jpeg-tv"),
         ("defense", "jedi", "gear-defense-jedi"),
         ("task", "panoptic", "gear-task-panoptic"),
-        ("model", "transformers_universal", "gear-model-transformers"),
+        ("model", "transformers_semseg", "gear-model-transformers"),
+        ("model", "transformers_depth", "gear-model-transformers"),
+        ("model", "transformers_detect2d", "gear-model-transformers"),
         ("attack", "art", "gear-attack-art"),
         ("task", "semseg", "mujoco-gear"),
     } <= names
@@ -131,6 +133,40 @@ def test_foreign_models_defenses_and_tasks_have_their_rows(home: Path) -> None:
     results = json.loads((folder / "predictions/panoptic.json").read_text())["annotations"]
     assert [one["image_id"] for one in results] == [0, 1]
     assert all((folder / "predictions/panoptic" / one["file_name"]).is_file() for one in results)
+
+
+NETWORKS = """
+import sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+import tiny_folders
+for name in sys.argv[2:]:
+    getattr(tiny_folders, name)(Path("networks") / name)
+"""
+ROWS = [
+    ("semseg", "mask2former", (), "miou"),
+    ("depth", "depth_anything", ("--set", "inverse_scale=0.5", "--set", "inverse_shift=0.02"), "abs_rel"),
+    ("detect2d", "detr", (), "ap"),
+]
+
+
+def test_networks_from_a_folder_have_a_row_in_each_task(home: Path) -> None:
+    """Tiny networks that transformers itself has written, behind a third party's adapter."""
+    tiny = ROOT / "examples/gear-model-transformers/tests"
+    names = [name for _, name, _, _ in ROWS]
+    call(home / "env/bin/python", "-c", NETWORKS, tiny, *names, cwd=home / "empty")
+    size = ("--set", "options.width_px=256", "--set", "options.height_px=128", "--set", SCENES)
+    common = (*TOWN, "--split", "debug", "--samples", "2", "--renderer", "classic", "--quality", "fast", *size)
+    for task, name, options, metric in ROWS:
+        data = f"folders/{task}"
+        gear(home, "collect", "--task", task, *common, "--patch", "random", "--out", data)
+        words = ("--model", f"transformers_{task}", "--set", f"folder=networks/{name}", *options, "--data", data)
+        found = json.loads(gear(home, "evaluate", *words, "--resamples", "20", "--json"))
+        assert found["model"]["name"] == f"transformers_{task}"
+        (row,) = found["rows"]
+        assert row["samples"] == 2 and metric in row["figures"]["task"]
+        if task != "detect2d":  # two small pictures may hold nothing to detect, and then there is no precision
+            assert row["figures"]["task"][metric]["value"] is not None
 
 
 def test_a_foreign_attack_makes_a_patch_that_goes_back_into_the_world(home: Path) -> None:

@@ -1,38 +1,131 @@
-"""Hugging Face's universal segmentation networks (MaskFormer, Mask2Former) from a local folder."""
+"""Any segmentation, depth or detection network of Hugging Face's transformers, from a local folder."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import Any, Literal
 
 from gear.contracts.hookspecs import hookimpl
+from gear.contracts.models import Model
 from gear.contracts.specs import ModelSpec
-from gear.nn.huggingface_options import FolderOptions
-
-if TYPE_CHECKING:
-    from gear_model_transformers.networks import UniversalSegmenter
+from gear.values.errors import FieldError
 
 
-def build(options: FolderOptions) -> UniversalSegmenter:
-    """Imports torch and transformers only when somebody asks for the model."""
-    from gear.nn.huggingface import open_folder
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FolderConfig:
+    """Options of every network from a folder.
 
-    from gear_model_transformers.networks import UniversalSegmenter
+    Attributes:
+        folder: what `save_pretrained` wrote, or a downloaded repository: config.json, safetensors and
+            preprocessor_config.json. Nothing is downloaded, and no pickle is opened.
+        device: `auto` takes a GPU where there is one.
+    """
 
-    return UniversalSegmenter(open_folder(options, "AutoModelForUniversalSegmentation"), options)
+    folder: str = ""
+    device: Literal["auto", "cpu", "cuda"] = "auto"
 
 
-universal = ModelSpec(
-    name="transformers_universal",
-    summary="A universal segmentation network of transformers from a local folder: MaskFormer, Mask2Former.",
-    config=FolderOptions,
-    build=build,
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LabelledConfig(FolderConfig):
+    """Options of a network that has classes.
+
+    Attributes:
+        classes: names of the network's classes, and what the task calls them: `{tarmac: road}`. Classes that both call
+            the same, and usual synonyms, need not be there; what has no match is left out.
+    """
+
+    classes: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DetectorConfig(LabelledConfig):
+    """Options of a detector.
+
+    Attributes:
+        least_score: detections that are less sure are dropped.
+    """
+
+    least_score: float = 0.05
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.least_score <= 1:
+            raise FieldError("least_score", f"must be 0 to 1, got {self.least_score:g}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DepthConfig(FolderConfig):
+    """Options of a depth network.
+
+    Attributes:
+        inverse_scale: a network of relative depth says how near things are, in units of its own; metres are
+            1 / (inverse_scale * what it says + inverse_shift). 0 for a network that says metres.
+        inverse_shift: see there, in 1/m.
+    """
+
+    inverse_scale: float = 0.0
+    inverse_shift: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.inverse_scale < 0:
+            raise FieldError("inverse_scale", f"must not be negative, got {self.inverse_scale:g}")
+
+
+def build_semseg(config: LabelledConfig) -> Model:
+    """Imports torch and transformers only when somebody asks for the model; so do the others."""
+    from gear_model_transformers.segmentation import Segmenter
+
+    return Segmenter(config)
+
+
+def build_depth(config: DepthConfig) -> Model:
+    """A depth network."""
+    from gear_model_transformers.depth import DepthNetwork
+
+    return DepthNetwork(config)
+
+
+def build_detect2d(config: DetectorConfig) -> Model:
+    """A detector."""
+    from gear_model_transformers.detection import Detector
+
+    return Detector(config)
+
+
+COMMON: dict[str, Any] = {
+    "views": ("left",),
+    "normalisation": "as the folder's image processor does it",
+    "needs": ("transformers", "torchvision"),
+}
+
+semseg: ModelSpec[LabelledConfig] = ModelSpec(
+    name="transformers_semseg",
+    summary="A segmentation network of transformers from a local folder: SegFormer, UPerNet, MaskFormer, Mask2Former.",
+    config=LabelledConfig,
+    build=build_semseg,
     tasks=("semseg",),
-    views=("left",),
-    needs=("transformers",),
+    **COMMON,
+)
+
+depth: ModelSpec[DepthConfig] = ModelSpec(
+    name="transformers_depth",
+    summary="A depth network of transformers from a local folder: GLPN, DPT, Depth Anything, ZoeDepth, Depth Pro.",
+    config=DepthConfig,
+    build=build_depth,
+    tasks=("depth",),
+    **COMMON,
+)
+
+detect2d: ModelSpec[DetectorConfig] = ModelSpec(
+    name="transformers_detect2d",
+    summary="An object detector of transformers from a local folder: DETR, Deformable DETR, RT-DETR, YOLOS.",
+    config=DetectorConfig,
+    build=build_detect2d,
+    tasks=("detect2d",),
+    **COMMON,
 )
 
 
 @hookimpl
-def gear_models() -> list[ModelSpec[FolderOptions]]:
+def gear_models() -> list[ModelSpec[Any]]:
     """Found by gear through the entry point in pyproject.toml."""
-    return [universal]
+    return [semseg, depth, detect2d]
