@@ -12,10 +12,11 @@ from gear.values.serial import Json, to_json
 from gear.values.truth import SurfaceTruth
 from gear.view.counts import count
 from gear.view.faces import hidden
+from gear.view.measures import measures
 
 
 def row(sidecar: Sidecar) -> dict[str, Json]:
-    """One sample's line in the index: places from above, surfaces, what its facts count."""
+    """One sample's line in the index: places from above, surfaces, what its facts count and measure."""
     record = sidecar.record
     return {
         "index": record.index,
@@ -30,6 +31,7 @@ def row(sidecar: Sidecar) -> dict[str, Json]:
         "boards": [_board(record, surface) for surface in record.surfaces],
         "surfaces": [_surface(truth, record) for truth in sidecar.surfaces],
         "counts": count(sidecar.facts),
+        "things": measures(sidecar.facts),
     }
 
 

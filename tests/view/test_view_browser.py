@@ -206,7 +206,7 @@ def test_filters_choose_samples_and_live_in_the_address(browser: Browser, page: 
     assert 0 < len(near) < 8
     browser.open(page)
     slide = (
-        "(() => { const slider = document.querySelector('[aria-label=\"Distance, at most\"]'); slider.value = 15;"
+        "(() => { const slider = document.querySelector('[aria-label=\"Patch distance, at most\"]'); slider.value = 15;"
         " slider.dispatchEvent(new Event('input')); })()"
     )
     browser.value(slide)
@@ -217,7 +217,7 @@ def test_filters_choose_samples_and_live_in_the_address(browser: Browser, page: 
     wait_for_hash(browser, "#/map?distance=0%7E15")
     browser.open(page, "#/samples?distance=0%7E15")
     assert cells(browser) == near
-    assert browser.value("document.querySelector('[aria-label=\"Distance, at most\"]').value") == "15"
+    assert browser.value("document.querySelector('[aria-label=\"Patch distance, at most\"]').value") == "15"
     browser.value("document.querySelector('#reset').click()")
     assert len(cells(browser)) == 8 and hash_of(browser) == "#/samples"
     browser.open(page, "#/samples?visible=99~100&distance=0~1")
@@ -226,6 +226,48 @@ def test_filters_choose_samples_and_live_in_the_address(browser: Browser, page: 
         browser.open(page, broken)
         assert len(cells(browser)) == 8
     no_trouble(browser)
+
+
+def test_filters_look_at_the_objects_of_the_task(browser: Browser, write_dataset: Any, tmp_path: Path) -> None:
+    root = write_dataset("detect2d", 8)
+    objects = [open_dataset(root).sidecar(i).facts["objects"] for i in range(8)]
+    label, far = objects[0][0]["label"], max(thing["distance_m"] for things in objects for thing in things)
+    wanted = [
+        f"{i:06d}"
+        for i, things in enumerate(objects)
+        if any(t["label"] == label and t["distance_m"] <= far / 2 and t["occluded_fraction"] >= 0.2 for t in things)
+    ]
+    assert 0 < len(wanted) < 8
+    write_view(root, tmp_path / "page.html")
+    asked = f"#/samples?object.distance_m=0~{far / 2}&object.occluded_fraction=20~100&thing={label}"
+    browser.open(tmp_path / "page.html", asked)
+    assert cells(browser) == wanted
+    assert text(browser, "#filters").count("Object distance") == 1
+    browser.press("h")
+    assert "Object distance" in browser.value(BARS)
+    browser.value("document.querySelector('#reset').click()")
+    assert text(browser, "#count") == "8 samples"
+    no_trouble(browser)
+
+
+def test_without_surfaces_nothing_speaks_of_patches(browser: Browser, tmp_path: Path) -> None:
+    task: Any = OddTask()
+    store_samples(tmp_path / "odd", "semseg", task, {}, 1, alter=lambda one: dataclasses.replace(one, surfaces=()))
+    write_page(dataclasses.replace(open_dataset(tmp_path / "odd"), task=task), tmp_path / "odd.html")
+    for fragment in ("", "#/sample/0", "#/map"):
+        browser.open(tmp_path / "odd.html", fragment)
+        browser.press("f")
+        browser.until("'sample' !== location.hash.split('/')[1] || document.querySelectorAll('#sample details').length")
+        assert browser.value("document.body.innerText.match(/surface|outline/gi)") is None
+
+
+def test_columns_of_long_texts_come_last(browser: Browser, write_dataset: Any, tmp_path: Path) -> None:
+    write_view(write_dataset("detect2d", 1), tmp_path / "page.html")
+    browser.open(tmp_path / "page.html", "#/sample/0")
+    headers = "[...document.querySelectorAll('#sample [aria-label=objects] th')].map((th) => th.textContent)"
+    browser.until(f"({headers}).length")
+    found = browser.value(headers)
+    assert found[-1] == "rle" and "distance_m" in found
 
 
 def test_a_sample_tells_all_it_knows(browser: Browser, page: Path, tmp_path: Path) -> None:
@@ -417,6 +459,8 @@ def test_a_thousand_samples_open_without_decoding_them_all(
     browser.press("h")
     browser.press("s")
     assert browser.value("document.querySelector('#main').scrollTop") == pytest.approx(scrolled, abs=300)
+    browser.press("m")
+    assert 0 < browser.value(MAP_SPOTS)[2] < 8 * 13 * 13  # eight places, each a small arrow however far one zooms in
     browser.open(tmp_path / "many.html", "#/sample/999")
     browser.until("document.querySelectorAll('#sample details').length === 2")
     no_trouble(browser)

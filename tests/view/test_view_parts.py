@@ -25,6 +25,7 @@ from gear.view.counts import count, without_identifiers
 from gear.view.document import embedded
 from gear.view.encoding import LEAST_WIDTH_PX, SCALES, encode, largest_scale
 from gear.view.faces import area_px2, clipped, hidden
+from gear.view.measures import measures
 from gear.view.rows import finite, row
 
 RIG = Rig(cameras=(CameraMount(name="left", width_px=320, height_px=160),))
@@ -183,6 +184,20 @@ def test_facts_are_counted_by_what_they_look_like() -> None:
     assert count(facts) == {"label_px": {"road": 5.0, "sky": 2.5}, "objects.kitti_type": {"Car": 2.0}}
     assert count([1, 2]) == {} and count(None) == {} and count({"x": {}, "y": [], "z": {"flag": True}}) == {}
     assert count({"x": {"a": float("nan")}}) == {}
+
+
+def test_objects_are_measured_by_what_their_fields_are_called() -> None:
+    near = {"label": "car", "visible_fraction": 0.51234, "distance_m": 12, "box": [1, 2], "flag_fraction": True}
+    far = {"label": "bus", "visible_fraction": float("nan"), "distance_m": 80.0, "seen_fraction": 0.5}
+    found = measures({"objects": [near, far], "baseline_m": 0.5, "empty": [], "parts": [{"code": 3}]})
+    assert found["labels"] == ["car", "bus", ""]
+    assert found["values"] == {
+        "visible_fraction": [0.512, None, None],
+        "distance_m": [12.0, 80.0, None],
+        "seen_fraction": [None, 0.5, None],
+    }
+    for facts in (None, [near], {"objects": [{"label": "car"}]}, {"objects": [near, 3]}):
+        assert measures(facts) == {"labels": [], "values": {}}
 
 
 def test_names_that_never_come_twice_are_no_classes() -> None:

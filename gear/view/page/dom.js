@@ -23,7 +23,8 @@ function filled(node, attributes, children) {
 const isNumber = (value) => typeof value === "number" && Number.isFinite(value);
 const grouped = (value) => value.toLocaleString("en-GB", { maximumFractionDigits: 0 });
 const rounded = (value, digits) => value.toLocaleString("en-GB", { maximumFractionDigits: digits });
-const percent = (value) => (isNumber(value) ? `${rounded(value * 100, value < 0.1 ? 1 : 0)} %` : "–");
+const percent = (value) => (isNumber(value) ? (value > 0 && value < 0.0005 ? "< 0.1 %" : `${rounded(value * 100, value < 0.1 ? 1 : 0)} %`) : "–");
+const counted = (number, thing) => `${number} ${thing}${number === 1 ? "" : "s"}`;
 const metres = (value) => (isNumber(value) ? `${value.toFixed(1)} m` : "–");
 const degrees = (value) => (isNumber(value) ? `${rounded(value, 0)}°` : "–");
 const sampleName = (sample) => String(sample.index).padStart(6, "0");

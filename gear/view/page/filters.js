@@ -1,40 +1,57 @@
-// Which samples are shown. A sample passes when one of its surfaces, in one camera, satisfies everything at once.
-const METRICS = [
+// Which samples are shown. A sample passes when one of its surfaces, in one camera, satisfies everything at once that is
+// asked of surfaces, and one of the task's objects everything that is asked of objects.
+const SURFACE_METRICS = [
   { key: "visible", label: "Patch visible", unit: " %", factor: 100, ceiling: 100, hint: "visible share of the face's whole silhouette" },
   { key: "occluded", label: "Patch occluded", unit: " %", factor: 100, ceiling: 100, hint: "share of what lies inside the picture that other things cover" },
-  { key: "distance", label: "Distance", unit: " m", factor: 1, hint: "camera to the middle of the face" },
-  { key: "incidence", label: "Incidence", unit: "°", factor: 1, ceiling: 180, hint: "0° is head-on, above 90° is seen from behind" },
-];
-for (const metric of METRICS) {
-  metric.values = SAMPLES.flatMap((sample) => sample.surfaces.map((surface) => surface[metric.key]))
-    .filter(isNumber)
-    .map((value) => value * metric.factor);
-  metric.high = metric.ceiling ?? niceCeiling(Math.max(0, ...metric.values));
-}
+  { key: "distance", label: "Patch distance", unit: " m", factor: 1, hint: "camera to the middle of the face" },
+  { key: "incidence", label: "Patch incidence", unit: "°", factor: 1, ceiling: 180, hint: "0° is head-on, above 90° is seen from behind" },
+].map((metric) => ({ ...metric, of: (sample) => sample.surfaces.map((surface) => surface[metric.key]) }));
 const unique = (values) => [...new Set(values)].sort();
+const OBJECT_METRICS = unique(SAMPLES.flatMap((sample) => Object.keys(sample.things.values))).map((name) => {
+  const isShare = name.endsWith("_fraction");
+  const label = `Object ${name.replace(/_(fraction|m)$/, "").replaceAll("_", " ")}`;
+  const scale = isShare ? { unit: " %", factor: 100, ceiling: 100 } : { unit: " m", factor: 1 };
+  return { key: `object.${name}`, label, ...scale, hint: `${name} of the task's objects`, of: (sample) => sample.things.values[name] ?? [] };
+});
+const METRICS = [...SURFACE_METRICS, ...OBJECT_METRICS];
+for (const metric of METRICS) {
+  metric.values = valuesOf(metric, SAMPLES);
+  metric.high = metric.ceiling ?? niceCeiling(metric.values.reduce((top, value) => Math.max(top, value), 0));
+}
+const OBJECT_LABELS = unique(SAMPLES.flatMap((sample) => sample.things.labels)).filter((label) => label);
 const SURFACE_NAMES = unique(SAMPLES.flatMap((sample) => sample.surfaces.map((surface) => surface.name)));
 const CAMERA_NAMES = unique(SAMPLES.flatMap((sample) => sample.surfaces.map((surface) => surface.camera)));
 const ASSETS = unique(SAMPLES.flatMap((sample) => sample.actors.map((actor) => actor[0])));
 
-const filters = { ranges: new Map(), surface: "", camera: "", asset: "", text: "" };
+const ASKED = [...(SURFACE_NAMES.length ? ["one surface in one camera"] : []), ...(OBJECT_METRICS.length ? ["one object"] : [])];
+const RULE = ASKED.length ? `A sample is shown when ${ASKED.join(", and ")}, satisfies everything at once that is asked of it.` : "A sample is shown when it satisfies all of this.";
+
+const CHOICES = { surface: "", camera: "", thing: "", asset: "", text: "" };
+const filters = { ranges: new Map(), ...CHOICES };
 const whenFiltered = [];
 let shown = SAMPLES;
 
+function valuesOf(metric, samples) {
+  return samples.flatMap(metric.of).filter(isNumber).map((value) => value * metric.factor);
+}
+
+function isWithin(metric, value) {
+  const range = filters.ranges.get(metric.key);
+  return !range || (isNumber(value) && value * metric.factor >= range[0] && value * metric.factor <= range[1]);
+}
+
 function passes(sample) {
-  const { ranges, surface: name, camera, asset, text } = filters;
+  const { ranges, surface: name, camera, thing, asset, text } = filters;
   if (asset && !sample.actors.some((actor) => actor[0] === asset)) return false;
   if (text && !`${sampleName(sample)} ${sample.sequence} ${sample.weather} ${sample.problem && "problem"}`.toLowerCase().includes(text)) return false;
-  if (!ranges.size && !name && !camera) return true;
-  return sample.surfaces.some(
-    (surface) =>
-      (!name || surface.name === name) &&
-      (!camera || surface.camera === camera) &&
-      METRICS.every((metric) => {
-        const range = ranges.get(metric.key);
-        const value = surface[metric.key];
-        return !range || (isNumber(value) && value * metric.factor >= range[0] && value * metric.factor <= range[1]);
-      }),
-  );
+  const isAsked = (metrics) => metrics.some((metric) => ranges.has(metric.key));
+  const surfacePasses = (surface) =>
+    (!name || surface.name === name) &&
+    (!camera || surface.camera === camera) &&
+    SURFACE_METRICS.every((metric) => isWithin(metric, surface[metric.key]));
+  const objectPasses = (label, i) => (!thing || label === thing) && OBJECT_METRICS.every((metric) => isWithin(metric, metric.of(sample)[i]));
+  if ((isAsked(SURFACE_METRICS) || name || camera) && !sample.surfaces.some(surfacePasses)) return false;
+  return !(isAsked(OBJECT_METRICS) || thing) || sample.things.labels.some(objectPasses);
 }
 
 function refilter() {
@@ -45,7 +62,7 @@ function refilter() {
 }
 
 function resetFilters() {
-  Object.assign(filters, { ranges: new Map(), surface: "", camera: "", asset: "", text: "" });
+  Object.assign(filters, { ranges: new Map(), ...CHOICES });
   buildFilters();
   refilter();
 }
@@ -53,7 +70,7 @@ function resetFilters() {
 function filtersToParams() {
   const params = new URLSearchParams();
   for (const [key, [low, high]] of filters.ranges) params.set(key, `${low}~${high}`);
-  for (const key of ["surface", "camera", "asset", "text"]) if (filters[key]) params.set(key, filters[key]);
+  for (const key of Object.keys(CHOICES)) if (filters[key]) params.set(key, filters[key]);
   return params.toString();
 }
 
@@ -63,7 +80,7 @@ function filtersFromParams(params) {
     const [low, high] = (params.get(metric.key) ?? "").split("~").map(Number);
     if (isNumber(low) && isNumber(high) && params.has(metric.key)) filters.ranges.set(metric.key, [low, high]);
   }
-  for (const key of ["surface", "camera", "asset", "text"]) filters[key] = params.get(key) ?? "";
+  for (const key of Object.keys(CHOICES)) filters[key] = params.get(key) ?? "";
 }
 
 function rangeFilter(metric) {
@@ -112,12 +129,14 @@ function buildFilters() {
   });
   byId("filters").replaceChildren(
     h("div", { class: "head" }, h("h2", {}, "Filters"), h("button", { type: "button", id: "reset", onclick: resetFilters }, "Reset")),
-    ...(SURFACE_NAMES.length ? METRICS.map(rangeFilter) : [h("p", { class: "dim" }, "No sample has a surface for a patch.")]),
+    ...(SURFACE_NAMES.length ? SURFACE_METRICS.map(rangeFilter) : []),
     ...(SURFACE_NAMES.length > 1 ? [choice("Surface", "surface", SURFACE_NAMES, "any surface")] : []),
     ...(CAMERA_NAMES.length > 1 ? [choice("Camera", "camera", CAMERA_NAMES, "any camera")] : []),
-    choice("Contains", "asset", ASSETS, "anything"),
+    ...OBJECT_METRICS.map(rangeFilter),
+    ...(OBJECT_METRICS.length && OBJECT_LABELS.length > 1 ? [choice("Object", "thing", OBJECT_LABELS, "any object")] : []),
+    choice("Actor", "asset", ASSETS, "anything"),
     h("label", {}, "Search", search),
-    h("p", { class: "dim" }, "A sample is shown when one surface in one camera satisfies all of this."),
+    h("p", { class: "dim" }, RULE),
   );
 }
 

@@ -50,7 +50,7 @@ function gridTools() {
 function overlayTools() {
   const strength = h("input", { type: "range", min: 0, max: 100, step: 5, value: 100, class: "strength", oninput: (event) => setStrength(Number(event.target.value)) });
   const lines = h("button", { type: "button", class: "outlines", "aria-pressed": "true", onclick: () => toggleOutlines() }, "Patch outline ", h("kbd", {}, "o"));
-  return [h("label", {}, "Overlay", strength), lines];
+  return [h("label", {}, "Overlay", strength), SURFACE_NAMES.length ? lines : null];
 }
 
 function setStrength(value) {

@@ -4,7 +4,8 @@ const ROLE_COLOUR = Object.fromEntries(ROLES.map((role) => [role.key, role.colou
 const LENGTH_M = { ego: 4.5, npc: 4.5, parked: 4.5, carrier: 8, pedestrian: 0.7 };
 const WIDTH_M = { ego: 1.9, npc: 1.9, parked: 1.9, carrier: 2.5, pedestrian: 0.7 };
 
-const MANY = 60; // samples; with more, everybody but the ego cars is a dot, so that drawing stays quick
+const MANY = 60; // samples; with more, everybody but the ego cars is a dot, so that drawing stays quick,
+const LONGEST_OF_MANY_PX = 13; // and ego cars are small arrows, or they would hide one another
 
 class Plan {
   constructor(label) {
@@ -131,10 +132,12 @@ class Plan {
     const [px, py] = this.toPixels(x, y);
     if (px < -40 || py < -40 || px > this.canvas.clientWidth + 40 || py > this.canvas.clientHeight + 40) return;
     const label = this.isSingle ? `${asset} · ${role} ${id}` : `${sampleName(sample)} · ${asset} · ${role}`;
-    this.spots.push([px, py, sample, label, ((LENGTH_M[role] ?? 4.5) * this.view.scale) / 2]);
-    if (role !== "ego" && this.samples.length > MANY) return void pen.fillRect(px - 1.5, py - 1.5, 3, 3);
-    const long = Math.max((LENGTH_M[role] ?? 4.5) * this.view.scale, role === "ego" ? 7 : 3);
-    const wide = Math.max((WIDTH_M[role] ?? 1.9) * this.view.scale, role === "ego" ? 5 : 2.5);
+    const isOneOfMany = this.samples.length > MANY;
+    const largest = isOneOfMany ? LONGEST_OF_MANY_PX : Infinity;
+    const long = Math.min(largest, Math.max((LENGTH_M[role] ?? 4.5) * this.view.scale, role === "ego" ? 7 : 3));
+    const wide = Math.min(largest / 2, Math.max((WIDTH_M[role] ?? 1.9) * this.view.scale, role === "ego" ? 5 : 2.5));
+    this.spots.push([px, py, sample, label, long / 2]);
+    if (role !== "ego" && isOneOfMany) return void pen.fillRect(px - 1.5, py - 1.5, 3, 3);
     pen.save();
     pen.translate(px, py);
     pen.rotate(-heading);
@@ -222,7 +225,8 @@ function drawScale(pen, view, width, height) {
 
 function legend(redraw) {
   const roles = unique(SAMPLES.flatMap((sample) => sample.actors.map((actor) => actor[1])));
-  const items = [...ROLES.filter((role) => roles.includes(role.key)).map((role) => [role.key, role.label]), ["board", "Patch surfaces"]];
+  const items = ROLES.filter((role) => roles.includes(role.key)).map((role) => [role.key, role.label]);
+  if (SAMPLES.some((sample) => sample.boards.length)) items.push(["board", "Patch surfaces"]);
   return h("div", { class: "legend", role: "group", "aria-label": "Layers of the map" }, items.map(([key, label]) =>
     h("label", {}, h("input", { type: "checkbox", checked: layers[key], onchange: (event) => { layers[key] = event.target.checked; redraw(); } }),
       h("i", { class: `swatch-${key === "carrier" ? "board" : key}` }), label)));

@@ -20,10 +20,12 @@ function showSample(sample) {
     sample.problem ? h("p", { class: "problem", role: "alert" }, sample.problem) : "",
     channels, first, wide, rest);
   samplePlan ??= new Plan("Map of the sample from above");
-  first.append(card("Map", "seen from above; the wedge is what a camera sees, symbols are not to scale", samplePlan.node, legend(() => samplePlan.draw())), surfaceCard(sample));
+  first.append(card("Map", "seen from above; the wedge is what a camera sees, symbols are not to scale", samplePlan.node, legend(() => samplePlan.draw())));
+  if (SURFACE_NAMES.length) first.append(surfaceCard(sample));
   samplePlan.show([sample], true);
   details(sample).then(({ record, facts: own, files }) => {
     if (current !== sample || !rest.isConnected) return;
+    first.append(sceneCard(record));
     wide.append(...factTables(own), actorCard(record));
     rest.append(...factCards(own), ...recordCards(record, files), raw("Scene record as JSON", record), raw("Facts of the task as JSON", own));
   });
@@ -58,12 +60,14 @@ function actorCard(record) {
   return card("Actors", `${rows.length}`, table("Actors", ["id", "role", "asset", "x m", "y m", "z m", "heading °", "speed m/s", "from ego m"], rows));
 }
 
+function sceneCard(record) {
+  return card("Scene", null, facts("Scene", Object.entries(record).filter(([, value]) => !(value instanceof Object))));
+}
+
 function recordCards(record, files) {
-  const scene = Object.entries(record).filter(([, value]) => !(value instanceof Object));
   const rows = files.map(([path, digest, link]) =>
-    h("tr", {}, h("td", {}, link ? h("a", { href: link, rel: "noreferrer" }, path) : path), h("td", { class: "dim", title: digest }, digest.slice(0, 12))));
+    h("tr", {}, h("td", {}, link ? h("a", { href: link, rel: "noreferrer" }, path) : path), h("td", { class: "dim digest", title: digest }, digest.slice(0, 12))));
   return [
-    card("Scene", null, facts("Scene", scene)),
     card("Weather", null, facts("Weather", Object.entries(record.weather))),
     ...record.cameras.map((camera) => card(`Camera ${camera.name}`, null, facts(`Camera ${camera.name}`, flattened(camera)))),
     ...record.surfaces.map((surface) => card(`Surface ${surface.name}`, null, facts(`Surface ${surface.name}`, flattened(surface)))),

@@ -24,8 +24,9 @@ function showStatistics() {
     ...own,
     card("Actors by kind", "without the ego car; choose one to filter", barList(byAsset, grouped, pick)),
     card("Actors by role", null, barList(byRole, grouped)),
-    ...METRICS.map(spread),
-    ...aboutCards()));
+    ...METRICS.map(spread)),
+    h("h2", { class: "part" }, "How the split was made"),
+    h("div", { class: "columns" }, ...aboutCards()));
 }
 
 function shares(totals) {
@@ -34,7 +35,7 @@ function shares(totals) {
 }
 
 function spread(metric) {
-  const values = shown.flatMap((sample) => sample.surfaces.map((surface) => surface[metric.key])).filter(isNumber).map((value) => value * metric.factor);
+  const values = valuesOf(metric, shown);
   if (!values.length) return null;
   const sorted = [...values].sort((a, b) => a - b);
   const at = (share) => `${rounded(sorted[Math.round(share * (sorted.length - 1))], 1)}${metric.unit}`;
@@ -44,6 +45,6 @@ function spread(metric) {
 
 function aboutCards() {
   return Object.entries(ABOUT.facts).filter(([, value]) => isObject(value) && Object.keys(value).length)
-    .map(([key, value]) => card(key, "of the split", facts(key, flattened(value))))
+    .map(([key, value]) => card(key, null, facts(key, flattened(value))))
     .concat([card("dataset", null, facts("dataset", Object.entries(ABOUT.facts).filter(([, value]) => !isObject(value))))]);
 }

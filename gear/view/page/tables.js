@@ -6,8 +6,9 @@ const LONGEST_TEXT = 32;
 function words(value) {
   if (isNumber(value)) return String(Math.abs(value) < 1e-3 ? Number(value.toPrecision(3)) : Number(value.toFixed(4)));
   if (value === null || value === undefined) return "–";
-  if (Array.isArray(value)) return value.length <= 4 && !value.some((item) => item instanceof Object) ? value.map((item) => (isNumber(item) ? rounded(item, 3) : words(item))).join(", ") : `${value.length} values`;
-  if (isObject(value)) return `${Object.keys(value).length} values`;
+  if (Array.isArray(value) && !value.length) return "none";
+  if (Array.isArray(value)) return value.length <= 4 && !value.some((item) => item instanceof Object) ? value.map((item) => (isNumber(item) ? rounded(item, 3) : words(item))).join(", ") : counted(value.length, "value");
+  if (isObject(value)) return counted(Object.keys(value).length, "value");
   return String(value);
 }
 
@@ -34,9 +35,12 @@ function flattened(value) {
   return Object.entries(value).flatMap(([key, item]) => (isObject(item) ? Object.entries(item).map(([inner, v]) => [`${key}.${inner}`, v]) : [[key, item]]));
 }
 
+// Columns of long texts, as run lengths are, come last: what can be read stands where it is seen.
 function tableOfRows(label, items) {
   const rows = items.map((item) => new Map(flattened(item)));
-  const headers = [...new Set(rows.flatMap((row) => [...row.keys()]))];
+  const names = [...new Set(rows.flatMap((row) => [...row.keys()]))];
+  const isLong = (name) => rows.some((row) => words(row.get(name)).length > LONGEST_TEXT);
+  const headers = [...names.filter((name) => !isLong(name)), ...names.filter(isLong)];
   return table(label, headers, rows.map((row) => headers.map((name) => row.get(name))));
 }
 
