@@ -11,6 +11,8 @@ from torch.nn import functional
 
 from gear.formats.cityscapes import LABELS
 from gear.losses.semantic import (
+    BALANCED,
+    SHARES,
     TRAIN_ID_OF_LABEL_ID,
     SegmentationLosses,
     hard_cross_entropy,
@@ -128,3 +130,21 @@ def test_losses_compare_sampled_logits_with_the_labels_of_their_pixels() -> None
     losses = SegmentationLosses(easy=1.0, least=0.0, auxiliary_weight=0.0)({"logits": logits}, [sample, sample])
 
     assert float(losses["cross_entropy"]) == pytest.approx(0.0, abs=1e-4)
+
+
+def test_weights_make_a_mean_of_classes_as_they_say() -> None:
+    logits, ids = torch.zeros(1, 2, 1, 4), torch.tensor([[[0, 0, 0, 1]]])
+    logits[:, 0] = 1.0
+    common, rare = -math.log(math.e / (math.e + 1)), -math.log(1 / (math.e + 1))
+
+    loss = hard_cross_entropy(logits, ids, easy=1.0, least=0.0, weights=(1.0, 3.0))
+    ignored = hard_cross_entropy(logits, torch.full_like(ids, 255), easy=1.0, least=0.0, weights=(1.0, 3.0))
+
+    assert float(loss) == pytest.approx((3 * common + 3 * rare) / 6)
+    assert float(ignored) == 0
+
+
+def test_rarer_classes_weigh_more() -> None:
+    order = np.argsort(SHARES, kind="stable")
+    assert np.all(np.diff(np.array(BALANCED)[order]) <= 0)
+    assert 1.9 < min(BALANCED) < 2.1 and max(BALANCED) < 7.2

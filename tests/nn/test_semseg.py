@@ -137,7 +137,7 @@ def test_many_at_once_are_the_same_as_one_by_one() -> None:
 
 
 def test_it_learns() -> None:
-    """Twelve steps on two pictures of coloured stripes teach the stripes' classes."""
+    """Twenty steps on two pictures of coloured stripes teach the stripes' classes."""
     model = build(SegmentationOptions(weights="none", device="cpu"))
     labels = np.repeat(np.array([7, 23, 26, 21], dtype=np.uint8), 16)[:, None] * np.ones((1, 64), dtype=np.uint8)
     colours = derive_rng(6, "stripes").random((34, 3), dtype=np.float32)
@@ -145,7 +145,7 @@ def test_it_learns() -> None:
     samples = [Labelled(labels), Labelled(np.ascontiguousarray(labels[::-1]))]
     optimiser = torch.optim.AdamW(model.parameters(), lr=2e-3)
     model.train()
-    for _ in range(12):
+    for _ in range(20):
         optimiser.zero_grad()
         total = torch.stack(list(model(views, samples).values())).sum()
         total.backward()
