@@ -403,6 +403,15 @@ def test_a_task_from_outside_is_shown_like_any_other(browser: Browser, odd: Data
     no_trouble(browser)
 
 
+def test_lists_of_numbers_can_be_told_apart(browser: Browser, odd: Dataset[Any], tmp_path: Path) -> None:
+    plan = dataclasses.replace(odd.plan, content={"edges_px": [1145.898, 20.12345, 1e-9], "boards": [], "truck": [{}]})
+    write_page(dataclasses.replace(odd, plan=plan), tmp_path / "odd.html")
+    browser.open(tmp_path / "odd.html", "#/statistics")
+    rows = "[...document.querySelectorAll('#statistics [aria-label=content] tr')].map((row) => row.innerText)"
+    assert browser.value(rows) == ["edges_px\t1145.9, 20.123, 0", "boards\tnone", "truck\t1 value"]
+    no_trouble(browser)
+
+
 @pytest.fixture
 def odd(tmp_path: Path) -> Dataset[Any]:
     """Two of its samples, the second without previews."""

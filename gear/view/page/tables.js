@@ -3,11 +3,14 @@ const isObject = (value) => value !== null && typeof value === "object" && !Arra
 const isRows = (value) => Array.isArray(value) && value.length > 0 && value.every(isObject);
 const LONGEST_TEXT = 32;
 
+// Without commas between thousands, which would look like more items; large numbers with fewer digits.
+const inList = (value) => String(Number(value.toFixed(Math.abs(value) < 100 ? 3 : 1)));
+
 function words(value) {
   if (isNumber(value)) return String(Math.abs(value) < 1e-3 ? Number(value.toPrecision(3)) : Number(value.toFixed(4)));
   if (value === null || value === undefined) return "–";
   if (Array.isArray(value) && !value.length) return "none";
-  if (Array.isArray(value)) return value.length <= 4 && !value.some((item) => item instanceof Object) ? value.map((item) => (isNumber(item) ? rounded(item, 3) : words(item))).join(", ") : counted(value.length, "value");
+  if (Array.isArray(value)) return value.length <= 4 && !value.some((item) => item instanceof Object) ? value.map((item) => (isNumber(item) ? inList(item) : words(item))).join(", ") : counted(value.length, "value");
   if (isObject(value)) return counted(Object.keys(value).length, "value");
   return String(value);
 }
