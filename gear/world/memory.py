@@ -40,7 +40,7 @@ def keep_no_assets() -> None:
 
 
 def map_large_buffers() -> None:
-    """Has every buffer of a picture's size come straight from the system, and go straight back.
+    """Has every buffer of a linear frame's size come straight from the system, and go straight back.
 
     Left alone, glibc soon keeps such buffers in its heap, in between what lives long: 130 MB of holes in `film`.
     Told so, it would also hand back all else that lies free at the end of its heap, to fetch it again for the next
