@@ -119,6 +119,8 @@ class SimulationConfig:
 
 RendererName = Literal["filament", "classic"]
 
+MOST_CROWDED = 10.0
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CollectionConfig:
@@ -137,6 +139,7 @@ class CollectionConfig:
         quality: `film` (2x2 supersampled) or `fast`.
         camera: optional effects: `shot_noise`, `read_noise` (percent), `vignette`, `shutter_s`, `lens` (`k1`, `k2`).
         seed, samples: instead of the simulation config's.
+        crowd: how many times the scene's numbers of other vehicles and people there are, their upper limits included.
         patch_seed: of random patches; not the split's, so that all splits show the same one.
         probes: also keep each surface's reach rendered black and white, from which compositors put patches in.
         simulation: name or path of the simulation config.
@@ -156,6 +159,7 @@ class CollectionConfig:
     camera: CameraEffects = field(default_factory=CameraEffects)
     seed: int | None = None
     samples: int | None = None
+    crowd: float = 1.0
     patch_seed: int = 0
     probes: bool = False
     simulation: str = "default"
@@ -168,5 +172,7 @@ class CollectionConfig:
             raise FieldError("seed", f"must not be negative, got {self.seed}")
         if self.samples is not None and not 1 <= self.samples <= 1_000_000:
             raise FieldError("samples", f"must be 1 to 1000000, got {self.samples}")
+        if not 0 <= self.crowd <= MOST_CROWDED:
+            raise FieldError("crowd", f"must be 0 to {MOST_CROWDED:g}, got {self.crowd:g}")
         if not self.scene:
             raise FieldError("scene", "must be a scene's name, such as billboard01")

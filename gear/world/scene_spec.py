@@ -67,6 +67,9 @@ class EgoLimits:
             raise FieldError("min_free", f"is a share, 0 to 1, got {self.min_free:g}")
 
 
+MOST_NPCS = 1000
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NpcLimits:
     """Where other road users may be, and how many.
@@ -84,8 +87,8 @@ class NpcLimits:
 
     def __post_init__(self) -> None:
         low, high = self.count
-        if not 0 <= low <= high <= 1000:
-            raise FieldError("count", f"must be two numbers, 0 to 1000, the smaller first, got {low} and {high}")
+        if not 0 <= low <= high <= MOST_NPCS:
+            raise FieldError("count", f"must be two numbers, 0 to {MOST_NPCS}, the smaller first, got {low} and {high}")
         _check_range("ahead_m", self.ahead_m)
         _check_range("lateral_m", self.lateral_m)
         _check_range("radius_m", self.radius_m, least=0.0)
@@ -164,6 +167,14 @@ class SceneSpec:
             pedestrians=_capped(self.pedestrians, max_pedestrians),
         )
 
+    def crowded(self, factor: float) -> SceneSpec:
+        """The same scene with so many times as many others."""
+        if factor == 1:
+            return self
+        return replace(
+            self, npc_vehicles=_multiplied(self.npc_vehicles, factor), pedestrians=_multiplied(self.pedestrians, factor)
+        )
+
 
 LimitsT = TypeVar("LimitsT", bound=NpcLimits)
 
@@ -171,6 +182,11 @@ LimitsT = TypeVar("LimitsT", bound=NpcLimits)
 def _capped(limits: LimitsT, most: int) -> LimitsT:
     low, high = limits.count
     return replace(limits, count=(min(low, most), min(high, most)))
+
+
+def _multiplied(limits: LimitsT, factor: float) -> LimitsT:
+    low, high = limits.count
+    return replace(limits, count=(min(round(low * factor), MOST_NPCS), min(round(high * factor), MOST_NPCS)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

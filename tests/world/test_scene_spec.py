@@ -56,3 +56,13 @@ def test_caps_lower_both_ends() -> None:
     capped = SceneSpec(npc_vehicles=VehicleLimits(count=(3, 7)), pedestrians=NpcLimits(count=(6, 20))).capped(2, 10)
     assert capped.npc_vehicles.count == (2, 2)
     assert capped.pedestrians.count == (6, 10)
+
+
+def test_a_crowd_multiplies_both_ends_up_to_the_most_there_may_be() -> None:
+    scene = SceneSpec(npc_vehicles=VehicleLimits(count=(3, 7)), pedestrians=NpcLimits(count=(6, 200)))
+    crowded = scene.crowded(2.5)
+    assert crowded.npc_vehicles == VehicleLimits(count=(8, 18))
+    assert crowded.pedestrians.count == (15, 500)
+    assert scene.crowded(10).pedestrians.count == (60, 1000)
+    assert scene.crowded(0).npc_vehicles.count == (0, 0)
+    assert scene.crowded(1.0) is scene

@@ -85,7 +85,7 @@ def resolve(config: CollectionConfig) -> Job:
     simulation = load_simulation(config.simulation)
     scene = find_scene(config, library.town_name)
     roomy = 1 if scene.boards else ROOMY_FACTOR
-    scene = scene.capped(simulation.max_vehicles * roomy, simulation.max_pedestrians)
+    scene = scene.capped(simulation.max_vehicles * roomy, simulation.max_pedestrians).crowded(config.crowd)
     split = split_of(simulation, config.split)
     split = dataclasses.replace(
         split,
