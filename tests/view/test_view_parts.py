@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from gear.contracts.tasks import Sample, Sidecar
@@ -29,6 +29,9 @@ from gear.view.measures import measures
 from gear.view.rows import finite, row
 
 RIG = Rig(cameras=(CameraMount(name="left", width_px=320, height_px=160),))
+BUSY = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
+"""Time says nothing of these tests, and machines may be busy."""
+
 WORLD_FROM_EGO = RigidTransform.from_yaw("world", "ego", (100.0, 50.0, 0.0), math.pi / 2)
 
 
@@ -138,6 +141,7 @@ def test_occlusion_and_truncation_of_a_board() -> None:
 coordinates = st.floats(-300, 600, allow_nan=False)
 
 
+@BUSY
 @given(st.tuples(coordinates, coordinates), st.floats(1, 400), st.floats(1, 400))
 def test_clipping_a_rectangle_is_intersecting_intervals(
     corner: tuple[float, float], width: float, height: float
@@ -212,6 +216,7 @@ json_values = st.recursive(
 )
 
 
+@BUSY
 @given(json_values)
 def test_whatever_a_record_holds_comes_back_and_cannot_end_its_block(value: Any) -> None:
     clean = finite(value)
