@@ -180,7 +180,7 @@ def write_results(root: Path, plan: PatchPlan) -> None:
         dataset="", twin="", split="test", patch="", renderer="", quality="", samples=(shot,), model=plan.model,
         effect={"clean": {"miou": 0.7}, "transport": {"miou": 0.48}, "rendered": {"miou": 0.5}},
     )  # fmt: skip
-    report = EvaluateReport(out=root, facts={}, rows=tuple(rows), differences=tuple(changes))
+    report = EvaluateReport(out=root, facts={}, rows=tuple(rows), together=(), differences=tuple(changes))
     attack = {"weights_sha256": "ab", "steps_done": 300, "seconds": 90.0}
     write_alone(root / "evaluation/results.json", dump_json(report.as_json()))
     write_alone(root / "gap/gap.json", dump_json(gap.as_json()))

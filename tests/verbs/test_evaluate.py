@@ -241,6 +241,34 @@ def test_twins_are_compared_and_the_patch_can_be_left_out(tmp_path: Path, small:
     }  # fmt: skip
 
 
+def test_datasets_of_one_label_have_a_row_together(tmp_path: Path, small: Small, install: Install) -> None:
+    """Right on one dataset, a metre too far on the other: together they are as if they were one."""
+    other = tmp_path / "other"
+    collect(
+        "depth", town=TINY_TOWN, scene="board", split="debug", samples=1, seed=77, renderer="classic", quality="fast",
+        patch="none", out=other, settings=[f"scenes={TINY_SCENES}", *size_settings("depth")],
+    )  # fmt: skip
+    roots = [small("depth", "none"), other]
+    seeds = [gear.open_dataset(root).plan.info.seed for root in roots]
+    install(model_spec(lambda _: Oracle(roots, lambda s, p: p + (s.record.seed == seeds[1])), "depth"))
+
+    report = evaluate(roots, model="odd", out=tmp_path / "out", resamples=50)
+
+    whole = gear.open_dataset(other).task.evaluator()
+    for root, error_m in zip(roots, (0, 1), strict=True):
+        dataset = gear.open_dataset(root)
+        for sample in dataset:
+            whole.update(sample, dataset.task.as_prediction(sample) + error_m)
+    (pooled,) = report.together
+    assert (pooled.patch, pooled.samples, pooled.rows) == ("none", 3, tuple(row.name for row in report.rows))
+    figures = pooled.figures["task"]
+    assert {name: one.value for name, one in figures.items()} == pytest.approx(dict(whole.result()), nan_ok=True)
+    assert figures["mae_m"].interval is not None and figures["mae_m"].interval[0] < figures["mae_m"].value
+    assert "all with patch none" in (tmp_path / "out" / "table.txt").read_text()
+    alone = evaluate(roots[:1], model="odd", out=tmp_path / "alone", resamples=50)
+    assert alone.together == ()
+
+
 def test_twins_are_tested_sample_by_sample(tmp_path: Path, small: Small, install: Install) -> None:
     """A network that the random patch leads astray by a metre a sample, on the patch alone in one report."""
     roots = [small("depth", "none", 3), small("depth", "random", 3)]

@@ -9,7 +9,7 @@ import numpy as np
 
 from gear.contracts.evaluation import Draws
 from gear.dataset.reading import Dataset
-from gear.verbs.evaluate.report import Difference, Estimate, PairedTest, RowReport
+from gear.verbs.evaluate.report import Difference, Estimate, PairedTest, RowReport, Together
 from gear.verbs.evaluate.scoring import Note, Scorer
 from gear.verbs.evaluate.spread import Figures, auroc, auroc_interval, bounds, draw, gather, paired_p
 
@@ -22,11 +22,6 @@ def row_report(
     name: str, dataset: Dataset[Any], scorer: Scorer, notes: list[Note], made: int, seed: int, resamples: int
 ) -> RowReport:
     """Figures, intervals and costs of one dataset, from its samples' notes."""
-    draws = draw(len(notes), resamples, seed)
-    figures = {}
-    for report, fresh in scorer.makers.items():
-        one = gather(fresh, [note.parts[report] for note in notes], draws)
-        figures[report] = {n: Estimate(value=v, interval=one.interval(n)) for n, v in one.overall.items()}
     masks = [note.mask for note in notes if note.mask is not None]
     plan = dataset.plan
     # Without a patch there is nothing to be found, only something to be covered by mistake.
@@ -45,11 +40,44 @@ def row_report(
         },
         samples=len(notes),
         made=made,
-        figures=figures,
+        figures=_figures(scorer, notes, seed, resamples),
         cost={key: float(np.mean([note.cost[key] for note in notes])) for key in ("model_s", "defense_s")},
         defense={key: _known_mean([mask[key] for mask in masks]) for key in keys},
         per_sample=[{k: v for k, v in note.as_json().items() if k != "facts"} for note in notes],
     )
+
+
+def together(
+    rows: Sequence[RowReport],
+    datasets: Sequence[Dataset[Any]],
+    scorers: Sequence[Scorer],
+    notes: Sequence[list[Note]],
+    seed: int,
+    resamples: int,
+) -> Iterable[Together]:
+    """Datasets of several scenes or weathers with patches of one label, as if they were one dataset."""
+    members: dict[str, list[int]] = {}
+    for number, row in enumerate(rows):
+        members.setdefault(row.patch, []).append(number)
+    for patch, numbers in members.items():
+        options = datasets[numbers[0]].plan.options
+        if len(numbers) > 1 and all(datasets[number].plan.options == options for number in numbers):
+            every = [note for number in numbers for note in notes[number]]
+            yield Together(
+                patch=patch,
+                rows=tuple(rows[number].name for number in numbers),
+                samples=len(every),
+                figures=_figures(scorers[numbers[0]], every, seed, resamples),
+            )
+
+
+def _figures(scorer: Scorer, notes: Sequence[Note], seed: int, resamples: int) -> dict[str, dict[str, Estimate]]:
+    draws = draw(len(notes), resamples, seed)
+    figures = {}
+    for report, fresh in scorer.makers.items():
+        one = gather(fresh, [note.parts[report] for note in notes], draws)
+        figures[report] = {n: Estimate(value=v, interval=one.interval(n)) for n, v in one.overall.items()}
+    return figures
 
 
 def compared(

@@ -76,6 +76,32 @@ class RowReport:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Together:
+    """Several datasets with patches of one label as one.
+
+    Attributes:
+        patch: the label.
+        rows: names of their rows.
+        samples: of all of them.
+        figures: over all samples.
+    """
+
+    patch: str
+    rows: tuple[str, ...]
+    samples: int
+    figures: Figures
+
+    def as_json(self) -> Json:
+        """As written into results.json."""
+        return {
+            "patch": self.patch,
+            "rows": list(self.rows),
+            "samples": self.samples,
+            "figures": figures_json(self.figures),
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PairedTest:
     """Whether the samples' own figures differ between twins by more than chance.
 
@@ -133,12 +159,14 @@ class EvaluateReport:
         out: folder of results.json, table.txt and the predictions.
         facts: model, defense, task, seed, versions; JSON.
         rows: the datasets, in the order given.
+        together: datasets that differ in more than their patch, by the patch's label.
         differences: between twins.
     """
 
     out: Path
     facts: Json
     rows: tuple[RowReport, ...]
+    together: tuple[Together, ...]
     differences: tuple[Difference, ...]
 
     def as_json(self) -> Json:
@@ -148,6 +176,7 @@ class EvaluateReport:
             "version": 1,
             **self.facts,
             "rows": [row.as_json() for row in self.rows],
+            "together": [one.as_json() for one in self.together],
             "differences": [one.as_json() for one in self.differences],
         }
 

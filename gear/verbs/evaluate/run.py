@@ -28,7 +28,7 @@ from gear.verbs.evaluate.choice import (
     chosen_defense,
     chosen_model,
 )
-from gear.verbs.evaluate.compare import compared, row_report
+from gear.verbs.evaluate.compare import compared, row_report, together
 from gear.verbs.evaluate.player import Player
 from gear.verbs.evaluate.report import EvaluateReport
 from gear.verbs.evaluate.row import evaluate_row
@@ -140,6 +140,7 @@ def evaluate(
         out=root,
         facts=facts | {"reports": list(reports), "resamples": resamples, "versions": _versions(player)},
         rows=rows,
+        together=tuple(together(rows, datasets, scorers, notes, seed, resamples)),
         differences=tuple(compared(rows, datasets, scorers, notes, seed, resamples)),
     )
     write_whole(root, "results.json", dump_json(found.as_json()))

@@ -19,6 +19,9 @@ def table(report: EvaluateReport) -> str:
     for row in report.rows:
         lines.append(_row(row, columns))
         lines += [_difference(one, report, columns) for one in report.differences if one.row == row.name]
+    for pooled in report.together:
+        figures = [_estimate(pooled.figures.get(name, {}).get(figure)) for name, figure in columns]
+        lines.append([f"all with patch {pooled.patch}", str(pooled.samples), *figures, "", "", "", ""])
     used = [i for i, title in enumerate(head) if title in ("", "samples") or any(line[i] for line in lines)]
     text = _aligned([[line[i] for i in used] for line in [head, *lines]])
     guarded = report.facts["defense"]
