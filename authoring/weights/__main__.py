@@ -8,6 +8,7 @@ Each collection is one `gear collect`, so the same command again goes on where i
 
     gear train --task semseg --model ddrnet23_slim --data data/training/semseg --out runs/semseg
     gear evaluate … --data data/held-out/semseg/…
+    python -m authoring.weights ship runs/semseg --evaluation evaluations/semseg/ddrnet23_slim
     python -m authoring.weights patches --task semseg --model ddrnet23_slim --out runs/patches
 """
 
@@ -21,6 +22,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from authoring.weights import ship
 from authoring.weights.patches import command as patches
 from authoring.weights.plan import HELD_OUT_SAMPLES, TRAINING_OPTIONS, Collection, held_out, training
 from gear.values.errors import GearError
@@ -49,6 +51,9 @@ def main() -> int:
     made = parts.add_parser("patches", help="makes a network's patches, scene by scene, and measures them")
     patches.add_arguments(made)
     made.set_defaults(run=patches.run)
+    shipped = parts.add_parser("ship", help="puts trained and measured weights into the weights package")
+    ship.add_arguments(shipped)
+    shipped.set_defaults(run=ship.run)
     args = parser.parse_args()
     try:
         return int(args.run(args))

@@ -1,0 +1,164 @@
+"""Trained weights into the weights package, with the figures of the held-out data and a card."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from gear.dataset.files import sha256, write_alone
+from gear.nn.shipped import CHECKOUT
+from gear.nn.weights import read, write
+from gear.plugins.build import build
+from gear.values.errors import GearError
+from gear.verbs.evaluate.choice import chosen_model
+from gear.verbs.evaluate.player import weights_digest
+from gear.verbs.train.results import HISTORY, WEIGHTS
+
+MODELS = CHECKOUT / "models"
+REPORT = "reference"
+FACTS = ("scene", "weather", "split", "seed", "patch", "samples")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Of the command."""
+    parser.add_argument(
+        "runs", nargs="+", type=Path, help="folders of gear train, in order; the last one's are shipped"
+    )
+    parser.add_argument(
+        "--evaluation", type=Path, required=True, help="gear evaluate --report reference, held-out data"
+    )
+    parser.add_argument(
+        "--base", type=Path, default=Path(), help="folder of data and runs, to leave out of what is said"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Ships one network."""
+    print(ship(args.runs, args.evaluation, args.base))
+    return 0
+
+
+def ship(runs: Sequence[Path], evaluation: Path, base: Path, models: Path = MODELS) -> Path:
+    """Writes `<model>.safetensors` and `<model>.md`; returns the former.
+
+    Args:
+        runs: folders of `gear train`; each but the first began with the one before.
+        evaluation: folder of `gear evaluate --report reference` with the last run's weights.
+        base: commands name files below it by what follows it.
+        models: the package's folder.
+
+    Raises:
+        GearError: the evaluation is of another network or other weights, or lacks the report.
+    """
+    results = _json(evaluation / "results.json")
+    weights = runs[-1] / WEIGHTS
+    state, metadata = read(weights)
+    name = metadata["model"]
+    if results["model"]["weights_sha256"] != _digest(name, weights):
+        raise GearError(f"{evaluation}: not an evaluation of {weights}")
+    measured = results["together"][0] if results["together"] else results["rows"][0]
+    figures: dict[str, Any] = measured["figures"].get(REPORT, {})
+    if not figures:
+        raise GearError(f"{evaluation}: holds no report {REPORT!r}; evaluate again with --report {REPORT}")
+    known = {key: one for key, one in figures.items() if one["value"] is not None}
+    metadata["metrics"] = json.dumps({key: one["value"] for key, one in known.items()})
+    metadata["intervals"] = json.dumps({key: [one["low"], one["high"]] for key, one in known.items()})
+    histories = [_json(one / HISTORY) for one in runs]
+    commands = [_without(base, history["command"]).replace("--out DIR", f"--out {_without(base, str(one))}")
+                for history, one in zip(histories, runs, strict=True)]  # fmt: skip
+    metadata["command"] = " && ".join(commands)
+    target = models / f"{name}.safetensors"
+    models.mkdir(parents=True, exist_ok=True)
+    write(target, state, metadata, halves=True)
+    card = _card(target, metadata, histories, commands, results, measured, figures)
+    write_alone(target.with_suffix(".md"), card.encode())
+    return target
+
+
+def _card(
+    target: Path,
+    metadata: Mapping[str, str],
+    histories: Sequence[Any],
+    commands: Sequence[str],
+    results: Any,
+    measured: Any,
+    figures: Mapping[str, Any],
+) -> str:
+    data = target.read_bytes()
+    absent = [key for key, one in figures.items() if one["value"] is None]
+    lines = [
+        f"# {metadata['model']} for {metadata['task']}",
+        "",
+        f"`{target.name}`, {len(data) / 1e6:.1f} MB, matrices in float16, sha256 `{sha256(data)}`. MIT licence.",
+        f"Made with gear {metadata['gear']}; the look that it knows is `{metadata['look_hash']}`.",
+        "",
+        "## Measured",
+        "",
+        f"On {measured['samples']} pictures at the task's own size, of two scenes and one weather that nothing was",
+        "trained on (`python -m authoring.weights held-out`), 95 % intervals by bootstrap over pictures:",
+        "",
+        "| figure | value | from | to |",
+        "|---|---|---|---|",
+        *(f"| {key} | {_number(one['value'])} | {_number(one['low'])} | {_number(one['high'])} |"
+          for key, one in figures.items() if one["value"] is not None),
+        "",
+        *([f"Nothing to measure for: {', '.join(absent)}.", ""] if absent else []),
+        *_rows(results),
+        "## Made by",
+        "",
+        f"`python -m authoring.weights training --task {metadata['task']} --out data`, and then",
+        "",
+        "```",
+        *commands,
+        "```",
+        "",
+        *(f"- {one['finished_steps']} steps in {one['elapsed_s'] / 60:.0f} minutes; the weights are those after step "
+          f"{one['best_step']}" for one in histories),
+        "",
+        "## Training data",
+        "",
+        "| scene | weather | split | seed | patch | samples |",
+        "|---|---|---|---|---|---|",
+        *("| " + " | ".join(str(fact[key]) for key in FACTS) + " |" for fact in histories[-1]["training"]),
+        "",
+        "## Limits",
+        "",
+        "Trained on rendered pictures of gear's towns alone. It knows their looks, weathers and cameras; on real",
+        "pictures, or on towns that look otherwise, nothing is promised.",
+        "",
+    ]  # fmt: skip
+    return "\n".join(lines)
+
+
+def _rows(results: Any) -> list[str]:
+    """The first figure of every dataset."""
+    first = next(iter(results["rows"][0]["figures"][REPORT]))
+    lines = [f"| scene | samples | {first} |", "|---|---|---|"]
+    for row in results["rows"]:
+        one, place = row["figures"][REPORT][first], row["dataset"]
+        lines.append(f"| {place['town']}/{place['scene']} | {row['samples']} | {_number(one['value'])} |")
+    return [*lines, ""]
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None or math.isnan(value) else f"{value:.3f}"
+
+
+def _without(base: Path, text: str) -> str:
+    return text.replace(f"{base.resolve()}/", "") if base != Path() else text
+
+
+def _digest(name: str, weights: Path) -> str | None:
+    """Of the numbers in the file, as evaluations name them."""
+    chosen = chosen_model(name, [f"weights={weights}"])
+    return weights_digest(build(chosen.found, chosen.options))
+
+
+def _json(path: Path) -> Any:
+    if not path.is_file():
+        raise GearError(f"{path}: there is no such file")
+    return json.loads(path.read_text())

@@ -1,0 +1,88 @@
+"""Weights into the package: what their file and card say, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from authoring.weights.ship import ship
+from gear.nn.options import SegmentationOptions
+from gear.nn.shipped import inspect
+from gear.nn.weights import read, write
+from gear.plugins.models.ddrnet23_slim import build
+from gear.values.errors import GearError
+from gear.verbs.evaluate.player import weights_digest
+
+MODEL = "ddrnet23_slim"
+
+
+def estimate(value: float | None) -> dict[str, float | None]:
+    return {"value": value, "low": value and value - 0.1, "high": value and value + 0.1}
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder as `gear train` leaves it, of a network that has learnt nothing."""
+    root = tmp_path_factory.mktemp("base") / "runs" / "semseg"
+    root.mkdir(parents=True)
+    texts = {"model": MODEL, "task": "semseg", "gear": "0.1.0", "look_hash": "ab12", "options": '{"input_scale": 0.5}'}
+    network = build(SegmentationOptions(weights="none", device="cpu"))
+    write(root / "model.safetensors", network.module().state_dict(), texts | {"metrics": '{"miou": 0.9}'}, halves=True)
+    base = root.parents[1]
+    history = {
+        "command": f"gear train --task semseg --model {MODEL} --data {base}/data --out DIR",
+        "training": [
+            {"scene": "town10/truck", "weather": "ClearNoon", "split": "train", "seed": 1, "patch": "-", "samples": 7}
+        ],
+        "finished_steps": 12, "elapsed_s": 240.0, "best_step": 11,
+    }  # fmt: skip
+    (root / "train.json").write_text(json.dumps(history))
+    return root
+
+
+@pytest.fixture
+def evaluation(run: Path, tmp_path: Path) -> Path:
+    figures = {"reference": {"miou": estimate(0.625), "iou_train": estimate(None)}}
+    row: dict[str, Any] = {"samples": 3, "figures": figures, "dataset": {"town": "suburb", "scene": "billboard05"}}
+    loaded = build(SegmentationOptions(weights=str(run / "model.safetensors"), device="cpu"))
+    results = {
+        "model": {"name": MODEL, "weights_sha256": weights_digest(loaded)},
+        "rows": [row, row],
+        "together": [{"patch": "none", "samples": 6, "figures": figures}],
+    }
+    (tmp_path / "results.json").write_text(json.dumps(results))
+    return tmp_path
+
+
+def test_the_file_has_the_same_numbers_and_says_what_was_measured(run: Path, evaluation: Path, tmp_path: Path) -> None:
+    path = ship([run], evaluation, run.parents[1], tmp_path / "models")
+    assert path.name == f"{MODEL}.safetensors"
+    facts = inspect(path).facts()
+    assert facts["metrics"] == {"miou": 0.625} and facts["intervals"] == {"miou": [0.525, 0.725]}
+    assert facts["options"] == {"input_scale": 0.5} and facts["look_hash"] == "ab12"
+    assert facts["command"] == f"gear train --task semseg --model {MODEL} --data data --out runs/semseg"
+    before, after = read(run / "model.safetensors")[0], read(path)[0]
+    assert before.keys() == after.keys() and all(bool((before[key] == after[key]).all()) for key in before)
+
+
+def test_the_card_says_how_they_came_and_how_good_they_are(run: Path, evaluation: Path, tmp_path: Path) -> None:
+    card = ship([run, run], evaluation, run.parents[1], tmp_path / "models").with_suffix(".md").read_text()
+    assert "| miou | 0.625 | 0.525 | 0.725 |" in card and "Nothing to measure for: iou_train." in card
+    assert "On 6 pictures" in card and "| suburb/billboard05 | 3 | 0.625 |" in card
+    assert card.count("--data data --out runs/semseg") == 2 and str(run.parents[1]) not in card
+    assert "| town10/truck | ClearNoon | train | 1 | - | 7 |" in card and "after step 11" in card
+
+
+def test_other_weights_and_other_reports_are_refused(run: Path, evaluation: Path, tmp_path: Path) -> None:
+    path = evaluation / "results.json"
+    results = json.loads(path.read_text())
+    path.write_text(json.dumps(results | {"model": {"name": MODEL, "weights_sha256": "0"}}))
+    with pytest.raises(GearError, match="not an evaluation of"):
+        ship([run], evaluation, run.parents[1], tmp_path / "models")
+    path.write_text(json.dumps(results | {"together": [{"samples": 6, "figures": {}}]}))
+    with pytest.raises(GearError, match="no report 'reference'"):
+        ship([run], evaluation, run.parents[1], tmp_path / "models")
+    assert not (tmp_path / "models").exists()
