@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +36,7 @@ UNKNOWN_LOGIT = -50.0
 
 NEAREST_M = 1e-3
 
-METRIC_TYPES = ("glpn", "zoedepth", "depth_pro")
+METRIC_TYPES = ("glpn", "zoedepth")
 """Families whose every network says metres; others say so in `depth_estimation_type`."""
 
 logger = logging.getLogger(__name__)
@@ -239,15 +239,29 @@ def open_folder(options: FolderOptions, auto: str) -> nn.Module:
     try:
         with _without_bars():
             if options.weights == FOLDER:
-                graph: nn.Module = kind.from_pretrained(folder, local_files_only=True, use_safetensors=True)
-                return graph
+                loaded, found = kind.from_pretrained(
+                    folder, local_files_only=True, use_safetensors=True, output_loading_info=True
+                )
+                return _complete(loaded, found["missing_keys"], folder)
             with seeded(options.seed):
-                graph = kind.from_config(transformers.AutoConfig.from_pretrained(folder, local_files_only=True))
+                graph: nn.Module = kind.from_config(transformers.AutoConfig.from_pretrained(folder, local_files_only=True))
     except (OSError, ValueError) as error:
         wanted = auto.removeprefix("AutoModelFor")
         raise GearError(f"{folder}: no network for {wanted}: {str(error).splitlines()[0]}") from error
     if options.weights != NONE:
         load_into(graph, options.weights)
+    return graph
+
+
+def _complete(graph: nn.Module, missing: Collection[str], folder: Path) -> nn.Module:
+    """The graph, unless transformers made up weights that the folder lacks: a classifier has no head for depth.
+
+    Raises:
+        GearError: it did.
+    """
+    if missing:
+        first = min(missing)
+        raise GearError(f"{folder}: {len(missing)} weights of {type(graph).__name__} are not there, such as {first}")
     return graph
 
 

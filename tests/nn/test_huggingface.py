@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 import torch
+from safetensors.torch import load_file, save_file
 
 from gear.contracts.models import Model
 from gear.nn import vision
@@ -232,6 +233,16 @@ def test_a_folder_of_another_kind_gets_one_line(tmp_path: Path) -> None:
     saved(glpn, tmp_path)
     with pytest.raises(GearError, match="no network for ObjectDetection"):
         detect2d.build(DetectorFolderOptions(folder=str(tmp_path)))
+
+
+def test_a_folder_without_the_head_is_refused_rather_than_given_a_random_one(tmp_path: Path) -> None:
+    folder = saved(segformer, tmp_path)
+    state = load_file(folder / "model.safetensors")
+    save_file(
+        {k: v for k, v in state.items() if "decode_head" not in k}, folder / "model.safetensors", {"format": "pt"}
+    )
+    with pytest.raises(GearError, match="weights of SegformerForSemanticSegmentation are not there, such as decode"):
+        semseg.build(FolderOptions(folder=str(folder)))
 
 
 def test_relative_depth_must_be_made_metres_and_metric_depth_must_not(tmp_path: Path) -> None:
