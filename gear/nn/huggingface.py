@@ -244,7 +244,8 @@ def open_folder(options: FolderOptions, auto: str) -> nn.Module:
                 )
                 return _complete(loaded, found["missing_keys"], folder)
             with seeded(options.seed):
-                graph: nn.Module = kind.from_config(transformers.AutoConfig.from_pretrained(folder, local_files_only=True))
+                config = transformers.AutoConfig.from_pretrained(folder, local_files_only=True)
+                graph: nn.Module = kind.from_config(config)
     except (OSError, ValueError) as error:
         wanted = auto.removeprefix("AutoModelFor")
         raise GearError(f"{folder}: no network for {wanted}: {str(error).splitlines()[0]}") from error
