@@ -33,6 +33,9 @@ SHARES = {"no_billboard": 0.45, "board": 0.45, "truck": 0.1}
 CROWDS = {"no_billboard": 3.0, "board": 2.0, "truck": 2.0}
 """Training streets are busier than those that networks are measured on: a picture teaches more where more is in it."""
 
+CROWDED = ("semseg", "detect2d", "stereo3d")
+"""Tasks in which it does: depth is learnt from every pixel."""
+
 FIRST_TRAINING_SEED, FIRST_HELD_OUT_SEED = 20_000, 30_000
 HELD_OUT_SAMPLES = 300
 
@@ -111,7 +114,7 @@ def training(task: str, samples: int) -> list[Collection]:
                     patch="none" if kind == "no_billboard" or number % 2 else "random",
                     seed=FIRST_TRAINING_SEED + order,
                     samples=max(1, round(counts[kind] / len(members))),
-                    settings=(*TRAINING_OPTIONS[task], f"crowd={CROWDS[kind]:g}"),
+                    settings=(*TRAINING_OPTIONS[task], *([f"crowd={CROWDS[kind]:g}"] if task in CROWDED else [])),
                 )
             )
     return result

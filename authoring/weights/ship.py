@@ -35,14 +35,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--base", type=Path, default=Path(), help="folder of data and runs, to leave out of what is said"
     )
 
+    parser.add_argument("--samples", type=int, help="of the training data, as their collection was told")
+
 
 def run(args: argparse.Namespace) -> int:
     """Ships one network."""
-    print(ship(args.runs, args.evaluation, args.base))
+    print(ship(args.runs, args.evaluation, args.base, samples=args.samples))
     return 0
 
 
-def ship(runs: Sequence[Path], evaluation: Path, base: Path, models: Path = MODELS) -> Path:
+def ship(
+    runs: Sequence[Path], evaluation: Path, base: Path, models: Path = MODELS, *, samples: int | None = None
+) -> Path:
     """Writes `<model>.safetensors` and `<model>.md`; returns the former.
 
     Args:
@@ -50,6 +54,7 @@ def ship(runs: Sequence[Path], evaluation: Path, base: Path, models: Path = MODE
         evaluation: folder of `gear evaluate --report reference` with the last run's weights.
         base: commands name files below it by what follows it.
         models: the package's folder.
+        samples: that the collection of the training data was told, if any.
 
     Raises:
         GearError: the evaluation is of another network or other weights, or lacks the report.
@@ -70,6 +75,8 @@ def ship(runs: Sequence[Path], evaluation: Path, base: Path, models: Path = MODE
     histories = [_json(one / HISTORY) for one in runs]
     commands = [_without(base, history["command"]).replace("--out DIR", f"--out {_without(base, str(one))}")
                 for history, one in zip(histories, runs, strict=True)]  # fmt: skip
+    collected = f"python -m authoring.weights training --task {metadata['task']} --out data"
+    commands.insert(0, collected + (f" --samples {samples}" if samples else ""))
     metadata["command"] = " && ".join(commands)
     target = models / f"{name}.safetensors"
     models.mkdir(parents=True, exist_ok=True)
@@ -109,8 +116,6 @@ def _card(
         *([f"Nothing to measure for: {', '.join(absent)}.", ""] if absent else []),
         *_rows(results),
         "## Made by",
-        "",
-        f"`python -m authoring.weights training --task {metadata['task']} --out data`, and then",
         "",
         "```",
         *commands,
