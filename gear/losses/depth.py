@@ -61,6 +61,18 @@ def log_l1(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float | None = CAP_M)
     return _log_errors(predicted_m, depth_m, mask).abs().sum() / mask.sum().clamp_min(1)
 
 
+def root_mean_square(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float = CAP_M) -> Tensor:
+    """The root of the mean squared error, in metres; an answer beyond `cap_m` counts as one of `cap_m`, as in reports.
+
+    Eigen et al., NeurIPS 2014, report it; logarithms care for what is near, this for what is far.
+    """
+    mask = known(depth_m, cap_m)
+    errors = torch.where(mask, predicted_m.clamp_max(cap_m) - torch.where(mask, depth_m, 0.0), 0.0)
+    mean = errors.square().sum() / mask.sum().clamp_min(1)
+    loss: Tensor = (mean + LEAST_SQUARE).sqrt() - LEAST_SQUARE**0.5
+    return loss
+
+
 def smooth_l1(predicted_m: Tensor, depth_m: Tensor, *, beta_m: float = 1.0, cap_m: float | None = CAP_M) -> Tensor:
     """Mean smooth L1 error in metres: squares below `beta_m`, absolute beyond (Girshick, ICCV 2015)."""
     mask = known(depth_m, cap_m)

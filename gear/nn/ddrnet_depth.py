@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from torch import Tensor, nn
 
-from gear.losses.depth import log_l1, silog
+from gear.losses.depth import log_l1, root_mean_square, silog
 from gear.nn.ddrnet import DDRNet23Slim
 from gear.nn.depth_network import DEPTH, DepthNetwork, resized
 from gear.nn.depth_options import DepthOptions
@@ -21,6 +21,9 @@ RANGE_M = (0.05, 1000.0)
 """Answers are kept in it, for the sake of finite numbers."""
 
 LAST_STD = 0.05
+
+RMS_UNIT_M = 20.0
+"""An error of this size in metres weighs like one of the logarithm by a factor of e."""
 
 
 def ddrnet_depth_graph() -> DDRNet23Slim:
@@ -48,11 +51,12 @@ class DdrnetDepth(DepthNetwork):
         return {DEPTH: MIDDLE_M * resized(channel.float(), height, width)[:, 0].clamp(least, most).exp()}
 
     def depth_losses(self, outputs: Mapping[str, Tensor], depth_m: Tensor) -> Mapping[str, Tensor]:
-        """Scale-invariant error, which outliers rule, and the mean relative one, which they do not."""
+        """Scale-invariant error, which outliers rule, the mean relative one, which they do not, and that in metres."""
         cap_m = self.options.max_depth_m
         return {
             "silog": silog(outputs[DEPTH], depth_m, cap_m=cap_m),
             "log_l1": log_l1(outputs[DEPTH], depth_m, cap_m=cap_m),
+            "rms": root_mean_square(outputs[DEPTH], depth_m, cap_m=cap_m) / RMS_UNIT_M,
         }
 
     def taps(self) -> Mapping[str, nn.Module]:

@@ -9,9 +9,9 @@ import pytest
 import torch
 from torch import Tensor
 
-from gear.losses.depth import adabins_silog, bins_chamfer, known, log_l1, silog, smooth_l1
+from gear.losses.depth import adabins_silog, bins_chamfer, known, log_l1, root_mean_square, silog, smooth_l1
 
-LOSSES: list[Callable[[Tensor, Tensor], Tensor]] = [silog, adabins_silog, log_l1, smooth_l1]
+LOSSES: list[Callable[[Tensor, Tensor], Tensor]] = [silog, adabins_silog, log_l1, root_mean_square, smooth_l1]
 
 
 def depths(seed: int, shape: tuple[int, ...] = (2, 6, 9)) -> Tensor:
@@ -90,3 +90,12 @@ def test_chamfer_is_that_of_the_whole_table(bins: int) -> None:
     value = bins_chamfer(centres, truth)
     torch.testing.assert_close(value, wanted)
     torch.testing.assert_close(torch.autograd.grad(value, centres), torch.autograd.grad(wanted, centres))
+
+
+def test_the_root_mean_square_is_in_metres_and_answers_end_at_the_cap() -> None:
+    truth = torch.tensor([[[10.0, 20.0, 79.0, 200.0, torch.nan]]])
+    predicted = torch.tensor([[[13.0, 16.0, 500.0, 1.0, 1.0]]], requires_grad=True)
+    loss = root_mean_square(predicted, truth)
+    assert float(loss.detach()) == pytest.approx(math.sqrt((9 + 16 + 1) / 3), rel=1e-4)
+    loss.backward()
+    assert predicted.grad is not None and (predicted.grad[0, 0] == 0).tolist() == [False, False, True, True, True]
