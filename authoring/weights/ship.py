@@ -75,7 +75,7 @@ def ship(
     histories = [_json(one / HISTORY) for one in runs]
     commands = [_without(base, history["command"]).replace("--out DIR", f"--out {_without(base, str(one))}")
                 for history, one in zip(histories, runs, strict=True)]  # fmt: skip
-    collected = f"python -m authoring.weights training --task {metadata['task']} --out data"
+    collected = f"python -m authoring.weights training --task {metadata['task']} --out ."
     commands.insert(0, collected + (f" --samples {samples}" if samples else ""))
     metadata["command"] = " && ".join(commands)
     target = models / f"{name}.safetensors"
@@ -142,10 +142,10 @@ def _card(
 def _rows(results: Any) -> list[str]:
     """The first figure of every dataset."""
     first = next(iter(results["rows"][0]["figures"][REPORT]))
-    lines = [f"| scene | samples | {first} |", "|---|---|---|"]
+    lines = [f"| collection | samples | {first} |", "|---|---|---|"]
     for row in results["rows"]:
-        one, place = row["figures"][REPORT][first], row["dataset"]
-        lines.append(f"| {place['town']}/{place['scene']} | {row['samples']} | {_number(one['value'])} |")
+        one, place = row["figures"][REPORT][first], Path(row["dataset"]["root"]).name
+        lines.append(f"| {place} | {row['samples']} | {_number(one['value'])} |")
     return [*lines, ""]
 
 

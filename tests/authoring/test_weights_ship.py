@@ -46,7 +46,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def evaluation(run: Path, tmp_path: Path) -> Path:
     figures = {"reference": {"miou": estimate(0.625), "iou_train": estimate(None)}}
-    row: dict[str, Any] = {"samples": 3, "figures": figures, "dataset": {"town": "suburb", "scene": "billboard05"}}
+    row: dict[str, Any] = {"samples": 3, "figures": figures, "dataset": {"root": "held-out/suburb-billboard05"}}
     loaded = build(SegmentationOptions(weights=str(run / "model.safetensors"), device="cpu"))
     results = {
         "model": {"name": MODEL, "weights_sha256": weights_digest(loaded)},
@@ -64,7 +64,7 @@ def test_the_file_has_the_same_numbers_and_says_what_was_measured(run: Path, eva
     assert facts["metrics"] == {"miou": 0.625} and facts["intervals"] == {"miou": [0.525, 0.725]}
     assert facts["options"] == {"input_scale": 0.5} and facts["look_hash"] == "ab12"
     collect, train = facts["command"].split(" && ")
-    assert collect == "python -m authoring.weights training --task semseg --out data --samples 7"
+    assert collect == "python -m authoring.weights training --task semseg --out . --samples 7"
     assert train == f"gear train --task semseg --model {MODEL} --data data --out runs/semseg"
     before, after = read(run / "model.safetensors")[0], read(path)[0]
     assert before.keys() == after.keys() and all(bool((before[key] == after[key]).all()) for key in before)
@@ -73,7 +73,7 @@ def test_the_file_has_the_same_numbers_and_says_what_was_measured(run: Path, eva
 def test_the_card_says_how_they_came_and_how_good_they_are(run: Path, evaluation: Path, tmp_path: Path) -> None:
     card = ship([run, run], evaluation, run.parents[1], tmp_path / "models").with_suffix(".md").read_text()
     assert "| miou | 0.625 | 0.525 | 0.725 |" in card and "Nothing to measure for: iou_train." in card
-    assert "On 6 pictures" in card and "| suburb/billboard05 | 3 | 0.625 |" in card
+    assert "On 6 pictures" in card and "| suburb-billboard05 | 3 | 0.625 |" in card
     assert card.count("--data data --out runs/semseg") == 2 and str(run.parents[1]) not in card
     assert "| town10/truck | ClearNoon | train | 1 | - | 7 |" in card and "after step 11" in card
 
