@@ -1,0 +1,67 @@
+"""The reference weights as they lie in the weights package: whole, said where from, small enough, and good."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from gear.contracts.models import Model
+from gear.dataset.files import sha256
+from gear.nn.shipped import CHECKOUT, inspect
+from gear.nn.weights import mismatches, read
+from gear.plugins.build import NO_OPTIONS, build, find
+from gear.verbs.collect.run import collect
+from gear.verbs.evaluate.run import evaluate
+
+FILES = sorted((CHECKOUT / "models").glob("*.safetensors"))
+TEXTS = {"model", "task", "gear", "command", "seed", "look", "look_hash", "data", "metrics", "intervals"}
+LARGEST_PACKAGE_BYTES = 90e6
+HOME = re.compile(r"/(?:tmp|home|root|work|Users|mnt)/")
+
+named = pytest.mark.parametrize("path", FILES, ids=[path.stem for path in FILES])
+
+
+def test_the_package_is_small() -> None:
+    size = sum(path.stat().st_size for path in CHECKOUT.rglob("*") if path.is_file())
+    assert FILES and size <= LARGEST_PACKAGE_BYTES
+
+
+@named
+def test_a_file_says_where_it_comes_from(path: Path) -> None:
+    file = inspect(path)
+    assert file.metadata.keys() >= TEXTS and file.metadata["model"] == path.stem
+    assert not any(HOME.search(text) for text in file.metadata.values())
+    facts = file.facts()
+    assert facts["metrics"] and facts["metrics"].keys() == facts["intervals"].keys()  # type: ignore[union-attr]
+    assert find("model", path.stem).spec.tasks[0] == facts["task"]
+
+
+@named
+def test_its_card_is_of_this_file(path: Path) -> None:
+    card = path.with_suffix(".md").read_text()
+    assert sha256(path.read_bytes()) in card and f"# {path.stem} for " in card
+    assert not HOME.search(card)
+
+
+@named
+def test_the_network_takes_them(path: Path) -> None:
+    model: Model = build(find("model", path.stem), NO_OPTIONS)
+    state = model.module().state_dict()  # type: ignore[attr-defined]
+    given, _ = read(path)
+    assert mismatches(state, given) == []
+    assert all(bool((state[key] == value).all()) for key, value in given.items())
+
+
+@pytest.mark.slow
+def test_depth_of_a_street_that_nobody_has_seen_before(tmp_path: Path) -> None:
+    collect(
+        "depth", town="suburb", scene="no_billboard", split="debug", seed=51_234, samples=2, weather="CloudyNoon",
+        out=tmp_path / "data",
+    )  # fmt: skip
+    report = evaluate(
+        tmp_path / "data", model="ddrnet23_slim_depth", reports=["reference"], resamples=0, out=tmp_path / "out"
+    )
+    figures = report.rows[0].figures["reference"]
+    assert figures["d1"].value > 0.75 and figures["rmse_m"].value < 10
