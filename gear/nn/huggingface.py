@@ -24,7 +24,7 @@ from gear.nn.network import Network
 from gear.nn.options import NONE
 from gear.nn.runtime import seeded
 from gear.nn.semseg import CLASSES, LABEL_ID_OF_TRAIN_ID
-from gear.nn.weights import load_into
+from gear.nn.weights import OPTIONAL, load_into
 from gear.values.errors import GearError
 from gear.values.frames import FloatImage
 
@@ -260,9 +260,9 @@ def _complete(graph: nn.Module, missing: Collection[str], folder: Path) -> nn.Mo
     Raises:
         GearError: it did.
     """
-    if missing:
-        first = min(missing)
-        raise GearError(f"{folder}: {len(missing)} weights of {type(graph).__name__} are not there, such as {first}")
+    lost = sorted(key for key in missing if not key.endswith(OPTIONAL))
+    if lost:
+        raise GearError(f"{folder}: {len(lost)} weights of {type(graph).__name__} are not there, such as {lost[0]}")
     return graph
 
 
