@@ -7,6 +7,7 @@ import numpy as np
 from authoring.kit.industry_plant import strut
 from authoring.kit.parts import Part, Sink, box_faces
 from authoring.kit.shapes import cylinder
+from authoring.kit.signs import BACK
 from authoring.materials.freight import LINERS, container_rect, panel_rect
 
 CONTAINER_M = (12.19, 2.44, 2.59)
@@ -158,7 +159,7 @@ def direction_sign(panel: int, *, width_m: float = 5.0) -> list[Part]:
 def _panel(sink: Sink, panel: int, y: float, z: float, width_m: float, *, front: float = -0.72) -> None:
     half, high = width_m / 2, width_m / 2
     sink.swatch_box(
-        "galvanised", (front + 0.005, y - half, z), (front + 0.07, y + half, z + high), label="traffic_sign"
+        "galvanised", (front + 0.005, y - half, z), (front + 0.07, y + half, z + high), label=BACK
     )
     u0, v0, u1, v1 = panel_rect(panel)
     corners = [(front, y + half, z), (front, y - half, z), (front, y - half, z + high), (front, y + half, z + high)]

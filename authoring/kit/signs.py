@@ -48,6 +48,10 @@ OUTLINES: dict[str, tuple[Array, float]] = {
 }
 
 
+BACK = "traffic_sign_back"
+"""Of rims and backs: Cityscapes' annotators called only the side that says something a traffic sign."""
+
+
 def traffic_sign(*names: str, post_m: float = 2.2) -> list[Part]:
     """A post with one sign, or several from the top down, faces towards -y.
 
@@ -56,7 +60,7 @@ def traffic_sign(*names: str, post_m: float = 2.2) -> list[Part]:
         post_m: height of the lowest sign's lower edge above the ground.
 
     Returns:
-        the post (label pole), the signs (label traffic_sign, or stop_sign for the octagon).
+        the post (label pole), the signs (label traffic_sign, or stop_sign for the octagon), their backs.
     """
     unknown = sorted(set(names) - set(TRAFFIC_SIGNS))
     if unknown or not names:
@@ -98,7 +102,7 @@ def _plate(
     flip: int = 1,
     back: bool = True,
 ) -> None:
-    """One plate: picture, rim and grey back."""
+    """One plate: picture, rim and grey back. Only the picture is a sign: see `BACK`."""
     label = "stop_sign" if name == "stop" else "traffic_sign"
     u0, v0, u1, v1 = traffic_sign_rect(name)
     uvs = np.array([(u0 + u1) / 2, (v0 + v1) / 2]) + outline * ((u1 - u0) / 2, (v1 - v0) / 2)
@@ -110,7 +114,7 @@ def _plate(
     if back:
         normal = np.tile([0.0, 1.0, 0.0], (count, 1))
         faces = [(0, i + 1, i) for i in range(1, count - 1)]
-        sink.swatch_mesh("galvanised", rear, faces, normal, label=label)
+        sink.swatch_mesh("galvanised", rear, faces, normal, label=BACK)
     for i in range(count):
         j = (i + 1) % count
-        sink.swatch_quad("galvanised", [front[j], front[i], rear[i], rear[j]], label=label)
+        sink.swatch_quad("galvanised", [front[j], front[i], rear[i], rear[j]], label=BACK)

@@ -66,6 +66,7 @@ LABELS: tuple[Label, ...] = (
     Label(30, "bicycle", 33, coco_id=2, kitti_type="Cyclist", is_instance=True),
     Label(31, "caravan", 29, kitti_type="Misc", is_instance=True),
     Label(32, "trailer", 30, kitti_type="Misc", is_instance=True),
+    Label(33, "traffic_sign_back", 4),
 )
 """All labels, in the order of their codes."""
 
