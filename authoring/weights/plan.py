@@ -39,6 +39,12 @@ CROWDED = ("semseg", "detect2d", "stereo3d")
 FIRST_TRAINING_SEED, FIRST_HELD_OUT_SEED = 20_000, 30_000
 HELD_OUT_SAMPLES = 300
 
+FILM_EVERY = 3
+"""Every third collection of a task of large pictures is rendered as `film`, the others as `fast`: more pictures in the
+same time, and networks that know both."""
+
+LARGE = ("semseg",)
+
 TRAINING_OPTIONS: dict[str, tuple[str, ...]] = {
     "semseg": ("options.width_px=1536", "options.height_px=768", "options.polygons=false"),
     "detect2d": (
@@ -114,7 +120,11 @@ def training(task: str, samples: int) -> list[Collection]:
                     patch="none" if kind == "no_billboard" or number % 2 else "random",
                     seed=FIRST_TRAINING_SEED + order,
                     samples=max(1, round(counts[kind] / len(members))),
-                    settings=(*TRAINING_OPTIONS[task], *([f"crowd={CROWDS[kind]:g}"] if task in CROWDED else [])),
+                    settings=(
+                        *TRAINING_OPTIONS[task],
+                        *([f"crowd={CROWDS[kind]:g}"] if task in CROWDED else []),
+                        *(["quality=fast"] if task in LARGE and order % FILM_EVERY else []),
+                    ),
                 )
             )
     return result

@@ -239,6 +239,22 @@ def test_countable_things_have_the_labels_that_datasets_count() -> None:
         assert label in {part.label for part in parts}
 
 
+@pytest.mark.parametrize("name", sorted(TRAFFIC_SIGNS))
+def test_only_the_side_of_a_sign_that_says_something_is_a_sign(name: str) -> None:
+    rng = np.random.default_rng(0)
+    parts = [part for part in kit.traffic_sign(name) if part.label != "pole"]
+    eyes = np.stack([rng.uniform(-2, 2, 50), np.full(50, 9.0), rng.uniform(1, 3, 50)], 1)
+    faces = [(part.label, part.mesh.vertices[np.asarray(part.mesh.faces)]) for part in parts]
+    for label, corners in faces:
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        is_seen_from_behind = ((eyes[:, None] - corners[:, 0]) * normals).sum(-1) > 1e-9
+        if label in ("traffic_sign", "stop_sign"):
+            assert not is_seen_from_behind.any()
+        else:
+            assert label == "traffic_sign_back"
+            assert is_seen_from_behind.any()
+
+
 def test_place_turns_counter_clockwise_and_then_moves() -> None:
     (part,) = [
         p for p in kit.place(kit.traffic_sign("stop"), x_m=5.0, yaw_rad=np.pi / 2) if p.material == "traffic_signs"

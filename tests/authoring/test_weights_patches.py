@@ -104,7 +104,7 @@ def test_every_command_is_one_that_gear_understands(task: str) -> None:
 
 
 def test_small_pictures_are_seen_at_the_size_that_the_weights_know(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("authoring.weights.patches.plan.trained_option", lambda *_: 0.5)
+    monkeypatch.setattr("authoring.weights.patches.plan.trained_option", lambda *_: 0.75)
     told = model_settings("semseg", "ddrnet23_slim", "net.safetensors", TRAINING_OPTIONS["semseg"])
     assert told == ("weights=net.safetensors", "input_scale=1")
     assert model_settings("semseg", "ddrnet23_slim", "shipped", ()) == ()
