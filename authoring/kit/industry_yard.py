@@ -158,9 +158,7 @@ def direction_sign(panel: int, *, width_m: float = 5.0) -> list[Part]:
 
 def _panel(sink: Sink, panel: int, y: float, z: float, width_m: float, *, front: float = -0.72) -> None:
     half, high = width_m / 2, width_m / 2
-    sink.swatch_box(
-        "galvanised", (front + 0.005, y - half, z), (front + 0.07, y + half, z + high), label=BACK
-    )
+    sink.swatch_box("galvanised", (front + 0.005, y - half, z), (front + 0.07, y + half, z + high), label=BACK)
     u0, v0, u1, v1 = panel_rect(panel)
     corners = [(front, y + half, z), (front, y - half, z), (front, y - half, z + high), (front, y + half, z + high)]
     sink.polygon("direction_signs", corners, [(u0, v0), (u1, v0), (u1, v1), (u0, v1)], label="traffic_sign")

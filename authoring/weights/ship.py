@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -34,18 +35,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--base", type=Path, default=Path(), help="folder of data and runs, to leave out of what is said"
     )
-
+    parser.add_argument("--note", default="", help="what else there is to say of how they were made")
     parser.add_argument("--samples", type=int, help="of the training data, as their collection was told")
 
 
 def run(args: argparse.Namespace) -> int:
     """Ships one network."""
-    print(ship(args.runs, args.evaluation, args.base, samples=args.samples))
+    print(ship(args.runs, args.evaluation, args.base, samples=args.samples, note=args.note))
     return 0
 
 
 def ship(
-    runs: Sequence[Path], evaluation: Path, base: Path, models: Path = MODELS, *, samples: int | None = None
+    runs: Sequence[Path],
+    evaluation: Path,
+    base: Path,
+    models: Path = MODELS,
+    *,
+    samples: int | None = None,
+    note: str = "",
 ) -> Path:
     """Writes `<model>.safetensors` and `<model>.md`; returns the former.
 
@@ -55,6 +62,7 @@ def ship(
         base: commands name files below it by what follows it.
         models: the package's folder.
         samples: that the collection of the training data was told, if any.
+        note: what else there is to say of how they were made.
 
     Raises:
         GearError: the evaluation is of another network or other weights, or lacks the report.
@@ -81,7 +89,7 @@ def ship(
     target = models / f"{name}.safetensors"
     models.mkdir(parents=True, exist_ok=True)
     write(target, state, metadata, halves=True)
-    card = _card(target, metadata, histories, commands, results, measured, figures)
+    card = _card(target, metadata, histories, commands, results, measured, figures, note)
     write_alone(target.with_suffix(".md"), card.encode())
     return target
 
@@ -94,6 +102,7 @@ def _card(
     results: Any,
     measured: Any,
     figures: Mapping[str, Any],
+    note: str,
 ) -> str:
     data = target.read_bytes()
     absent = [key for key, one in figures.items() if one["value"] is None]
@@ -124,6 +133,7 @@ def _card(
         *(f"- {one['finished_steps']} steps in {one['elapsed_s'] / 60:.0f} minutes; the weights are those after step "
           f"{one['best_step']}" for one in histories),
         "",
+        *([*textwrap.wrap(note, 110), ""] if note else []),
         "## Training data",
         "",
         "| scene | weather | split | seed | patch | samples |",
