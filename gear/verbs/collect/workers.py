@@ -100,6 +100,6 @@ def _portable(error: GearError) -> GearError:
     """The error itself where it survives the way to the parent, else its text."""
     try:
         pickle.loads(pickle.dumps(error))
-    except Exception:
+    except Exception:  # unpickling runs the error's own code, which may be a third party's
         return GearError(str(error))
     return error
