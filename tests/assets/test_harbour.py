@@ -21,8 +21,8 @@ TOWN = ROOT / "mjcf" / "towns" / "harbour.xml"
 SCENES = ROOT / "configs" / "scenes" / "harbour.yml"
 LABELS = {
     "road", "road_marking", "sidewalk", "parking", "ground", "terrain", "building", "wall", "fence", "guard_rail",
-    "bridge", "pole", "traffic_light", "traffic_sign", "stop_sign", "vegetation", "static", "bench", "fire_hydrant",
-    "parking_meter",
+    "bridge", "pole", "traffic_light", "traffic_sign", "traffic_sign_back", "stop_sign", "vegetation", "static",
+    "bench", "fire_hydrant", "parking_meter",
 }  # fmt: skip
 BOARDS = [f"billboard0{index}" for index in range(1, 7)]
 DOWN = np.array([0.0, 0.0, -1.0])

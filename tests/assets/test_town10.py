@@ -21,8 +21,8 @@ COLLISION = np.array([0, 0, 0, 1, 0, 0], np.uint8)
 VISIBLE = np.array([1, 1, 1, 0, 0, 0], np.uint8)
 LABELS = {
     "road", "road_marking", "sidewalk", "parking", "ground", "terrain", "building", "wall", "fence", "guard_rail",
-    "bridge", "pole", "traffic_light", "traffic_sign", "stop_sign", "vegetation", "static", "bench", "fire_hydrant",
-    "parking_meter",
+    "bridge", "pole", "traffic_light", "traffic_sign", "traffic_sign_back", "stop_sign", "vegetation", "static",
+    "bench", "fire_hydrant", "parking_meter",
 }  # fmt: skip
 COUNTABLE = {"traffic_light", "stop_sign", "bench", "fire_hydrant", "parking_meter"}
 FACE_M = (7.4, 3.7)

@@ -112,6 +112,7 @@ def test_change_keeps_ground_truth_and_pictures_together(roots: Callable[[str], 
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:This DataLoader will create")  # on a machine of one core
 def test_worker_processes_change_nothing(roots: Callable[[str], Path]) -> None:
     dataset = TorchDataset(roots("semseg"), change=upside_down, seed=4)
     here = list(batches(dataset, size=2, seed=9, epoch=3))
