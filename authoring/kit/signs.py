@@ -49,7 +49,7 @@ OUTLINES: dict[str, tuple[Array, float]] = {
 
 
 BACK = "traffic_sign_back"
-"""Of rims and backs: Cityscapes' annotators called only the side that says something a traffic sign."""
+"""Of rims and backs: only the side that says something is a traffic sign, as we understand Cityscapes' classes."""
 
 
 def traffic_sign(*names: str, post_m: float = 2.2) -> list[Part]:

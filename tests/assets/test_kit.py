@@ -244,14 +244,15 @@ def test_only_the_side_of_a_sign_that_says_something_is_a_sign(name: str) -> Non
     rng = np.random.default_rng(0)
     parts = [part for part in kit.traffic_sign(name) if part.label != "pole"]
     eyes = np.stack([rng.uniform(-2, 2, 50), np.full(50, 9.0), rng.uniform(1, 3, 50)], 1)
-    faces = [(part.label, part.mesh.vertices[np.asarray(part.mesh.faces)]) for part in parts]
-    for label, corners in faces:
+    assert len({part.label for part in parts}) == 2
+    for part in parts:
+        corners = part.mesh.vertices[np.asarray(part.mesh.faces)]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         is_seen_from_behind = ((eyes[:, None] - corners[:, 0]) * normals).sum(-1) > 1e-9
-        if label in ("traffic_sign", "stop_sign"):
+        if part.label in ("traffic_sign", "stop_sign"):
             assert not is_seen_from_behind.any()
         else:
-            assert label == "traffic_sign_back"
+            assert part.label == "traffic_sign_back"
             assert is_seen_from_behind.any()
 
 

@@ -54,12 +54,16 @@ def test_the_network_takes_them(path: Path) -> None:
     assert all(bool((state[key] == value).all()) for key, value in given.items())
 
 
-UNSEEN: dict[str, tuple[str, dict[str, float]]] = {
-    "ddrnet23_slim_depth": ("reference", {"d1": 0.75}),
-    "ddrnet23_slim": ("reference", {"iou_road": 0.85, "iou_building": 0.75, "iou_sky": 0.85, "iou_car": 0.3}),
-    "retinanet_lite0_fpn": ("task", {"ap50": 0.25}),  # there are too few of everything for the other report
+UNSEEN: dict[str, tuple[str, dict[str, tuple[float, float]]]] = {
+    "ddrnet23_slim_depth": ("reference", {"d1": (0.75, 1), "rmse_m": (0, 10)}),
+    "ddrnet23_slim": (
+        "reference",
+        {"iou_road": (0.85, 1), "iou_building": (0.75, 1), "iou_sky": (0.85, 1), "iou_car": (0.3, 1)},
+    ),
+    "retinanet_lite0_fpn": ("task", {"ap50": (0.25, 1)}),  # there are too few of everything for the other report
 }
-"""What each network must reach, by far less than it does, on two pictures of a street and weather that it never saw."""
+"""Between what each network's figures must lie on two pictures of a street and weather that it never saw; it does far
+better than the worse of them."""
 
 
 @pytest.mark.slow
@@ -71,6 +75,6 @@ def test_on_a_street_that_nobody_has_seen_before(path: Path, tmp_path: Path) -> 
         out=tmp_path / "data",
     )  # fmt: skip
     report = evaluate(tmp_path / "data", model=path.stem, reports=["reference"], resamples=0, out=tmp_path / "out")
-    name, leasts = UNSEEN[path.stem]
+    name, bounds = UNSEEN[path.stem]
     figures = report.rows[0].figures[name]
-    assert all(figures[key].value > least for key, least in leasts.items()), figures
+    assert all(low < figures[key].value < high for key, (low, high) in bounds.items()), figures
