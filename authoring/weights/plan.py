@@ -40,10 +40,10 @@ FIRST_TRAINING_SEED, FIRST_HELD_OUT_SEED = 20_000, 30_000
 HELD_OUT_SAMPLES = 300
 
 FILM_EVERY = 3
-"""Every third collection of a task of large pictures is rendered as `film`, the others as `fast`: more pictures in the
-same time, and networks that know both."""
+"""Every third collection of a task whose samples cost much (large pictures, or two of them) is rendered as `film`, the
+others as `fast`: more pictures in the same time, and networks that know both."""
 
-LARGE = ("semseg",)
+COSTLY = ("semseg", "stereo3d")
 
 TRAINING_OPTIONS: dict[str, tuple[str, ...]] = {
     "semseg": ("options.width_px=1536", "options.height_px=768", "options.polygons=false"),
@@ -123,7 +123,7 @@ def training(task: str, samples: int) -> list[Collection]:
                     settings=(
                         *TRAINING_OPTIONS[task],
                         *([f"crowd={CROWDS[kind]:g}"] if task in CROWDED else []),
-                        *(["quality=fast"] if task in LARGE and order % FILM_EVERY else []),
+                        *(["quality=fast"] if task in COSTLY and order % FILM_EVERY else []),
                     ),
                 )
             )

@@ -89,17 +89,22 @@ def correlate(left: Tensor, right: Tensor, disparities: int) -> Tensor:
         disparities: d = 0 .. disparities - 1.
 
     Returns:
-        (B, disparities, H, W); 0 where x - d lies outside.
+        (B, disparities, H, W); 0 where x - d lies outside. In float32, under autocast too: what lies between two
+        disparities is in differences that bfloat16 does not have.
     """
+    with torch.autocast(left.device.type, enabled=False):
+        return _band(left.float(), right.float(), disparities)
+
+
+def _band(left: Tensor, right: Tensor, disparities: int) -> Tensor:
     batch, channels, height, width = left.shape
     one = functional.normalize(left, dim=1).permute(0, 2, 3, 1).reshape(batch * height, width, channels)
     two = functional.normalize(right, dim=1).permute(0, 2, 1, 3).reshape(batch * height, channels, width)
     # All columns against all columns of a row is one product of matrices, of which a band is kept: faster than a
-    # product for each shift.
-    all_pairs = functional.pad(torch.bmm(one, two), (disparities - 1, 0))
-    columns = torch.arange(width, device=left.device)[:, None] + disparities - 1
-    shifts = torch.arange(disparities, device=left.device)[None]
-    band = all_pairs.gather(2, (columns - shifts).repeat(batch * height, 1, 1))
+    # product for each shift. With one more column a row, the band's rows lie one apart in memory.
+    all_pairs = functional.pad(torch.bmm(one, two), (disparities - 1, 1))
+    rows, _, step = all_pairs.stride()
+    band = all_pairs.as_strided((batch * height, width, disparities), (rows, width + disparities + step, step)).flip(2)
     return band.reshape(batch, height, width, disparities).permute(0, 3, 1, 2)
 
 

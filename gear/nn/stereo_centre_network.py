@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import torch
 from torch import Tensor, nn
 
 from gear.formats.kitti_object import KittiLabel
 from gear.losses.stereo import Grid, LabelledPair, centre_losses, centre_targets
 from gear.nn.network import Network, Normalise
+from gear.nn.shipped import trained_option
 from gear.nn.stereo_centre import KINDS, STRIDE, StereoCentre, StereoCentreShape, fit_to_network, in_picture_px
 from gear.nn.stereo_decode import Peaks, decode
 from gear.nn.stereo_options import LEFT, RIGHT, StereoCentreOptions
 from gear.nn.weights import build_graph
 
 NAME = "stereo_centre"
+
+INPUT_SCALE = 0.5
+"""Where neither the user nor the weights say."""
 
 
 class StereoCentreNetwork(Network):
@@ -27,13 +32,16 @@ class StereoCentreNetwork(Network):
         graph = build_graph(lambda: StereoCentre(StereoCentreShape(width=options.width)), options, NAME)
         super().__init__(graph, options, views=(LEFT, RIGHT))
         self.normalise = Normalise().to(self.device)
+        self.input_scale = options.input_scale or trained_option(options.weights, NAME, "input_scale") or INPUT_SCALE
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """The graph's maps."""
-        # Pictures come with channels last; in float32 and with few channels the CPU is slow at that.
-        pair = [self.normalise(pictures[name].contiguous()) for name in (LEFT, RIGHT)]
-        left, ratio = fit_to_network(pair[0], self.options.input_scale)
-        right, _ = fit_to_network(pair[1], self.options.input_scale)
+        # Channels last: a quarter faster on the CPU, in float32 and in bfloat16.
+        pair = [
+            self.normalise(pictures[name]).contiguous(memory_format=torch.channels_last) for name in (LEFT, RIGHT)
+        ]
+        left, ratio = fit_to_network(pair[0], self.input_scale)
+        right, _ = fit_to_network(pair[1], self.input_scale)
         return in_picture_px(self.graph(left, right), ratio)
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[LabelledPair]) -> Mapping[str, Tensor]:
@@ -58,5 +66,5 @@ class StereoCentreNetwork(Network):
 
     def _ratio(self, size_px: tuple[int, ...]) -> tuple[float, float]:
         """How many pixels of a picture of (height, width) one of the network's input is, in x and in y."""
-        height, width = (max(1, round(side * self.options.input_scale)) for side in size_px)
+        height, width = (max(1, round(side * self.input_scale)) for side in size_px)
         return size_px[1] / width, size_px[0] / height

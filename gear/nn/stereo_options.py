@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from gear.formats.kitti_object import Calibration
-from gear.nn.options import NetworkOptions
+from gear.nn.options import LARGEST_SCALE, NetworkOptions
 from gear.values.errors import FieldError
 from gear.values.geometry import Intrinsics
 
@@ -43,20 +43,21 @@ class StereoCentreOptions(StereoOptions):
 
     Attributes:
         width: channels of its stem; everything else follows.
-        input_scale: size at which it looks at the pictures; 0.5 is half the width and half the height.
+        input_scale: size at which it looks at the pictures; 0.5 is half the width and half the height. null takes what
+            the weights were trained for, or one half where they do not say.
         least_score: below which nothing is reported.
     """
 
     width: int = 32
-    input_scale: float = 0.5
+    input_scale: float | None = None
     least_score: float = 0.02
 
     def __post_init__(self) -> None:
         StereoOptions.__post_init__(self)
         if self.width < 1:
             raise FieldError("width", f"must be at least 1, got {self.width}")
-        if not 0.05 <= self.input_scale <= 2:
-            raise FieldError("input_scale", f"must be 0.05 to 2, got {self.input_scale:g}")
+        if self.input_scale is not None and not 0.05 <= self.input_scale <= LARGEST_SCALE:
+            raise FieldError("input_scale", f"must be 0.05 to {LARGEST_SCALE:g}, got {self.input_scale:g}")
         if not 0 <= self.least_score <= 1:
             raise FieldError("least_score", f"must be 0 to 1, got {self.least_score:g}")
 
