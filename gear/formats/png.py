@@ -52,7 +52,8 @@ def decode_rgb(data: bytes) -> UInt8Image:
     Raises:
         ValueError: the bytes are no picture.
     """
-    return np.ascontiguousarray(_decode(data, cv2.IMREAD_COLOR)[..., ::-1])
+    picture = _decode(data, cv2.IMREAD_COLOR)
+    return np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB, dst=picture))
 
 
 def decode_plain(data: bytes) -> npt.NDArray[Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, Literal, Protocol
 
@@ -55,13 +56,17 @@ class DepthEvaluator:
         known = np.isfinite(truth_m)
         if not np.isfinite(prediction[known]).all() or (prediction[known] <= 0).any():
             raise ValueError("prediction must be positive and finite wherever there is ground truth")
-        found = _devkit(truth_m[known].astype(np.float64), prediction[known].astype(np.float64))
         looked_at = known & self._window(truth_m.shape) & (truth_m > MIN_DEPTH_M) & (truth_m < self.max_depth_m)
         clipped = np.clip(prediction[looked_at].astype(np.float64), MIN_DEPTH_M, self.max_depth_m)
+        found = self._everywhere(truth_m[known], prediction[known])
         found |= _eigen(truth_m[looked_at].astype(np.float64), clipped)
         for name, value in found.items():
             self.figures.setdefault(name, []).append(value)
         return found
+
+    def _everywhere(self, truth_m: FloatImage, found_m: FloatImage) -> dict[str, float]:
+        """The devkit's figures of every pixel with ground truth."""
+        return _devkit(truth_m.astype(np.float64), found_m.astype(np.float64))
 
     def _window(self, shape: tuple[int, ...]) -> np.ndarray:
         height, width = shape[0], shape[1]
@@ -102,6 +107,10 @@ class NearDepth(DepthEvaluator):
         """`d1`, `rmse_m`, `d2`, `d3`, `abs_rel`, `sq_rel`, `rmse_log`, `log10`, `silog`: means over pictures."""
         return _renamed(super().result())
 
+    def _everywhere(self, truth_m: FloatImage, found_m: FloatImage) -> dict[str, float]:
+        """None: the devkit's figures are not shown."""
+        return {}
+
 
 def _renamed(figures: Mapping[str, float]) -> dict[str, float]:
     """Eigen's figures without their prefix."""
@@ -137,7 +146,7 @@ def _eigen(truth_m: Array, found_m: Array) -> dict[str, float]:
         "eigen_sq_rel": _mean(error**2 / truth_m),
         "eigen_rmse_m": _root(_mean(error**2)),
         "eigen_rmse_log": _root(_mean(log**2)),
-        "eigen_log10": _mean(np.abs(np.log10(truth_m) - np.log10(found_m))),
+        "eigen_log10": _mean(np.abs(log)) / math.log(10),
         "eigen_silog": _root(_mean(log**2) - 0.5 * _mean(log) ** 2),
     }
 
