@@ -37,9 +37,7 @@ class StereoCentreNetwork(Network):
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """The graph's maps."""
         # Channels last: a quarter faster on the CPU, in float32 and in bfloat16.
-        pair = [
-            self.normalise(pictures[name]).contiguous(memory_format=torch.channels_last) for name in (LEFT, RIGHT)
-        ]
+        pair = [self.normalise(pictures[name]).contiguous(memory_format=torch.channels_last) for name in (LEFT, RIGHT)]
         left, ratio = fit_to_network(pair[0], self.input_scale)
         right, _ = fit_to_network(pair[1], self.input_scale)
         return in_picture_px(self.graph(left, right), ratio)
