@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,19 +19,42 @@ CONTROLS = (NONE, "random")
 """Patch labels that others are compared with."""
 
 
-def row_report(
-    name: str, dataset: Dataset[Any], scorer: Scorer, notes: list[Note], made: int, seed: int, resamples: int
-) -> RowReport:
-    """Figures, intervals and costs of one dataset, from its samples' notes."""
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Measured:
+    """One dataset, sample by sample.
+
+    Attributes:
+        name: of its folder.
+        dataset: itself.
+        scorer: that measured it.
+        notes: of its samples, in order.
+        made: how many of them were predicted now.
+    """
+
+    name: str
+    dataset: Dataset[Any]
+    scorer: Scorer
+    notes: list[Note]
+    made: int
+
+    @property
+    def patch(self) -> str:
+        """Label of what its surfaces show."""
+        return self.dataset.plan.info.patch_label
+
+
+def row_report(row: Measured, seed: int, resamples: int) -> RowReport:
+    """Figures, intervals and costs of one dataset."""
+    notes = row.notes
     masks = [note.mask for note in notes if note.mask is not None]
-    plan = dataset.plan
+    plan = row.dataset.plan
     # Without a patch there is nothing to be found, only something to be covered by mistake.
     keys = [key for key in (masks[0] if masks else {}) if key == "mask_area" or plan.info.patch_label != NONE]
     return RowReport(
-        name=name,
-        dataset=dataset.root,
+        name=row.name,
+        dataset=row.dataset.root,
         facts={
-            "root": str(dataset.root),
+            "root": str(row.dataset.root),
             "town": plan.info.town,
             "scene": plan.info.scene,
             "split": plan.info.split,
@@ -39,35 +63,28 @@ def row_report(
             "twin_key": plan.twin_key,
         },
         samples=len(notes),
-        made=made,
-        figures=_figures(scorer, notes, seed, resamples),
+        made=row.made,
+        figures=_figures(row.scorer, notes, seed, resamples),
         cost={key: float(np.mean([note.cost[key] for note in notes])) for key in ("model_s", "defense_s")},
         defense={key: _known_mean([mask[key] for mask in masks]) for key in keys},
         per_sample=[{k: v for k, v in note.as_json().items() if k != "facts"} for note in notes],
     )
 
 
-def together(
-    rows: Sequence[RowReport],
-    datasets: Sequence[Dataset[Any]],
-    scorers: Sequence[Scorer],
-    notes: Sequence[list[Note]],
-    seed: int,
-    resamples: int,
-) -> Iterable[Together]:
+def together(rows: Sequence[Measured], seed: int, resamples: int) -> Iterable[Together]:
     """Datasets of several scenes or weathers with patches of one label, as if they were one dataset."""
-    members: dict[str, list[int]] = {}
-    for number, row in enumerate(rows):
-        members.setdefault(row.patch, []).append(number)
-    for patch, numbers in members.items():
-        options = datasets[numbers[0]].plan.options
-        if len(numbers) > 1 and all(datasets[number].plan.options == options for number in numbers):
-            every = [note for number in numbers for note in notes[number]]
+    labelled: dict[str, list[Measured]] = {}
+    for row in rows:
+        labelled.setdefault(row.patch, []).append(row)
+    for patch, members in labelled.items():
+        first = members[0]
+        if len(members) > 1 and all(row.dataset.plan.options == first.dataset.plan.options for row in members):
+            every = [note for row in members for note in row.notes]
             yield Together(
                 patch=patch,
-                rows=tuple(rows[number].name for number in numbers),
+                rows=tuple(row.name for row in members),
                 samples=len(every),
-                figures=_figures(scorers[numbers[0]], every, seed, resamples),
+                figures=_figures(first.scorer, every, seed, resamples),
             )
 
 
@@ -80,36 +97,32 @@ def _figures(scorer: Scorer, notes: Sequence[Note], seed: int, resamples: int) -
     return figures
 
 
-def compared(
-    rows: Sequence[RowReport],
-    datasets: Sequence[Dataset[Any]],
-    scorers: Sequence[Scorer],
-    notes: Sequence[list[Note]],
-    seed: int,
-    resamples: int,
-) -> Iterable[Difference]:
+def compared(rows: Sequence[Measured], seed: int, resamples: int) -> Iterable[Difference]:
     """Every patched dataset against its twins without a patch and with a random one."""
-    for here, row in enumerate(rows):
+    for row in rows:
         for control in CONTROLS[: CONTROLS.index(row.patch) if row.patch in CONTROLS else len(CONTROLS)]:
-            for there, other in enumerate(rows):
-                is_twin = datasets[here].plan.twin_key == datasets[there].plan.twin_key
-                if other.patch == control and is_twin:
-                    count = min(len(notes[here]), len(notes[there]))
-                    pair = (notes[here][:count], notes[there][:count])
-                    draws = draw(count, resamples, seed)
-                    yield Difference(
-                        row=row.name,
-                        against=other.name,
-                        figures={
-                            report: _paired(
-                                gather(fresh, [note.parts[report] for note in pair[0]], draws),
-                                gather(fresh, [note.parts[report] for note in pair[1]], draws),
-                            )
-                            for report, fresh in scorers[here].makers.items()
-                        },
-                        auroc=_auroc(*pair, draws),
-                        paired={report: _tested(*pair, report, seed) for report in scorers[here].makers},
-                    )
+            for other in rows:
+                if other.patch == control and other.dataset.plan.twin_key == row.dataset.plan.twin_key:
+                    yield _difference(row, other, seed, resamples)
+
+
+def _difference(row: Measured, other: Measured, seed: int, resamples: int) -> Difference:
+    count = min(len(row.notes), len(other.notes))
+    here, there = row.notes[:count], other.notes[:count]
+    draws = draw(count, resamples, seed)
+    return Difference(
+        row=row.name,
+        against=other.name,
+        figures={
+            report: _paired(
+                gather(fresh, [note.parts[report] for note in here], draws),
+                gather(fresh, [note.parts[report] for note in there], draws),
+            )
+            for report, fresh in row.scorer.makers.items()
+        },
+        auroc=_auroc(here, there, draws),
+        paired={report: _tested(here, there, report, seed) for report in row.scorer.makers},
+    )
 
 
 def _paired(one: Figures, other: Figures) -> dict[str, Estimate]:

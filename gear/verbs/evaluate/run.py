@@ -28,7 +28,7 @@ from gear.verbs.evaluate.choice import (
     chosen_defense,
     chosen_model,
 )
-from gear.verbs.evaluate.compare import compared, row_report, together
+from gear.verbs.evaluate.compare import Measured, compared, row_report, together
 from gear.verbs.evaluate.player import Player
 from gear.verbs.evaluate.report import EvaluateReport
 from gear.verbs.evaluate.row import evaluate_row
@@ -124,24 +124,18 @@ def evaluate(
 
     if progress is not None:
         progress(0, total)
-    notes, scorers, made = [], [], []
+    rows = []
     for dataset, name in zip(datasets, names, strict=True):
         scorer = Scorer(dataset, root, name, tuple(reports), chosen.found)
-        done, new = evaluate_row(dataset, scorer, player, batch=batch, workers=workers, told=told)
+        done, made = evaluate_row(dataset, scorer, player, batch=batch, workers=workers, told=told)
         scorer.finish(done)
-        notes.append(done)
-        scorers.append(scorer)
-        made.append(new)
-    rows = tuple(
-        row_report(name, dataset, scorer, done, new, seed, resamples)
-        for name, dataset, scorer, done, new in zip(names, datasets, scorers, notes, made, strict=True)
-    )
+        rows.append(Measured(name=name, dataset=dataset, scorer=scorer, notes=done, made=made))
     found = EvaluateReport(
         out=root,
         facts=facts | {"reports": list(reports), "resamples": resamples, "versions": _versions(player)},
-        rows=rows,
-        together=tuple(together(rows, datasets, scorers, notes, seed, resamples)),
-        differences=tuple(compared(rows, datasets, scorers, notes, seed, resamples)),
+        rows=tuple(row_report(row, seed, resamples) for row in rows),
+        together=tuple(together(rows, seed, resamples)),
+        differences=tuple(compared(rows, seed, resamples)),
     )
     write_whole(root, "results.json", dump_json(found.as_json()))
     write_whole(root, "table.txt", table(found).encode())
