@@ -89,7 +89,7 @@ class CentreTargets:
         is_counted: (B, 1, h, w) bool; False inside ignored objects.
         where: (N, 3) batch, row and column of the cells that learn what their object is.
         weight: (N,) of these; an object's sum to 1.
-        values: (N, 14): sides (4), centre (2), size (3), heading (4) as the outputs are named, and the hidden share.
+        values: (N, 11): sides (4), centre (2), size (3) as the outputs are named, observation angle, hidden share.
         disparity_px: (N,) of the middle of the object in space.
         surface_px: (B, h, w) disparity of what is seen of vehicles; NaN elsewhere.
     """
@@ -147,7 +147,7 @@ def centre_targets(samples: Sequence[LabelledPair], kinds: Sequence[str], grid: 
         is_counted=torch.from_numpy(is_counted),
         where=torch.from_numpy(_joined(wheres, (0, 3))).long(),
         weight=torch.from_numpy(_joined(weights, (0,))).float(),
-        values=torch.from_numpy(_joined(values, (0, 14))).float(),
+        values=torch.from_numpy(_joined(values, (0, 11))).float(),
         disparity_px=torch.from_numpy(_joined(disparities, (0,))).float(),
         surface_px=torch.from_numpy(np.stack([_surface_px(sample, grid) for sample in samples])).float(),
     )
@@ -212,12 +212,7 @@ def _values(thing: LabelledObject, calibration: Calibration, middles_px: Array) 
     u, v = middles_px.T
     least = 1.0
     seen_px = calibration.intrinsics.project(middle_of(box))
-    alpha = box.alpha_rad
-    fixed = (
-        *(box.height_m, box.width_m, box.length_m),
-        *(math.cos(2 * alpha), math.sin(2 * alpha), math.cos(alpha), math.sin(alpha)),
-        thing.occluded_fraction,
-    )
+    fixed = (box.height_m, box.width_m, box.length_m, box.alpha_rad, thing.occluded_fraction)
     sides = np.stack([u - left, v - top, right - u, bottom - v], axis=1).clip(least)
     return np.concatenate([sides, seen_px - middles_px, np.tile(fixed, (len(u), 1))], axis=1)
 
@@ -231,7 +226,7 @@ def centre_losses(
     logarithm (Kendall and Gal, NeurIPS 2017), so that one unit is one relative error of depth wherever the object
     stands, with the cross-entropy of the bins, the target shared between the two next to it. `surface` is the same
     cross-entropy for the disparities that the volume alone says of every cell on a vehicle: what makes the features
-    match.
+    match. `heading` is a cross-entropy too.
 
     Args:
         outputs: as `gear.nn.stereo_centre.StereoCentre` names them, lengths in pixels of the picture.
@@ -251,7 +246,7 @@ def centre_losses(
     def mean(each: Tensor) -> Tensor:
         return (each * weight).sum() / count
 
-    sides, centre, size, heading, hidden = torch.split(values, [4, 2, 3, 4, 1], dim=1)
+    sides, centre, size, heading, hidden = torch.split(values, [4, 2, 3, 1, 1], dim=1)
     error = (at("disparity_px")[:, 0].log() - wanted_px.log()).abs()
     spread = at("disparity_spread")[:, 0]
     cells = values.new_tensor(cell_px)
@@ -261,7 +256,7 @@ def centre_losses(
         "centre": 0.5
         * mean(functional.smooth_l1_loss(at("centre_px") / cells, centre / cells, reduction="none").mean(1)),
         "size": 2 * mean((at("size_m").log() - size.log()).abs().mean(dim=1)),
-        "heading": mean((at("heading") - heading).abs().mean(dim=1)),
+        "heading": mean(_heading_entropy(at("heading_logits"), heading[:, 0])),
         "hidden": 0.2 * mean(functional.binary_cross_entropy_with_logits(at("hidden"), hidden, reduction="none")[:, 0]),
         "disparity": 0.5 * mean(error * (-spread).exp() + spread) + 5 * mean(error),
         "surface": 0.5 * _surface_entropy(outputs["surface_logits"], targets.surface_px.to(device), bins_px.to(device)),
@@ -283,6 +278,18 @@ def _surface_entropy(logits: Tensor, wanted_px: Tensor, bins_px: Tensor) -> Tens
     if not bool(is_known.any()):
         return logits.sum() * 0
     return _bin_entropy(logits.permute(0, 2, 3, 1)[is_known], wanted_px[is_known], bins_px).mean()
+
+
+def _heading_entropy(logits: Tensor, angle_rad: Tensor) -> Tensor:
+    """(N,) cross-entropy with the target shared linearly between the two directions next to it."""
+    count = logits.shape[1]
+    place = (angle_rad / (2 * math.pi)).remainder(1) * count
+    lower = place.floor().long() % count
+    share = place - place.floor()
+    chances = logits.log_softmax(dim=1)
+    before = chances.gather(1, lower[:, None])[:, 0]
+    after = chances.gather(1, (lower[:, None] + 1) % count)[:, 0]
+    return -((1 - share) * before + share * after)
 
 
 def _bin_entropy(logits: Tensor, wanted_px: Tensor, bins_px: Tensor) -> Tensor:

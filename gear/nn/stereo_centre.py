@@ -4,8 +4,10 @@ Both pictures go through the same first layers (stem and one stage of a ResNet-1
 disparities at half the resolution (as DispNetC does, Mayer et al., CVPR 2016), and what comes out runs, with the left
 features, through the remaining stages of the ResNet and a feature pyramid. Every cell of the finest level then says
 whether an object's centre lies there and what the object is (CenterNet, Zhou et al., 2019; StereoCenterNet, Shi et al.,
-2021; RTS3D, Li et al., AAAI 2021). The disparity of an object's centre is the expectation of a distribution over bins
-with equal steps of its logarithm, plus a correction, with its own uncertainty. No anchors, no boxes to be matched
+2021; RTS3D, Li et al., AAAI 2021). Which way it faces is a distribution over directions (as in Mousavian et al., CVPR
+2017): a car that may stand one way or the other is not taken to stand between them. The disparity of an object's centre
+is the expectation of a distribution over bins with equal steps of its logarithm, plus a correction, with its own
+uncertainty. No anchors, no boxes to be matched
 between the pictures; everything is differentiable to the pixels.
 """
 
@@ -26,6 +28,9 @@ STRIDE = 4
 MULTIPLE = 32
 MATCHING_STRIDE = 2
 PRIOR_SIZE_M = (1.6, 1.8, 3.9)
+HEADINGS = 24
+"""Directions, evenly round the circle from 0 on, of which an observation angle is a distribution."""
+
 PRIOR_HEAT = -4.6
 """A hundredth: what a cell says at first."""
 
@@ -155,7 +160,7 @@ class StereoCentre(nn.Module):
         self.smooth = nn.ModuleList(_conv_relu(pyramid, pyramid, 3) for _ in stages[:-1])
         self.heat = Head(pyramid, pyramid, len(KINDS))
         self.place = Head(pyramid, pyramid, 6)
-        self.body = Head(pyramid, pyramid, 8)
+        self.body = Head(pyramid, pyramid, 3 + HEADINGS + 1)
         self.disparity = Head(pyramid + 2 * width, pyramid, shape.bins + 2)
         self.heat.start_at(PRIOR_HEAT)
         nearest, farthest = (math.log(value) for value in shape.disparity_px)
@@ -179,7 +184,7 @@ class StereoCentre(nn.Module):
             `sides_px`: 4, above 0, from the cell to the left, top, right and bottom of the object's box.
             `centre_px`: 2, from the cell to where the middle of the object in space is seen, x and y.
             `size_m`: 3, above 0, height, width and length.
-            `heading`: 4, cos 2a, sin 2a, cos a, sin a of the observation angle.
+            `heading_logits`: a channel a direction of `HEADINGS`, of the observation angle.
             `hidden`: 1, logit of the share that other things cover.
             `disparity_logits`: a channel a bin.
             `disparity_px`: 1, above 0, of the middle of the object in space.
@@ -210,8 +215,8 @@ class StereoCentre(nn.Module):
             "sides_px": 3 * STRIDE * _exp(place[:, :4]),
             "centre_px": STRIDE * place[:, 4:],
             "size_m": prior * _exp(body[:, :3]),
-            "heading": body[:, 3:7],
-            "hidden": body[:, 7:],
+            "heading_logits": body[:, 3:-1],
+            "hidden": body[:, -1:],
         }
 
     def _disparity(self, features: Tensor) -> dict[str, Tensor]:

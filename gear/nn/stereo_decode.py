@@ -17,7 +17,11 @@ from gear.metrics.boxes import iou_2d
 from gear.values.geometry import Array, wrap_angle_rad
 
 TRUSTED_M = 1.0
-"""A detection's score is the chance that it is one times that of its depth being this right."""
+"""A detection's score is the chance that it is one times that of its depth being this right, and its line too where
+that matters."""
+
+LONG = ("Car", "Van", "Truck", "Cyclist")
+"""Kinds whose boxes lie elsewhere when they are turned."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,7 +92,7 @@ def _label(
     depth_m = intrinsics.focal_px * calibration.baseline_m / float(said["disparity_px"][0])
     middle_m = intrinsics.unproject(np.array(cell_middle_px) + said["centre_px"], np.array(depth_m))
     height_m, width_m, length_m = (float(value) for value in said["size_m"])
-    alpha_rad = heading_rad(said["heading"])
+    alpha_rad, line_chance = heading_rad(said["heading_logits"])
     rotation_y_rad = wrap_angle_rad(alpha_rad + math.atan2(middle_m[0], middle_m[2]))
     location_m = (float(middle_m[0]), float(middle_m[1] + height_m / 2), depth_m)
     (u, v), (left, top, right, bottom) = cell_middle_px, said["sides_px"]
@@ -112,19 +116,27 @@ def _label(
         length_m=length_m,
         location_m=location_m,
         rotation_y_rad=rotation_y_rad,
-        score=chance * (1 - math.exp(-TRUSTED_M / error_m)),
+        score=chance * (1 - math.exp(-TRUSTED_M / error_m)) * (line_chance if kind in LONG else 1.0),
     )
 
 
-def heading_rad(said: Array) -> float:
-    """The angle of (cos 2a, sin 2a, cos a, sin a).
+def heading_rad(logits: Array) -> tuple[float, float]:
+    """The angle of a distribution over directions, evenly round the circle from 0 on, and how sure its line is, 0..1.
 
-    Its line is that of the first two, which know no front and back and so do not waver between them; the last two say
-    which end is the front.
+    Its line is where the chances of both ends are highest together, so that not knowing front from back does not turn
+    it; between directions it is the mean of the best one and its neighbours. Then the likelier end is the front.
     """
-    along = math.atan2(said[1], said[0]) / 2
-    is_front = math.cos(along) * said[2] + math.sin(along) * said[3] >= 0
-    return wrap_angle_rad(along if is_front else along + math.pi)
+    chances = np.exp(logits - logits.max())
+    chances /= chances.sum()
+    half = len(chances) // 2
+    lines = chances[:half] + chances[half:]
+    best = int(lines.argmax())
+    near = np.arange(best - 1, best + 2)
+    sure = lines[near % half]
+    place = best + float(sure @ (-1, 0, 1)) / float(sure.sum())
+    is_front = chances[near % len(chances)].sum() >= chances[(near + half) % len(chances)].sum()
+    angle_rad = math.pi * (place / half + (0 if is_front else 1))
+    return wrap_angle_rad(angle_rad), float(sure.sum())
 
 
 def _apart(labels: Sequence[KittiLabel], peaks: Peaks) -> tuple[KittiLabel, ...]:

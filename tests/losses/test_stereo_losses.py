@@ -46,6 +46,16 @@ def car(x_m: float = 1.0, z_m: float = 8.0) -> Thing:
     return Thing(box=box)
 
 
+def shared_out(angle_rad: torch.Tensor, count: int = 24) -> torch.Tensor:
+    """Logits of directions that give an angle's chance to the two next to it."""
+    chances = torch.full((len(angle_rad), count), 1e-9)
+    for row, angle in enumerate(angle_rad.tolist()):
+        place = angle / (2 * math.pi) * count
+        chances[row, math.floor(place) % count] += 1 - place % 1
+        chances[row, (math.floor(place) + 1) % count] += place % 1
+    return chances.log()
+
+
 def perfect(targets: CentreTargets) -> dict[str, torch.Tensor]:
     """Outputs that say exactly what the targets want, and are sure of it."""
     shape = (len(targets.heat), GRID.height, GRID.width)
@@ -56,14 +66,14 @@ def perfect(targets: CentreTargets) -> dict[str, torch.Tensor]:
         maps[batch, :, row, column] = values
         return maps
 
-    sides, centre, size, heading, hidden = torch.split(targets.values, [4, 2, 3, 4, 1], dim=1)
+    sides, centre, size, heading, hidden = torch.split(targets.values, [4, 2, 3, 1, 1], dim=1)
     disparity_px = targets.disparity_px[:, None]
     return {
         "heat": torch.where(targets.heat > 0.999, 20.0, -20.0),
         "sides_px": spread_out(sides, 1.0),
         "centre_px": spread_out(centre, 0.0),
         "size_m": spread_out(size, 1.0),
-        "heading": spread_out(heading, 0.0),
+        "heading_logits": spread_out(shared_out(heading[:, 0]), 0.0),
         "hidden": spread_out(torch.logit(hidden, eps=1e-6), 0.0),
         "disparity_logits": torch.zeros(shape[0], len(BINS_PX), *shape[1:]),
         "surface_logits": torch.zeros(shape[0], len(BINS_PX), *shape[1:]),
@@ -97,8 +107,7 @@ def test_the_cells_lead_back_to_the_object() -> None:
         middle = CALIBRATION.intrinsics.unproject([u + float(said[4]), v + float(said[5])], np.array(depth_m))
         assert np.allclose(middle + np.array((0, thing.box.height_m / 2, 0)), thing.box.bottom_m, atol=1e-3)
         assert said[6:9].tolist() == pytest.approx([1.5, 1.8, 4.2])
-        assert math.atan2(said[12], said[11]) == pytest.approx(thing.box.alpha_rad, abs=1e-5)
-        assert math.cos(math.atan2(said[10], said[9]) - 2 * thing.box.alpha_rad) == pytest.approx(1)
+        assert float(said[9]) == pytest.approx(thing.box.alpha_rad, abs=1e-5)
 
 
 def test_the_nearer_object_has_the_cells() -> None:
@@ -133,7 +142,7 @@ def test_perfect_outputs_cost_nothing_and_others_do() -> None:
     targets = centre_targets([Pair(objects=(car(),)), Pair(objects=(car(-3.0, 15.0),))], KINDS, GRID)
     outputs = perfect(targets)
     best = losses(outputs, targets)
-    for name in ("heat", "sides", "centre", "size", "heading"):
+    for name in ("heat", "sides", "centre", "size"):
         assert float(best[name]) == pytest.approx(0, abs=1e-5), name
     assert float(best["disparity"]) == pytest.approx(0.5 * -6, abs=1e-3)
     worse = {
@@ -141,12 +150,22 @@ def test_perfect_outputs_cost_nothing_and_others_do() -> None:
         "sides": {"sides_px": outputs["sides_px"] * 1.2},
         "centre": {"centre_px": outputs["centre_px"] + 8},
         "size": {"size_m": outputs["size_m"] * 0.8},
-        "heading": {"heading": -outputs["heading"]},
+        "heading": {"heading_logits": outputs["heading_logits"].roll(1, dims=1)},
         "hidden": {"hidden": outputs["hidden"] + 3},
         "disparity": {"disparity_px": outputs["disparity_px"] * 1.1},
     }
     for name, change in worse.items():
         assert float(losses(outputs | change, targets)[name]) > float(best[name]) + 0.01, name
+
+
+@pytest.mark.parametrize("other", [-0.1, 0.1, math.pi])
+def test_no_heading_costs_less_than_the_right_one(other: float) -> None:
+    targets = centre_targets([Pair(objects=(car(),))], KINDS, GRID)
+    outputs, angle_rad = perfect(targets), targets.values[:, 9]
+    batch, row, column = targets.where.unbind(dim=1)
+    right = float(losses(outputs, targets)["heading"])
+    outputs["heading_logits"][batch, :, row, column] = shared_out(angle_rad + other)
+    assert float(losses(outputs, targets)["heading"]) > right + 0.01
 
 
 def test_the_disparity_loss_is_the_relative_error() -> None:

@@ -10,7 +10,7 @@ import torch
 
 from gear.groundtruth.visibility import VisibilityLimits
 from gear.nn.network import as_batch
-from gear.nn.stereo_centre import KINDS, STRIDE, StereoCentre, StereoCentreShape, correlate, fit_to_network
+from gear.nn.stereo_centre import HEADINGS, KINDS, STRIDE, StereoCentre, StereoCentreShape, correlate, fit_to_network
 from gear.nn.stereo_centre_network import StereoCentreNetwork
 from gear.nn.stereo_decode import Peaks, decode, heading_rad
 from gear.nn.stereo_options import StereoCentreOptions
@@ -86,7 +86,7 @@ def test_decoding_gives_back_what_the_maps_say() -> None:
         "sides_px": [20.0, 10.0, 24.0, 12.0],
         "centre_px": [3.0, -2.0],
         "size_m": [1.5, 1.8, 4.2],
-        "heading": [math.cos(2 * alpha_rad), math.sin(2 * alpha_rad), math.cos(alpha_rad), math.sin(alpha_rad)],
+        "heading_logits": facing(alpha_rad),
         "hidden": [-3.0],
         "disparity_px": [disparity],
         "disparity_spread": [math.log(0.02)],
@@ -109,12 +109,44 @@ def test_decoding_gives_back_what_the_maps_say() -> None:
     assert label.score == pytest.approx(chance * (1 - math.exp(-1 / (0.02 * depth_m))), rel=1e-3)
 
 
-@pytest.mark.parametrize("alpha_rad", [-3.0, -1.6, 0.2, 1.5, 3.1])
-def test_the_heading_comes_back(alpha_rad: float) -> None:
+def facing(alpha_rad: float, behind: float = 0.0) -> list[float]:
+    """Logits that share an angle between its neighbours, some of it at the other end."""
+    chances = np.full(HEADINGS, 1e-9)
+    for turn, part in ((0.0, 1 - behind), (math.pi, behind)):
+        place = (alpha_rad + turn) / (2 * math.pi) * HEADINGS
+        lower = math.floor(place)
+        chances[lower % HEADINGS] += part * (1 - place + lower)
+        chances[(lower + 1) % HEADINGS] += part * (place - lower)
+    return [float(value) for value in np.log(chances)]
+
+
+@pytest.mark.parametrize("alpha_rad", [-3.14, -3.0, -1.6, -0.01, 0.2, 1.5, 3.1])
+@pytest.mark.parametrize("behind", [0.0, 0.45])
+def test_the_heading_comes_back(alpha_rad: float, behind: float) -> None:
     """Also where the network is unsure of front and back: the line stays right."""
-    line = (math.cos(2 * alpha_rad), math.sin(2 * alpha_rad))
-    unsure = (0.1 * math.cos(alpha_rad + 0.7), 0.1 * math.sin(alpha_rad + 0.7))
-    assert heading_rad(np.array([*line, *unsure])) == pytest.approx(alpha_rad, abs=1e-9)
+    found_rad, sure = heading_rad(np.array(facing(alpha_rad, behind)))
+    assert found_rad == pytest.approx(alpha_rad, abs=1e-6) and sure == pytest.approx(1, abs=1e-6)
+
+
+def test_of_two_headings_one_is_taken() -> None:
+    """Not what lies between them."""
+    chances = 0.6 * np.exp(facing(0.6)) + 0.4 * np.exp(facing(-0.6))
+    found_rad, sure = heading_rad(np.log(chances))
+    assert found_rad == pytest.approx(0.6, abs=0.05) and sure == pytest.approx(0.6, abs=0.01)
+
+
+def test_scores_know_how_sure_the_line_is() -> None:
+    """Of long things alone."""
+    calibration = StereoCentreOptions(weights="none").calibration((96, 256))
+    found = {}
+    for kind in ("Car", "Pedestrian"):
+        outputs = {name: torch.ones(1, count, 24, 64) for name, count in (("centre_px", 2), ("size_m", 3))}
+        outputs |= {"heading_logits": torch.zeros(1, HEADINGS, 24, 64), "hidden": torch.zeros(1, 1, 24, 64)}
+        outputs |= {"sides_px": torch.full((1, 4, 24, 64), 30.0), "disparity_px": torch.full((1, 1, 24, 64), 8.0)}
+        outputs |= {"disparity_spread": torch.full((1, 1, 24, 64), -4.0), "heat": torch.full((1, 6, 24, 64), -9.0)}
+        outputs["heat"][0, KINDS.index(kind), 12, 30] = 3.0
+        found[kind] = decode(outputs, KINDS, calibration, (STRIDE, STRIDE), Peaks())[0][0].score
+    assert found["Car"] == pytest.approx(found["Pedestrian"] / 4, rel=1e-6)
 
 
 def test_one_object_is_reported_once() -> None:
@@ -122,7 +154,7 @@ def test_one_object_is_reported_once() -> None:
     calibration = StereoCentreOptions(weights="none").calibration((96, 256))
     for factor, expected in ((1.02, 1), (1.6, 2)):
         outputs = {name: torch.ones(1, count, 24, 64) for name, count in (("centre_px", 2), ("size_m", 3))}
-        outputs |= {"heading": torch.ones(1, 4, 24, 64), "hidden": torch.zeros(1, 1, 24, 64)}
+        outputs |= {"heading_logits": torch.ones(1, HEADINGS, 24, 64), "hidden": torch.zeros(1, 1, 24, 64)}
         outputs |= {"sides_px": torch.full((1, 4, 24, 64), 30.0), "disparity_px": torch.full((1, 1, 24, 64), 8.0)}
         outputs |= {"disparity_spread": torch.full((1, 1, 24, 64), -4.0), "heat": torch.full((1, 6, 24, 64), -9.0)}
         outputs["heat"][0, 0, 12, 30], outputs["heat"][0, 0, 12, 32] = 3.0, 2.0

@@ -25,7 +25,7 @@ stereo_centre: ModelSpec[StereoCentreOptions] = ModelSpec(
     taps=("layer1", "volume", "layer2", "layer3", "layer4"),
     recipe=Recipe(learning_rate=1e-3, weight_decay=1e-2, batch=4, epochs=20, gradient_norm=10.0),
     normalisation="ImageNet mean and deviation",
-    parameters=4_960_374,
+    parameters=4_962_314,
 )
 
 
