@@ -7,8 +7,7 @@ whether an object's centre lies there and what the object is (CenterNet, Zhou et
 2021; RTS3D, Li et al., AAAI 2021). Which way it faces is a distribution over directions (as in Mousavian et al., CVPR
 2017): a car that may stand one way or the other is not taken to stand between them. The disparity of an object's centre
 is the expectation of a distribution over bins with equal steps of its logarithm, plus a correction, with its own
-uncertainty. No anchors, no boxes to be matched
-between the pictures; everything is differentiable to the pixels.
+uncertainty. No anchors, no boxes to be matched between the pictures; everything is differentiable to the pixels.
 """
 
 from __future__ import annotations
