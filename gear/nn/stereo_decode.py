@@ -17,8 +17,8 @@ from gear.metrics.boxes import iou_2d
 from gear.values.geometry import Array, wrap_angle_rad
 
 TRUSTED_M = 1.0
-"""A detection's score is the chance that it is one times that of its depth being this right, and its line too where
-that matters."""
+"""A detection's score is the geometric mean of the chances that it is one, that its depth is this right, and that its
+line is, where that matters."""
 
 LONG = ("Car", "Van", "Truck", "Cyclist")
 """Kinds whose boxes lie elsewhere when they are turned."""
@@ -105,6 +105,7 @@ def _label(
     projected = project_box(box.corners_m, intrinsics)
     clipped = clip_box(projected, intrinsics) if projected else None
     error_m = depth_m * math.exp(float(said["disparity_spread"][0]))
+    chances = (chance, 1 - math.exp(-TRUSTED_M / error_m), *((line_chance,) if kind in LONG else ()))
     return KittiLabel(
         type=kind,
         truncated=truncation(projected, clipped) if projected and clipped else 1.0,
@@ -116,7 +117,7 @@ def _label(
         length_m=length_m,
         location_m=location_m,
         rotation_y_rad=rotation_y_rad,
-        score=chance * (1 - math.exp(-TRUSTED_M / error_m)) * (line_chance if kind in LONG else 1.0),
+        score=math.prod(chances) ** (1 / len(chances)),
     )
 
 

@@ -106,7 +106,7 @@ def test_decoding_gives_back_what_the_maps_say() -> None:
     assert label.alpha_rad == pytest.approx(alpha_rad, abs=1e-5)
     assert label.rotation_y_rad == pytest.approx(alpha_rad + math.atan2(middle[0], middle[2]), abs=1e-5)
     chance = 1 / (1 + math.exp(-2.0))
-    assert label.score == pytest.approx(chance * (1 - math.exp(-1 / (0.02 * depth_m))), rel=1e-3)
+    assert label.score == pytest.approx((chance * (1 - math.exp(-1 / (0.02 * depth_m)))) ** (1 / 3), rel=1e-3)
 
 
 def facing(alpha_rad: float, behind: float = 0.0) -> list[float]:
@@ -146,7 +146,7 @@ def test_scores_know_how_sure_the_line_is() -> None:
         outputs |= {"disparity_spread": torch.full((1, 1, 24, 64), -4.0), "heat": torch.full((1, 6, 24, 64), -9.0)}
         outputs["heat"][0, KINDS.index(kind), 12, 30] = 3.0
         found[kind] = decode(outputs, KINDS, calibration, (STRIDE, STRIDE), Peaks())[0][0].score
-    assert found["Car"] == pytest.approx(found["Pedestrian"] / 4, rel=1e-6)
+    assert found["Car"] ** 3 == pytest.approx(found["Pedestrian"] ** 2 / 4, rel=1e-6)
 
 
 def test_one_object_is_reported_once() -> None:

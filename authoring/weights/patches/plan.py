@@ -32,8 +32,19 @@ STEPS = 120
 EVERY = 25
 """Steps between two looks at the validation pictures."""
 
-CHEAPER: dict[str, tuple[str, ...]] = {"semseg": ("quality=fast",)}
-"""Settings of a task's pictures beside those of training: the largest are rendered as `fast`, which networks know."""
+PICTURES: dict[str, tuple[str, ...]] = {
+    "semseg": ("quality=fast",),
+    "stereo3d": ("quality=fast", "crowd=3"),
+}
+"""Settings of a task's pictures beside those of training: what costs most is rendered as `fast`, which networks know,
+and a test of which objects are found wants objects."""
+
+ATTACK: dict[str, tuple[str, ...]] = {
+    "stereo_centre": tuple(
+        f"losses.{name}=0" for name in ("sides", "centre", "size", "hidden", "surface", "disparity_bins")
+    ),
+}
+"""Options of the attack on a network: every loss is a backward pass of its own, and three of nine say what matters."""
 
 OUTSIDE = {
     "semseg": ("outside_patch", "miou"),
@@ -167,7 +178,7 @@ def plans(
         raise GearError(f"model {model!r} does {', '.join(found.tasks)}, not {task}")
     if steps < 1 or (samples is not None and samples < 1):
         raise GearError("samples and steps must be at least 1")
-    chosen = (*TRAINING_OPTIONS[task], *CHEAPER.get(task, ()), *settings)
+    chosen = (*TRAINING_OPTIONS[task], *PICTURES.get(task, ()), *settings)
     counts = SAMPLES if samples is None else {"train": samples, "val": max(1, samples // 6), "test": samples}
     known = [(town, scene) for town in dict.fromkeys((*TOWNS, *towns)) for scene in patched_scenes(town)]
     here = [(number, place) for number, place in enumerate(known) if place[0] in towns]
@@ -185,7 +196,7 @@ def plans(
             steps=steps,
             settings=chosen,
             model_settings=model_settings(task, model, weights, chosen),
-            attack_settings=tuple(attack_settings),
+            attack_settings=(*ATTACK.get(model, ()), *attack_settings),
         )
         for number, (town, scene) in here
         if not scenes or scene in scenes

@@ -1,0 +1,57 @@
+"""The patches in the weights package: made against the weights beside them, and harmful where it was measured."""
+
+from __future__ import annotations
+
+import functools
+import json
+import re
+from collections import Counter
+from pathlib import Path
+
+import cv2
+import pytest
+
+from gear.nn.shipped import CHECKOUT
+from gear.plugins.build import NO_OPTIONS, build, find
+from gear.verbs.evaluate.player import weights_digest
+
+FOLDERS = sorted(path.parent for path in (CHECKOUT / "patches").glob("*/attack.json"))
+HOME = re.compile(r"/(?:tmp|home|root|work|Users|mnt)/")
+SCENES_A_TASK = 5
+
+named = pytest.mark.parametrize("folder", FOLDERS, ids=[folder.name for folder in FOLDERS])
+
+
+@functools.cache
+def digest(model: str) -> str | None:
+    return weights_digest(build(find("model", model), NO_OPTIONS))
+
+
+@named
+def test_a_patch_is_against_the_weights_that_are_shipped(folder: Path) -> None:
+    text = (folder / "attack.json").read_text()
+    attack = json.loads(text)
+    (model,) = [one["name"] for one in attack["models"]]
+    assert folder.name.startswith(f"{model}-") and not HOME.search(text)
+    assert attack["weights_sha256"] == digest(model)
+    for index in range(len(attack["patches"])):
+        picture = cv2.imread(str(folder / f"patch_{index}.png"))
+        options = attack["attack"]["options"]
+        assert picture is not None and picture.shape == (options["height_px"], options["width_px"], 3)
+
+
+@named
+def test_the_digital_patch_was_the_rendered_one(folder: Path) -> None:
+    effect = json.loads((folder / "effect.json").read_text())
+    share = effect["effect"]["share"]
+    assert effect["psnr_db"] >= 40
+    assert share is None or share >= 0.9 or abs(effect["effect"]["digital"]) < 0.02
+
+
+def test_every_task_has_scenes_where_the_optimised_patch_is_worse_than_noise() -> None:
+    """Outside the patch, by the paired test over unseen pictures."""
+    effects = [json.loads((folder / "effect.json").read_text()) for folder in FOLDERS]
+    harmful = Counter(
+        effect["task"] for effect in effects if effect["outside"]["p"] < 0.01 and effect["outside"]["mean"] < 0
+    )
+    assert all(harmful[task] >= SCENES_A_TASK for task in ("semseg", "depth", "detect2d", "stereo3d")), harmful
