@@ -14,7 +14,7 @@ _CHATTER = re.compile(
     # Small frames follow each other faster than it measures them.
     r"|FrameInfo's circular queue is full"
     # A large world outgrows Filament's pool of handles; it says so with a stack trace and takes them from the heap.
-    r"|^PanicLog$|in allocateHandleSlow|HandleAllocator arena is full|^#\d+\s.*(_render_filament|libc|libstdc|unknown)"
+    r"|^PanicLog$|in allocateHandleSlow|HandleAllocator arena is full|^#\d+\s+\S+\s+0x[0-9a-f]+\s|^#\d+\s.*unknown"
 )
 
 

@@ -79,6 +79,17 @@ def test_only_known_chatter_is_kept_back(capfd: pytest.CaptureFixture[str]) -> N
     assert chatter == ["FEngine (64 bits) created at 0x1 (threading is enabled)"]
 
 
+def test_a_stack_trace_of_a_full_arena_is_chatter_whoever_called(capfd: pytest.CaptureFixture[str]) -> None:
+    lines = (
+        "HandleAllocator arena is full, using slower system heap.",
+        "#0\t_render_filament.so  0x7f0 operator() + 1",
+        "#13\tlibpython3.11.so.1.0                0x7f36b9b58ba3 PyObject_Vectorcall + 51",
+    )
+    with native_output() as chatter:
+        os.write(2, "\n".join((*lines, "#13 of 20 is missing", "")).encode())
+    assert capfd.readouterr() == ("", "#13 of 20 is missing\n") and chatter == list(lines)
+
+
 def test_output_comes_back_after_an_exception(capfd: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(RuntimeError), native_output():
         os.write(2, b"last words\n")
