@@ -41,7 +41,7 @@ def main() -> None:
     args = parser.parse_args()
     model: Model = build(find("model", args.model), with_overrides(NO_OPTIONS, args.settings))
     scenes = Scenes(open_all([args.data], args.task, names=("train", "debug")), "transport", "cpu")
-    config = SceneSpecificConfig(batch=args.batch)
+    config = SceneSpecific(SceneSpecificConfig(batch=args.batch)).settings(scenes.samples[0])
     problem = Problem(model=model, dataset=scenes.samples, compositor=scenes.compositor, settings=config)
     objective = SceneSpecific(config).objective(scenes.samples[0])
     ascend = unit_gradients(problem, objective, config)

@@ -38,7 +38,7 @@ class TextureSettings:
     Attributes:
         height_px, width_px: of every patch.
         batch: samples a step.
-        learning_rate: of Adam, at its highest, one number or one a channel.
+        learning_rate: of Adam, at its highest, one number or one a channel; null where the attack decides.
         decay: whether it falls to 0 with a cosine.
         appearance: what is varied, anew for every sample of every step.
     """
@@ -46,7 +46,7 @@ class TextureSettings:
     height_px: int = 150
     width_px: int = 300
     batch: int = 2
-    learning_rate: float | tuple[float, float, float] = 0.06
+    learning_rate: float | tuple[float, float, float] | None = 0.06
     decay: bool = True
     appearance: Appearance = field(default_factory=Appearance)
 
@@ -57,7 +57,7 @@ class TextureSettings:
         if not 1 <= self.batch <= 4096:
             raise FieldError("batch", f"must be 1 to 4096, got {self.batch}")
         rates = self.learning_rate if isinstance(self.learning_rate, tuple) else (self.learning_rate,)
-        if not all(0 < rate <= 10 for rate in rates):
+        if not all(rate is None or 0 < rate <= 10 for rate in rates):
             raise FieldError("learning_rate", f"must be above 0, up to 10, got {self.learning_rate}")
 
 

@@ -7,7 +7,7 @@ falling learning rate and the intentions of their losses.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -32,6 +32,7 @@ class SceneSpecificConfig(Settings):
     """Options.
 
     Attributes:
+        learning_rate: null for 0.25 against depth networks, which give way to coarse strokes, and 0.06 against others.
         gamma: semantic segmentation: share of the pixels that are still right, 0 to 1; below 0 for their share of
             all pixels, step by step. Depth: share of the pixels whose error is below half a metre, 0.8 where below 0.
         attacked, target: semantic segmentation: Cityscapes classes; pixels of `attacked` (all where empty) are pushed
@@ -43,6 +44,7 @@ class SceneSpecificConfig(Settings):
             `bbox_regression=-`; names that are left out are made large.
     """
 
+    learning_rate: float | tuple[float, float, float] | None = None
     gamma: float = -1.0
     attacked: str = ""
     target: str = ""
@@ -62,6 +64,9 @@ class SceneSpecificConfig(Settings):
             if sign not in SIGNS:
                 raise FieldError(f"losses.{name}", f"must be one of {', '.join(SIGNS)}, got {sign!r}")
 
+
+USUAL_RATE = 0.06
+LEARNING_RATES = {"depth": 0.25}
 
 SIGNS = {"+": 1.0, "-": -1.0, "0": 0.0}
 
@@ -85,9 +90,17 @@ class SceneSpecific:
         """One patch a surface."""
         from gear.attacking.loop import Problem, climb, unit_gradients
 
-        objective = self.objective(dataset[0])
-        problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=self._config)
-        return climb(problem, unit_gradients(problem, objective, self._config), budget=budget, rng=rng, watch=watch)
+        objective, settings = self.objective(dataset[0]), self.settings(dataset[0])
+        problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=settings)
+        return climb(problem, unit_gradients(problem, objective, settings), budget=budget, rng=rng, watch=watch)
+
+    def settings(self, sample: Any) -> SceneSpecificConfig:
+        """With the learning rate that suits the task that the sample is of."""
+        from gear.attacking.objectives import kind_of
+
+        if self._config.learning_rate is not None:
+            return self._config
+        return replace(self._config, learning_rate=LEARNING_RATES.get(kind_of(sample), USUAL_RATE))
 
     def objective(self, sample: Any) -> Objective:
         """What is made large, by the task that the sample is of.

@@ -12,7 +12,7 @@ import torch
 from gear.attacking.objectives import SemsegObjective
 from gear.contracts.attacks import Patch
 from gear.plugins.attacks.carla_gear import carla_gear
-from gear.plugins.attacks.scene_specific import SceneSpecificConfig, scene_specific
+from gear.plugins.attacks.scene_specific import SceneSpecific, SceneSpecificConfig, scene_specific
 from gear.testing.attack_contract import AttackContract, Counted
 from gear.testing.tiny_compositor import TinyCompositor
 from gear.values.errors import FieldError
@@ -86,6 +86,19 @@ def test_depth_goes_where_it_is_pushed(direction: str, grows: bool) -> None:
     start = mean_log_depth(contract.attack(model, dataset, steps=1))
     end = mean_log_depth(contract.attack(model, dataset, steps=30))
     assert (end > start) == grows
+
+
+@pytest.mark.parametrize(("task", "rate"), [("depth", 0.25), ("semseg", 0.06)])
+def test_steps_are_as_large_as_the_task_wants(task: str, rate: float) -> None:
+    """Unless the user says how large."""
+
+    class Contract(AttackContract):
+        spec = scene_specific
+
+    Contract.task = task
+    sample = Contract().dataset()[0]
+    assert SceneSpecific(SceneSpecificConfig()).settings(sample).learning_rate == rate
+    assert SceneSpecific(SceneSpecificConfig(learning_rate=0.1)).settings(sample).learning_rate == 0.1
 
 
 def test_a_class_becomes_another() -> None:
