@@ -14,6 +14,7 @@ import fpng
 import numpy as np
 import numpy.typing as npt
 
+from gear.formats.png_rows import decode_rows
 from gear.values.frames import FloatImage, UInt8Image
 
 LABEL_PNG = [
@@ -52,6 +53,9 @@ def decode_rgb(data: bytes) -> UInt8Image:
     Raises:
         ValueError: the bytes are no picture.
     """
+    plain = decode_rows(data)
+    if plain is not None and plain.ndim == 3:
+        return plain
     picture = _decode(data, cv2.IMREAD_COLOR)
     return np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB, dst=picture))
 
@@ -62,7 +66,8 @@ def decode_plain(data: bytes) -> npt.NDArray[Any]:
     Raises:
         ValueError: the bytes are no picture.
     """
-    return _decode(data, cv2.IMREAD_UNCHANGED)
+    plain = decode_rows(data)
+    return plain if plain is not None and plain.ndim == 2 else _decode(data, cv2.IMREAD_UNCHANGED)
 
 
 def _decode(data: bytes, mode: int) -> npt.NDArray[Any]:
