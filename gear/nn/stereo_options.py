@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from gear.formats.kitti_object import Calibration
-from gear.nn.options import LARGEST_SCALE, NetworkOptions
+from gear.nn.options import NetworkOptions
 from gear.values.errors import FieldError
 from gear.values.geometry import Intrinsics
 
@@ -56,8 +56,8 @@ class StereoCentreOptions(StereoOptions):
         StereoOptions.__post_init__(self)
         if self.width < 1:
             raise FieldError("width", f"must be at least 1, got {self.width}")
-        if self.input_scale is not None and not 0.05 <= self.input_scale <= LARGEST_SCALE:
-            raise FieldError("input_scale", f"must be 0.05 to {LARGEST_SCALE:g}, got {self.input_scale:g}")
+        if self.input_scale is not None and not 0.05 <= self.input_scale <= 2:
+            raise FieldError("input_scale", f"must be 0.05 to 2, got {self.input_scale:g}")
         if not 0 <= self.least_score <= 1:
             raise FieldError("least_score", f"must be 0 to 1, got {self.least_score:g}")
 
