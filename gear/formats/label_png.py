@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from gear.formats.byte_runs import compress
 from gear.formats.png import encode_labels
+from gear.formats.png_rows import SIGNATURE
 from gear.formats.runs import STRIP_ROWS, Ints
 from gear.values.frames import UInt8Image
 
@@ -87,7 +88,7 @@ def _png(shape: tuple[int, ...], places: Ints, steps: Bytes, colour_type: int) -
     content = compress(*_runs(height * stride, positions[order], values[order]))
     header = struct.pack(">IIBBBBB", width, height, 16 if depth == 2 else 8, colour_type, 0, 0, 0)
     chunks = _chunk(b"IHDR", header) + _chunk(b"IDAT", content) + _chunk(b"IEND", b"")
-    return b"\x89PNG\r\n\x1a\n" + chunks
+    return SIGNATURE + chunks
 
 
 def _runs(size: int, positions: Ints, values: Bytes) -> tuple[Bytes, Ints]:

@@ -16,8 +16,8 @@ SIGNATURE = b"\x89PNG\r\n\x1a\n"
 PLAIN_CHUNKS = {b"IHDR", b"IDAT", b"IEND", b"fdEC"}
 """Those that say nothing of colours; the last is fpng's mark."""
 
-CHANNELS = {0: 1, 2: 3}
-"""By PNG's colour type: grey and RGB."""
+CHANNELS = {(8, 0): 1, (16, 0): 1, (8, 2): 3}
+"""By bits and PNG's colour type: grey and RGB."""
 
 NONE, SUB, UP = 0, 1, 2
 
@@ -34,9 +34,8 @@ def decode_rows(data: bytes) -> npt.NDArray[Any] | None:
         return None
     width, height = (int.from_bytes(header[at : at + 4], "big") for at in (0, 4))
     depth_bits, colour, *methods = header[8:]
-    channels = CHANNELS.get(colour)
-    is_plain = (depth_bits == 8 and channels is not None) or (depth_bits == 16 and channels == 1)
-    if channels is None or not is_plain or any(methods) or not width or not height:
+    channels = CHANNELS.get((depth_bits, colour))
+    if channels is None or any(methods) or not width or not height:
         return None
     pixel_bytes = channels * depth_bits // 8
     size = height * (1 + width * pixel_bytes)
