@@ -30,8 +30,7 @@ class TextureOptimiser:
 
     def __init__(self, surfaces: int, settings: TextureSettings, rng: np.random.Generator, saved: State | None) -> None:
         shape = (surfaces, 3, settings.height_px, settings.width_px)
-        assert settings.learning_rate is not None
-        self.rate = torch.as_tensor(settings.learning_rate, dtype=torch.float32).reshape(-1, 1, 1)
+        self.rate = torch.as_tensor(settings.rate, dtype=torch.float32).reshape(-1, 1, 1)
         if saved is None:
             self.textures = torch.from_numpy(rng.uniform(0, 1, shape).astype(np.float32))
             self.mean, self.square = torch.zeros(shape), torch.zeros(shape)

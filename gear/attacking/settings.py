@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 
 from gear.values.errors import FieldError
 
+USUAL_RATE = 0.06
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Appearance:
@@ -38,7 +40,8 @@ class TextureSettings:
     Attributes:
         height_px, width_px: of every patch.
         batch: samples a step.
-        learning_rate: of Adam, at its highest, one number or one a channel; null where the attack decides.
+        learning_rate: of Adam, at its highest, one number or one a channel; null for 0.06, or what suits the
+            task where the attack knows.
         decay: whether it falls to 0 with a cosine.
         appearance: what is varied, anew for every sample of every step.
     """
@@ -46,7 +49,7 @@ class TextureSettings:
     height_px: int = 150
     width_px: int = 300
     batch: int = 2
-    learning_rate: float | tuple[float, float, float] | None = 0.06
+    learning_rate: float | tuple[float, float, float] | None = USUAL_RATE
     decay: bool = True
     appearance: Appearance = field(default_factory=Appearance)
 
@@ -56,9 +59,14 @@ class TextureSettings:
                 raise FieldError(name, f"must be 2 to 4096, got {getattr(self, name)}")
         if not 1 <= self.batch <= 4096:
             raise FieldError("batch", f"must be 1 to 4096, got {self.batch}")
-        rates = self.learning_rate if isinstance(self.learning_rate, tuple) else (self.learning_rate,)
-        if not all(rate is None or 0 < rate <= 10 for rate in rates):
+        rates = self.rate if isinstance(self.rate, tuple) else (self.rate,)
+        if not all(0 < rate <= 10 for rate in rates):
             raise FieldError("learning_rate", f"must be above 0, up to 10, got {self.learning_rate}")
+
+    @property
+    def rate(self) -> float | tuple[float, float, float]:
+        """The learning rate, also where none was said."""
+        return USUAL_RATE if self.learning_rate is None else self.learning_rate
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from gear.attacking.settings import Settings
+from gear.attacking.settings import USUAL_RATE, Settings
 from gear.contracts.attacks import Budget, Compositor, Patch, Watch
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
@@ -65,8 +65,8 @@ class SceneSpecificConfig(Settings):
                 raise FieldError(f"losses.{name}", f"must be one of {', '.join(SIGNS)}, got {sign!r}")
 
 
-USUAL_RATE = 0.06
 LEARNING_RATES = {"depth": 0.25}
+"""Of tasks that want another one than the usual; measured, docs/attack.md."""
 
 SIGNS = {"+": 1.0, "-": -1.0, "0": 0.0}
 

@@ -10,6 +10,7 @@ import pytest
 import torch
 
 from gear.attacking.objectives import SemsegObjective
+from gear.attacking.settings import Settings
 from gear.contracts.attacks import Patch
 from gear.plugins.attacks.carla_gear import carla_gear
 from gear.plugins.attacks.scene_specific import SceneSpecific, SceneSpecificConfig, scene_specific
@@ -99,6 +100,7 @@ def test_steps_are_as_large_as_the_task_wants(task: str, rate: float) -> None:
     sample = Contract().dataset()[0]
     assert SceneSpecific(SceneSpecificConfig()).settings(sample).learning_rate == rate
     assert SceneSpecific(SceneSpecificConfig(learning_rate=0.1)).settings(sample).learning_rate == 0.1
+    assert Settings(learning_rate=None).rate == Settings().rate == 0.06
 
 
 def test_a_class_becomes_another() -> None:
