@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from authoring.weights.patches.install import install
-from authoring.weights.patches.plan import SAMPLES, STEPS, PatchPlan, plans
+from authoring.weights.patches.plan import SAMPLES, STEPS, STEPS_OF, PatchPlan, plans
 from authoring.weights.patches.run import gear_process, make_patch
 from authoring.weights.patches.summary import table
 from authoring.weights.plan import TOWNS, TRAINING_OPTIONS
@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--samples", type=int, metavar="N", help=f"a scene, to make the patch on and to measure it ({SAMPLES['train']})"
     )
-    parser.add_argument("--steps", type=int, default=STEPS, metavar="N", help=f"of each attack ({STEPS})")
+    parser.add_argument("--steps", type=int, metavar="N", help=f"of each attack ({STEPS}; stereo3d {STEPS_OF['stereo3d']})")
     parser.add_argument("--weights", default=SHIPPED, metavar="FILE", help="the network's, while none are shipped")
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings", help="a key of the collections"

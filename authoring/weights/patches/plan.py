@@ -29,11 +29,15 @@ FIRST_SEEDS = {"train": 40_000, "val": 41_000, "test": 42_000}
 
 SAMPLES = {"train": 24, "val": 4, "test": 24}
 STEPS = 120
+STEPS_OF = {"stereo3d": 300}
+"""Of tasks whose networks need more to give in."""
+
 EVERY = 25
 """Steps between two looks at the validation pictures."""
 
 PICTURES: dict[str, tuple[str, ...]] = {
     "semseg": ("quality=fast",),
+    "depth": ("quality=fast",),
     "stereo3d": ("quality=fast", "crowd=3"),
 }
 """Settings of a task's pictures beside those of training: what costs most is rendered as `fast`, which networks know,
@@ -151,7 +155,7 @@ def plans(
     towns: Sequence[str] = TOWNS,
     scenes: Sequence[str] = (),
     samples: int | None = None,
-    steps: int = STEPS,
+    steps: int | None = None,
     weights: str = SHIPPED,
     settings: Iterable[str] = (),
     attack_settings: Iterable[str] = (),
@@ -164,7 +168,7 @@ def plans(
         towns: to make them in.
         scenes: the names of those that are wanted; all with a board or the truck unless given.
         samples: pictures that each patch is made on, and as many that it is measured on.
-        steps: of each attack.
+        steps: of each attack; the task's usual number unless given.
         weights: as the networks' option of that name.
         settings: further `KEY=VALUE` texts of the collections.
         attack_settings: of the attack.
@@ -176,6 +180,7 @@ def plans(
     assert isinstance(found, ModelSpec)
     if task not in found.tasks:
         raise GearError(f"model {model!r} does {', '.join(found.tasks)}, not {task}")
+    steps = STEPS_OF.get(task, STEPS) if steps is None else steps
     if steps < 1 or (samples is not None and samples < 1):
         raise GearError("samples and steps must be at least 1")
     chosen = (*TRAINING_OPTIONS[task], *PICTURES.get(task, ()), *settings)
