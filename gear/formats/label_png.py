@@ -6,15 +6,12 @@ take a fifth of its time.
 
 from __future__ import annotations
 
-import struct
-import zlib
-
 import numpy as np
 import numpy.typing as npt
 
 from gear.formats.byte_runs import compress
 from gear.formats.png import encode_labels
-from gear.formats.png_rows import SIGNATURE
+from gear.formats.png_rows import whole
 from gear.formats.runs import STRIP_ROWS, Ints
 from gear.values.frames import UInt8Image
 
@@ -86,9 +83,7 @@ def _png(shape: tuple[int, ...], places: Ints, steps: Bytes, colour_type: int) -
     values = np.concatenate([filters, steps[is_step]])
     order = np.argsort(positions, kind="stable")
     content = compress(*_runs(height * stride, positions[order], values[order]))
-    header = struct.pack(">IIBBBBB", width, height, 16 if depth == 2 else 8, colour_type, 0, 0, 0)
-    chunks = _chunk(b"IHDR", header) + _chunk(b"IDAT", content) + _chunk(b"IEND", b"")
-    return SIGNATURE + chunks
+    return whole(width, height, 16 if depth == 2 else 8, colour_type, content)
 
 
 def _runs(size: int, positions: Ints, values: Bytes) -> tuple[Bytes, Ints]:
@@ -102,7 +97,3 @@ def _runs(size: int, positions: Ints, values: Bytes) -> tuple[Bytes, Ints]:
     lengths[0:-1:2] -= own
     there = lengths > 0
     return all_values[there], lengths[there]
-
-
-def _chunk(kind: bytes, content: bytes) -> bytes:
-    return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))

@@ -1,11 +1,12 @@
-"""Quick decoding of the plain PNG files that gear writes; whatever else there is, is OpenCV's.
+"""Quick decoding of the plain PNG files that gear writes, and quick encoding of noisy maps; the rest is OpenCV's.
 
-Most of the time that libpng takes goes into inflating, which ISA-L does three times as fast, and into a filter that
-undoes a row at a time.
+Most of the time that libpng takes goes into inflating and deflating, which ISA-L does three times as fast, and into a
+filter that undoes a row at a time.
 """
 
 from __future__ import annotations
 
+import struct
 from typing import Any
 
 import numpy as np
@@ -51,6 +52,30 @@ def decode_rows(data: bytes) -> npt.NDArray[Any] | None:
     if depth_bits == 16:
         return rows.view(">u2").astype(np.uint16)
     return rows.reshape(height, width, 3) if channels == 3 else rows
+
+
+def encode_deep(values: npt.NDArray[np.uint16]) -> bytes:
+    """(H, W) uint16 to a grey PNG of 16 bits, for values that seldom repeat; processors may differ in its bytes.
+
+    A third of OpenCV's time and size for a predicted depth map. What is to be the same file everywhere goes through
+    `gear.formats.png`.
+    """
+    height, width = values.shape
+    rows = values.astype(">u2").view(np.uint8).reshape(height, -1)
+    filtered = np.empty((height, rows.shape[1] + 1), np.uint8)
+    filtered[:, 0] = UP
+    filtered[0, 1:] = rows[0]
+    np.subtract(rows[1:], rows[:-1], out=filtered[1:, 1:])
+    return whole(width, height, 16, 0, isal_zlib.compress(filtered, 1))
+
+
+def whole(width: int, height: int, depth_bits: int, colour: int, deflated: bytes) -> bytes:
+    """A PNG file around its filtered, deflated rows; `colour` is PNG's colour type."""
+    header = struct.pack(">IIBBBBB", width, height, depth_bits, colour, 0, 0, 0)
+    return SIGNATURE + b"".join(
+        struct.pack(">I", len(content)) + name + content + struct.pack(">I", isal_zlib.crc32(name + content))
+        for name, content in ((b"IHDR", header), (b"IDAT", deflated), (b"IEND", b""))
+    )
 
 
 def _chunks(data: bytes) -> dict[bytes, bytes]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any, Literal, Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from gear.values.frames import FloatImage
 from gear.values.geometry import Array
@@ -122,33 +123,39 @@ def _renamed(figures: Mapping[str, float]) -> dict[str, float]:
 
 def _devkit(truth_m: Array, found_m: Array) -> dict[str, float]:
     error, inverse, log = found_m - truth_m, 1 / truth_m - 1 / found_m, np.log(truth_m) - np.log(found_m)
+    relative, log_square = error / truth_m, _mean(log**2)
     return {
         "mae_m": _mean(np.abs(error)),
         "rmse_m": _root(_mean(error**2)),
         "imae_per_km": 1000 * _mean(np.abs(inverse)),
         "irmse_per_km": 1000 * _root(_mean(inverse**2)),
         "log_mae": _mean(np.abs(log)),
-        "log_rmse": _root(_mean(log**2)),
-        "silog": 100 * _root(_mean(log**2) - _mean(log) ** 2),
-        "abs_rel": _mean(np.abs(error) / truth_m),
-        "sq_rel": _mean((error / truth_m) ** 2),
+        "log_rmse": _root(log_square),
+        "silog": 100 * _root(log_square - _mean(log) ** 2),
+        "abs_rel": _mean(np.abs(relative)),
+        "sq_rel": _mean(relative**2),
     }
 
 
 def _eigen(truth_m: Array, found_m: Array) -> dict[str, float]:
     ratio = np.maximum(truth_m / found_m, found_m / truth_m)
     error, log = truth_m - found_m, np.log(found_m) - np.log(truth_m)
+    square, log_square = error**2, _mean(log**2)
     return {
-        "eigen_d1": _mean((ratio < 1.25).astype(np.float64)),
-        "eigen_d2": _mean((ratio < 1.25**2).astype(np.float64)),
-        "eigen_d3": _mean((ratio < 1.25**3).astype(np.float64)),
+        "eigen_d1": _share(ratio < 1.25),
+        "eigen_d2": _share(ratio < 1.25**2),
+        "eigen_d3": _share(ratio < 1.25**3),
         "eigen_abs_rel": _mean(np.abs(error) / truth_m),
-        "eigen_sq_rel": _mean(error**2 / truth_m),
-        "eigen_rmse_m": _root(_mean(error**2)),
-        "eigen_rmse_log": _root(_mean(log**2)),
+        "eigen_sq_rel": _mean(square / truth_m),
+        "eigen_rmse_m": _root(_mean(square)),
+        "eigen_rmse_log": _root(log_square),
         "eigen_log10": _mean(np.abs(log)) / math.log(10),
-        "eigen_silog": _root(_mean(log**2) - 0.5 * _mean(log) ** 2),
+        "eigen_silog": _root(log_square - 0.5 * _mean(log) ** 2),
     }
+
+
+def _share(truths: npt.NDArray[np.bool_]) -> float:
+    return np.count_nonzero(truths) / truths.size if truths.size else float("nan")
 
 
 def _mean(values: Array) -> float:

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gear.formats.png import decode_plain, decode_rgb, encode_labels, encode_rgb
-from gear.formats.png_rows import decode_rows
+from gear.formats.png_rows import decode_rows, encode_deep
 
 FILTERS = {"none": cv2.IMWRITE_PNG_FILTER_NONE, "sub": cv2.IMWRITE_PNG_FILTER_SUB, "up": cv2.IMWRITE_PNG_FILTER_UP}
 
@@ -55,6 +55,15 @@ def test_gears_own_files_are_read_the_quick_way(seed: int) -> None:
     for dtype in ("uint8", "uint16"):
         labels = picture(seed, 37, 53, 1, dtype)
         assert np.array_equal(decode_rows(encode_labels(labels)), labels)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 99), st.integers(1, 40), st.integers(1, 40))
+def test_deep_maps_are_files_that_everybody_reads(seed: int, height: int, width: int) -> None:
+    values = picture(seed, height, width, 1, "uint16")
+    data = encode_deep(values)
+    assert np.array_equal(cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED), values)
+    assert np.array_equal(decode_rows(data), values)
 
 
 def test_other_pictures_are_left_alone() -> None:

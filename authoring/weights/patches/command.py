@@ -31,7 +31,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--samples", type=int, metavar="N", help=f"a scene, to make the patch on and to measure it ({SAMPLES['train']})"
     )
-    parser.add_argument("--steps", type=int, metavar="N", help=f"of each attack ({STEPS}; stereo3d {STEPS_OF['stereo3d']})")
+    parser.add_argument(
+        "--steps", type=int, metavar="N", help=f"of each attack ({STEPS}; stereo3d {STEPS_OF['stereo3d']})"
+    )
     parser.add_argument("--weights", default=SHIPPED, metavar="FILE", help="the network's, while none are shipped")
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings", help="a key of the collections"

@@ -17,6 +17,7 @@ from gear.formats import kitti_depth, results
 from gear.formats.billboard_info import billboard_info
 from gear.formats.jsontext import dump
 from gear.formats.png import encode_labels, encode_rgb, encode_tiff
+from gear.formats.png_rows import encode_deep
 from gear.metrics.depth import Crop, DepthEvaluator, NearDepth
 from gear.plugins.tasks.common import CameraOptions, draw_surfaces, images_of, read_plain, read_rgb, surfaces_of
 from gear.values.errors import FieldError
@@ -146,7 +147,7 @@ class DepthTask:
         units, metres = results.kitti_depth_paths(sample.record.index)
         depth_m = np.asarray(prediction, dtype=np.float32)
         return Encoded(
-            files={units: encode_labels(kitti_depth.to_units(depth_m)), metres: encode_tiff(depth_m)}, facts={}
+            files={units: encode_deep(kitti_depth.to_units(depth_m)), metres: encode_tiff(depth_m)}, facts={}
         )
 
     def decode_prediction(self, root: Path, sample: DepthSample, facts: Json, info: SplitInfo) -> FloatImage:
