@@ -30,12 +30,13 @@ def main() -> None:
     parser.add_argument("--task", required=True)
     parser.add_argument("--model", required=True)
     parser.add_argument("--steps", type=int, default=120)
+    parser.add_argument("--figure", help="of the task's evaluator (the task's own)")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--model-set", action="append", default=[])
     args = parser.parse_args()
     spec = find("task", args.task).spec
     assert isinstance(spec, TaskSpec)
-    figure = spec.figure.rpartition(".")[2]
+    figure = args.figure or spec.figure.rpartition(".")[2]
     print(f"{figure} over scenes; {args.steps} steps each")
     changes: dict[str, list[float]] = {attack: [] for attack in ATTACKS}
     for folder in args.folders:

@@ -135,7 +135,7 @@ def effect(**changes: Any) -> dict[str, Any]:
         "patch": "net-town-a", "task": "semseg", "model": "net", "scene": "town-a",
         "metric": {"figure": "miou", "none": 0.7, "random": 0.68, "patched": 0.5},
         "outside": {"figure": "outside_patch.miou", "mean": -0.12, "p": 0.0001, "pairs": 40},
-        "effect": {"digital": -0.2, "rendered": -0.19, "share": 0.95},
+        "effect": {"figure": "miou", "digital": -0.2, "rendered": -0.19, "share": 0.95},
         "psnr_db": 44.31, "minutes": {"attack": 3.0, "all": 7.25},
     }  # fmt: skip
     return found | changes
@@ -145,7 +145,7 @@ def test_the_table_counts_what_is_clearly_worse() -> None:
     better = effect(scene="town-b", outside={"figure": "outside_patch.miou", "mean": 0.1, "p": 0.001, "pairs": 40})
     unknown = effect(
         scene="town-c", outside={"figure": "outside_patch.miou", "mean": None, "p": None, "pairs": 0},
-        effect={"digital": None, "rendered": None, "share": None}, psnr_db=None,
+        effect={"figure": "miou", "digital": None, "rendered": None, "share": None}, psnr_db=None,
     )  # fmt: skip
     assert [is_clearly_worse(one) for one in (effect(), better, unknown)] == [True, False, False]
     lines = table([effect(), better, unknown]).splitlines()

@@ -11,6 +11,8 @@ from pathlib import Path
 import cv2
 import pytest
 
+from authoring.weights.patches.plan import patched_scenes
+from authoring.weights.plan import TOWNS
 from gear.nn.shipped import CHECKOUT
 from gear.plugins.build import NO_OPTIONS, build, find
 from gear.verbs.evaluate.player import weights_digest
@@ -18,8 +20,16 @@ from gear.verbs.evaluate.player import weights_digest
 FOLDERS = sorted(path.parent for path in (CHECKOUT / "patches").glob("*/attack.json"))
 HOME = re.compile(r"/(?:tmp|home|root|work|Users|mnt)/")
 SCENES_A_TASK = 5
-PATCHED = ("semseg", "depth", "detect2d")
-"""Tasks that have pre-computed patches."""
+NETWORKS = {
+    "semseg": "ddrnet23_slim",
+    "depth": "ddrnet23_slim_depth",
+    "detect2d": "retinanet_lite0_fpn",
+    "stereo3d": "stereo_centre",
+}
+"""The reference networks: each has a patch in every scene with a surface."""
+
+FELT = 0.005
+"""Of a figure that a patch changes by less, no share can be asked for."""
 
 named = pytest.mark.parametrize("folder", FOLDERS, ids=[folder.name for folder in FOLDERS])
 
@@ -45,7 +55,15 @@ def test_a_patch_is_against_the_weights_that_are_shipped(folder: Path) -> None:
 @named
 def test_the_digital_patch_was_the_rendered_one(folder: Path) -> None:
     effect = json.loads((folder / "effect.json").read_text())
-    assert effect["psnr_db"] >= 40 and effect["effect"]["share"] >= 0.9
+    done = effect["effect"]
+    assert effect["psnr_db"] >= 40 and (abs(done["digital"]) < FELT or done["share"] >= 0.9)
+
+
+def test_every_scene_has_a_patch_against_every_reference_network() -> None:
+    places = [f"{town}-{scene}" for town in TOWNS for scene in patched_scenes(town)]
+    assert {folder.name for folder in FOLDERS} == {
+        f"{model}-{place}" for model in NETWORKS.values() for place in places
+    }
 
 
 def test_tasks_have_scenes_where_the_optimised_patch_is_worse_than_noise() -> None:
@@ -54,4 +72,5 @@ def test_tasks_have_scenes_where_the_optimised_patch_is_worse_than_noise() -> No
     harmful = Counter(
         effect["task"] for effect in effects if effect["outside"]["p"] < 0.01 and effect["outside"]["mean"] < 0
     )
-    assert all(harmful[task] >= SCENES_A_TASK for task in PATCHED), harmful
+    felt = Counter(effect["task"] for effect in effects if abs(effect["effect"]["digital"]) >= FELT)
+    assert all(min(harmful[task], felt[task]) >= SCENES_A_TASK for task in NETWORKS), (harmful, felt)

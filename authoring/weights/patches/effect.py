@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from authoring.weights.patches.plan import OUTSIDE, PatchPlan
+from authoring.weights.patches.plan import EFFECT, OUTSIDE, PatchPlan
 from gear.contracts.specs import TaskSpec
 from gear.dataset.sidecar import load_json
 from gear.plugins.build import find
@@ -17,9 +17,10 @@ def read_effect(plan: PatchPlan, root: Path, minutes: float) -> Json:
     """The figures of one scene's patch.
 
     `metric` holds the task's own figure without a patch, with a random one and with this one; `outside` the mean change
-    of a sample's figure outside the patch against the random one, with its p; `effect` what the patch changes of the
-    metric, digitally and rendered, and the share of the first that the second is (None where there is no effect or the
-    figure is not one of the task's own evaluator). Figures that have nothing to be measured on are None.
+    of a sample's figure outside the patch against the random one, with its p; `effect` what the patch changes of a
+    figure of the task's own evaluator (the same one, or that of `EFFECT`), digitally and rendered, and the share of the
+    first that the second is (None where there is no effect or no such figure). Figures that have nothing to be measured
+    on are None.
 
     Args:
         plan: of the scene.
@@ -60,7 +61,7 @@ def read_effect(plan: PatchPlan, root: Path, minutes: float) -> Json:
             "patched_minus_random": change["figures"][report or TASK].get(figure),
         },
         "outside": {"figure": f"{where}.{tested}", **change["paired"][where][tested]},
-        "effect": _effect(gap, figure),
+        "effect": _effect(gap, EFFECT.get(plan.task, figure)),
         "psnr_db": gap["median_psnr_db"].get("transport"),
         "minutes": {"attack": round(attack["seconds"] / 60, 2), "all": round(minutes, 2)},
     }
@@ -69,9 +70,9 @@ def read_effect(plan: PatchPlan, root: Path, minutes: float) -> Json:
 def _effect(gap: Json, figure: str) -> Json:
     clean, digital, rendered = (gap["effect"][name].get(figure) for name in ("clean", "transport", "rendered"))
     if clean is None or digital is None or rendered is None:
-        return {"digital": None, "rendered": None, "share": None}
+        return {"figure": figure, "digital": None, "rendered": None, "share": None}
     share = gap["rendered_share_of_digital_effect"].get("transport", {}).get(figure)
-    return {"digital": digital - clean, "rendered": rendered - clean, "share": share}
+    return {"figure": figure, "digital": digital - clean, "rendered": rendered - clean, "share": share}
 
 
 def _kind(label: str) -> str:

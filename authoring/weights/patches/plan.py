@@ -60,6 +60,11 @@ OUTSIDE = {
 on it, so the share of objects that are found is such a figure as it is."""
 
 
+EFFECT = {"stereo3d": "car_2d_moderate_r40"}
+"""Figure of a task's own evaluator by which digital harm is compared with rendered, where it is not the task's figure:
+the reference report's counts near cars alone, of which a scene's pictures have few."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Step:
     """One gear command.
