@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import tempfile
-import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
 import numpy as np
+from isal import isal_zlib
 
 from gear.values.scene import Weather
 from gear.values.serial import from_json, to_json
@@ -126,5 +126,5 @@ def _crc32(path: Path) -> int:
     value = 0
     with path.open("rb") as file:
         while chunk := file.read(1 << 20):
-            value = zlib.crc32(chunk, value)
+            value = isal_zlib.crc32(chunk, value)
     return value

@@ -1,15 +1,16 @@
 """One MJCF out of many: a town, its boards, and a pool of actors.
 
-dm_control.mjcf keeps the names of different files apart. Every asset's file is attached once, for its meshes, textures
-and materials; each instance is a body whose geoms refer to those, so ten equal cars cost one mesh. Only faces that take
-a patch get a material and a texture of their own.
+dm_control.mjcf keeps the names of different files apart; what stands in a town goes around it as it is. Every asset's
+file is attached once, for its meshes, textures and materials; each instance is a body whose geoms refer to those, so
+ten equal cars cost one mesh. Only faces that take a patch get a material and a texture of their own.
 """
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,8 +19,10 @@ from gear.values.errors import TownError
 from gear.values.scene import Weather
 from gear.world.assets import ActorFacts, AssetLibrary
 from gear.world.instances import AssetParts, FaceName, load_mjcf
+from gear.world.light import lighting_of
 from gear.world.quiet_mjcf import mjcf
 from gear.world.scene_spec import BoardSpec
+from gear.world.statics import Statics, split_town
 from gear.world.weather import apply_weather
 
 PARKED_DEPTH_M = 60.0
@@ -88,29 +91,40 @@ def compose(
         TownError: a file cannot be composed.
         UnknownNameError: a board's asset is not there.
     """
-    root = load_mjcf(library.town)
+    with ThreadPoolExecutor(1) as aside:
+        lighting = aside.submit(lighting_of, weather)
+        text, statics = split_town(library.town)
+        root = load_mjcf(library.town, text)
+        slots = slots_of(pool, carrier)
+        faces = _fill(root, library, statics, boards, slots)
+    apply_weather(root, weather, lighting.result(), statics.worn)
+    return Composition(
+        xml=statics.put_into(root.to_xml_string()),
+        assets=root.get_assets(),
+        town=library.town,
+        slots=slots,
+        faces=faces,
+    )
+
+
+def _fill(
+    root: mjcf.RootElement, library: AssetLibrary, statics: Statics, boards: Sequence[BoardSpec], slots: Iterable[Slot]
+) -> tuple[FaceName, ...]:
+    """Puts boards and actors into the town's tree."""
     parts = AssetParts(root)
     faces: list[FaceName] = []
     for index, board in enumerate(boards):
         path = library.path("surface", board.asset)
-        body = _new_body(root, library.town, f"board_{index}", **_placed(board))
+        body = _new_body(root, library.town, statics, f"board_{index}", **_placed(board))
         faces.append(parts.add_bearer(path, body, is_carried=False))
-    slots = slots_of(pool, carrier)
     for slot in slots:
-        body = _new_body(root, library.town, slot.body, mocap=True)
+        body = _new_body(root, library.town, statics, slot.body, mocap=True)
         if slot.bears_surface:
             faces.append(parts.add_bearer(slot.actor.path, body, is_carried=True))
         else:
             parts.add_instance(slot.actor.path, body)
     parts.drop_templates()
-    apply_weather(root, weather)
-    return Composition(
-        xml=root.to_xml_string(),
-        assets=root.get_assets(),
-        town=library.town,
-        slots=slots,
-        faces=tuple(faces),
-    )
+    return tuple(faces)
 
 
 def slots_of(pool: Sequence[tuple[ActorFacts, int]], carrier: ActorFacts | None) -> tuple[Slot, ...]:
@@ -123,11 +137,14 @@ def slots_of(pool: Sequence[tuple[ActorFacts, int]], carrier: ActorFacts | None)
     return tuple(slots)
 
 
-def _new_body(root: mjcf.RootElement, town: Path, name: str, **attributes: Any) -> Any:
+def _new_body(root: mjcf.RootElement, town: Path, statics: Statics, name: str, **attributes: Any) -> Any:
+    taken = TownError(town, f"has a body named {name!r}, a name that gear gives to what it puts there")
+    if name in statics.body_names:
+        raise taken
     try:
         return root.worldbody.add("body", name=name, **attributes)
     except ValueError as error:
-        raise TownError(town, f"has a body named {name!r}, a name that gear gives to what it puts there") from error
+        raise taken from error
 
 
 def _merged(pool: Sequence[tuple[ActorFacts, int]]) -> list[tuple[ActorFacts, int]]:

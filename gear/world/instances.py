@@ -9,6 +9,7 @@ from typing import Any
 from gear.values.errors import TownError
 from gear.world.faces import FACE_SIZE_PX
 from gear.world.quiet_mjcf import mjcf
+from gear.world.statics import UNNAMED
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,14 +32,21 @@ class FaceName:
     neutral_material: str
 
 
-def load_mjcf(path: Path) -> mjcf.RootElement:
+def load_mjcf(path: Path, text: str | None = None) -> mjcf.RootElement:
     """Reads one file; its model is named after the file and everything in it has a name.
+
+    Args:
+        path: of the file.
+        text: what is read in its place.
 
     Raises:
         TownError: dm_control cannot read it.
     """
     try:
-        root = mjcf.from_path(str(path))
+        if text is None:
+            root = mjcf.from_path(str(path))
+        else:
+            root = mjcf.from_xml_string(text, model_dir=str(path.parent))
     except (ValueError, OSError, AttributeError, KeyError, SyntaxError) as error:
         raise TownError(path, f"cannot be read as MJCF: {error}") from error
     root.model = path.stem
@@ -46,7 +54,7 @@ def load_mjcf(path: Path) -> mjcf.RootElement:
     for tag in ("geom", "site", "body"):
         for index, element in enumerate(root.find_all(tag)):
             if getattr(element, "name", "") is None:
-                element.name = f"unnamed_{tag}_{index}"
+                element.name = f"{UNNAMED}{tag}_{index}"
     return root
 
 

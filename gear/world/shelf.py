@@ -137,7 +137,8 @@ def _load(place: Path, library: AssetLibrary, scene: SceneSpec) -> Compiled | No
 
 def _compile_apart(order: dict[str, Json], folder: Path) -> bool:
     """Compiles into a folder, in another process; whether that went well."""
-    code = "import sys; from gear.world.apart import main; main(sys.argv[1])"
+    # Without Python's own end, which would free half a million objects one by one.
+    code = "import os, sys; from gear.world.apart import main; main(sys.argv[1]); os._exit(0)"
     places = os.pathsep.join(path for path in sys.path if path)
     done = subprocess.run(
         [sys.executable, "-c", code, str(folder)],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import cv2
@@ -14,6 +15,9 @@ from gear.values.resources import data_dir
 from gear.values.scene import Weather
 from gear.world.light import FACE_ORDER, FILAMENT_LUX, Floats, Lighting, encode_srgb, lighting_of
 from gear.world.quiet_mjcf import mjcf
+
+Worn = tuple[str, str | None]
+"""A default class, and a material that a geom has besides."""
 
 WET_LABELS = frozenset({"road", "road_marking", "sidewalk", "parking", "ground"})
 """What lies open to the rain and holds its water."""
@@ -42,7 +46,9 @@ PRESETS: dict[str, Weather] = _read_presets()
 """Weather presets by name, from `configs/weather/presets.yml`."""
 
 
-def apply_weather(root: mjcf.RootElement, weather: Weather) -> None:
+def apply_weather(
+    root: mjcf.RootElement, weather: Weather, lighting: Lighting | None = None, worn: Sequence[Worn] = ()
+) -> None:
     """Puts a weather into a composed world, in place of the light that its town came with.
 
     - a light `sun`, a texture `sky` as the sky's picture, and the same picture as a light for Filament;
@@ -50,11 +56,11 @@ def apply_weather(root: mjcf.RootElement, weather: Weather) -> None:
     - colours of materials and geoms are read as linear albedo by both renderers.
 
     """
-    lighting = lighting_of(weather)
+    lighting = lighting or lighting_of(weather)
     _remove_old_light(root)
     _add_sky(root, lighting)
     _add_sun(root, lighting)
-    _wet(root, wetness(weather))
+    _wet(_open_materials(root, worn), wetness(weather))
     root.custom.add("text", name="filament.material.base_color_type", data="linear")
     # Gear's renderers have their own, which costs less and loses no memory.
     root.custom.add("numeric", name="filament.ao.enabled", data=[0])
@@ -128,11 +134,11 @@ def _display(light: Floats) -> Floats:
     return encode_srgb(light).astype(np.float64) / 255
 
 
-def _wet(root: mjcf.RootElement, amount: float) -> None:
+def _wet(materials: Iterable[Any], amount: float) -> None:
     """Water fills the pores: less light comes back from inside, and the surface mirrors more sharply."""
     if amount <= 0:
         return
-    for material in _open_materials(root):
+    for material in materials:
         rgba = np.array(material.rgba if material.rgba is not None else (1.0, 1.0, 1.0, 1.0))
         rgba[:3] *= 1 - _WET_DARKENING * amount
         material.rgba = rgba
@@ -140,18 +146,24 @@ def _wet(root: mjcf.RootElement, amount: float) -> None:
             material.roughness = float(material.roughness * (1 - _WET_SMOOTHING * amount))
 
 
-def _open_materials(root: mjcf.RootElement) -> list[Any]:
-    """Materials of geoms whose label is in `WET_LABELS`, each once, in the order of the file."""
-    found: dict[str, Any] = {}
-    for geom in root.find_all("geom"):
-        default = geom.dclass
-        name = default.dclass if default is not None else ""
-        if name.rsplit("/", 1)[-1].partition(".")[0] not in WET_LABELS:
-            continue
-        material = geom.material if geom.material is not None else _inherited_material(default)
-        if material is not None:
-            found.setdefault(material.full_identifier, material)
-    return list(found.values())
+def _open_materials(root: mjcf.RootElement, worn: Sequence[Worn]) -> list[Any]:
+    """Materials of geoms whose label is in `WET_LABELS`, each once."""
+    pairs: list[tuple[Any, Any]] = [
+        (root.find("default", name), None if own is None else root.find("material", own))
+        for name, own in worn
+        if _is_open(name)
+    ]
+    pairs += [
+        (geom.dclass, geom.material)
+        for geom in root.find_all("geom")
+        if geom.dclass is not None and _is_open(geom.dclass.dclass)
+    ]
+    found = (own if own is not None else _inherited_material(default) for default, own in pairs)
+    return list({material.full_identifier: material for material in found if material is not None}.values())
+
+
+def _is_open(class_name: str) -> bool:
+    return class_name.rsplit("/", 1)[-1].partition(".")[0] in WET_LABELS
 
 
 def _inherited_material(default: Any) -> Any:

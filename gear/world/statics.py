@@ -1,0 +1,76 @@
+"""What of a town stays as its file says: geoms and bodies that go around dm_control, which needs half a millisecond for
+each of them and would change nothing."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass
+from pathlib import Path
+
+from gear.values.errors import TownError
+
+UNNAMED = "unnamed_"
+"""How names begin that gear gives to what has none."""
+
+_PLAIN = ("geom", "body")
+_WORLD = "<worldbody>"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Statics:
+    """Elements of a town's worldbody, in their order.
+
+    Attributes:
+        xml: as MJCF; every geom has a name.
+        body_names: of the bodies.
+        worn: default class and own material, if it has one, of the geoms; each pair once, in the order of the file.
+    """
+
+    xml: str = ""
+    body_names: frozenset[str] = frozenset()
+    worn: tuple[tuple[str, str | None], ...] = ()
+
+    def put_into(self, xml: str) -> str:
+        """MJCF with them before everything else in its worldbody."""
+        before, world, after = xml.partition(_WORLD)
+        return before + world + self.xml + after if self.xml else xml
+
+
+def split_town(path: Path) -> tuple[str, Statics]:
+    """A town's MJCF without its geoms and bodies, and those.
+
+    Nothing is taken out of a town whose geoms and bodies are not all plain ones: such with joints, cameras or sites in
+    them, geoms without a class of their own, or files that include others. dm_control reads those whole.
+
+    Raises:
+        TownError: it is no XML, or cannot be read.
+    """
+    try:
+        root = ET.parse(path).getroot()
+    except (OSError, ET.ParseError) as error:
+        raise TownError(path, f"cannot be read as MJCF: {error}") from error
+    worlds = root.findall("worldbody")
+    taken = [child for world in worlds for child in world if child.tag in _PLAIN]
+    if len(worlds) != 1 or next(root.iter("include"), None) is not None or not all(map(_is_plain, taken)):
+        return ET.tostring(root, encoding="unicode"), Statics()
+    for child in taken:
+        worlds[0].remove(child)
+    geoms = [geom for child in taken for geom in child.iter("geom")]
+    for index, geom in enumerate(geoms):
+        geom.attrib.setdefault("name", f"{UNNAMED}geom_{index}")
+    statics = Statics(
+        xml="".join(ET.tostring(child, encoding="unicode") for child in taken),
+        body_names=frozenset(body.get("name", "") for child in taken for body in child.iter("body")),
+        worn=tuple(dict.fromkeys((geom.get("class", ""), geom.get("material")) for geom in geoms)),
+    )
+    return ET.tostring(root, encoding="unicode"), statics
+
+
+def _is_plain(element: ET.Element) -> bool:
+    return all(
+        part.tag in _PLAIN
+        and part.get("childclass") is None
+        and not part.get("name", "").startswith(UNNAMED)
+        and part.get("class" if part.tag == "geom" else "name") is not None
+        for part in element.iter()
+    )
