@@ -36,11 +36,12 @@ class Statics:
         return before + world + self.xml + after if self.xml else xml
 
 
-def split_town(path: Path) -> tuple[str, Statics]:
+def split_town(path: Path) -> tuple[str | None, Statics]:
     """A town's MJCF without its geoms and bodies, and those.
 
     Nothing is taken out of a town whose geoms and bodies are not all plain ones: such with joints, cameras or sites in
-    them, geoms without a class of their own, or files that include others. dm_control reads those whole.
+    them, geoms without a class of their own, or files that include others. dm_control reads such a file itself: the
+    text is None.
 
     Raises:
         TownError: it is no XML, or cannot be read.
@@ -52,7 +53,7 @@ def split_town(path: Path) -> tuple[str, Statics]:
     worlds = root.findall("worldbody")
     taken = [child for world in worlds for child in world if child.tag in _PLAIN]
     if len(worlds) != 1 or next(root.iter("include"), None) is not None or not all(map(_is_plain, taken)):
-        return ET.tostring(root, encoding="unicode"), Statics()
+        return None, Statics()
     for child in taken:
         worlds[0].remove(child)
     geoms = [geom for child in taken for geom in child.iter("geom")]

@@ -55,12 +55,19 @@ def apply_weather(
     - wet materials: what lies open to the rain is darker and smoother;
     - colours of materials and geoms are read as linear albedo by both renderers.
 
+    Args:
+        root: of the world.
+        weather: to put there.
+        lighting: of it, where that is known already.
+        worn: default class and own material of geoms of the world that are not in the tree.
     """
     lighting = lighting or lighting_of(weather)
     _remove_old_light(root)
     _add_sky(root, lighting)
     _add_sun(root, lighting)
-    _wet(_open_materials(root, worn), wetness(weather))
+    amount = wetness(weather)
+    if amount > 0:
+        _wet(_open_materials(root, worn), amount)
     root.custom.add("text", name="filament.material.base_color_type", data="linear")
     # Gear's renderers have their own, which costs less and loses no memory.
     root.custom.add("numeric", name="filament.ao.enabled", data=[0])
@@ -136,8 +143,6 @@ def _display(light: Floats) -> Floats:
 
 def _wet(materials: Iterable[Any], amount: float) -> None:
     """Water fills the pores: less light comes back from inside, and the surface mirrors more sharply."""
-    if amount <= 0:
-        return
     for material in materials:
         rgba = np.array(material.rgba if material.rgba is not None else (1.0, 1.0, 1.0, 1.0))
         rgba[:3] *= 1 - _WET_DARKENING * amount
