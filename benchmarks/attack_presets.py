@@ -4,6 +4,8 @@
     python benchmarks/attack_presets.py --task depth --model ddrnet23_slim_depth --steps 120 --out presets \\
         patches/ddrnet23_slim_depth/*
 
+`--attack NAME:KEY=VALUE:…`, repeatable, compares other attacks, or one with other options.
+
 Takes the pictures of finished scenes (`train`, `val`, and `none`, which patches are judged on). Prints, for each scene
 and attack, the task's figure of clean pictures, its change by the rendered patch, and the minutes of the attack; then
 the mean change of each attack. What is finished is only read when it is called again.
@@ -20,7 +22,7 @@ from gear.contracts.specs import TaskSpec
 from gear.dataset.sidecar import load_json
 from gear.plugins.build import find
 
-ATTACKS = ("scene_specific", "carla_gear")
+ATTACKS = ["scene_specific", "carla_gear"]
 
 
 def main() -> None:
@@ -30,6 +32,7 @@ def main() -> None:
     parser.add_argument("--task", required=True)
     parser.add_argument("--model", required=True)
     parser.add_argument("--steps", type=int, default=120)
+    parser.add_argument("--attack", action="append", metavar="NAME:KEY=VALUE:…", help=f"({' '.join(ATTACKS)})")
     parser.add_argument("--figure", help="of the task's evaluator (the task's own)")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--model-set", action="append", default=[])
@@ -38,13 +41,14 @@ def main() -> None:
     assert isinstance(spec, TaskSpec)
     figure = args.figure or spec.figure.rpartition(".")[2]
     print(f"{figure} over scenes; {args.steps} steps each")
-    changes: dict[str, list[float]] = {attack: [] for attack in ATTACKS}
+    changes: dict[str, list[float]] = {attack: [] for attack in args.attack or ATTACKS}
     for folder in args.folders:
-        for attack in ATTACKS:
-            out = args.out / f"{folder.name}-{attack}"
+        for attack in changes:
+            name, *settings = attack.split(":")
+            out = args.out / f"{folder.name}-{attack.replace(':', '-')}"
             gear.attack(
-                folder / "train", model=args.model, out=out / "patch", attack=attack, steps=args.steps,
-                model_settings=args.model_set, val=folder / "val",
+                folder / "train", model=args.model, out=out / "patch", attack=name, steps=args.steps,
+                settings=settings, model_settings=args.model_set, val=folder / "val",
             )  # fmt: skip
             found = gear.gap(
                 folder / "none", patch=out / "patch", model=args.model, settings=args.model_set,
@@ -53,12 +57,12 @@ def main() -> None:
             changes[attack].append(found["rendered"][figure] - found["clean"][figure])
             minutes = load_json(out / "patch/attack.json")["seconds"] / 60
             print(
-                f"{folder.name:24} {attack:16} clean {found['clean'][figure]:.3f}  change {changes[attack][-1]:+.3f}  "
+                f"{folder.name:24} {attack:40} clean {found['clean'][figure]:.3f}  change {changes[attack][-1]:+.3f}  "
                 f"{minutes:.1f} min",
                 flush=True,
             )
     for attack, found_changes in changes.items():
-        print(f"mean {attack:16} {statistics.mean(found_changes):+.4f} over {len(found_changes)} scenes")
+        print(f"mean {attack:40} {statistics.mean(found_changes):+.4f} over {len(found_changes)} scenes")
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -23,6 +24,10 @@ CROPS: dict[str, tuple[float, float, float, float]] = {
 
 MIN_DEPTH_M = 1e-3
 
+PIECE = 1 << 13
+"""Pixels at a time: what is worked out of them stays in the processor's cache, and BLAS takes one thread, so that sums
+do not depend on how many there are."""
+
 
 class DepthTruth(Protocol):
     """What the metric looks at."""
@@ -40,6 +45,8 @@ class DepthEvaluator:
     and `max_depth_m` inside the crop, with predictions clipped to the same range.
     """
 
+    _wants_devkit = True
+
     def __init__(self, *, max_depth_m: float = 80.0, crop: Crop = "none") -> None:
         self.max_depth_m = max_depth_m
         self.crop = crop
@@ -54,20 +61,25 @@ class DepthEvaluator:
         truth_m = sample.depth_m
         if prediction.shape != truth_m.shape:
             raise ValueError(f"prediction must have shape {truth_m.shape}, got {prediction.shape}")
-        known = np.isfinite(truth_m)
-        if not np.isfinite(prediction[known]).all() or (prediction[known] <= 0).any():
-            raise ValueError("prediction must be positive and finite wherever there is ground truth")
-        looked_at = known & self._window(truth_m.shape) & (truth_m > MIN_DEPTH_M) & (truth_m < self.max_depth_m)
-        clipped = np.clip(prediction[looked_at].astype(np.float64), MIN_DEPTH_M, self.max_depth_m)
-        found = self._everywhere(truth_m[known], prediction[known])
-        found |= _eigen(truth_m[looked_at].astype(np.float64), clipped)
+        everywhere, near = _Sums(), _Sums()
+        window = self._window(truth_m.shape).reshape(-1)
+        flat_truth_m, flat_found_m = truth_m.reshape(-1), prediction.reshape(-1)
+        for start in range(0, truth_m.size, PIECE):
+            piece = slice(start, start + PIECE)
+            known = np.isfinite(flat_truth_m[piece])
+            found_m, seen = flat_found_m[piece][known], flat_truth_m[piece][known]
+            if not np.isfinite(found_m).all() or (found_m <= 0).any():
+                raise ValueError("prediction must be positive and finite wherever there is ground truth")
+            pair = _Pair.of(seen.astype(np.float64), found_m.astype(np.float64))
+            if self._wants_devkit:
+                everywhere.add(_devkit_sums(pair))
+            looked_at = window[piece][known] & (seen > MIN_DEPTH_M) & (seen < self.max_depth_m)
+            near.add(_eigen_sums(pair.where(looked_at).clipped(MIN_DEPTH_M, self.max_depth_m)))
+        found = _devkit(everywhere) if self._wants_devkit else {}
+        found |= _eigen(near)
         for name, value in found.items():
             self.figures.setdefault(name, []).append(value)
         return found
-
-    def _everywhere(self, truth_m: FloatImage, found_m: FloatImage) -> dict[str, float]:
-        """The devkit's figures of every pixel with ground truth."""
-        return _devkit(truth_m.astype(np.float64), found_m.astype(np.float64))
 
     def _window(self, shape: tuple[int, ...]) -> np.ndarray:
         height, width = shape[0], shape[1]
@@ -88,14 +100,19 @@ class DepthEvaluator:
         (squared error over squared depth); `eigen_d1` to `eigen_d3`, `eigen_abs_rel`, `eigen_sq_rel` (over depth),
         `eigen_rmse_m`, `eigen_rmse_log`, `eigen_log10`, `eigen_silog`.
         """
-        names = (*_devkit(np.ones(1), np.ones(1)), *_eigen(np.ones(1), np.ones(1)))
+        names = (*_devkit(_Sums()), *_eigen(_Sums()))
         known = {name: [v for v in self.figures.get(name, []) if v == v] for name in names}
         # Sorted, so that the order in which pictures came does not reach the last digit.
         return {name: float(np.mean(np.sort(values))) if values else float("nan") for name, values in known.items()}
 
 
 class NearDepth(DepthEvaluator):
-    """What a reference network is held to: whole pictures below 80 m, predictions clipped there; no sky."""
+    """What a reference network is held to: whole pictures below 80 m, predictions clipped there; no sky.
+
+    The devkit's figures are not shown.
+    """
+
+    _wants_devkit = False
 
     def __init__(self) -> None:
         super().__init__(max_depth_m=80.0, crop="none")
@@ -108,10 +125,6 @@ class NearDepth(DepthEvaluator):
         """`d1`, `rmse_m`, `d2`, `d3`, `abs_rel`, `sq_rel`, `rmse_log`, `log10`, `silog`: means over pictures."""
         return _renamed(super().result())
 
-    def _everywhere(self, truth_m: FloatImage, found_m: FloatImage) -> dict[str, float]:
-        """None: the devkit's figures are not shown."""
-        return {}
-
 
 def _renamed(figures: Mapping[str, float]) -> dict[str, float]:
     """Eigen's figures without their prefix."""
@@ -121,45 +134,107 @@ def _renamed(figures: Mapping[str, float]) -> dict[str, float]:
     return first | plain
 
 
-def _devkit(truth_m: Array, found_m: Array) -> dict[str, float]:
-    error, inverse, log = found_m - truth_m, 1 / truth_m - 1 / found_m, np.log(truth_m) - np.log(found_m)
-    relative, log_square = error / truth_m, _mean(log**2)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pair:
+    """Depth of the same pixels, (N,) float64 metres, and what several figures are made of."""
+
+    truth_m: Array
+    found_m: Array
+    error_m: Array
+    relative: Array
+    log: Array
+
+    @classmethod
+    def of(cls, truth_m: Array, found_m: Array) -> _Pair:
+        error_m = found_m - truth_m
+        return cls(truth_m, found_m, error_m, error_m / truth_m, np.log(found_m) - np.log(truth_m))
+
+    def where(self, chosen: npt.NDArray[np.bool_]) -> _Pair:
+        if chosen.all():
+            return self
+        parts = (self.truth_m, self.found_m, self.error_m, self.relative, self.log)
+        return _Pair(*(part[chosen] for part in parts))
+
+    def clipped(self, least_m: float, most_m: float) -> _Pair:
+        if not self.found_m.size or (self.found_m.min() >= least_m and self.found_m.max() <= most_m):
+            return self
+        return _Pair.of(self.truth_m, np.clip(self.found_m, least_m, most_m))
+
+
+class _Sums:
+    """Sums over pixels, by name, piece after piece."""
+
+    def __init__(self) -> None:
+        self._sums: dict[str, float] = {}
+
+    def add(self, sums: Mapping[str, float]) -> None:
+        for name, value in sums.items():
+            self._sums[name] = self._sums.get(name, 0.0) + float(value)
+
+    def mean(self, name: str) -> float:
+        """NaN where there were no pixels."""
+        pixels = self._sums.get("pixels", 0.0)
+        return self._sums[name] / pixels if pixels else float("nan")
+
+
+def _devkit_sums(pair: _Pair) -> dict[str, float]:
+    inverse = pair.relative / pair.found_m
     return {
-        "mae_m": _mean(np.abs(error)),
-        "rmse_m": _root(_mean(error**2)),
-        "imae_per_km": 1000 * _mean(np.abs(inverse)),
-        "irmse_per_km": 1000 * _root(_mean(inverse**2)),
-        "log_mae": _mean(np.abs(log)),
-        "log_rmse": _root(log_square),
-        "silog": 100 * _root(log_square - _mean(log) ** 2),
-        "abs_rel": _mean(np.abs(relative)),
-        "sq_rel": _mean(relative**2),
+        "pixels": pair.truth_m.size,
+        "error": np.abs(pair.error_m).sum(),
+        "error_square": pair.error_m @ pair.error_m,
+        "inverse": np.abs(inverse).sum(),
+        "inverse_square": inverse @ inverse,
+        "log": pair.log.sum(),
+        "log_size": np.abs(pair.log).sum(),
+        "log_square": pair.log @ pair.log,
+        "relative": np.abs(pair.relative).sum(),
+        "relative_square": pair.relative @ pair.relative,
     }
 
 
-def _eigen(truth_m: Array, found_m: Array) -> dict[str, float]:
-    ratio = np.maximum(truth_m / found_m, found_m / truth_m)
-    error, log = truth_m - found_m, np.log(found_m) - np.log(truth_m)
-    square, log_square = error**2, _mean(log**2)
+def _devkit(sums: _Sums) -> dict[str, float]:
     return {
-        "eigen_d1": _share(ratio < 1.25),
-        "eigen_d2": _share(ratio < 1.25**2),
-        "eigen_d3": _share(ratio < 1.25**3),
-        "eigen_abs_rel": _mean(np.abs(error) / truth_m),
-        "eigen_sq_rel": _mean(square / truth_m),
-        "eigen_rmse_m": _root(_mean(square)),
-        "eigen_rmse_log": _root(log_square),
-        "eigen_log10": _mean(np.abs(log)) / math.log(10),
-        "eigen_silog": _root(log_square - 0.5 * _mean(log) ** 2),
+        "mae_m": sums.mean("error"),
+        "rmse_m": _root(sums.mean("error_square")),
+        "imae_per_km": 1000 * sums.mean("inverse"),
+        "irmse_per_km": 1000 * _root(sums.mean("inverse_square")),
+        "log_mae": sums.mean("log_size"),
+        "log_rmse": _root(sums.mean("log_square")),
+        "silog": 100 * _root(sums.mean("log_square") - sums.mean("log") ** 2),
+        "abs_rel": sums.mean("relative"),
+        "sq_rel": sums.mean("relative_square"),
     }
 
 
-def _share(truths: npt.NDArray[np.bool_]) -> float:
-    return np.count_nonzero(truths) / truths.size if truths.size else float("nan")
+def _eigen_sums(pair: _Pair) -> dict[str, float]:
+    ratio = np.maximum(pair.truth_m / pair.found_m, pair.found_m / pair.truth_m)
+    return {
+        "pixels": pair.truth_m.size,
+        "d1": np.count_nonzero(ratio < 1.25),
+        "d2": np.count_nonzero(ratio < 1.25**2),
+        "d3": np.count_nonzero(ratio < 1.25**3),
+        "relative": np.abs(pair.relative).sum(),
+        "error_relative": pair.error_m @ pair.relative,
+        "error_square": pair.error_m @ pair.error_m,
+        "log": pair.log.sum(),
+        "log_size": np.abs(pair.log).sum(),
+        "log_square": pair.log @ pair.log,
+    }
 
 
-def _mean(values: Array) -> float:
-    return float(values.mean()) if values.size else float("nan")
+def _eigen(sums: _Sums) -> dict[str, float]:
+    return {
+        "eigen_d1": sums.mean("d1"),
+        "eigen_d2": sums.mean("d2"),
+        "eigen_d3": sums.mean("d3"),
+        "eigen_abs_rel": sums.mean("relative"),
+        "eigen_sq_rel": sums.mean("error_relative"),
+        "eigen_rmse_m": _root(sums.mean("error_square")),
+        "eigen_rmse_log": _root(sums.mean("log_square")),
+        "eigen_log10": sums.mean("log_size") / math.log(10),
+        "eigen_silog": _root(sums.mean("log_square") - 0.5 * sums.mean("log") ** 2),
+    }
 
 
 def _root(value: float) -> float:

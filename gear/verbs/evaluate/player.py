@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import sys
 import time
@@ -18,11 +19,13 @@ from gear.contracts.specs import DefenseSpec, ModelSpec
 from gear.dataset.reading import Dataset
 from gear.plugins.build import blamed, build
 from gear.plugins.catalogue import Found
+from gear.plugins.manager import DISTRIBUTION
 from gear.values.errors import PluginError
 from gear.values.frames import UInt8Image
 from gear.values.rng import derive_rng
 from gear.verbs.defend import Guard
 from gear.verbs.evaluate.choice import Chosen
+from gear.verbs.evaluate.lanes import lanes_of
 
 Views = Mapping[str, UInt8Image]
 
@@ -33,7 +36,7 @@ class Answer:
 
     Attributes:
         prediction: the task's.
-        model_s, defense_s: wall time; of a batch, its share.
+        model_s, defense_s: wall time; of a batch its share, also of the batches that went through beside it.
         mask: where the defense sees the patch, (H, W) float32 in 0..1 by camera name.
         score: how sure it is of an attack.
     """
@@ -46,7 +49,13 @@ class Answer:
 
 
 class Player:
-    """A built model with its defense, fitted where it must be."""
+    """A built model with its defense, fitted where it must be.
+
+    Attributes:
+        model: defended, if there is a defense.
+        weights_sha256: of the bare model; None for what is no torch model.
+        lanes: how many threads may `play` at a time. Defenses and models of third parties are never asked to.
+    """
 
     def __init__(
         self,
@@ -75,6 +84,8 @@ class Player:
             self._guard, self.model = self._guarded(defense, bare, clean, patched)
         many = getattr(self.model, "predict_many", None)
         self._many = many if callable(many) else None
+        is_ours = model.found.owner.package == DISTRIBUTION
+        self.lanes = lanes_of(bare) if is_ours and defense is None else 1
 
     def _guarded(
         self, defense: Chosen, bare: Model, clean: Dataset[Any] | None, patched: Dataset[Any] | None
@@ -115,7 +126,7 @@ class Player:
             shown.append(result.views if result else seen)
         begun = time.perf_counter()
         predictions = self._predict(shown, indices)
-        each_s = (time.perf_counter() - begun) / len(indices)
+        each_s = (time.perf_counter() - begun) / len(indices) / self.lanes
         return [
             Answer(
                 prediction=prediction,
@@ -129,7 +140,7 @@ class Player:
 
     def _predict(self, shown: Sequence[Views], indices: Sequence[int]) -> list[Any]:
         stage = f"predict on sample {indices[0]}" + (f" to {indices[-1]}" if len(indices) > 1 else "")
-        with blamed(self._found, stage):
+        with blamed(self._found, stage) if self.lanes == 1 else contextlib.nullcontext():
             if self._many is None:
                 return [self.model.predict(views) for views in shown]
             answers = list(self._many(list(shown)))

@@ -9,6 +9,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 from gear.dataset.reading import Dataset
+from gear.verbs.evaluate.lanes import lanes
 from gear.verbs.evaluate.player import Answer, Player
 from gear.verbs.evaluate.scoring import Note, Scorer
 
@@ -21,8 +22,8 @@ def evaluate_row(
 ) -> tuple[list[Note], int]:
     """Every sample's note, in order, and how many of them were predicted now.
 
-    Pictures are decoded and predictions measured and written in threads, while the model works on a batch; what waits
-    is bounded, so memory does not grow with the dataset.
+    Pictures are decoded and predictions measured and written in threads, while the model works on a batch, or on one in
+    each of its lanes; what waits is bounded, so memory does not grow with the dataset.
     """
     kept = scorer.kept()
     missing = [index for index in range(len(dataset)) if index not in kept]
@@ -34,19 +35,33 @@ def evaluate_row(
         if not done.cancelled() and done.exception() is None:
             told()
 
-    with ThreadPoolExecutor(workers) as readers, ThreadPoolExecutor(workers) as scorers:
+    def play(indices: Sequence[int], samples: Sequence[Any]) -> dict[int, Future[Note]]:
+        answers: Sequence[Answer] = player.play([sample.images for sample in samples], indices)
+        scored = {}
+        for index, sample, answer in zip(indices, samples, answers, strict=True):
+            waiting.acquire()
+            scored[index] = scorers.submit(scorer.first, index, sample, answer)
+            scored[index].add_done_callback(tell)
+        return scored
+
+    with (
+        ThreadPoolExecutor(workers) as readers,
+        ThreadPoolExecutor(workers) as scorers,
+        lanes(player.lanes) as submit,
+    ):
         try:
             for index in sorted(kept):
                 waiting.acquire()
                 notes[index] = scorers.submit(scorer.again, index)
                 notes[index].add_done_callback(tell)
+            played: deque[Future[dict[int, Future[Note]]]] = deque()
             for indices, samples in _batches(dataset, missing, readers, batch, workers):
-                answers: Sequence[Answer] = player.play([sample.images for sample in samples], indices)
-                for index, sample, answer in zip(indices, samples, answers, strict=True):
-                    waiting.acquire()
-                    _raise_early(notes)
-                    notes[index] = scorers.submit(scorer.first, index, sample, answer)
-                    notes[index].add_done_callback(tell)
+                played.append(submit(play, indices, samples))
+                if len(played) > player.lanes:
+                    notes |= played.popleft().result()
+                _raise_early(notes)
+            for one in played:
+                notes |= one.result()
             done = [notes[index].result() for index in range(len(dataset))]
         except BaseException:
             readers.shutdown(wait=False, cancel_futures=True)

@@ -1,0 +1,126 @@
+"""Batches of one network side by side: the same answers, whoever works on them, and errors that stop the run."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+from gear.nn.network import Network
+from gear.verbs.collect.run import CollectReport
+from gear.verbs.evaluate.lanes import MOST, lanes, lanes_of
+from gear.verbs.evaluate.run import evaluate
+
+SETTINGS = ("weights=none", "seed=3")
+
+
+@pytest.fixture(autouse=True)
+def _threads() -> Iterator[None]:
+    before = torch.get_num_threads()
+    yield
+    torch.set_num_threads(before)
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("depth") / "none"
+
+
+@pytest.fixture
+def pictures(data: Path, collect_small: Callable[..., CollectReport]) -> Path:
+    collect_small("depth", data, samples=5)
+    return data
+
+
+def files(out: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(out)): path.read_bytes() for path in sorted(out.rglob("predictions/**/*.png"))}
+
+
+@pytest.mark.parametrize("batch", [1, 2])
+def test_one_lane_and_three_give_the_same_bytes(
+    tmp_path: Path, pictures: Path, monkeypatch: pytest.MonkeyPatch, batch: int
+) -> None:
+    made: dict[int, dict[str, bytes]] = {}
+    predict, met = Network.predict_many, threading.Event()
+    inside: list[int] = []
+
+    def watched(network: Any, samples: Any) -> Any:
+        assert torch.get_num_threads() == 1
+        inside.append(1)
+        if len(inside) > 1:
+            met.set()
+        assert count == 1 or met.wait(60), "nobody else worked beside the first"
+        answers = predict(network, samples)
+        inside.pop()
+        return answers
+
+    monkeypatch.setattr(Network, "predict_many", watched)
+    for count in (1, 3):
+        torch.set_num_threads(count)
+        out = tmp_path / str(count)
+        evaluate(pictures, model="ddrnet23_slim_depth", settings=SETTINGS, out=out, resamples=0, batch=batch)
+        made[count] = files(out)
+        assert torch.get_num_threads() == count
+        assert met.is_set() == (count > 1)
+    assert len(made[1]) == 5 and made[1] == made[3]
+
+
+def test_a_network_that_fails_stops_the_run_and_it_is_taken_up_again(
+    tmp_path: Path, pictures: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    torch.set_num_threads(2)
+    predict, shown = Network.predict_many, 0
+
+    def failing(network: Any, samples: Any) -> Any:
+        nonlocal shown
+        shown += 1
+        if shown == 3:
+            raise RuntimeError("out of luck")
+        return predict(network, samples)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Network, "predict_many", failing)
+        with pytest.raises(RuntimeError, match="out of luck"):  # our own networks keep their traceback
+            evaluate(pictures, model="ddrnet23_slim_depth", settings=SETTINGS, out=tmp_path, resamples=0)
+    assert torch.get_num_threads() == 2
+    (row,) = evaluate(pictures, model="ddrnet23_slim_depth", settings=SETTINGS, out=tmp_path, resamples=0).rows
+    assert row.samples == 5 and 1 <= row.made < 5
+    assert len(files(tmp_path)) == 5
+
+
+class Still(Network):
+    def __init__(self) -> None:
+        torch.nn.Module.__init__(self)
+        self.device = torch.device("cpu")
+
+    def run(self, pictures: Any) -> Any: ...
+    def losses(self, outputs: Any, targets: Any) -> Any: ...
+    def answers(self, outputs: Any, size_px: Any) -> Any: ...
+
+
+def test_only_a_network_on_a_cpu_has_lanes() -> None:
+    network = Still()
+    for threads, count in ((1, 1), (2, 2), (MOST + 3, MOST)):
+        torch.set_num_threads(threads)
+        assert lanes_of(network) == count
+    network.device = torch.device("cuda")
+    assert lanes_of(network) == 1
+    assert lanes_of(object()) == 1
+
+
+def test_lanes_share_the_threads_and_print_nothing_on_stdout(capsys: pytest.CaptureFixture[str]) -> None:
+    torch.set_num_threads(4)
+    with lanes(2) as submit:
+        assert submit(torch.get_num_threads).result() == 2
+        submit(print, "aside").result()
+    assert torch.get_num_threads() == 4
+    assert capsys.readouterr() == ("", "aside\n")
+    with lanes(1) as submit:
+        assert submit(threading.current_thread).result() is threading.main_thread()
+        with pytest.raises(SystemExit):
+            submit(sys.exit, 3)
