@@ -17,6 +17,7 @@ from typing import Any
 
 import gear
 from gear.dataset.reading import Dataset
+from gear.dataset.sidecar import Sidecar
 from gear.verbs.evaluate.choice import chosen_defense, chosen_model
 from gear.verbs.evaluate.player import Player
 from gear.verbs.evaluate.row import evaluate_row
@@ -25,12 +26,16 @@ from gear.verbs.evaluate.spread import draw, gather
 
 
 class Part(Dataset[Any]):
-    """The first samples of a split."""
+    """The first samples of a split, and again from the start where more are wanted than there are."""
 
     count = 0
 
     def __len__(self) -> int:
-        return min(self.count, len(self.manifest["samples"]))
+        return self.count
+
+    def sidecar(self, index: int) -> Sidecar:
+        """Of one sample."""
+        return super().sidecar(index % len(self.manifest["samples"]))
 
 
 def main() -> None:
