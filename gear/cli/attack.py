@@ -19,6 +19,8 @@ The folder holds patch_0.png, …, patch.safetensors, attack.json and figures/.
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the command's flags."""
+    from gear.cli.gap import add_places
+
     parser.epilog = EXAMPLE
     parser.add_argument("--model", required=True, action="append", metavar="NAME", help="model plugin; repeatable")
     parser.add_argument(
@@ -42,6 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--verify", metavar="DIR", help="dataset with probes on which the patches are rendered and compared afterwards"
     )
+    add_places(parser)
     parser.add_argument("--compositor", default="transport", metavar="NAME", help="transport, or homography")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of everything that is drawn (0)")
     parser.add_argument("--allow-test-data", action="store_true", help="optimise on test splits too")
@@ -82,7 +85,15 @@ def run(args: argparse.Namespace) -> int:
         from gear.verbs.attack.verify import verify
 
         with ProgressBar() as progress:
-            reports = verify(args.out, args.verify, models=args.model, settings=args.model_set, progress=progress)
+            reports = verify(
+                args.out,
+                args.verify,
+                models=args.model,
+                settings=args.model_set,
+                town=args.town,
+                scenes=args.scenes,
+                progress=progress,
+            )
         for name, found in reports.items():
             print(json.dumps({name: found.as_json()}, indent=2) if args.json else found.table())
     return 0

@@ -7,6 +7,7 @@ import argparse
 EXAMPLE = """examples:
   gear gap data/train --twin data/train-patched
   gear gap data/train --patch patches/ --out gap/
+  gear gap data/mine --patch patches/ --town mjcf/mytown.xml --scenes configs/scenes/mytown.yaml --out gap/
   gear gap data/test --twin data/test-patched --model ddrnet23_slim --json
 
 The dataset must have been collected with --probes. With --patch the twin is rendered into OUT/twin first.
@@ -21,6 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("dataset", help="root of a dataset with probes")
     parser.add_argument("--twin", metavar="DIR", help="its twin with patches, rendered")
     parser.add_argument("--patch", help="a patch folder or picture, or random: its twin is rendered")
+    add_places(parser)
     parser.add_argument("--split", help="its split, where it has several")
     parser.add_argument("--model", metavar="NAME", help="also what the patches do to a model, digitally and rendered")
     parser.add_argument(
@@ -30,6 +32,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--samples", type=positive, metavar="N", help="the first N samples only")
     parser.add_argument("--out", metavar="DIR", help="folder for gap.json and gap.txt")
     parser.add_argument("--json", action="store_true", help="print the report as JSON")
+
+
+def add_places(parser: argparse.ArgumentParser) -> None:
+    """Adds the flags that say where a dataset's town lies."""
+    parser.add_argument(
+        "--town", metavar="FILE", help="of the dataset, if it is not gear's own: its twin is rendered"
+    )
+    parser.add_argument("--scenes", metavar="FILE", help="scene library of that town")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -48,6 +58,8 @@ def run(args: argparse.Namespace) -> int:
             model=args.model,
             settings=args.settings,
             samples=args.samples,
+            town=args.town,
+            scenes=args.scenes,
             out=args.out,
             progress=progress,
             **given,

@@ -283,23 +283,12 @@ def test_the_patch_goes_back_into_the_world(small: Small, install: Install, tmp_
     assert len(gear.open_twins(small(), tmp_path / "patched")) == 2
 
 
-def test_the_rendered_check(
-    small: Small,
-    install: Install,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def collect_tiny_twin(clean: Any, patch: Any, out: Path) -> None:
-        collect(
-            "semseg", town=TINY_TOWN, scene="board", split="val", samples=2, renderer="classic", quality="fast",
-            patch=str(patch), out=out, settings=[f"scenes={TINY_SCENES}", *size_settings("semseg")],
-        )  # fmt: skip
-
-    # A town given by its path cannot be found again by its name.
-    monkeypatch.setattr("gear.verbs.gap.run.collect_twin", collect_tiny_twin)
+def test_the_rendered_check(small: Small, install: Install, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["attack", "--model=tiny_segmenter", f"--data={small()}", "--steps=2", f"--out={tmp_path / 'p'}"]
-    assert main([*words, *(f"--set={text}" for text in SMALL), f"--verify={small(split='val')}"]) == 0
+    words += [*(f"--set={text}" for text in SMALL), f"--verify={small(split='val')}"]
+    assert main(words) == 2
+    assert "say where its town and scene library lie with --town and --scenes" in capsys.readouterr().err
+    assert main([*words, f"--town={TINY_TOWN}", f"--scenes={TINY_SCENES}"]) == 0
     table = capsys.readouterr().out
     assert "PSNR inside the patch" in table and "rendered / digital" in table
     report = json.loads((tmp_path / "p" / "verify" / "tiny_segmenter" / "gap.json").read_text())

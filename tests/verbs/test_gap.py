@@ -14,6 +14,7 @@ import pytest
 import gear
 from gear.cli.main import main
 from gear.testing.tiny_networks import tiny_segmenter
+from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import DatasetError, GearError
 from gear.verbs.collect.run import CollectReport
 from gear.verbs.gap import effect
@@ -97,6 +98,17 @@ def test_what_cannot_be_compared_is_refused(pair: tuple[Path, Path], tmp_path: P
         gear.gap(clean, twin=tmp_path / "other")
     with pytest.raises(GearError, match="this is a semseg dataset"):
         gear.gap(clean, twin=twin, model="glpdepth")
+
+
+def test_the_twin_of_somebodys_own_town_is_rendered_too(pair: tuple[Path, Path], tmp_path: Path) -> None:
+    clean, twin = pair
+    report = gear.gap(clean, patch="random", town=TINY_TOWN, scenes=TINY_SCENES, out=tmp_path / "gap", samples=1)
+    assert report.median_db("transport") > 40
+    names = sorted(path.name for path in twin.rglob("*_leftImg8bit.png"))
+    assert len(names) == 2
+    for name in names:
+        (there,), (made,) = twin.rglob(name), (tmp_path / "gap/twin").rglob(name)
+        assert made.read_bytes() == there.read_bytes()
 
 
 @pytest.mark.slow

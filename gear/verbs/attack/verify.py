@@ -19,6 +19,8 @@ def verify(
     models: Sequence[str],
     settings: Iterable[str] = (),
     samples: int | None = None,
+    town: str | Path | None = None,
+    scenes: str | Path | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> dict[str, GapReport]:
     """Renders a patch folder on a held-out dataset, and compares pictures and effect, digital and rendered.
@@ -31,6 +33,7 @@ def verify(
         models: names of model plugins.
         settings: `KEY=VALUE` texts for their options.
         samples: its first so many samples; all unless given.
+        town, scenes: files of its town and of that one's scene library, where they are none of gear's own.
         progress: told after every sample.
 
     Returns:
@@ -50,6 +53,8 @@ def verify(
             model=model,
             settings=texts,
             samples=samples,
+            town=town,
+            scenes=scenes,
             out=place / model.replace("/", "-"),
             progress=progress,
         )

@@ -46,6 +46,8 @@ def gap(
     settings: Iterable[str] = (),
     compositors: Sequence[str] = ("transport", "homography"),
     samples: int | None = None,
+    town: str | Path | None = None,
+    scenes: str | Path | None = None,
     out: str | Path | None = None,
     progress: Progress | None = None,
 ) -> GapReport:
@@ -60,6 +62,7 @@ def gap(
         settings: `KEY=VALUE` texts for the model's options.
         compositors: names of compositors.
         samples: so many of the split's first samples; all unless given.
+        town, scenes: with `patch`, files of the town and of its scene library, where they are none of gear's own.
         out: folder for `gap.json` and `gap.txt`; needed with `patch`.
         progress: told after every sample.
 
@@ -74,7 +77,7 @@ def gap(
     if patch is not None:
         if out is None:
             raise DatasetError(clean.root, "a twin has to be rendered: say where to with --out DIR")
-        collect_twin(clean, patch, Path(out) / "twin")
+        collect_twin(clean, patch, Path(out) / "twin", town=town, scenes=scenes)
         twin = Path(out) / "twin"
     assert twin is not None
     pairs = checked_twin(clean, open_dataset(twin, clean.plan.info.split))

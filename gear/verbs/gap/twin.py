@@ -28,29 +28,44 @@ def checked_twin(clean: Dataset[Any], twin: Dataset[Any]) -> Twins[Any]:
     return pairs
 
 
-def collect_twin(clean: Dataset[Any], patch: str | Path, root: Path) -> None:
+def collect_twin(
+    clean: Dataset[Any],
+    patch: str | Path,
+    root: Path,
+    *,
+    town: str | Path | None = None,
+    scenes: str | Path | None = None,
+) -> None:
     """Collects a split's twin with a patch, or completes it.
+
+    Args:
+        clean: the split.
+        patch: what to show.
+        root: of the twin.
+        town, scenes: files of the town and of its scene library, where they were given by path: a dataset holds no
+            paths of the machine that it was made on.
 
     Raises:
         PatchError: the patch cannot be used.
-        DatasetError: the manifest does not say enough to make the same scenes again: a town or a scene library was
-            given by path, or versions differ.
+        DatasetError: with these files and versions the same scenes cannot be made again.
     """
     content = clean.plan.content
     config: dict[str, Any] = {
         **clean.manifest["config"],
-        "town": content["town"],
+        "town": str(town or content["town"]),
         "samples": clean.plan.samples // content["frames"],
         "patch": str(patch),
         "root": str(root),
         "probes": False,
+        **({"scenes": str(scenes)} if scenes else {}),
     }
     remedy = f"collect the twin yourself, as the dataset was but with --patch {patch}, and name it with --twin DIR"
     try:
         node = parse_text(yaml.safe_dump(config, sort_keys=False), f"{clean.root} manifest")
         job = resolve(read_node(CollectionConfig, node))
     except (UnknownNameError, ConfigError) as error:
-        raise DatasetError(clean.root, f"cannot be collected again ({error}); {remedy}") from error
+        files = "" if town and scenes else "say where its town and scene library lie with --town and --scenes, or "
+        raise DatasetError(clean.root, f"cannot be collected again ({error}); {files}{remedy}") from error
     if job.plan.twin_key != clean.plan.twin_key:
         raise DatasetError(clean.root, f"this gear would not make the same scenes again; {remedy}")
     run_job(job)
