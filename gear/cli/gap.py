@@ -36,9 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def add_places(parser: argparse.ArgumentParser) -> None:
     """Adds the flags that say where a dataset's town lies."""
-    parser.add_argument(
-        "--town", metavar="FILE", help="of the dataset, if it is not gear's own: its twin is rendered"
-    )
+    parser.add_argument("--town", metavar="FILE", help="of the dataset, if it is not gear's own: its twin is rendered")
     parser.add_argument("--scenes", metavar="FILE", help="scene library of that town")
 
 
