@@ -1,8 +1,8 @@
 """The paper's settings against gear's: what patches of the same scenes, pictures and steps do once they are rendered.
 
     python -m authoring.weights patches --task depth --model ddrnet23_slim_depth --out patches
-    python benchmarks/attack_presets.py --task depth --model ddrnet23_slim_depth --steps 120 --out presets \\
-        patches/ddrnet23_slim_depth/*
+    python benchmarks/attack_presets.py --task depth --model ddrnet23_slim_depth --model-set input_scale=1 \\
+        --steps 120 --out presets patches/ddrnet23_slim_depth/*
 
 `--attack NAME:KEY=VALUE:…`, repeatable, compares other attacks, or one with other options.
 
