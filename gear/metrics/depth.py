@@ -11,8 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.values.frames import FloatImage
-
-Values = npt.NDArray[np.float32]
+from gear.values.geometry import Array
 
 Crop = Literal["none", "garg", "eigen"]
 
@@ -25,7 +24,7 @@ CROPS: dict[str, tuple[float, float, float, float]] = {
 
 MIN_DEPTH_M = 1e-3
 
-PIECE = 1 << 16
+PIECE = 1 << 15
 """Pixels at a time: few enough that what is worked out of them stays in the processor's cache."""
 
 
@@ -58,7 +57,7 @@ class DepthEvaluator:
         Raises:
             ValueError: the prediction has another shape, or is not positive and finite where there is ground truth.
         """
-        truth_m = sample.depth_m
+        truth_m, prediction = sample.depth_m, np.asarray(prediction, np.float32)  # as it is kept in files
         if prediction.shape != truth_m.shape:
             raise ValueError(f"prediction must have shape {truth_m.shape}, got {prediction.shape}")
         everywhere, near = _Sums(), _Sums()
@@ -72,7 +71,7 @@ class DepthEvaluator:
             found_m, seen_m = flat_found_m[piece].take(known), flat_truth_m[piece].take(known)
             if not np.isfinite(found_m).all() or (found_m <= 0).any():
                 raise ValueError("prediction must be positive and finite wherever there is ground truth")
-            pair = _Pair.of(seen_m, found_m)
+            pair = _Pair.of(seen_m.astype(np.float64), found_m.astype(np.float64))
             if self._wants_devkit:
                 everywhere.add(_devkit_sums(pair))
             looked_at = (seen_m > MIN_DEPTH_M) & (seen_m < self.max_depth_m)
@@ -140,19 +139,16 @@ def _renamed(figures: Mapping[str, float]) -> dict[str, float]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Pair:
-    """Depth of the same pixels, (N,) float32 metres, and what several figures are made of.
+    """Depth of the same pixels, (N,) float64 metres, and what several figures are made of."""
 
-    Every pixel's numbers are as exact as its depth; sums of many pixels lie within 1e-7 of those of float64.
-    """
-
-    truth_m: Values
-    found_m: Values
-    error_m: Values
-    relative: Values
-    log: Values
+    truth_m: Array
+    found_m: Array
+    error_m: Array
+    relative: Array
+    log: Array
 
     @classmethod
-    def of(cls, truth_m: Values, found_m: Values) -> _Pair:
+    def of(cls, truth_m: Array, found_m: Array) -> _Pair:
         error_m = found_m - truth_m
         return cls(truth_m, found_m, error_m, error_m / truth_m, np.log(found_m) - np.log(truth_m))
 

@@ -1,10 +1,11 @@
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import pytest
 
-from gear.metrics.depth import DepthEvaluator
+from gear.metrics.depth import CROPS, PIECE, DepthEvaluator
 
 
 @dataclass(frozen=True)
@@ -82,3 +83,46 @@ def test_impossible_predictions_are_refused(bad: float) -> None:
         DepthEvaluator().update(sample, prediction)
     with pytest.raises(ValueError, match="shape"):
         DepthEvaluator().update(sample, prediction[:, :2])
+
+
+@pytest.mark.parametrize("crop", ["none", "garg"])
+def test_many_pieces_are_one_picture(crop: Literal["none", "garg"]) -> None:
+    rng = np.random.default_rng(4)
+    truth = np.exp(rng.uniform(0, 6, (300, 3 * PIECE // 280))).astype(np.float32)
+    truth[rng.random(truth.shape) < 0.2] = np.nan
+    truth[:90] = np.nan
+    found = np.nan_to_num(truth, nan=70.0) * rng.uniform(0.6, 1.5, truth.shape).astype(np.float32)
+    result = DepthEvaluator(crop=crop).update(Deep(truth), found)
+    window = np.zeros(truth.shape, bool)
+    top, bottom, left, right = CROPS[crop]
+    rows, columns = truth.shape
+    window[int(top * rows) : int(bottom * rows), int(left * columns) : int(right * columns)] = True
+    known = np.isfinite(truth)
+    t, p = truth[known].astype(float), found[known].astype(float)
+    assert result["rmse_m"] == pytest.approx(np.sqrt(np.mean((t - p) ** 2)), rel=1e-12)
+    assert result["irmse_per_km"] == pytest.approx(1000 * np.sqrt(np.mean((1 / t - 1 / p) ** 2)), rel=1e-9)
+    assert result["silog"] == pytest.approx(100 * np.std(np.log(p) - np.log(t)), rel=1e-9)
+    near = known & window & (truth < 80)
+    t, p = truth[near].astype(float), found[near].astype(float).clip(1e-3, 80)
+    assert result["eigen_d1"] == np.mean(np.maximum(t / p, p / t) < 1.25)
+    assert result["eigen_sq_rel"] == pytest.approx(np.mean((t - p) ** 2 / t), rel=1e-12)
+    assert result["eigen_rmse_log"] == pytest.approx(np.sqrt(np.mean((np.log(t) - np.log(p)) ** 2)), rel=1e-12)
+
+
+@pytest.mark.parametrize("value", [1e-38, 1e-20, 1e20, 3e38])
+def test_absurd_depths_have_finite_figures(value: float) -> None:
+    truth, _ = two_pixels()
+    result = DepthEvaluator().update(truth, np.full_like(truth.depth_m, value))
+    assert all(math.isfinite(figure) for figure in result.values())
+
+
+@pytest.mark.parametrize("kind", [np.float16, np.float64, np.uint8])
+def test_predictions_of_other_types_are_measured_as_they_are_kept(kind: type) -> None:
+    truth, found = two_pixels()
+    expected = DepthEvaluator().update(truth, found.astype(kind).astype(np.float32))
+    assert DepthEvaluator().update(truth, found.astype(kind)) == expected
+
+
+def test_a_scale_alone_is_no_error_of_scale_invariant_figures() -> None:
+    truth = np.linspace(2, 200, 5000, dtype=np.float32)[None]
+    assert DepthEvaluator().update(Deep(truth), truth * np.float32(1.25))["silog"] < 1e-4

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from gear.verbs.collect.run import CollectReport
 from gear.verbs.evaluate.lanes import MOST, lanes, lanes_of
 from gear.verbs.evaluate.run import evaluate
 
-SETTINGS = ("weights=none", "seed=3")
+NAME, SETTINGS = "ddrnet23_slim_depth", ("weights=none", "seed=3")
 
 
 @pytest.fixture(autouse=True)
@@ -63,7 +64,7 @@ def test_one_lane_and_three_give_the_same_bytes(
     for count in (1, 3):
         torch.set_num_threads(count)
         out = tmp_path / str(count)
-        evaluate(pictures, model="ddrnet23_slim_depth", settings=SETTINGS, out=out, resamples=0, batch=batch)
+        evaluate(pictures, model=NAME, settings=SETTINGS, out=out, resamples=0, batch=batch)
         made[count] = files(out)
         assert torch.get_num_threads() == count
         assert met.is_set() == (count > 1)
@@ -86,9 +87,9 @@ def test_a_network_that_fails_stops_the_run_and_it_is_taken_up_again(
     with monkeypatch.context() as patched:
         patched.setattr(Network, "predict_many", failing)
         with pytest.raises(RuntimeError, match="out of luck"):  # our own networks keep their traceback
-            evaluate(pictures, model="ddrnet23_slim_depth", settings=SETTINGS, out=tmp_path, resamples=0)
+            evaluate(pictures, model=NAME, settings=SETTINGS, out=tmp_path, resamples=0)
     assert torch.get_num_threads() == 2
-    (row,) = evaluate(pictures, model="ddrnet23_slim_depth", settings=SETTINGS, out=tmp_path, resamples=0).rows
+    (row,) = evaluate(pictures, model=NAME, settings=SETTINGS, out=tmp_path, resamples=0).rows
     assert row.samples == 5 and 1 <= row.made < 5
     assert len(files(tmp_path)) == 5
 
@@ -113,6 +114,37 @@ def test_only_a_network_on_a_cpu_has_lanes() -> None:
     assert lanes_of(object()) == 1
 
 
+def test_one_batch_gets_every_thread_and_says_its_whole_time(
+    tmp_path: Path, pictures: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    torch.set_num_threads(3)
+    predict, spent = Network.predict_many, []
+
+    def slow(network: Any, samples: Any) -> Any:
+        assert torch.get_num_threads() == 3
+        begun = time.perf_counter()
+        time.sleep(0.2)
+        answers = predict(network, samples)
+        spent.append(time.perf_counter() - begun)
+        return answers
+
+    monkeypatch.setattr(Network, "predict_many", slow)
+    report = evaluate(pictures, model=NAME, settings=SETTINGS, out=tmp_path, resamples=0, batch=5)
+    assert report.rows[0].cost["model_s"] * 5 == pytest.approx(spent[0], rel=0.05)
+
+
+def test_what_progress_raises_stops_the_run(tmp_path: Path, pictures: Path) -> None:
+    def progress(finished: int, total: int) -> None:
+        if finished == 2:
+            raise LookupError("the screen is gone")
+
+    for threads in (1, 2):
+        torch.set_num_threads(threads)
+        with pytest.raises(LookupError, match="the screen is gone"):
+            out = tmp_path / str(threads)
+            evaluate(pictures, model=NAME, settings=SETTINGS, out=out, resamples=0, progress=progress)
+
+
 def test_lanes_share_the_threads_and_print_nothing_on_stdout(capsys: pytest.CaptureFixture[str]) -> None:
     torch.set_num_threads(4)
     with lanes(2) as submit:
@@ -120,6 +152,14 @@ def test_lanes_share_the_threads_and_print_nothing_on_stdout(capsys: pytest.Capt
         submit(print, "aside").result()
     assert torch.get_num_threads() == 4
     assert capsys.readouterr() == ("", "aside\n")
+    meet = threading.Barrier(3)
+
+    def share() -> int:
+        meet.wait(60)
+        return torch.get_num_threads()
+
+    with lanes(3) as submit:
+        assert sorted(future.result() for future in [submit(share) for _ in range(3)]) == [1, 1, 2]
     with lanes(1) as submit:
         assert submit(threading.current_thread).result() is threading.main_thread()
         with pytest.raises(SystemExit):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -30,14 +31,23 @@ def lanes_of(model: Any) -> int:
 
 @contextlib.contextmanager
 def lanes(count: int) -> Iterator[Submit]:
-    """Runs what is submitted: at once and here where there is one lane, else in threads that share torch's cores."""
+    """Runs what is submitted: at once and here where there is one lane, else in threads that share torch's cores.
+
+    What is printed meanwhile goes to stderr, as it does wherever a plugin works.
+    """
     if count == 1:
         yield _at_once
         return
     import torch
 
     threads = torch.get_num_threads()
-    pool = ThreadPoolExecutor(count, initializer=torch.set_num_threads, initargs=(threads // count,))
+    shares = itertools.chain([threads // count + 1] * (threads % count), itertools.repeat(threads // count))
+
+    def begin() -> None:
+        torch.get_num_threads()  # torch sets a thread up at its first look, and would undo what was set before
+        torch.set_num_threads(next(shares))
+
+    pool = ThreadPoolExecutor(count, initializer=begin)
     try:
         with contextlib.redirect_stdout(sys.stderr), pool:  # one redirection for all: threads share stdout
             try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import sys
+import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -86,6 +87,7 @@ class Player:
         self._many = many if callable(many) else None
         is_ours = model.found.owner.package == DISTRIBUTION
         self.lanes = lanes_of(bare) if is_ours and defense is None else 1
+        self._at_work, self._counting = 0, threading.Lock()
 
     def _guarded(
         self, defense: Chosen, bare: Model, clean: Dataset[Any] | None, patched: Dataset[Any] | None
@@ -124,9 +126,12 @@ class Player:
             spent.append(time.perf_counter() - begun if result else 0.0)
             results.append(result)
             shown.append(result.views if result else seen)
-        begun = time.perf_counter()
-        predictions = self._predict(shown, indices)
-        each_s = (time.perf_counter() - begun) / len(indices) / self.lanes
+        begun, beside = time.perf_counter(), self._count(+1)
+        try:
+            predictions = self._predict(shown, indices)
+        finally:
+            beside += 1 + self._count(-1)
+        each_s = (time.perf_counter() - begun) / len(indices) / (beside / 2)
         return [
             Answer(
                 prediction=prediction,
@@ -137,6 +142,12 @@ class Player:
             )
             for prediction, defense_s, result in zip(predictions, spent, results, strict=True)
         ]
+
+    def _count(self, change: int) -> int:
+        """Takes note of who comes and goes; returns how many there are."""
+        with self._counting:
+            self._at_work += change
+            return self._at_work
 
     def _predict(self, shown: Sequence[Views], indices: Sequence[int]) -> list[Any]:
         stage = f"predict on sample {indices[0]}" + (f" to {indices[-1]}" if len(indices) > 1 else "")

@@ -28,12 +28,20 @@ def evaluate_row(
     kept = scorer.kept()
     missing = [index for index in range(len(dataset)) if index not in kept]
     notes: dict[int, Future[Note]] = {}
-    waiting = threading.Semaphore(2 * batch + workers)
+    count = min(player.lanes, -(-len(missing) // batch)) or 1
+    waiting, one_tells, failed = threading.Semaphore(2 * batch + workers), threading.Lock(), list[BaseException]()
 
     def tell(done: Future[Note]) -> None:
         waiting.release()
-        if not done.cancelled() and done.exception() is None:
-            told()
+        error = None if done.cancelled() else done.exception()
+        try:
+            if not done.cancelled() and error is None:
+                with one_tells:
+                    told()
+        except BaseException as problem:  # futures keep what is raised here to themselves
+            error = problem
+        if error is not None:
+            failed.append(error)
 
     def play(indices: Sequence[int], samples: Sequence[Any]) -> dict[int, Future[Note]]:
         answers: Sequence[Answer] = player.play([sample.images for sample in samples], indices)
@@ -47,7 +55,7 @@ def evaluate_row(
     with (
         ThreadPoolExecutor(workers) as readers,
         ThreadPoolExecutor(workers) as scorers,
-        lanes(player.lanes) as submit,
+        lanes(count) as submit,
     ):
         try:
             for index in sorted(kept):
@@ -57,12 +65,15 @@ def evaluate_row(
             played: deque[Future[dict[int, Future[Note]]]] = deque()
             for indices, samples in _batches(dataset, missing, readers, batch, workers):
                 played.append(submit(play, indices, samples))
-                if len(played) > player.lanes:
+                if len(played) > count:
                     notes |= played.popleft().result()
-                _raise_early(notes)
+                if failed:  # a sample that failed stops the run now, not at its end
+                    raise failed[0]
             for one in played:
                 notes |= one.result()
             done = [notes[index].result() for index in range(len(dataset))]
+            if failed:
+                raise failed[0]
         except BaseException:
             readers.shutdown(wait=False, cancel_futures=True)
             scorers.shutdown(wait=False, cancel_futures=True)
@@ -87,10 +98,3 @@ def _batches(
         samples = [future.result() for _, future in chosen]
         read_on(len(chosen))
         yield [index for index, _ in chosen], samples
-
-
-def _raise_early(notes: dict[int, Future[Note]]) -> None:
-    """A sample that failed stops the run now, not at its end."""
-    for future in notes.values():
-        if future.done() and future.exception() is not None:
-            future.result()
