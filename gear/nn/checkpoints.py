@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import pickletools
 import re
 import warnings
 from collections.abc import Mapping
@@ -32,6 +33,14 @@ PLAIN_GLOBALS: list[Any] = [
     *(type(np.dtype(code)) for code in ("f2", "f4", "f8", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", "?")),
 ]
 """NumPy's scalars, such as the best figure so far: numbers, which run nothing."""
+
+STATE_DICT_ALONE = "state dict alone (torch.save(model.state_dict(), FILE))"
+
+LOOKED_AT_BYTES = 1 << 20
+"""Of a pickle, to say what it wants."""
+
+HARMLESS = ("torch", "collections", "numpy")
+"""Packages that checkpoints are made of."""
 
 DEPTH = 3
 """How deep in a checkpoint the network may lie."""
@@ -88,18 +97,48 @@ def _load(path: Path) -> Any:
             warnings.simplefilter("ignore", UserWarning)  # of pickles in newer protocols, which then load or do not
             return torch.load(path, map_location="cpu", weights_only=True)
     except pickle.UnpicklingError as error:
-        wanted = re.search(r"GLOBAL ([\w.]+)", str(error))
+        found = re.search(r"GLOBAL ([\w.]+)", str(error))
+        wanted = found[1] if found else _foreign_global(path)
         if wanted is None:
             # torch's own text suggests to read the file unsafely; only its reason is passed on.
             reason = re.search(r"WeightsUnpickler error: *(\S.*)", str(error))
             why = reason[1] if reason else "it is no plain pickle of tensors"
             raise GearError(f"{path}: not a checkpoint that can be read safely ({why})") from error
         raise GearError(
-            f"{path}: refused, because reading it would run {wanted[1]}; have somebody who trusts the file save its "
-            "state dict alone (torch.save(model.state_dict(), FILE)), or get it as safetensors"
+            f"{path}: refused, because reading it would run {wanted}; have somebody who trusts the file save its "
+            f"{STATE_DICT_ALONE}, or get it as safetensors"
         ) from error
     except (RuntimeError, EOFError, ValueError, OSError, KeyError, AttributeError, IndexError) as error:
+        if "TorchScript" in str(error):
+            raise GearError(
+                f"{path}: refused, because it is a TorchScript archive, which holds code; have somebody who trusts it "
+                f"save its {STATE_DICT_ALONE}"
+            ) from error
         raise GearError(f"{path}: not a checkpoint of PyTorch's ({_first_line(error)})") from error
+
+
+def _foreign_global(path: Path) -> str | None:
+    """The first thing that a bare pickle would import and that is not torch's; nothing of the file is run."""
+    texts: list[str] = []
+    memo: dict[int, str] = {}
+    try:
+        with path.open("rb") as file:
+            for code, argument, _ in pickletools.genops(file.read(LOOKED_AT_BYTES)):
+                if code.name == "GLOBAL":
+                    texts += str(argument).split(" ", 1)
+                elif "UNICODE" in code.name:
+                    texts.append(str(argument))
+                elif code.name == "MEMOIZE":
+                    memo[len(memo)] = texts[-1] if texts else ""
+                elif code.name in ("BINPUT", "LONG_BINPUT"):
+                    memo[int(str(argument))] = texts[-1] if texts else ""
+                elif code.name in ("BINGET", "LONG_BINGET"):
+                    texts.append(memo.get(int(str(argument)), ""))
+                if code.name.endswith("GLOBAL") and len(texts) > 1 and texts[-2].split(".")[0] not in HARMLESS:
+                    return ".".join(texts[-2:])
+    except (ValueError, OSError, IndexError, KeyError):
+        return None
+    return None
 
 
 def _first_line(error: BaseException) -> str:

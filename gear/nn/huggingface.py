@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from safetensors import SafetensorError
 from torch import Tensor, nn
 from torch.nn import functional
 
@@ -246,7 +247,7 @@ def open_folder(options: FolderOptions, auto: str) -> nn.Module:
             with seeded(options.seed):
                 config = transformers.AutoConfig.from_pretrained(folder, local_files_only=True)
                 graph: nn.Module = kind.from_config(config)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, SafetensorError) as error:
         wanted = auto.removeprefix("AutoModelFor")
         raise GearError(f"{folder}: no network for {wanted}: {str(error).splitlines()[0]}") from error
     if options.weights != NONE:

@@ -91,6 +91,15 @@ def read_processor(folder: Path) -> Processor:
         facts: dict[str, Any] = json.loads(path.read_text())
     except json.JSONDecodeError as error:
         raise GearError(f"{path}:{error.lineno}: not JSON: {error.msg}") from error
+    if not isinstance(facts, dict):
+        raise GearError(f"{path}: a mapping is wanted, got {facts!r}")
+    try:
+        return _processor(facts, path)
+    except (TypeError, ValueError) as error:
+        raise GearError(f"{path}: a value is not of the kind that it should be ({error})") from error
+
+
+def _processor(facts: dict[str, Any], path: Path) -> Processor:
     resizes, resample = facts.get("do_resize", True), facts.get("resample", 2)
     if resizes and resample not in RESAMPLING:
         raise GearError(f"{path}: resample {resample} is not supported; nearest (0), bilinear (2) and bicubic (3) are")

@@ -71,12 +71,31 @@ def test_a_file_that_wants_to_run_something_is_refused_by_name(tmp_path: Path, z
     assert not mark.exists()
 
 
+@pytest.mark.parametrize("protocol", range(pickle.HIGHEST_PROTOCOL + 1))
+def test_a_bare_pickle_is_refused_by_what_it_wants(tmp_path: Path, protocol: int) -> None:
+    mark, path = tmp_path / "mark", tmp_path / "a.pkl"
+    for content, name in (({"model": 1, "x": Evil(mark)}, "pathlib|getattr"), (len, "len"), ([len, len], "len")):
+        path.write_bytes(pickle.dumps(content, protocol))
+        with pytest.raises(GearError, match=f"refused, because reading it would run .*({name})"):
+            read_published(path)
+    assert not mark.exists()
+
+
+def test_a_torchscript_archive_is_refused(tmp_path: Path) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        torch.jit.save(torch.jit.trace(nn.Linear(2, 2), torch.zeros(1, 2)), tmp_path / "a.pt")
+    with pytest.raises(GearError, match="TorchScript archive, which holds code") as caught:
+        read_published(tmp_path / "a.pt")
+    assert "weights_only" not in str(caught.value)
+
+
 @pytest.mark.parametrize(
     ("content", "problem"),
     [
         (b"", "not a checkpoint of PyTorch's"),
         (b"hello world" * 10, "not a checkpoint of PyTorch's"),
-        (pickle.dumps(len), "not a checkpoint that can be read safely"),
+        (pickle.dumps({1: 2}, 0), "not a checkpoint"),
         (b"PK\x03\x04 but no archive", "not a checkpoint of PyTorch's"),
     ],
     ids=["empty", "text", "pickle", "broken zip"],

@@ -245,6 +245,23 @@ def test_a_folder_without_the_head_is_refused_rather_than_given_a_random_one(tmp
         semseg.build(FolderOptions(folder=str(folder)))
 
 
+@pytest.mark.parametrize(
+    ("name", "content", "problem"),
+    [
+        ("model.safetensors", b"\x08\0\0\0\0\0\0\0half", "no network for SemanticSegmentation"),
+        ("preprocessor_config.json", b"[1]", "a mapping is wanted"),
+        ("preprocessor_config.json", b'{"size": {"height": "a", "width": 3}}', "not of the kind that it should be"),
+        ("preprocessor_config.json", b'{"image_mean": 3}', "not of the kind that it should be"),
+    ],
+)
+def test_a_damaged_folder_gets_one_line(tmp_path: Path, name: str, content: bytes, problem: str) -> None:
+    folder = saved(segformer, tmp_path)
+    (folder / name).write_bytes(content)
+    with pytest.raises(GearError, match=problem) as caught:
+        semseg.build(FolderOptions(folder=str(folder)))
+    assert "\n" not in str(caught.value)
+
+
 def test_relative_depth_must_be_made_metres_and_metric_depth_must_not(tmp_path: Path) -> None:
     relative = str(saved(depth_anything, tmp_path / "relative"))
     metric = str(saved(lambda: depth_anything("metric"), tmp_path / "metric"))

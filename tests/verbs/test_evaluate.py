@@ -182,6 +182,29 @@ def test_it_is_taken_up_again_and_predicts_nothing_twice(
         evaluate(data, model="odd", out=folder, seed=1)
 
 
+@pytest.mark.parametrize("damage", ["note", "half", "key", "prediction"])
+def test_a_damaged_sample_says_what_to_delete_and_is_made_again(
+    tmp_path: Path, small: Small, install: Install, damage: str
+) -> None:
+    data = small("depth")
+    install(model_spec(lambda _: Oracle([data]), "depth"))
+    out = tmp_path / "out"
+    first = evaluate(data, model="odd", out=out, resamples=0)
+    (row,) = sorted(path for path in out.iterdir() if path.is_dir())
+    note = row / "samples/000001.json"
+    (row / "samples/notes-of-mine.json").write_text("[]")
+    if damage == "prediction":
+        for path in (row / "predictions").rglob("*0001*"):
+            path.write_bytes(b"half")
+    else:
+        note.write_text({"note": "[]", "half": note.read_text()[:40], "key": '{"index": 1}'}[damage])
+    with pytest.raises(DatasetError, match=r"delete .*000001.json and give the command again"):
+        evaluate(data, model="odd", out=out, resamples=0)
+    note.unlink()
+    again = evaluate(data, model="odd", out=out, resamples=0)
+    assert again.rows[0].made == 1 and again.rows[0].figures == first.rows[0].figures
+
+
 def test_the_official_script_finds_the_predictions_and_agrees(
     tmp_path: Path, small: Small, install: Install, monkeypatch: pytest.MonkeyPatch
 ) -> None:

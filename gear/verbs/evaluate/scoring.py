@@ -15,7 +15,7 @@ from gear.dataset.reading import Dataset
 from gear.dataset.sidecar import dump_json, load_json
 from gear.plugins.catalogue import Found, one_line
 from gear.plugins.manager import DISTRIBUTION
-from gear.values.errors import GearError
+from gear.values.errors import DatasetError, GearError
 from gear.values.serial import Json
 from gear.verbs.evaluate.choice import OUTSIDE_PATCH
 from gear.verbs.evaluate.patch_area import mask_figures, patch_masks, widened
@@ -26,6 +26,9 @@ TASK = "task"
 """The task's own evaluator, among its reports."""
 
 PREDICTIONS = "predictions"
+
+KEPT = {"facts", "model_s", "defense_s", "score", "mask"}
+"""Keys of a note that are read again."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -90,7 +93,7 @@ class Scorer:
         folder = inside(self._root, f"{self._folder}/samples")
         if self._keeper is None or not folder.is_dir():
             return set()
-        return {int(path.stem) for path in folder.glob("*.json") if int(path.stem) < len(self._dataset)}
+        return {int(p.stem) for p in folder.glob("*.json") if p.stem.isdecimal() and int(p.stem) < len(self._dataset)}
 
     def first(self, index: int, sample: Sample, answer: Answer) -> Note:
         """Measures an answer and writes it, the note last."""
@@ -114,14 +117,26 @@ class Scorer:
         return note
 
     def again(self, index: int) -> Note:
-        """Measures what a former run predicted."""
+        """Measures what a former run predicted.
+
+        Raises:
+            DatasetError: its note or its prediction cannot be read.
+        """
         assert self._keeper is not None
         path = inside(self._root, f"{self._folder}/samples/{index:06d}.json")
-        there = load_json(path)
         sample = self._dataset[index]
         folder = inside(self._root, f"{self._folder}/{PREDICTIONS}")
-        with explained(path):
-            prediction = self._keeper.decode_prediction(folder, sample, there["facts"], self._dataset.plan.info)
+        try:
+            there = load_json(path)
+            if not isinstance(there, dict) or not there.keys() >= KEPT:
+                raise DatasetError(path, "is no note of a sample")
+            with explained(path):
+                prediction = self._keeper.decode_prediction(folder, sample, there["facts"], self._dataset.plan.info)
+        except DatasetError as error:
+            problem = error.problem.partition(";")[0]
+            raise DatasetError(
+                error.path, f"{problem}; delete {path} and give the command again: the sample is then predicted again"
+            ) from error
         with self._blamed(index):
             figures, parts = self._measure(sample, prediction)
         return Note(

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from safetensors import safe_open
+from safetensors import SafetensorError, safe_open
 from safetensors.torch import save as to_bytes
 from torch import Tensor, nn
 
@@ -86,15 +86,19 @@ def load(
         The progress and the extra tensors.
 
     Raises:
-        DatasetError: what is there was begun with other settings or data.
+        DatasetError: what is there was begun with other settings or data, or is damaged.
     """
     path = root / FILE
     if not path.exists():
         return None
-    with safe_open(str(path), framework="pt") as opened:
-        texts = opened.metadata()
-        tensors = {key: opened.get_tensor(key) for key in opened.keys()}  # noqa: SIM118
-    check_plan(root, json.loads(texts["plan"]), plan)
+    try:
+        with safe_open(str(path), framework="pt") as opened:
+            texts = opened.metadata() or {}
+            tensors = {key: opened.get_tensor(key) for key in opened.keys()}  # noqa: SIM118
+        there, progress = json.loads(texts["plan"]), json.loads(texts["progress"])
+    except (SafetensorError, KeyError, ValueError) as error:
+        raise DatasetError(path, f"is damaged ({error}); delete it to train from the start") from error
+    check_plan(root, there, plan)
     module.load_state_dict(_below(tensors, "module."))
     for key, value in _below(tensors, "mean.").items():
         mean.state[key].copy_(value)
@@ -103,7 +107,7 @@ def load(
         number, _, name = key.partition(".")
         state.setdefault(int(number), {})[name] = value
     optimiser.load_state_dict({**optimiser.state_dict(), "state": state})
-    return Progress.from_json(json.loads(texts["progress"])), _below(tensors, "extra.")
+    return Progress.from_json(progress), _below(tensors, "extra.")
 
 
 def check_plan(root: Path, there: Json, wanted: Json) -> None:

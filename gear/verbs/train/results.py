@@ -20,8 +20,10 @@ from gear.config.reader import read_node
 from gear.dataset.files import sha256, write_whole
 from gear.nn.weights import write as write_weights
 from gear.plugins.catalogue import Found
+from gear.values.errors import DatasetError
 from gear.values.serial import to_json
 from gear.verbs.look import Look
+from gear.verbs.train.checkpoint import FILE as CHECKPOINT
 from gear.verbs.train.checkpoint import Progress
 from gear.verbs.train.config import TrainConfig
 from gear.verbs.train.data import Samples
@@ -137,6 +139,8 @@ def write_history(root: Path, origin: Origin, progress: Progress) -> None:
 def card(root: Path, origin: Origin, progress: Progress) -> str:
     """The model card, in Markdown."""
     best = next(entry for entry in progress.validations if entry["step"] == progress.best_step)
+    if not (root / WEIGHTS).is_file():
+        raise DatasetError(root / WEIGHTS, f"is gone; delete {CHECKPOINT} beside it to train again")
     weights = (root / WEIGHTS).read_bytes()
     config = origin.config
     spec: Any = origin.model.spec

@@ -12,6 +12,7 @@ from gear.contracts.evaluation import Reports
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Task
 from gear.readers import as_pictures, picture_tensor
+from gear.values.errors import GearError
 
 LOSS = "loss"
 
@@ -20,6 +21,9 @@ def validate(model: Any, task: Task[Any, Any], samples: Sequence[Any], views: Se
     """Figures over the samples, with the model in eval mode.
 
     Those of the task's evaluator, those of its reports as `<report>.<figure>`, and `loss`, the mean of summed losses.
+
+    Raises:
+        GearError: a prediction cannot be measured.
     """
     evaluators = {"": task.evaluator()}
     if isinstance(task, Reports):
@@ -33,7 +37,13 @@ def validate(model: Any, task: Task[Any, Any], samples: Sequence[Any], views: Se
             losses.append(float(total(model.forward(batch, [sample]))))
         prediction = model.predict(pictures)
         for evaluator in evaluators.values():
-            evaluator.update(sample, prediction)
+            try:
+                evaluator.update(sample, prediction)
+            except ValueError as error:
+                raise GearError(
+                    f"what the network says of a validation picture cannot be measured ({error}); if it came apart, "
+                    "train again with a lower --lr in another --out"
+                ) from error
     figures = {
         f"{prefix}{name}": value
         for prefix, evaluator in evaluators.items()

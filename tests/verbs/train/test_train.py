@@ -128,6 +128,21 @@ def test_finished_work_is_not_done_again(street: Street, tmp_path: Path, install
         quick(street, tmp_path / "out", batch=3)
 
 
+def test_damaged_work_is_said_in_a_line(street: Street, tmp_path: Path, install: Any) -> None:
+    first = quick(street, tmp_path / "out")
+    checkpoint = tmp_path / "out" / "checkpoint.safetensors"
+    whole = checkpoint.read_bytes()
+    first.weights.unlink()
+    with pytest.raises(DatasetError, match=r"is gone; delete checkpoint.safetensors"):
+        quick(street, tmp_path / "out")
+    for damaged in (whole[: len(whole) // 2], b"", b"\x02\0\0\0\0\0\0\0{}"):
+        checkpoint.write_bytes(damaged)
+        with pytest.raises(DatasetError, match=r"is damaged .*; delete it to train from the start"):
+            quick(street, tmp_path / "out")
+    checkpoint.unlink()
+    assert quick(street, tmp_path / "out").figures == first.figures
+
+
 def test_the_seed_decides(street: Street, tmp_path: Path, install: Any) -> None:
     one, two = quick(street, tmp_path / "a", seed=1), quick(street, tmp_path / "b", seed=2)
     assert one.weights.read_bytes() != two.weights.read_bytes()
@@ -246,10 +261,21 @@ class Overflowing(TinySegmenter):
         return super().loss(raw, targets) * float("nan")
 
 
+class Cropping(TinySegmenter):
+    def predict(self, views: Any) -> Any:
+        return super().predict(views)[1:]
+
+
 def test_a_loss_that_is_no_number_ends_it(street: Street, tmp_path: Path, install: Any) -> None:
     install(replace(tiny_segmenter, build=Overflowing, recipe=Recipe(batch=1, epochs=9)))
     with pytest.raises(GearError, match=r"loss is nan .* lower --lr"):
         quick(street, tmp_path / "out", epochs=30, batch=1)
+
+
+def test_answers_that_cannot_be_measured_end_it(street: Street, tmp_path: Path, install: Any) -> None:
+    install(replace(tiny_segmenter, build=Cropping, recipe=Recipe(batch=1, epochs=9)))
+    with pytest.raises(GearError, match=r"cannot be measured \(prediction must have shape .* lower --lr"):
+        quick(street, tmp_path / "out")
 
 
 def test_the_command(street: Street, tmp_path: Path, install: Any, capsys: pytest.CaptureFixture[str]) -> None:
