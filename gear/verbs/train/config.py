@@ -116,6 +116,10 @@ class TrainConfig(Recipe):
         return Framing(crop_px=self.crop_px, scales=self.scales)
 
 
+FLAGS = {"learning_rate": "lr", "time_budget_s": "time-budget"}
+"""Of the command, where they are not called like the key."""
+
+
 def read_config(recipe: Recipe, flags: Mapping[str, Any], settings: Iterable[str] = ()) -> TrainConfig:
     """A recipe with flags (None where one was not given) and `KEY=VALUE` texts on top.
 
@@ -123,9 +127,9 @@ def read_config(recipe: Recipe, flags: Mapping[str, Any], settings: Iterable[str
         ConfigError: a key is not known, or a value refused.
     """
     base = parse_text(to_yaml(recipe), "recipe")
-    given: dict[str, tuple[Place, Node]] = {
-        key: (Place(f"--{key}"), Scalar(str(value), False, Place(f"--{key}")))
-        for key, value in flags.items()
-        if value is not None
-    }
+    given: dict[str, tuple[Place, Node]] = {}
+    for key, value in flags.items():
+        if value is not None:
+            place = Place(f"--{FLAGS.get(key, key)}")
+            given[key] = (place, Scalar(str(value), False, place))
     return read_node(TrainConfig, with_overrides(merged(base, MappingNode(given, base.place)), settings))

@@ -82,6 +82,8 @@ def test_settings_go_before_flags_and_flags_before_the_recipe() -> None:
     assert (config.batch, config.epochs, config.crop_px) == (3, 9, (64, 96))
     assert config.augmentation.flip == 0
     assert read_config(recipe, {}, ["crop_px=null"]).crop_px is None
+    with pytest.raises(ConfigError, match=r"^--lr: .*expected float, got 'nan'"):
+        read_config(Recipe(), {"learning_rate": math.nan})
     for setting in ("batch=0", "ema=1", "scales=[2, 1]", "learning_rate=0", "warm_up=1", "precision=int8"):
         with pytest.raises(ConfigError, match=setting.split("=")[0]):
             read_config(recipe, {}, [setting])
