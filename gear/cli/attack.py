@@ -8,8 +8,8 @@ EXAMPLE = """examples:
   gear collect --task semseg --scene billboard01 --split train --probes --out data/b01
   gear attack --model ddrnet23_slim --data data/b01 --out patches/b01
   gear attack --model ddrnet23_slim --data data/b01 --set target=sky --set attacked=road --out patches/road_to_sky
-  gear attack --model glpn_b0 --attack carla_gear --steps 5100 --data data/depth --out patches/paper
-  gear attack --model ddrnet23_slim --model bisenet_x39 --data data/b01 --data data/b02 --out patches/universal
+  gear attack --model ddrnet23_slim_depth --attack carla_gear --steps 5100 --data data/depth --out patches/paper
+  gear attack --model ddrnet23_slim --data data/b01 --data data/b02 --data data/b01-sunset --out patches/universal
   gear attack --model ddrnet23_slim --data data/b01 --out patches/b01 --verify data/b01-val
   gear collect --task semseg --scene billboard01 --split test --patch patches/b01 --out data/b01-patched
 
@@ -49,7 +49,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of everything that is drawn (0)")
     parser.add_argument("--allow-test-data", action="store_true", help="optimise on test splits too")
     parser.add_argument("--force", action="store_true", help="start afresh where something else is")
-    parser.add_argument("--json", action="store_true", help="print attack.json")
+    parser.add_argument(
+        "--json", action="store_true", help="print attack.json; with --verify, both as attack and verify"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -57,8 +59,16 @@ def run(args: argparse.Namespace) -> int:
     import json
 
     from gear.cli.progress import ProgressBar
+    from gear.values.errors import GearError
     from gear.verbs.attack.run import attack
+    from gear.verbs.attack.verify import check_held_out, verify
 
+    if args.verify is not None:
+        check_held_out(args.data, args.verify)
+    elif args.town is not None or args.scenes is not None:
+        raise GearError(
+            "--town and --scenes are of the dataset that --verify names; add --verify DIR, or leave them out"
+        )
     with ProgressBar(unit="step") as progress:
         report = attack(
             args.data,
@@ -80,10 +90,9 @@ def run(args: argparse.Namespace) -> int:
             force=args.force,
             progress=progress,
         )
-    print(json.dumps(report.facts, indent=2) if args.json else report.summary())
+    if args.verify is None or not args.json:
+        print(json.dumps(report.facts, indent=2) if args.json else report.summary())
     if args.verify is not None:
-        from gear.verbs.attack.verify import verify
-
         with ProgressBar() as progress:
             reports = verify(
                 args.out,
@@ -94,6 +103,10 @@ def run(args: argparse.Namespace) -> int:
                 scenes=args.scenes,
                 progress=progress,
             )
-        for name, found in reports.items():
-            print(json.dumps({name: found.as_json()}, indent=2) if args.json else found.table())
+        if args.json:
+            verified = {name: found.as_json() for name, found in reports.items()}
+            print(json.dumps({"attack": report.facts, "verify": verified}, indent=2))
+        else:
+            for found in reports.values():
+                print(found.table())
     return 0

@@ -19,6 +19,7 @@ def with_overrides(node: Node, settings: Iterable[str]) -> Node:
         name = f"--set {setting}"
         if not separator or not key.strip():
             raise ConfigError(name, 0, 0, "", "expected KEY=VALUE, such as --set weather.cloudiness=30")
+        text = f"'{text.strip()}'" if text.strip() == "-" else text  # to YAML a minus alone begins a list
         node = with_value(node, tuple(key.strip().split(".")), parse_value(text, name))
     return node
 

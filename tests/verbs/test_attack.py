@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import sys
 import types
@@ -28,6 +29,7 @@ from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_depth, ti
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import DatasetError, GearError, PluginError
 from gear.verbs.attack.run import attack
+from gear.verbs.attack.verify import verify
 from gear.verbs.attack.watch import CHECKPOINT, Recorder
 from gear.verbs.collect.run import collect
 from tests.verbs.conftest import size_settings
@@ -288,12 +290,57 @@ def test_the_rendered_check(small: Small, install: Install, tmp_path: Path, caps
     words += [*(f"--set={text}" for text in SMALL), f"--verify={small(split='val')}"]
     assert main(words) == 2
     assert "say where its town and scene library lie with --town and --scenes" in capsys.readouterr().err
-    assert main([*words, f"--town={TINY_TOWN}", f"--scenes={TINY_SCENES}"]) == 0
+    words += [f"--town={TINY_TOWN}", f"--scenes={TINY_SCENES}"]
+    assert main([*words, "--json"]) == 0
+    both = json.loads(capsys.readouterr().out)
+    assert both["attack"]["steps_done"] == 2 and both["verify"].keys() == {"tiny_segmenter"}
+    assert main(words) == 0
     table = capsys.readouterr().out
     assert "PSNR inside the patch" in table and "rendered / digital" in table
     report = json.loads((tmp_path / "p" / "verify" / "tiny_segmenter" / "gap.json").read_text())
     assert report["median_psnr_db"]["transport"] > 35 > report["median_psnr_db"]["homography"]
     assert (tmp_path / "p" / "patch_0.png").exists(), "the check leaves the patch folder as it was"
+
+
+def test_checks_want_other_samples_than_patches_are_made_on(
+    small: Small, install: Install, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = small()
+    with pytest.raises(GearError, match="--data and --val hold the same samples"):
+        attack(data, model="tiny_segmenter", val=data, out=tmp_path / "x", steps=1, settings=SMALL)
+    words = ["attack", "--model=tiny_segmenter", f"--data={data}", "--steps=1", f"--out={tmp_path / 'x'}"]
+    assert main([*words, f"--verify={data}"]) == 2
+    assert "no patch may be made on what --verify names" in capsys.readouterr().err
+    assert main([*words, f"--verify={tmp_path / 'nowhere'}"]) == 2
+    assert main([*words, f"--town={TINY_TOWN}"]) == 2
+    assert not (tmp_path / "x").exists(), "all of it is said before anything is made"
+    attack(data, model="tiny_segmenter", out=tmp_path / "x", steps=1, settings=SMALL)
+    with pytest.raises(DatasetError, match="was made on; verify it on other samples"):
+        verify(tmp_path / "x", data, models=["tiny_segmenter"], town=TINY_TOWN, scenes=TINY_SCENES)
+
+
+def test_patches_against_other_weights_are_others(small: Small, install: Install, tmp_path: Path) -> None:
+    out = tmp_path / "p"
+    first = attack(small(), model="tiny_segmenter", out=out, steps=2, settings=SMALL)
+
+    def retrained(config: Any) -> TinySegmenter:
+        network = TinySegmenter(config)
+        next(network.parameters()).data.mul_(1.5)
+        return network
+
+    install(dataclasses.replace(tiny_segmenter, build=retrained))
+    with pytest.raises(DatasetError, match="made otherwise"):
+        attack(small(), model="tiny_segmenter", out=out, steps=2, settings=SMALL)
+    (out / "patch_1.png").write_bytes(b"of another attack")
+    (out / "verify").mkdir()
+    second = attack(small(), model="tiny_segmenter", out=out, steps=2, settings=SMALL, force=True)
+    assert second.facts["weights_sha256"] != first.facts["weights_sha256"]
+    assert not (out / "patch_1.png").exists() and not (out / "verify").exists()
+
+
+def test_a_minus_turns_a_loss_round(small: Small, install: Install, tmp_path: Path) -> None:
+    report = attack(small(), model="tiny_segmenter", out=tmp_path, steps=1, settings=[*SMALL, "losses.cross_entropy=-"])
+    assert report.facts["attack"]["options"]["losses"] == {"cross_entropy": "-"}
 
 
 def test_a_look_at_validation_samples_changes_no_check(small: Small, install: Install, tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import importlib.metadata
 import json
+import shutil
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -39,6 +40,10 @@ Progress = Callable[[int, int], None]
 
 TRAINING = ("train", "finetuning", "debug")
 VALIDATION = ("val",)
+
+
+VERIFY = "verify"
+"""Folder of the rendered check, in that of the patches."""
 
 
 def attack(
@@ -102,7 +107,11 @@ def attack(
     config = read_node(found.spec.config, options, "")
     surfaces = len(datasets[0].sidecar(0).record.surfaces)
     check_attack(found, chosen, task, surfaces, queries)
+    if {one.plan.content_key for one in datasets} & {one.plan.content_key for one in validation}:
+        raise GearError("--data and --val hold the same samples; give --val another split")
     product = build(found, options)
+    network = build_model(chosen, guard)
+    before = weights_digest(network)
     plan: Json = {
         "attack": {
             "name": found.spec.name,
@@ -111,6 +120,7 @@ def attack(
             "options": to_plain(config),
         },
         "models": [one.facts() for one in chosen],
+        "weights_sha256": before,
         "defense": None if guard is None else guard.facts(),
         "task": task,
         "data": [_facts(dataset) for dataset in datasets],
@@ -127,10 +137,8 @@ def attack(
     if there is not None:
         return AttackReport(out=root, patches=_read_patches(root), facts=there, made=False)
 
-    network = build_model(chosen, guard)
     device = str(getattr(network, "device", "cpu"))
     seen, held = (Scenes(group, compositor, device) for group in (datasets, validation))
-    before = weights_digest(network)
     # One each: an objective remembers the clean answers of its samples by their numbers.
     make = product.objective if hasattr(product, "objective") else default_objective
     objective, held_objective = make(seen.samples[0]), make(seen.samples[0])
@@ -165,7 +173,6 @@ def attack(
         "gear": importlib.metadata.version("mujoco-gear"),
         "torch": str(torch.__version__),
         **plan,
-        "weights_sha256": before,
         "steps_done": done,
         "seconds": round(seconds, 3),
         "steps_per_s": round(done / seconds, 4) if seconds else None,
@@ -195,8 +202,9 @@ def _begin(root: Path, plan: Json, *, force: bool) -> Json | None:
     """
     finished = root / "attack.json"
     if force:
-        for path in (finished, root / CHECKPOINT):
+        for path in (finished, root / CHECKPOINT, *root.glob("patch_*.png")):
             path.unlink(missing_ok=True)
+        shutil.rmtree(root / VERIFY, ignore_errors=True)  # what the patches that go did in the world
     if finished.exists():
         there = load_json(finished)
         if any(there.get(key) != json.loads(json.dumps(value)) for key, value in plan.items()):

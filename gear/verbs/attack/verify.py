@@ -2,14 +2,33 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
+from gear.dataset.sidecar import load_json
+from gear.opening import open_dataset
+from gear.values.errors import DatasetError, GearError
+from gear.verbs.attack.run import VERIFY
 from gear.verbs.gap.report import GapReport
 from gear.verbs.gap.run import gap
 from gear.verbs.train.data import root_and_split
 
-FOLDER = "verify"
+
+def check_held_out(data: Sequence[str | Path], held: str | Path) -> None:
+    """Whether a dataset is there and none that patches are made on.
+
+    Raises:
+        GearError: it is not.
+    """
+    root, split = root_and_split(held)
+    wanted = open_dataset(root, split).plan.content_key
+    for one in data:
+        with contextlib.suppress(DatasetError):  # a folder of datasets, say: the attack knows what is wrong
+            if open_dataset(*root_and_split(one)).plan.content_key == wanted:
+                raise GearError(
+                    f"{held}: no patch may be made on what --verify names; give it another split than --data"
+                )
 
 
 def verify(
@@ -43,7 +62,10 @@ def verify(
         GearError: anything that the user can put right; its text is one line.
     """
     root, split = root_and_split(data)
-    place, texts, reports = Path(out) / FOLDER, list(settings), {}
+    made_on = {one["content"] for one in load_json(Path(out) / "attack.json")["data"]}
+    if open_dataset(root, split).plan.content_key in made_on:
+        raise DatasetError(root, f"is what {out} was made on; verify it on other samples")
+    place, texts, reports = Path(out) / VERIFY, list(settings), {}
     for number, model in enumerate(models):
         reports[model] = gap(
             root,

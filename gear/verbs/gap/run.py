@@ -79,6 +79,8 @@ def gap(
             raise DatasetError(clean.root, "a twin has to be rendered: say where to with --out DIR")
         collect_twin(clean, patch, Path(out) / "twin", town=town, scenes=scenes)
         twin = Path(out) / "twin"
+    elif town is not None or scenes is not None:
+        raise DatasetError(clean.root, "--town and --scenes say what to render; with --twin nothing is rendered")
     assert twin is not None
     pairs = checked_twin(clean, open_dataset(twin, clean.plan.info.split))
     count = min(len(pairs), samples or len(pairs))
