@@ -338,6 +338,21 @@ def test_patches_against_other_weights_are_others(small: Small, install: Install
     assert not (out / "patch_1.png").exists() and not (out / "verify").exists()
 
 
+def test_queries_that_end_between_two_looks_are_judged_too(small: Small, install: Install, tmp_path: Path) -> None:
+    report = attack(
+        small(), model="tiny_segmenter", val=small(split="val"), out=tmp_path, attack="square", queries=7, every=50,
+        settings=SMALL[:2],
+    )  # fmt: skip
+    (judged,) = report.facts["validation_harm"]
+    assert judged[0] == report.facts["steps_done"] < 50
+
+
+def test_a_control_takes_no_steps(small: Small, install: Install, tmp_path: Path) -> None:
+    report = attack(small(), model="tiny_segmenter", out=tmp_path, attack="control", settings=SMALL[:2])
+    assert (report.facts["steps_done"], report.facts["steps_per_s"], report.facts["masking"]) == (0, None, None)
+    assert report.summary().splitlines() == [f"{tmp_path}: 1 patch after 0 steps"]
+
+
 def test_a_minus_turns_a_loss_round(small: Small, install: Install, tmp_path: Path) -> None:
     report = attack(small(), model="tiny_segmenter", out=tmp_path, steps=1, settings=[*SMALL, "losses.cross_entropy=-"])
     assert report.facts["attack"]["options"]["losses"] == {"cross_entropy": "-"}

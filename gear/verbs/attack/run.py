@@ -19,6 +19,7 @@ from gear.config.dump import to_plain
 from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
 from gear.contracts.attacks import Budget, Patch
+from gear.contracts.specs import AttackSpec
 from gear.dataset.files import clear_scratch, explained, read_bytes, sha256
 from gear.dataset.reading import Dataset
 from gear.dataset.sidecar import dump_json, load_json
@@ -165,17 +166,21 @@ def attack(
     _check_patches(last, surfaces, f"{found.spec.name} ({found.owner.package} {found.owner.version})")
     if weights_digest(network) != before:
         raise PluginError(found.spec.name, "optimise", "the attack changed the model; nothing was written")
+    assert isinstance(found.spec, AttackSpec)
+    is_control = found.spec.is_control
+    done = 0 if is_control else max((len(curve) for curve in recorder.curves.values()), default=steps)
+    if not recorder.stopped:
+        recorder.finish(done, last)
     patches = recorder.best or last
-    done = max((len(curve) for curve in recorder.curves.values()), default=steps)
     seconds = recorder.clock()
-    promised, kept = seen.masking(network, objective, patches)
+    promised, kept = (0.0, 0.0) if is_control else seen.masking(network, objective, patches)
     facts: Json = {
         "gear": importlib.metadata.version("mujoco-gear"),
         "torch": str(torch.__version__),
         **plan,
         "steps_done": done,
         "seconds": round(seconds, 3),
-        "steps_per_s": round(done / seconds, 4) if seconds else None,
+        "steps_per_s": round(done / seconds, 4) if done and seconds else None,
         "stopped": recorder.stopped,
         "gradient": _gradient_facts(recorder.curves.get("gradient", [])),
         "masking": {"promised": promised, "kept": kept} if promised else None,

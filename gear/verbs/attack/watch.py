@@ -106,6 +106,11 @@ class Recorder:
             self.told(done, self.steps)
         return bool(self.stopped)
 
+    def finish(self, done: int, last: tuple[Patch, ...]) -> None:
+        """Judges the last patches where that has not been done: queries may end an attack between two looks."""
+        if self.judge is not None and (not self.judged or self.judged[-1][0] != done):
+            self._validate(done, last)
+
     def save(self, done: int, state: State) -> None:
         """Writes the checkpoint, whole or not at all; nothing for an attack that keeps no state."""
         self._saved = time.monotonic()
