@@ -19,10 +19,13 @@ from safetensors.numpy import load_file
 
 import gear
 from gear.cli.main import main
+from gear.config.overrides import with_overrides
+from gear.config.reader import read_node
 from gear.contracts.attacks import Patch
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import AttackSpec, ModelSpec
 from gear.plugins import build as building
+from gear.plugins.attacks.scene_specific import SceneSpecificConfig
 from gear.plugins.manager import discover
 from gear.testing.compare import difference
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_depth, tiny_segmenter
@@ -353,9 +356,15 @@ def test_a_control_takes_no_steps(small: Small, install: Install, tmp_path: Path
     assert report.summary().splitlines() == [f"{tmp_path}: 1 patch after 0 steps"]
 
 
-def test_a_minus_turns_a_loss_round(small: Small, install: Install, tmp_path: Path) -> None:
-    report = attack(small(), model="tiny_segmenter", out=tmp_path, steps=1, settings=[*SMALL, "losses.cross_entropy=-"])
-    assert report.facts["attack"]["options"]["losses"] == {"cross_entropy": "-"}
+@pytest.mark.parametrize("setting", ["goal=vanish", "direction=farther", "losses.cross_entropy=-"])
+def test_options_of_other_tasks_are_refused(small: Small, install: Install, tmp_path: Path, setting: str) -> None:
+    with pytest.raises(GearError, match=f"option {setting.partition('=')[0].partition('.')[0]} of the attack is for"):
+        attack(small(), model="tiny_segmenter", out=tmp_path / "x", steps=1, settings=[*SMALL, setting])
+
+
+def test_a_minus_is_no_list() -> None:
+    config = read_node(SceneSpecificConfig, with_overrides(building.NO_OPTIONS, ["losses.bbox_regression=-"]), "")
+    assert config.losses == {"bbox_regression": "-"}
 
 
 def test_a_look_at_validation_samples_changes_no_check(small: Small, install: Install, tmp_path: Path) -> None:

@@ -106,11 +106,12 @@ class SceneSpecific:
         """What is made large, by the task that the sample is of.
 
         Raises:
-            GearError: the goal is one of 2D detection, and the sample is of another task.
+            GearError: an option is set that is for samples of another task.
         """
         from gear.attacking.objectives import DepthObjective, LossObjective, SemsegObjective, kind_of
 
         config, kind = self._config, kind_of(sample)
+        self._check(kind)
         if kind == "semseg":
             return SemsegObjective(
                 gamma="dynamic" if config.gamma < 0 else config.gamma,
@@ -122,6 +123,18 @@ class SceneSpecific:
         if config.goal != "harm":
             return self._detection_goal(sample)
         return LossObjective(signs={name: SIGNS[sign] for name, sign in config.losses.items()})
+
+    def _check(self, kind: str) -> None:
+        config = self._config
+        for name, is_set, wanted, whose in (
+            ("target", config.target, "semseg", "semantic segmentation"),
+            ("attacked", config.attacked, "semseg", "semantic segmentation"),
+            ("direction", config.direction != "any", "depth", "depth"),
+            ("goal", config.goal != "harm", "losses", "2D detection"),
+            ("losses", config.losses, "losses", "detectors and stereo networks"),
+        ):
+            if is_set and kind != wanted:
+                raise GearError(f"option {name} of the attack is for {whose}; these are other samples")
 
     def _detection_goal(self, sample: Any) -> Objective:
         from gear.plugins.attacks.detection_goals import DetectionGoal
