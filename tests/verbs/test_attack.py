@@ -113,6 +113,7 @@ def test_a_patch_folder_is_whole(small: Small, install: Install, tmp_path: Path)
     data, out = small(), tmp_path / "patches"
     report = attack(data, model="tiny_segmenter", out=out, steps=4, settings=SMALL)
     assert report.made and [patch.name for patch in report.patches] == ["patch_0"]
+    assert not (out / "gear").exists()
     picture = cv2.imread(str(out / "patch_0.png"))[..., ::-1]
     exact = load_file(out / "patch.safetensors")["patch_0"]
     assert exact.shape == (12, 24, 3) and exact.dtype == np.float32

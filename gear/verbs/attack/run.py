@@ -21,6 +21,7 @@ from gear.config.reader import read_node
 from gear.contracts.attacks import Budget, Patch
 from gear.contracts.specs import AttackSpec
 from gear.dataset.files import clear_scratch, explained, read_bytes, sha256
+from gear.dataset.layout import GEAR
 from gear.dataset.reading import Dataset
 from gear.dataset.sidecar import dump_json, load_json
 from gear.plugins.build import NO_OPTIONS, blamed, build, find
@@ -196,6 +197,8 @@ def attack(
     with contextlib.suppress(FileNotFoundError):
         (root / CHECKPOINT).unlink()
     clear_scratch(root)
+    with contextlib.suppress(OSError):
+        (root / GEAR).rmdir()
     return AttackReport(out=root, patches=tuple(patches), facts=facts, made=True)
 
 
