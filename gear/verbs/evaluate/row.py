@@ -72,12 +72,12 @@ def evaluate_row(
             for one in played:
                 notes |= one.result()
             done = [notes[index].result() for index in range(len(dataset))]
-            if failed:
-                raise failed[0]
         except BaseException:
             readers.shutdown(wait=False, cancel_futures=True)
             scorers.shutdown(wait=False, cancel_futures=True)
             raise
+    if failed:  # looked at again now that every callback has ended: that of the last sample may fail too
+        raise failed[0]
     return done, len(missing)
 
 
