@@ -17,6 +17,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from gear.attacking.borrowed import frozen
+from gear.attacking.group import members_of
 from gear.contracts.models import Model
 from gear.formats import rle
 from gear.formats.cityscapes import IGNORED_TRAIN_ID, LABELS
@@ -192,6 +194,17 @@ class LossObjective:
         losses = model.forward(views, samples)
         signs = {name: self.signs.get(name, 1.0) for name in losses}
         return {name: Term(value=loss, weight=signs[name]) for name, loss in losses.items() if signs[name]}
+
+
+def loss_names(model: Model, sample: Any) -> list[str]:
+    """What a model calls its losses, of a group all members', in the order that they come in."""
+    views = {
+        name: torch.from_numpy(picture.copy()).permute(2, 0, 1)[None].float() / 255
+        for name, picture in sample.images.items()
+    }
+    with torch.no_grad(), frozen(model):
+        found = [name for member in members_of(model).values() for name in member.forward(views, [sample])]
+    return list(dict.fromkeys(found))
 
 
 def train_labels(samples: Sequence[Any], classes: int) -> Tensor:

@@ -11,7 +11,7 @@ import torch
 
 from gear.attacking.group import members_of
 from gear.attacking.objectives import DepthObjective, Objective
-from gear.contracts.attacks import Budget, Compositor, Patch
+from gear.contracts.attacks import Budget, Compositor, Patch, State
 from gear.contracts.models import Model
 from gear.values.errors import GearError
 
@@ -36,6 +36,14 @@ class Oracle:
             raise GearError("an attack without gradients is counted in forward passes: say how many with --queries N")
         self.left = budget.queries
         self._seen: set[int] = set()
+
+    def state(self) -> State:
+        """What was spent and on what, to go on from."""
+        return {"left": np.array(self.left), "paid": np.array(sorted(self._seen), np.int64)}
+
+    def restore(self, state: State) -> None:
+        """Goes on where `state` was taken."""
+        self.left, self._seen = int(state["left"]), {int(index) for index in state["paid"]}
 
     def cost(self, indexes: Sequence[int]) -> int:
         """Queries of one question about these samples."""

@@ -9,6 +9,7 @@ EXAMPLE = """examples:
   gear attack --model ddrnet23_slim --data data/b01 --out patches/b01
   gear attack --model ddrnet23_slim --data data/b01 --set target=sky --set attacked=road --out patches/road_to_sky
   gear attack --model ddrnet23_slim_depth --attack carla_gear --steps 5100 --data data/depth --out patches/paper
+  gear attack --model ddrnet23_slim --attack square --queries 5000 --data data/b01 --out patches/black-box
   gear attack --model ddrnet23_slim --data data/b01 --data data/b02 --data data/b01-sunset --out patches/universal
   gear attack --model ddrnet23_slim --data data/b01 --out patches/b01 --verify data/b01-val
   gear collect --task semseg --scene billboard01 --split test --patch patches/b01 --out data/b01-patched
@@ -28,7 +29,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--out", required=True, metavar="DIR", help="the patch folder")
     parser.add_argument("--attack", default="scene_specific", metavar="NAME", help="attack plugin (scene_specific)")
-    parser.add_argument("--steps", type=int, default=300, metavar="N", help="of optimisation, at most (300)")
+    parser.add_argument(
+        "--steps", type=int, metavar="N", help="of optimisation, at most (300; no end where queries are counted)"
+    )
     parser.add_argument("--queries", type=int, metavar="N", help="forward passes, for attacks without gradients")
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings", help="an option of the attack"
@@ -69,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
         raise GearError(
             "--town and --scenes are of the dataset that --verify names; add --verify DIR, or leave them out"
         )
-    with ProgressBar(unit="step") as progress:
+    with ProgressBar(unit="step" if args.queries is None else "query") as progress:
         report = attack(
             args.data,
             model=args.model,
@@ -99,6 +102,8 @@ def run(args: argparse.Namespace) -> int:
                 args.verify,
                 models=args.model,
                 settings=args.model_set,
+                defense=args.defense,
+                defense_settings=args.defense_set,
                 town=args.town,
                 scenes=args.scenes,
                 progress=progress,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 
 EXAMPLE = """examples:
   gear collect --task stereo3d
@@ -88,6 +89,7 @@ def run(args: argparse.Namespace) -> int:
             workers=args.workers,
             force=args.force,
             progress=progress,
+            noted=lambda text: print(f"gear: note: {text}", file=sys.stderr),
         )
     print(report.summary())
     return 0

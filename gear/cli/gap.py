@@ -9,6 +9,7 @@ EXAMPLE = """examples:
   gear gap data/train --patch patches/ --out gap/
   gear gap data/mine --patch patches/ --town mjcf/mytown.xml --scenes configs/scenes/mytown.yaml --out gap/
   gear gap data/test --twin data/test-patched --model ddrnet23_slim --json
+  gear gap data/test --twin data/test-patched --model ddrnet23_slim --defense jpeg --defense-set quality=50
 
 The dataset must have been collected with --probes. With --patch the twin is rendered into OUT/twin first.
 """
@@ -28,6 +29,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings", help="an option of the model"
     )
+    parser.add_argument("--defense", metavar="NAME", help="a defense plugin that the model stands behind")
+    parser.add_argument("--defense-set", metavar="KEY=VALUE", action="append", default=[], help="an option of it")
     parser.add_argument("--compositor", action="append", dest="compositors", help="transport, homography (both)")
     parser.add_argument("--samples", type=positive, metavar="N", help="the first N samples only")
     parser.add_argument("--out", metavar="DIR", help="folder for gap.json and gap.txt")
@@ -55,6 +58,8 @@ def run(args: argparse.Namespace) -> int:
             split=args.split,
             model=args.model,
             settings=args.settings,
+            defense=args.defense,
+            defense_settings=args.defense_set,
             samples=args.samples,
             town=args.town,
             scenes=args.scenes,

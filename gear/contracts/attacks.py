@@ -82,7 +82,13 @@ class Watch(Protocol):
 
 
 class Attack(Protocol):
-    """Optimises patches against a model."""
+    """Optimises patches against a model.
+
+    Two methods more are used where an attack has them, each of one sample of the data set: `objective(sample)`, a
+    `gear.attacking.objectives.Objective` by which patches are judged on validation samples (untargeted harm to the
+    task otherwise), and `settings(sample)`, a dataclass with the options as they are used, where those depend on the
+    task.
+    """
 
     def optimise(
         self,

@@ -18,6 +18,7 @@ import pytest
 from safetensors.numpy import load_file
 
 import gear
+from gear.attacking.objectives import SemsegObjective
 from gear.cli.main import main
 from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
@@ -32,6 +33,7 @@ from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_depth, ti
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import DatasetError, GearError, PluginError
 from gear.verbs.attack.run import attack
+from gear.verbs.attack.scenes import Scenes
 from gear.verbs.attack.verify import verify
 from gear.verbs.attack.watch import CHECKPOINT, Recorder
 from gear.verbs.collect.run import collect
@@ -92,13 +94,15 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
     """Datasets with probes, which tests share and only read."""
     made: dict[tuple[Any, ...], Path] = {}
 
-    def root(task: str = "semseg", scene: str = "board", split: str = "train", probes: bool = True) -> Path:
-        key = (task, scene, split, probes)
+    def root(
+        task: str = "semseg", scene: str = "board", split: str = "train", probes: bool = True, seed: int | None = None
+    ) -> Path:
+        key = (task, scene, split, probes, seed)
         if key not in made:
-            made[key] = tmp_path_factory.mktemp("data") / f"{task}-{scene}-{split}"
+            made[key] = tmp_path_factory.mktemp("data") / f"{task}-{scene}-{split}-{seed}"
             collect(
                 task, town=TINY_TOWN, scene=scene, split=split, samples=2, renderer="classic", quality="fast",
-                probes=probes, out=made[key], settings=[f"scenes={TINY_SCENES}", *size_settings(task)],
+                probes=probes, seed=seed, out=made[key], settings=[f"scenes={TINY_SCENES}", *size_settings(task)],
             )  # fmt: skip
         return made[key]
 
@@ -301,9 +305,17 @@ def test_the_rendered_check(small: Small, install: Install, tmp_path: Path, caps
     assert main(words) == 0
     table = capsys.readouterr().out
     assert "PSNR inside the patch" in table and "rendered / digital" in table
-    report = json.loads((tmp_path / "p" / "verify" / "tiny_segmenter" / "gap.json").read_text())
+    (written,) = (tmp_path / "p" / "verify").glob("board-val-*/tiny_segmenter/gap.json")
+    report = json.loads(written.read_text())
     assert report["median_psnr_db"]["transport"] > 35 > report["median_psnr_db"]["homography"]
     assert (tmp_path / "p" / "patch_0.png").exists(), "the check leaves the patch folder as it was"
+    other = verify(
+        tmp_path / "p", small(split="val", seed=5), models=["tiny_segmenter"], defense="median", samples=1,
+        town=TINY_TOWN, scenes=f"{TINY_SCENES}:board",
+    )["tiny_segmenter"]  # fmt: skip
+    assert len(list((tmp_path / "p" / "verify").glob("board-val-*"))) == 2, "every dataset has a check of its own"
+    assert other.defense == "median" and "tiny_segmenter behind median" in other.table()
+    assert json.loads(written.read_text()) == report
 
 
 def test_checks_want_other_samples_than_patches_are_made_on(
@@ -349,6 +361,71 @@ def test_queries_that_end_between_two_looks_are_judged_too(small: Small, install
     )  # fmt: skip
     (judged,) = report.facts["validation_harm"]
     assert judged[0] == report.facts["steps_done"] < 50
+
+
+def test_queries_alone_decide_how_long_it_takes(small: Small, install: Install, tmp_path: Path) -> None:
+    seen: list[tuple[int, int]] = []
+    report = attack(
+        small(), model="tiny_segmenter", out=tmp_path / "a", attack="square", queries=401, settings=SMALL[:2],
+        progress=lambda *done: seen.append(done),
+    )  # fmt: skip
+    assert 301 < report.facts["steps_done"] < 401 and report.facts["curves"]["queries_left"][-1] == 0
+    assert seen[0] == (0, 401) and seen[-1] == (401, 401), "progress counts queries"
+    capped = attack(
+        small(), model="tiny_segmenter", out=tmp_path / "b", attack="nes", queries=401, steps=2, settings=SMALL[:2]
+    )
+    assert capped.facts["steps_done"] == 2
+    with pytest.raises(GearError, match="takes steps; --queries is for"):
+        attack(small(), model="tiny_segmenter", out=tmp_path / "c", queries=10)
+
+
+@pytest.mark.parametrize("name", ["square", "nes"])
+def test_a_killed_search_pays_no_query_twice(
+    small: Small, install: Install, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """Depth costs one query more for every sample seen for the first time, also when it goes on."""
+    settings = [*SMALL[:2], "pairs=2"] if name == "nes" else SMALL[:2]
+    facts: dict[str, Any] = {"model": "tiny_depth", "attack": name, "queries": 40, "settings": settings}
+    whole = attack(small("depth"), out=tmp_path / "whole", **facts)
+    monkeypatch.setattr("gear.verbs.attack.watch.SECONDS_BETWEEN", 0.0)
+
+    def killed(done: int, total: int) -> None:
+        if done > 15:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        attack(small("depth"), out=tmp_path / "cut", **facts, progress=killed)
+    resumed = attack(small("depth"), out=tmp_path / "cut", **facts)
+    assert resumed.facts["curves"] == whole.facts["curves"]
+    assert not difference(resumed.patches, whole.patches, "patches")
+
+
+def test_validation_is_by_the_attacks_own_objective(small: Small, install: Install, tmp_path: Path) -> None:
+    data, val = small(), small(split="val")
+    facts: dict[str, Any] = {"model": "tiny_segmenter", "val": val, "steps": 1, "every": 1, "settings": SMALL[:2]}
+    paper = attack(data, out=tmp_path / "paper", attack="carla_gear", **facts)
+    gears = attack(data, out=tmp_path / "gears", **facts)
+    assert paper.facts["settings"]["batch"] == 2 and not paper.facts["settings"]["decay"]
+    assert paper.facts["settings"]["learning_rate"] == pytest.approx([0.1145, 0.112, 0.1125])
+    assert (
+        gears.facts["settings"]["learning_rate"] == 0.06 and gears.facts["attack"]["options"]["learning_rate"] is None
+    )
+    scenes = Scenes([gear.open_dataset(val)], "transport", "cpu")
+    network = TinySegmenter(TinyConfig())
+    for report, gamma in ((paper, 1.0), (gears, "dynamic")):
+        objective = SemsegObjective(gamma=gamma)  # type: ignore[arg-type]
+        wanted = scenes.harm(network, objective, report.patches)
+        assert report.facts["validation_harm"][0][1] == pytest.approx(wanted, rel=1e-4)
+    assert paper.facts["validation_harm"][0][1] != pytest.approx(
+        scenes.harm(network, SemsegObjective(), paper.patches), rel=1e-3
+    )
+
+
+def test_what_is_not_there_to_be_attacked_is_said(small: Small, install: Install, tmp_path: Path) -> None:
+    facts: dict[str, Any] = {"model": "tiny_segmenter", "out": tmp_path / "x", "steps": 1}
+    for name in ("scene_specific", "rp2"):
+        with pytest.raises(GearError, match="none of the 2 pictures shows train; name a class that is seen"):
+            attack(small(), attack=name, settings=[*SMALL, "attacked=train", "target=road"], **facts)
 
 
 def test_a_control_takes_no_steps(small: Small, install: Install, tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from gear.testing.tiny_networks import tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import DatasetError, GearError
 from gear.verbs.collect.run import CollectReport
-from gear.verbs.gap import effect
+from gear.verbs.evaluate import choice
 from gear.verbs.gap.figures import PERFECT_DB, picture_gap
 
 Collect = Callable[..., CollectReport]
@@ -63,7 +63,7 @@ def test_a_models_figures_are_taken_digitally_and_rendered(
     pair: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     owner = SimpleNamespace(package="mujoco-gear", version="0")
-    monkeypatch.setattr(effect, "find", lambda kind, name: SimpleNamespace(spec=tiny_segmenter, owner=owner))
+    monkeypatch.setattr(choice, "find", lambda kind, name: SimpleNamespace(spec=tiny_segmenter, owner=owner))
     clean, twin = pair
     report = gear.gap(clean, twin=twin, model="tiny", compositors=("transport",), samples=1)
     assert set(report.effect) == {"clean", "transport", "rendered"}
@@ -71,6 +71,26 @@ def test_a_models_figures_are_taken_digitally_and_rendered(
     figures: Any = report.as_json()["rendered_share_of_digital_effect"]["transport"]
     assert all(value is None or isinstance(value, float) for value in figures.values())
     assert "rendered / digital" in report.table()
+    (alone,) = report.sample_effects
+    assert alone.index == 0 and alone.change.keys() == {"transport", "rendered"}
+    figure = report.shown_figure()
+    # One sample: its own figure is the whole's, and so is what the patch changes of it.
+    for way, change in alone.change.items():
+        assert alone.clean[figure] == pytest.approx(report.effect["clean"][figure])
+        assert change[figure] == pytest.approx(report.effect[way][figure] - report.effect["clean"][figure])
+    assert f"{change[figure]:+.4f}" in report.table()
+
+
+def test_what_does_not_suit_is_said_before_anything_is_rendered(pair: tuple[Path, Path], tmp_path: Path) -> None:
+    clean, _ = pair
+    places: dict[str, Any] = {"town": TINY_TOWN, "scenes": TINY_SCENES, "out": tmp_path / "gap", "patch": "random"}
+    with pytest.raises(GearError, match="is a semseg dataset"):
+        gear.gap(clean, model="glpdepth", **places)
+    with pytest.raises(GearError, match="name one with --model"):
+        gear.gap(clean, defense="median", **places)
+    with pytest.raises(GearError, match="defense"):
+        gear.gap(clean, model="ddrnet23_slim", settings=["weights=random"], defense="no_such", **places)
+    assert not (tmp_path / "gap").exists()
 
 
 def test_the_command_prints_a_table_or_json(pair: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
@@ -96,7 +116,7 @@ def test_what_cannot_be_compared_is_refused(pair: tuple[Path, Path], tmp_path: P
     collect_small("semseg", tmp_path / "other", patch="random", seed=9)
     with pytest.raises(DatasetError, match="is no twin"):
         gear.gap(clean, twin=tmp_path / "other")
-    with pytest.raises(GearError, match="this is a semseg dataset"):
+    with pytest.raises(GearError, match="is a semseg dataset"):
         gear.gap(clean, twin=twin, model="glpdepth")
 
 

@@ -1,12 +1,15 @@
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
+from gear.config.collection import CollectionConfig
 from gear.values.errors import PatchError
+from gear.verbs.collect.job import resolve
 from gear.verbs.collect.patches import random_patch, resolve_patch
 
 
@@ -52,6 +55,29 @@ def test_a_folder_gives_one_picture_a_surface_in_order(tmp_path: Path, picture: 
     found = resolve_patch(str(tmp_path), surfaces=11, seed=0)
     assert [int(i[0, 0, 0]) for i in found.images] == list(range(11))
     assert len(resolve_patch(str(tmp_path), surfaces=2, seed=0).images) == 2
+
+
+def test_patches_know_where_they_were_made(tmp_path: Path, picture: np.ndarray) -> None:
+    save(tmp_path / "patch_0.png", picture)
+    assert resolve_patch(str(tmp_path), surfaces=1, seed=0).made_for == ()
+    notes = {
+        "data": [{"scene": "town10/billboard02"}, {"scene": "town10/billboard01"}, {"scene": "town10/billboard02"}]
+    }
+    (tmp_path / "attack.json").write_text(json.dumps(notes))
+    made = resolve_patch(str(tmp_path), surfaces=1, seed=0)
+    assert made.made_for == ("town10/billboard01", "town10/billboard02")
+    assert made.digest == resolve_patch(str(tmp_path / "patch_0.png"), surfaces=1, seed=0).digest
+    for odd in ("not json", "[]", '{"data": [1]}'):
+        (tmp_path / "attack.json").write_text(odd)
+        assert resolve_patch(str(tmp_path), surfaces=1, seed=0).made_for == ()
+
+
+def test_a_patch_in_a_foreign_scene_is_mentioned(tmp_path: Path, picture: np.ndarray) -> None:
+    save(tmp_path / "patch_0.png", picture)
+    (tmp_path / "attack.json").write_text(json.dumps({"data": [{"scene": "town10/billboard02"}]}))
+    for scene, note in (("billboard02", ""), ("billboard01", "were made for town10/billboard02; this is town10/billb")):
+        job = resolve(CollectionConfig(task="semseg", scene=scene, patch=str(tmp_path), root=str(tmp_path / "out")))
+        assert (note in job.note) if note else job.note == ""
 
 
 def test_the_original_tools_names_are_read(tmp_path: Path, picture: np.ndarray) -> None:

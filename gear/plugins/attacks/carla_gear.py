@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from gear.contracts.attacks import Budget, Compositor, Patch, Watch
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec
+
+if TYPE_CHECKING:
+    from gear.attacking.objectives import Objective
 
 IMAGENET_STD = (0.229, 0.224, 0.225)
 PaperTask = Literal["semseg", "depth", "detect2d", "stereo3d"]
@@ -61,10 +64,15 @@ class CarlaGear:
         5100 for the others.
         """
         from gear.attacking.loop import Problem, climb, unit_gradients
-        from gear.attacking.objectives import DepthObjective, LossObjective, Objective, SemsegObjective
 
-        task = task_of(dataset[0])
-        settings = Settings(
+        objective, settings = self.objective(dataset[0]), self.settings(dataset[0])
+        problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=settings)
+        return climb(problem, unit_gradients(problem, objective, settings), budget=budget, rng=rng, watch=watch)
+
+    def settings(self, sample: Any) -> Settings:
+        """The paper's, by the task that the sample is of."""
+        task = task_of(sample)
+        return Settings(
             height_px=self._config.height_px,
             width_px=self._config.width_px,
             batch=2 if task == "semseg" else 1,
@@ -73,13 +81,17 @@ class CarlaGear:
             smoothness=0.1,
             appearance=Appearance(noise=0.02, brightness=BRIGHTNESS[task], contrast=0.1, blur_px=6),
         )
-        objective: Objective = LossObjective(signs=dict.fromkeys(STEREO_LOSSES_LEFT_OUT, 0.0))
+
+    def objective(self, sample: Any) -> Objective:
+        """What the paper makes large, by the task that the sample is of."""
+        from gear.attacking.objectives import DepthObjective, LossObjective, SemsegObjective
+
+        task = task_of(sample)
         if task == "semseg":
-            objective = SemsegObjective(gamma=1.0)
-        elif task == "depth":
-            objective = DepthObjective(gamma=0.8)
-        problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=settings)
-        return climb(problem, unit_gradients(problem, objective, settings), budget=budget, rng=rng, watch=watch)
+            return SemsegObjective(gamma=1.0)
+        if task == "depth":
+            return DepthObjective(gamma=0.8)
+        return LossObjective(signs=dict.fromkeys(STEREO_LOSSES_LEFT_OUT, 0.0))
 
 
 LEARNING_RATES: dict[PaperTask, float | tuple[float, float, float]] = {

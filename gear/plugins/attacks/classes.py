@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from gear.formats.cityscapes import LABELS
-from gear.values.errors import FieldError
+from gear.values.errors import FieldError, GearError
 
 LABEL_IDS: Mapping[str, int] = {label.name: label.id for label in LABELS if label.is_evaluated}
 
@@ -21,3 +22,15 @@ def check_classes(attacked: str, target: str) -> None:
             raise FieldError(name, f"must be one of {', '.join(LABEL_IDS)}, got {value!r}")
     if attacked and not target:
         raise FieldError("target", "must say what the attacked class is to become")
+
+
+def check_seen(attacked: str, dataset: Sequence[Any]) -> None:
+    """Whether any sample shows the class, if one is named.
+
+    Raises:
+        GearError: none does, so that there is nothing to push.
+    """
+    if attacked and not any(bool((sample.label_ids == LABEL_IDS[attacked]).any()) for sample in dataset):
+        raise GearError(
+            f"option attacked: none of the {len(dataset)} pictures shows {attacked}; name a class that is seen"
+        )

@@ -80,12 +80,8 @@ class Nes:
         grid = rng.uniform(0, 1, (count, 3, rows, columns)).astype(np.float32)
         seed, done = int(rng.integers(2**62)), 0
         if saved is not None:
-            grid, seed, done, oracle.left = (
-                saved["grid"].copy(),
-                int(saved["seed"]),
-                int(saved["done"]),
-                int(saved["left"]),
-            )
+            grid, seed, done = saved["grid"].copy(), int(saved["seed"]), int(saved["done"])
+            oracle.restore(saved)
         while done < budget.steps:
             draws = derive_rng(seed, "draws", done)
             indexes = batch_of(done, len(dataset), config.batch, seed)
@@ -103,7 +99,7 @@ class Nes:
             grid = np.clip(grid + config.step * np.sign(slope), 0, 1).astype(np.float32)
             done += 1
             figures = {"harm": float(np.mean(seen)), "queries_left": float(oracle.left)}
-            state = {"grid": grid, "seed": np.int64(seed), "done": np.int64(done), "left": np.int64(oracle.left)}
+            state = {"grid": grid, "seed": np.int64(seed), "done": np.int64(done), **oracle.state()}
             made = partial(as_patches, self._spread_out(grid))
             if watch is not None and watch.step(done, figures, made, partial(dict, state)):
                 break

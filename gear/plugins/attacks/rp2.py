@@ -17,7 +17,7 @@ from gear.contracts.attacks import Budget, Compositor, Patch, Watch
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec
-from gear.plugins.attacks.classes import LABEL_IDS, check_classes
+from gear.plugins.attacks.classes import LABEL_IDS, check_classes, check_seen
 from gear.values.errors import FieldError
 
 if TYPE_CHECKING:
@@ -79,6 +79,7 @@ class Rp2:
 
         problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=self._config)
         objective = self.objective(dataset[0])
+        check_seen(self._config.attacked, dataset)
 
         def value(textures: Tensor, seen: Seen) -> Mapping[str, Tensor]:
             return self._value(problem.model, objective, textures, seen)

@@ -18,7 +18,7 @@ from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec
 from gear.formats.coco import CATEGORY_NAMES
-from gear.plugins.attacks.classes import LABEL_IDS, check_classes
+from gear.plugins.attacks.classes import LABEL_IDS, check_classes, check_seen
 from gear.values.errors import FieldError, GearError
 
 if TYPE_CHECKING:
@@ -91,6 +91,8 @@ class SceneSpecific:
         from gear.attacking.loop import Problem, climb, unit_gradients
 
         objective, settings = self.objective(dataset[0]), self.settings(dataset[0])
+        check_seen(self._config.attacked, dataset)
+        self._check_losses(model, dataset[0])
         problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=settings)
         return climb(problem, unit_gradients(problem, objective, settings), budget=budget, rng=rng, watch=watch)
 
@@ -135,6 +137,16 @@ class SceneSpecific:
         ):
             if is_set and kind != wanted:
                 raise GearError(f"option {name} of the attack is for {whose}; these are other samples")
+
+    def _check_losses(self, model: Model, sample: Any) -> None:
+        from gear.attacking.objectives import loss_names
+
+        if not self._config.losses:
+            return
+        known = loss_names(model, sample)
+        for name in self._config.losses:
+            if name not in known:
+                raise GearError(f"option losses.{name}: no loss of the model; it has {', '.join(known)}")
 
     def _detection_goal(self, sample: Any) -> Objective:
         from gear.plugins.attacks.detection_goals import DetectionGoal

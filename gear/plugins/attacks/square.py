@@ -78,7 +78,8 @@ class Square:
         seed, done, best, whole = int(rng.integers(2**62)), 0, -math.inf, oracle.left
         if saved is not None:
             textures, seed, done = saved["textures"].copy(), int(saved["seed"]), int(saved["done"])
-            best, oracle.left = float(saved["best"]), int(saved["left"])
+            best = float(saved["best"])
+            oracle.restore(saved)
         turn = max(1, min(budget.steps, whole) // config.turns)
         while done < budget.steps:
             indexes = batch_of(done // turn, len(dataset), config.batch, seed)
@@ -98,7 +99,7 @@ class Square:
                 "seed": np.int64(seed),
                 "done": np.int64(done),
                 "best": np.float64(best),
-                "left": np.int64(oracle.left),
+                **oracle.state(),
             }
             if watch is not None and watch.step(done, figures, partial(as_patches, textures), partial(dict, state)):
                 break

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from gear.attacking.loop import Seen
+    from gear.attacking.objectives import Objective, Term
 
 SCORES = ("objectness", "cls_logits")
 """Raw outputs of detectors that a sigmoid makes scores of."""
@@ -69,30 +70,51 @@ class Thys:
         from gear.attacking.loop import Problem, climb, one_gradient
 
         problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=self._config)
+        objective = self.objective(dataset[0])
 
         def value(textures: Tensor, seen: Seen) -> Mapping[str, Tensor]:
-            return self._value(problem.model, textures, seen)
+            return self._value(problem.model, objective, textures, seen)
 
         return climb(problem, one_gradient(value), budget=budget, rng=rng, watch=watch)
 
-    def _value(self, model: Model, textures: Tensor, seen: Seen) -> Mapping[str, Tensor]:
+    def objective(self, sample: Any) -> Objective:
+        """The surest detection, to be made less sure."""
+        return SurestObjective()
+
+    def _value(self, model: Model, objective: Objective, textures: Tensor, seen: Seen) -> Mapping[str, Tensor]:
         import torch
 
         from gear.attacking.group import members_of
         from gear.attacking.regularisers import non_printability
 
         config, pixels = self._config, textures[:, 0].numel()
-        sure = torch.stack([surest(member.forward(seen.views)).mean() for member in members_of(model).values()]).sum()
+        harm = [
+            term.value
+            for member in members_of(model).values()
+            for term in objective.terms(member, seen.views, seen.samples, seen.indexes).values()
+        ]
         down = (textures[:, :, 1:] - textures[:, :, :-1]).abs().sum()
         right = (textures[:, :, :, 1:] - textures[:, :, :, :-1]).abs().sum()
         variation = config.variation_weight * (down + right) / textures.numel()
         return {
-            "objectness": -sure,
+            "objectness": torch.stack(harm).sum(),
             "printability": -config.printability_weight
             * torch.stack([non_printability(t) for t in textures]).sum()
             / pixels,
             "variation": -variation.clamp_min(config.least_variation),
         }
+
+
+class SurestObjective:
+    """Grows as the surest detection of every picture becomes less sure."""
+
+    def terms(
+        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
+    ) -> Mapping[str, Term]:
+        """`objectness`."""
+        from gear.attacking.objectives import Term
+
+        return {"objectness": Term(value=-surest(model.forward(views)).mean())}
 
 
 def surest(outputs: Mapping[str, Tensor]) -> Tensor:

@@ -69,7 +69,10 @@ def check_attack(
         assert isinstance(model.found.spec, ModelSpec)
         if spec.needs_gradients and not model.found.spec.has_gradients:
             raise GearError(f"attack {spec.name!r} needs gradients; model {model.found.spec.name!r} gives none")
-    if not spec.needs_gradients and not spec.is_control and queries is None:
+    is_counted = not spec.needs_gradients and not spec.is_control
+    if queries is not None and not is_counted:
+        raise GearError(f"attack {spec.name!r} takes steps; --queries is for attacks without gradients")
+    if is_counted and queries is None:
         raise GearError(f"attack {spec.name!r} is counted in forward passes: say how many with --queries N")
     return spec
 

@@ -40,6 +40,9 @@ from gear.verbs.train.data import open_all, root_and_split
 Progress = Callable[[int, int], None]
 """Called with (steps done, steps in all)."""
 
+STEPS = 300
+"""Where neither steps nor queries are given."""
+
 TRAINING = ("train", "finetuning", "debug")
 VALIDATION = ("val",)
 
@@ -54,7 +57,7 @@ def attack(
     model: str | Sequence[str],
     out: str | Path,
     attack: str = "scene_specific",
-    steps: int = 300,
+    steps: int | None = None,
     queries: int | None = None,
     settings: Iterable[str] = (),
     model_settings: Iterable[str] = (),
@@ -79,7 +82,7 @@ def attack(
         model: name of a model plugin; several are attacked at once.
         out: the patch folder.
         attack: name of an attack plugin.
-        steps: of optimisation, at most.
+        steps: of optimisation, at most; 300 unless given, and without an end where queries are counted.
         queries: forward passes, for attacks without gradients.
         settings: `KEY=VALUE` texts for the attack's options.
         model_settings: for the models' options.
@@ -97,7 +100,7 @@ def attack(
     Raises:
         GearError: anything that the user can put right; its text is one line.
     """
-    if steps < 1 or every < 1 or patience < 0 or (queries is not None and queries < 1):
+    if (steps is not None and steps < 1) or every < 1 or patience < 0 or (queries is not None and queries < 1):
         raise GearError("steps, queries and every must be at least 1, patience at least 0")
     datasets = open_all(_list(data), _task_of(data), names=TRAINING, allow_tests=allow_tests)
     task = datasets[0].plan.task["name"]
@@ -109,6 +112,8 @@ def attack(
     config = read_node(found.spec.config, options, "")
     surfaces = len(datasets[0].sidecar(0).record.surfaces)
     check_attack(found, chosen, task, surfaces, queries)
+    if steps is None:
+        steps = STEPS if queries is None else queries  # a step costs at least one
     if {one.plan.content_key for one in datasets} & {one.plan.content_key for one in validation}:
         raise GearError("--data and --val hold the same samples; give --val another split")
     product = build(found, options)
@@ -143,6 +148,7 @@ def attack(
     seen, held = (Scenes(group, compositor, device) for group in (datasets, validation))
     # One each: an objective remembers the clean answers of its samples by their numbers.
     make = product.objective if hasattr(product, "objective") else default_objective
+    used = product.settings(seen.samples[0]) if hasattr(product, "settings") else config
     objective, held_objective = make(seen.samples[0]), make(seen.samples[0])
     recorder = Recorder(
         root=root,
@@ -151,10 +157,10 @@ def attack(
         judge=(lambda patches: held.harm(network, held_objective, patches)) if validation else None,
         every=every,
         patience=patience,
+        queries=queries,
         told=progress,
     )
-    if progress is not None:
-        progress(0, steps)
+    recorder.tell(0)
     with blamed(found, "optimise"):
         last = product.optimise(
             network,
@@ -179,6 +185,7 @@ def attack(
         "gear": importlib.metadata.version("mujoco-gear"),
         "torch": str(torch.__version__),
         **plan,
+        "settings": to_plain(used),
         "steps_done": done,
         "seconds": round(seconds, 3),
         "steps_per_s": round(done / seconds, 4) if done and seconds else None,

@@ -37,6 +37,8 @@ def verify(
     *,
     models: Sequence[str],
     settings: Iterable[str] = (),
+    defense: str | None = None,
+    defense_settings: Iterable[str] = (),
     samples: int | None = None,
     town: str | Path | None = None,
     scenes: str | Path | None = None,
@@ -44,13 +46,16 @@ def verify(
 ) -> dict[str, GapReport]:
     """Renders a patch folder on a held-out dataset, and compares pictures and effect, digital and rendered.
 
-    Under `out/verify` lie the rendered twin, and for each model `<model>/gap.json` and `gap.txt`.
+    Under `out/verify/<scene>-<split>-<hash>`, one for each dataset, lie for each model `<model>/gap.json` and
+    `gap.txt`, and beside those of the first the rendered twin.
 
     Args:
         out: the patch folder.
         data: root of a dataset of the scene with probes, or `DIR:SPLIT`; not one that the patches were made on.
         models: names of model plugins.
         settings: `KEY=VALUE` texts for their options.
+        defense: a defense plugin that they stand behind.
+        defense_settings: for its options.
         samples: its first so many samples; all unless given.
         town, scenes: files of its town and of that one's scene library, where they are none of gear's own.
         progress: told after every sample.
@@ -63,9 +68,11 @@ def verify(
     """
     root, split = root_and_split(data)
     made_on = {one["content"] for one in load_json(Path(out) / "attack.json")["data"]}
-    if open_dataset(root, split).plan.content_key in made_on:
+    plan = open_dataset(root, split).plan
+    if plan.content_key in made_on:
         raise DatasetError(root, f"is what {out} was made on; verify it on other samples")
-    place, texts, reports = Path(out) / VERIFY, list(settings), {}
+    place = Path(out) / VERIFY / f"{Path(plan.info.scene).name}-{plan.info.split}-{plan.content_key[:6]}"
+    texts, defense_texts, reports = list(settings), list(defense_settings), {}
     for number, model in enumerate(models):
         reports[model] = gap(
             root,
@@ -74,6 +81,8 @@ def verify(
             split=split,
             model=model,
             settings=texts,
+            defense=defense,
+            defense_settings=defense_texts,
             samples=samples,
             town=town,
             scenes=scenes,

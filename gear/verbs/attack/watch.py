@@ -34,7 +34,8 @@ class Recorder:
         judge: harm of patches on samples that the attack does not see; None without validation.
         every: steps between validations.
         patience: validations without a better one until the attack is ended; 0 for never.
-        told: of the steps done and of those in all.
+        queries: of the budget, where they are what is counted.
+        told: of the steps done and of those in all; of queries where they are counted.
         curves: values by figure, one a step.
         judged: (step, harm) of every validation.
         best: the patches that did most harm there.
@@ -48,6 +49,7 @@ class Recorder:
     judge: Judge | None = None
     every: int = 25
     patience: int = 0
+    queries: int | None = None
     told: Told | None = None
     curves: dict[str, list[float]] = field(default_factory=dict)
     judged: list[tuple[int, float]] = field(default_factory=list)
@@ -57,6 +59,7 @@ class Recorder:
 
     def __post_init__(self) -> None:
         self._since = self._saved = time.monotonic()
+        self._queries_left: float | None = None
 
     def resume(self) -> State | None:
         """The checkpoint's state, with curves and validations taken up again.
@@ -82,8 +85,7 @@ class Recorder:
         kept = sorted(name for name in arrays if name.startswith("best/"))
         if kept:
             self.best = tuple(Patch(name=name.removeprefix("best/"), rgb=arrays[name]) for name in kept)
-        if self.told is not None:
-            self.told(int(notes["done"]), self.steps)
+        self.tell(int(notes["done"]), notes.get("queries_left"))
         return {name.removeprefix("state/"): arrays[name] for name in arrays if name.startswith("state/")}
 
     def step(
@@ -99,12 +101,21 @@ class Recorder:
             curve += [float("nan")] * (done - 1 - len(curve)) + [float(value)]
         if self.judge is not None and (done % self.every == 0 or done == self.steps):
             self._validate(done, patches())
+        self._queries_left = figures.get("queries_left")
         now = time.monotonic()
         if now - self._saved >= SECONDS_BETWEEN:
             self.save(done, state())
-        if self.told is not None:
-            self.told(done, self.steps)
+        self.tell(done, self._queries_left)
         return bool(self.stopped)
+
+    def tell(self, done: int, queries_left: float | None = None) -> None:
+        """Says how far it is: in queries where they are counted, in steps otherwise."""
+        if self.told is None:
+            return
+        if self.queries is None:
+            self.told(done, self.steps)
+        else:
+            self.told(0 if queries_left is None else self.queries - int(queries_left), self.queries)
 
     def finish(self, done: int, last: tuple[Patch, ...]) -> None:
         """Judges the last patches where that has not been done: queries may end an attack between two looks."""
@@ -122,6 +133,7 @@ class Recorder:
         notes = {
             "key": self.key,
             "done": done,
+            "queries_left": self._queries_left,
             "curves": self.curves,
             "judged": self.judged,
             "seconds": self.seconds,

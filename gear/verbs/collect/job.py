@@ -64,6 +64,14 @@ class Job:
     renderer: RendererInfo
 
     @property
+    def note(self) -> str:
+        """What the user may not have meant, or nothing: a patch in a foreign scene is an experiment or a slip."""
+        here = f"{self.plan.info.town}/{self.plan.info.scene}"
+        if not self.patch.made_for or here in self.patch.made_for:
+            return ""
+        return f"the patches of {self.patch.source} were made for {', '.join(self.patch.made_for)}; this is {here}"
+
+    @property
     def frames(self) -> int:
         """Samples of the whole split."""
         return self.split.samples * self.split.frames

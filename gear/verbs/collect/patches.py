@@ -6,14 +6,15 @@ import difflib
 import hashlib
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 
+from gear.dataset.sidecar import load_json
 from gear.nn.shipped import shipped_patches
-from gear.values.errors import PatchError
+from gear.values.errors import DatasetError, PatchError
 from gear.values.frames import UInt8Image
 from gear.values.rng import derive_rng
 
@@ -35,6 +36,7 @@ class PatchSet:
         digest: sha256 of the pictures.
         files: what is copied into the dataset, by name.
         source: what the user said.
+        made_for: `town/scene` of the scenes that the pictures were optimised in, where an `attack.json` says so.
     """
 
     label: str
@@ -42,6 +44,7 @@ class PatchSet:
     digest: str
     files: Mapping[str, bytes] = field(default_factory=dict)
     source: str = ""
+    made_for: tuple[str, ...] = ()
 
     def by_surface(self, names: tuple[str, ...]) -> dict[str, UInt8Image]:
         """The picture of each surface that has one."""
@@ -70,7 +73,8 @@ def resolve_patch(patch: str, *, surfaces: int, seed: int) -> PatchSet:
         path = shipped_patches().get(patch, path)
     if path.is_dir():
         found = _numbered(path)
-        return _patch_set(path.resolve().name, tuple(read_patch(p) for p in found[: max(1, surfaces)]), patch)
+        images = tuple(read_patch(p) for p in found[: max(1, surfaces)])
+        return replace(_patch_set(path.resolve().name, images, patch), made_for=_scenes(path / "attack.json"))
     if not path.exists():
         near = difflib.get_close_matches(patch, shipped_patches(), n=1)
         hint = f"; did you mean {near[0]}?" if near else ""
@@ -141,6 +145,14 @@ def _numbered(folder: Path) -> list[Path]:
     if sorted(numbered) != list(range(len(numbered))):
         raise PatchError(folder, f"lacks patch_{next(i for i in range(len(numbered) + 1) if i not in numbered)}.png")
     return [numbered[i] for i in range(len(numbered))]
+
+
+def _scenes(notes: Path) -> tuple[str, ...]:
+    """Where an attack's patches were made; nothing without its notes, or where somebody changed them."""
+    try:
+        return tuple(sorted({str(one["scene"]) for one in load_json(notes)["data"]}))
+    except (DatasetError, KeyError, TypeError):
+        return ()
 
 
 def _patch_set(name: str, images: tuple[UInt8Image, ...], source: str, *, is_hashed: bool = True) -> PatchSet:

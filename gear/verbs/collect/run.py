@@ -22,6 +22,9 @@ from gear.verbs.collect.workers import collect_in_processes
 Progress = Callable[[int, int], None]
 """Called with (samples finished, samples of the split)."""
 
+Noted = Callable[[str], None]
+"""Called, before anything is rendered, with what the user may not have meant."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CollectReport:
@@ -65,6 +68,7 @@ def collect(
     workers: int = 1,
     force: bool = False,
     progress: Progress | None = None,
+    noted: Noted | None = None,
 ) -> CollectReport:
     """Collects one dataset split; takes up again what was begun, never makes a finished sample twice.
 
@@ -78,6 +82,7 @@ def collect(
         workers: processes; they change nothing but time.
         force: replaces a split that was made with another configuration.
         progress: told after every sample.
+        noted: told of patches that were made for another scene.
 
     Raises:
         GearError: anything that the user can put right; its text is one line.
@@ -102,16 +107,25 @@ def collect(
         workers=workers,
         force=force,
         progress=progress,
+        noted=noted,
     )
 
 
 def collect_config(
-    config: CollectionConfig, *, workers: int = 1, force: bool = False, progress: Progress | None = None
+    config: CollectionConfig,
+    *,
+    workers: int = 1,
+    force: bool = False,
+    progress: Progress | None = None,
+    noted: Noted | None = None,
 ) -> CollectReport:
     """As `collect`, from a config object."""
     if workers < 1:
         raise ValueError(f"workers must be at least 1, got {workers}")
-    return run_job(resolve(config), workers=workers, force=force, progress=progress)
+    job = resolve(config)
+    if noted is not None and job.note:
+        noted(job.note)
+    return run_job(job, workers=workers, force=force, progress=progress)
 
 
 def run_job(job: Job, *, workers: int = 1, force: bool = False, progress: Progress | None = None) -> CollectReport:

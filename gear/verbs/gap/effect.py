@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from gear.config.overrides import with_overrides
-from gear.contracts.models import Model
-from gear.contracts.specs import ModelSpec
+from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Evaluator
 from gear.dataset.reading import Dataset
-from gear.plugins.build import NO_OPTIONS, blamed, build, find
-from gear.plugins.catalogue import Found
-from gear.values.errors import GearError
+from gear.plugins.build import find
+from gear.verbs.evaluate.choice import check_defense, check_model, chosen_defense, chosen_model
+from gear.verbs.evaluate.player import Player
 
 CLEAN, RENDERED = "clean", "rendered"
 
@@ -21,44 +20,81 @@ Figures = Mapping[str, float]
 """A task's metric by name."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SampleEffect:
+    """What patches change of one sample's own figures.
+
+    Attributes:
+        index: which sample.
+        clean: its figures without a patch; those that a single sample has.
+        change: what is added to them, by compositor's name and `rendered`; NaN where either figure is.
+    """
+
+    index: int
+    clean: Figures
+    change: Mapping[str, Figures]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Effect:
     """The task's metric on clean, composed and rendered pictures of the same samples.
 
     Attributes:
-        found: the model's plugin.
-        model: what it built.
+        player: the model, behind its defense if there is one.
         evaluators: by `clean`, a compositor's name, or `rendered`.
+        figure: of the task, the one that is to be looked at first.
+        samples: of those taken in so far.
     """
 
-    found: Found
-    model: Model
-    evaluators: Mapping[str, Evaluator[Any, Any]] = field(default_factory=dict)
+    player: Player
+    evaluators: Mapping[str, Evaluator[Any, Any]]
+    figure: str
+    samples: list[SampleEffect] = field(default_factory=list)
 
     @staticmethod
-    def of(model: str, settings: Iterable[str], dataset: Dataset[Any], compositors: tuple[str, ...]) -> Effect:
-        """For a model plugin.
+    def of(
+        model: str,
+        settings: Iterable[str],
+        dataset: Dataset[Any],
+        compositors: tuple[str, ...],
+        *,
+        defense: str | None = None,
+        defense_settings: Iterable[str] = (),
+    ) -> Effect:
+        """For a model plugin, behind a defense plugin that need not learn first, if one is named.
 
         Raises:
-            UnknownNameError: there is no such model.
-            GearError: it is not made for the dataset's task.
+            UnknownNameError: there is no such model or defense.
+            GearError: it is not made for the dataset's task, or the defense does not suit it.
             ConfigError: its options cannot be read.
         """
-        found = find("model", model)
-        spec = found.spec
-        assert isinstance(spec, ModelSpec)
+        chosen = chosen_model(model, settings)
+        check_model(chosen, dataset)
         task = dataset.plan.task["name"]
-        if task not in spec.tasks:
-            raise GearError(f"model {spec.name!r} is for {', '.join(spec.tasks)}; this is a {task} dataset")
-        product = build(found, with_overrides(NO_OPTIONS, settings))
+        guard = None if defense is None else chosen_defense(defense, defense_settings)
+        if guard is not None:
+            check_defense(guard, chosen, task, is_calibrated=False)
+        spec = find("task", task).spec
+        assert isinstance(spec, TaskSpec)
         names = (CLEAN, *compositors, RENDERED)
-        return Effect(found, product, {name: dataset.task.evaluator() for name in names})
+        return Effect(
+            player=Player(chosen, guard),
+            evaluators={name: dataset.task.evaluator() for name in names},
+            figure=spec.figure.rpartition(".")[2],
+        )
 
-    def update(self, clean: Any, shown: Mapping[str, Any]) -> None:
+    def update(self, index: int, clean: Any, shown: Mapping[str, Any]) -> None:
         """Takes in one sample: untouched, and with patches, by compositor and rendered."""
-        with blamed(self.found, "predict"):
-            for name, sample in {CLEAN: clean, **shown}.items():
-                self.evaluators[name].update(sample, self.model.predict(sample.images))
+        alone: dict[str, Figures] = {}
+        for name, sample in {CLEAN: clean, **shown}.items():
+            (answer,) = self.player.play([sample.images], [index])
+            alone[name] = dict(self.evaluators[name].update(sample, answer.prediction))
+        before = alone.pop(CLEAN)
+        change = {
+            name: {figure: figures.get(figure, math.nan) - value for figure, value in before.items()}
+            for name, figures in alone.items()
+        }
+        self.samples.append(SampleEffect(index=index, clean=before, change=change))
 
     def result(self) -> dict[str, Figures]:
         """The metric of each."""

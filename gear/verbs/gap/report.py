@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from gear.values.serial import Json, to_json
-from gear.verbs.gap.effect import CLEAN, RENDERED, Figures
+from gear.verbs.gap.effect import CLEAN, RENDERED, Figures, SampleEffect
 from gear.verbs.gap.figures import PictureGap
 
 UNMOVED = 1e-9
@@ -45,7 +45,10 @@ class GapReport:
         split, patch, renderer, quality: of both.
         samples: pictures that show a patch; others have no gap.
         effect: the task's metric by `clean`, compositor and `rendered`; empty without a model.
+        sample_effects: what patches change of single samples' figures, by sample.
+        figure: the task's own, that a table shows by sample, or another where single samples do not have it.
         model: whose effect it is.
+        defense: that it stands behind.
     """
 
     dataset: str
@@ -56,7 +59,10 @@ class GapReport:
     quality: str
     samples: tuple[SampleGap, ...]
     effect: Mapping[str, Figures]
+    sample_effects: tuple[SampleEffect, ...] = ()
+    figure: str = ""
     model: str | None
+    defense: str | None = None
 
     def median_db(self, compositor: str) -> float:
         """Over all pictures; NaN where none shows a patch."""
@@ -99,13 +105,38 @@ class GapReport:
             lines.append(f"{'median':34}" + "".join(f"{self.median_db(name):16.1f}{'':16}" for name in names))
         else:
             lines.append("no picture shows a patch")
-        return "\n".join(lines + self._effect_lines())
+        return "\n".join(lines + self._sample_lines() + self._effect_lines())
+
+    def shown_figure(self) -> str:
+        """The figure of single samples that the table shows: the task's, or the first that has a value."""
+        known = [name for one in self.sample_effects for name, value in one.clean.items() if math.isfinite(value)]
+        return self.figure if self.figure in known else next(iter(known), "")
+
+    def _sample_lines(self) -> list[str]:
+        """Changes of one figure, sample by sample, and their means over the samples that have it."""
+        figure = self.shown_figure()
+        if not figure:
+            return []
+        columns = list(self.sample_effects[0].change)
+        head = f"{'sample':>6} {figure:>17}" + "".join(f"{name:>14}" for name in columns)
+        lines = ["", head + "   change with the patch"]
+        rows = [
+            (one.index, [one.clean.get(figure, math.nan), *(one.change[name][figure] for name in columns)])
+            for one in self.sample_effects
+            if figure in one.clean
+        ]
+        lines += [f"{index:6} {_numbers(values)}" for index, values in rows]
+        whole = [values for _, values in rows if np.isfinite(values).all()]
+        if whole:
+            lines.append(f"{'mean':>6} {_numbers(np.mean(whole, axis=0).tolist())}")
+        return lines
 
     def _effect_lines(self) -> list[str]:
         if not self.effect:
             return []
         columns = list(self.effect)
-        lines = ["", f"{self.model or '':28}" + "".join(f"{name:>14}" for name in columns) + "   rendered / digital"]
+        whose = f"{self.model or ''}{f' behind {self.defense}' if self.defense else ''}"
+        lines = ["", f"{whose:28}" + "".join(f"{name:>14}" for name in columns) + "   rendered / digital"]
         shares = {name: self.kept(name) for name in self.compositors}
         for figure in self.effect[CLEAN]:
             values = "".join(f"{self.effect[name].get(figure, math.nan):14.4f}" for name in columns)
@@ -121,6 +152,15 @@ class GapReport:
 
 def _cells(gap: PictureGap) -> str:
     return f"{gap.psnr_db:16.1f}{gap.worst:7}{gap.outside_worst:9}"
+
+
+def _numbers(values: Sequence[float]) -> str:
+    """A sample's figure and its changes; `-` where there is none."""
+    first, *changes = [
+        f"{value:{sign}.4f}" if math.isfinite(value) else "-"
+        for sign, value in zip(["", *"+" * (len(values) - 1)], values, strict=True)
+    ]
+    return f"{first:>17}" + "".join(f"{text:>14}" for text in changes)
 
 
 def _finite(value: Json) -> Json:

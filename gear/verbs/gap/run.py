@@ -21,7 +21,7 @@ from gear.opening import open_dataset
 from gear.values.errors import DatasetError
 from gear.values.frames import UInt8Image
 from gear.verbs.collect.patches import read_patch
-from gear.verbs.gap.effect import Effect
+from gear.verbs.gap.effect import RENDERED, Effect
 from gear.verbs.gap.figures import PictureGap, picture_gap, visible_mask
 from gear.verbs.gap.report import GapReport, SampleGap
 from gear.verbs.gap.twin import checked_twin, collect_twin
@@ -44,6 +44,8 @@ def gap(
     split: str | None = None,
     model: str | None = None,
     settings: Iterable[str] = (),
+    defense: str | None = None,
+    defense_settings: Iterable[str] = (),
     compositors: Sequence[str] = ("transport", "homography"),
     samples: int | None = None,
     town: str | Path | None = None,
@@ -60,6 +62,8 @@ def gap(
         split: of the dataset; may be left out where there is only one.
         model: a model plugin for the task's metric; none for pictures alone.
         settings: `KEY=VALUE` texts for the model's options.
+        defense: a defense plugin that the model stands behind; one that need not learn first.
+        defense_settings: for its options.
         compositors: names of compositors.
         samples: so many of the split's first samples; all unless given.
         town, scenes: with `patch`, files of the town and of its scene library, where they are none of gear's own.
@@ -74,19 +78,27 @@ def gap(
     clean = open_dataset(dataset, split)
     if (patch is None) == (twin is None):
         raise DatasetError(clean.root, "say one of: --twin DIR, a rendered twin; or --patch PATCH, to render one")
-    if patch is not None:
-        if out is None:
-            raise DatasetError(clean.root, "a twin has to be rendered: say where to with --out DIR")
-        collect_twin(clean, patch, Path(out) / "twin", town=town, scenes=scenes)
-        twin = Path(out) / "twin"
-    elif town is not None or scenes is not None:
+    if patch is None and (town is not None or scenes is not None):
         raise DatasetError(clean.root, "--town and --scenes say what to render; with --twin nothing is rendered")
-    assert twin is not None
-    pairs = checked_twin(clean, open_dataset(twin, clean.plan.info.split))
+    if patch is not None and out is None:
+        raise DatasetError(clean.root, "a twin has to be rendered: say where to with --out DIR")
+    if defense is not None and model is None:
+        raise DatasetError(clean.root, "a defense guards a model: name one with --model")
+    root = Path(twin) if twin is not None else Path(out or "") / "twin"
+    if patch is None:
+        checked_twin(clean, open_dataset(root, clean.plan.info.split))
+    # What does not suit the dataset is to be found before a twin is rendered.
+    engines = {name: open_compositor(name, clean, rounding=True) for name in compositors}
+    effect = (
+        None
+        if model is None
+        else Effect.of(model, settings, clean, tuple(compositors), defense=defense, defense_settings=defense_settings)
+    )
+    if patch is not None:
+        collect_twin(clean, patch, root, town=town, scenes=scenes)
+    pairs = checked_twin(clean, open_dataset(root, clean.plan.info.split))
     count = min(len(pairs), samples or len(pairs))
     images = shown_patches(pairs.second, len(clean.sidecar(0).record.surfaces))
-    engines = {name: open_compositor(name, clean, rounding=True) for name in compositors}
-    effect = None if model is None else Effect.of(model, settings, clean, tuple(compositors))
     found: list[SampleGap] = []
     if progress is not None:
         progress(0, count)
@@ -103,14 +115,17 @@ def gap(
         quality=str(clean.plan.content["quality"]),
         samples=tuple(found),
         effect={} if effect is None else effect.result(),
+        sample_effects=() if effect is None else tuple(effect.samples),
+        figure="" if effect is None else effect.figure,
         model=model,
+        defense=defense,
     )
     if out is not None:
-        root = Path(out)
-        root.mkdir(parents=True, exist_ok=True)
-        write_whole(root, REPORT, dump_json(report.as_json()))
-        write_whole(root, TABLE, (report.table() + "\n").encode())
-        clear_scratch(root)
+        folder = Path(out)
+        folder.mkdir(parents=True, exist_ok=True)
+        write_whole(folder, REPORT, dump_json(report.as_json()))
+        write_whole(folder, TABLE, (report.table() + "\n").encode())
+        clear_scratch(folder)
     return report
 
 
@@ -146,7 +161,7 @@ def sample_gaps(
         )
     if effect is not None:
         shown = {name: replace(clean, images=pictures) for name, pictures in composed.items()}
-        effect.update(clean, {**shown, "rendered": rendered})
+        effect.update(index, clean, {**shown, RENDERED: rendered})
     return found
 
 

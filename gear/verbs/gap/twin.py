@@ -42,8 +42,8 @@ def collect_twin(
         clean: the split.
         patch: what to show.
         root: of the twin.
-        town, scenes: files of the town and of its scene library, where they were given by path: a dataset holds no
-            paths of the machine that it was made on.
+        town, scenes: files of the town and of its scene library (`FILE`, or `FILE:SCENE`), where they were given by
+            path: a dataset holds no paths of the machine that it was made on.
 
     Raises:
         PatchError: the patch cannot be used.
@@ -57,7 +57,8 @@ def collect_twin(
         "patch": str(patch),
         "root": str(root),
         "probes": False,
-        **({"scenes": str(scenes)} if scenes else {}),
+        # As `gear collect --scene` is given it: the library's file and the scene in it.
+        **({"scenes": str(scenes).removesuffix(f":{clean.plan.info.scene}")} if scenes else {}),
     }
     remedy = f"collect the twin yourself, as the dataset was but with --patch {patch}, and name it with --twin DIR"
     try:

@@ -121,6 +121,15 @@ def test_thys_hides_what_was_surest() -> None:
     assert sure(run(40)) <= min(sure(run(1)), sure(grey)) + 1e-6
 
 
+def test_thys_is_judged_by_what_it_lowers() -> None:
+    dataset, model = AttackContract().dataset(), Detector(TinyConfig())
+    objective = thys.build(ThysConfig(**SMALL)).objective(dataset[0])
+    picture = torch.from_numpy(dataset[0].images["left"].copy()).permute(2, 0, 1)[None].float() / 255
+    with torch.no_grad():
+        (term,) = objective.terms(model, {"left": picture}, [dataset[0]], [0]).values()
+        assert float(term.value) == -float(surest(model.forward({"left": picture})).mean())
+
+
 def test_thys_needs_a_detector() -> None:
     with pytest.raises(GearError, match="needs a detector"):
         surest({"logits": torch.zeros(1, 2, 3, 3)})

@@ -16,7 +16,8 @@ from gear.plugins.attacks.carla_gear import carla_gear
 from gear.plugins.attacks.scene_specific import SceneSpecific, SceneSpecificConfig, scene_specific
 from gear.testing.attack_contract import AttackContract, Counted
 from gear.testing.tiny_compositor import TinyCompositor
-from gear.values.errors import FieldError
+from gear.testing.tiny_networks import TinyConfig, TinySegmenter
+from gear.values.errors import FieldError, GearError
 
 SMALL = {"height_px": 16, "width_px": 32}
 
@@ -101,6 +102,29 @@ def test_steps_are_as_large_as_the_task_wants(task: str, rate: float) -> None:
     assert SceneSpecific(SceneSpecificConfig()).settings(sample).learning_rate == rate
     assert SceneSpecific(SceneSpecificConfig(learning_rate=0.1)).settings(sample).learning_rate == 0.1
     assert Settings(learning_rate=None).rate == Settings().rate == 0.06
+
+
+class WithLosses(TinySegmenter):
+    """A tiny network with two losses."""
+
+    def forward(self, views: Any, targets: Any | None = None) -> Any:
+        given = super().forward(views)
+        mean = given["logits"].mean()
+        return given if targets is None else {"one": mean, "two": -mean}
+
+
+def test_names_of_losses_are_those_of_the_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gear.attacking.objectives.kind_of", lambda sample: "losses")
+
+    class Contract(AttackContract):
+        spec = scene_specific
+        options: ClassVar[Mapping[str, Any]] = {**SMALL, "losses": {"two": "0"}}
+
+    contract = Contract()
+    assert len(contract.attack(WithLosses(TinyConfig()), contract.dataset(), steps=1)) == 1
+    Contract.options = {**SMALL, "losses": {"tow": "0"}}
+    with pytest.raises(GearError, match=r"losses.tow: no loss of the model; it has one, two"):
+        contract.attack(WithLosses(TinyConfig()), contract.dataset(), steps=1)
 
 
 def test_a_class_becomes_another() -> None:
