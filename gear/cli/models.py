@@ -27,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Lists the installed networks."""
+    from gear.nn.shipped import shipped_networks
     from gear.verbs.models import list_models
 
     models = list_models(args.task)
@@ -37,6 +38,8 @@ def run(args: argparse.Namespace) -> int:
         show(model)
     if not models:
         print(f"no installed model does {args.task}")
+    if not shipped_networks():
+        print("no weights are installed; mujoco-gear-weights has those of one network for every task of gear's")
     return 0
 
 
@@ -57,7 +60,7 @@ def show(model: ModelFacts) -> None:
 def shipped_line(weights: ShippedWeights | None) -> str:
     """The reference weights in one line."""
     if weights is None:
-        return "none here (mujoco-gear-weights has reference weights)"
+        return "none"
     facts = weights.to_json()
     metrics = facts["metrics"] if isinstance(facts["metrics"], dict) else {}
     figures = ", ".join(f"{key} {value:.3g}" for key, value in metrics.items() if isinstance(value, (int, float)))

@@ -95,9 +95,11 @@ def resolve(weights: str, name: str) -> Path | None:
         return Path(weights)
     path = shipped(name)
     if path is None:
+        others = shipped_networks()
+        remedy = f"those installed are of {', '.join(others)};" if others else "install mujoco-gear-weights, or"
         raise GearError(
-            f"{name} has no weights here: install mujoco-gear-weights, or say weights=FILE.safetensors "
-            "(gear weights convert makes one of a published file), or weights=none for random ones"
+            f"{name} has no weights here: {remedy} say weights=FILE.safetensors "
+            "(gear weights convert makes one of a published file, gear train another), or weights=none for random ones"
         )
     return path
 
@@ -119,6 +121,11 @@ def shipped(name: str) -> Path | None:
         if path.is_file():
             return path
     return None
+
+
+def shipped_networks() -> list[str]:
+    """Names of the networks that installed packages have reference weights of."""
+    return sorted({path.stem for folder in shipped_folders() for path in (folder / "models").glob("*.safetensors")})
 
 
 @functools.cache

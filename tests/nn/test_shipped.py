@@ -84,7 +84,10 @@ def test_what_weights_mean(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(shipped, "shipped_folders", lambda: (tmp_path,))
     assert shipped.resolve("none", "net") is None
     assert shipped.resolve("some/file.safetensors", "net") == Path("some/file.safetensors")
-    with pytest.raises(GearError, match="net has no weights here: install mujoco-gear-weights"):
+    with pytest.raises(GearError, match="net has no weights here: install mujoco-gear-weights, or say weights="):
+        shipped.resolve("shipped", "net")
+    write(tmp_path / "models" / "other.safetensors", {"a": torch.zeros(2)}, {})
+    with pytest.raises(GearError, match="net has no weights here: those installed are of other; say weights="):
         shipped.resolve("shipped", "net")
 
 

@@ -43,7 +43,7 @@ def test_networks_are_listed_with_what_is_published(packages: Path, capsys: pyte
     assert all("semseg" in entry["tasks"] for entry in listed.values())
     assert main(["models", "--task", "semseg"]) == 0
     text = capsys.readouterr().out
-    assert "5.7 M parameters" in text and "none here" in text
+    assert "5.7 M parameters" in text and "shipped: none" in text
     assert main(["models", "--task", "semsag"]) == 2
     assert "did you mean semseg?" in capsys.readouterr().err
 
