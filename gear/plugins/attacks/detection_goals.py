@@ -24,24 +24,27 @@ Goal = Literal["vanish", "appear"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DetectionGoal:
-    """An objective for `detect2d`.
+    """An objective for samples with objects: both goals in `detect2d`, vanishing in `stereo3d`.
 
     Attributes:
         goal: nothing is to be seen any more, or the patch is to be seen as an object.
         category_id: COCO's, of what appears.
+        left_out: losses that do not count.
     """
 
     goal: Goal
     category_id: int = 0
+    left_out: frozenset[str] = frozenset()
 
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> Mapping[str, Term]:
         """The losses against the rewritten labels, each to be made small."""
         wanted = [self.rewritten(sample) for sample in samples]
-        return {name: Term(value=-loss) for name, loss in model.forward(views, wanted).items()}
+        losses = model.forward(views, wanted)
+        return {name: Term(value=-loss) for name, loss in losses.items() if name not in self.left_out}
 
-    def rewritten(self, sample: Detect2dSample) -> Detect2dSample:
+    def rewritten(self, sample: Any) -> Any:
         """The sample as the detector is to see it: empty, or with one object a visible surface."""
         objects = self._on_surfaces(sample) if self.goal == "appear" else ()
         return dataclasses.replace(sample, objects=objects)

@@ -38,10 +38,12 @@ class SceneSpecificConfig(Settings):
         attacked, target: semantic segmentation: Cityscapes classes; pixels of `attacked` (all where empty) are pushed
             to `target`; untargeted where `target` is empty.
         direction: depth: push it anywhere, farther or nearer.
-        goal: 2D detection: any harm, or make everything vanish, or make an object appear on the patch.
+        goal: any harm, or make everything vanish (detectors and stereo networks), or make an object appear on the
+            patch (2D detection).
         appears: COCO category of what appears.
         losses: detectors and stereo networks: sign of a loss by name, `+` and `-` to make it large or small, e.g.
-            `bbox_regression=-`; names that are left out are made large.
+            `bbox_regression=-`, 0 to leave it out; names that are not said are made large. With another `goal` than
+            harm every loss is made small, and can only be left out.
     """
 
     learning_rate: float | tuple[float, float, float] | None = None
@@ -132,7 +134,7 @@ class SceneSpecific:
             ("target", config.target, "semseg", "semantic segmentation"),
             ("attacked", config.attacked, "semseg", "semantic segmentation"),
             ("direction", config.direction != "any", "depth", "depth"),
-            ("goal", config.goal != "harm", "losses", "2D detection"),
+            ("goal", config.goal != "harm", "losses", "detectors and stereo networks"),
             ("losses", config.losses, "losses", "detectors and stereo networks"),
         ):
             if is_set and kind != wanted:
@@ -153,9 +155,16 @@ class SceneSpecific:
         from gear.plugins.tasks.detect2d import Detect2dSample
 
         config = self._config
-        if config.goal == "harm" or not isinstance(sample, Detect2dSample):
-            raise GearError(f"goal={config.goal} is for 2D detection; these are other samples")
-        return DetectionGoal(goal=config.goal, category_id=CATEGORY_IDS[config.appears])
+        assert config.goal != "harm"
+        if config.goal == "appear" and not isinstance(sample, Detect2dSample):
+            raise GearError("goal=appear is for 2D detection; these are other samples")
+        if config.goal == "vanish" and not hasattr(sample, "objects"):
+            raise GearError("goal=vanish is for samples with objects; these have none")
+        for name, sign in config.losses.items():
+            if sign != "0":
+                raise GearError(f"option losses.{name}: goal={config.goal} makes losses small; 0 leaves one out")
+        category_id = CATEGORY_IDS[config.appears] if config.goal == "appear" else 0
+        return DetectionGoal(goal=config.goal, category_id=category_id, left_out=frozenset(config.losses))
 
 
 scene_specific: AttackSpec[SceneSpecificConfig] = AttackSpec(

@@ -66,5 +66,18 @@ def test_goals_are_options_of_the_scene_specific_attack() -> None:
     assert chosen == DetectionGoal(goal="appear", category_id=3)
     with pytest.raises(FieldError, match="COCO"):
         SceneSpecificConfig(goal="appear", appears="unicorn")
+    stereo = type("Stereo", (), {"images": {}, "objects": ()})()
     with pytest.raises(GearError, match="2D detection"):
-        SceneSpecific(SceneSpecificConfig(goal="vanish")).objective(type("Stereo", (), {"images": {}})())
+        SceneSpecific(SceneSpecificConfig(goal="appear")).objective(stereo)
+    assert SceneSpecific(SceneSpecificConfig(goal="vanish")).objective(stereo) == DetectionGoal(goal="vanish")
+    with pytest.raises(GearError, match="samples with objects"):
+        SceneSpecific(SceneSpecificConfig(goal="vanish")).objective(type("Odd", (), {"images": {}})())
+
+
+def test_losses_can_be_left_out_of_a_goal() -> None:
+    options = SceneSpecificConfig(goal="vanish", losses={"bbox_regression": "0"})
+    objective = SceneSpecific(options).objective(sample())
+    terms = objective.terms(Listening(), {"left": torch.ones(1, 3, 4, 4)}, [sample()], [0])
+    assert terms.keys() == {"classification"}
+    with pytest.raises(GearError, match=r"losses\.classification: goal=vanish makes losses small"):
+        SceneSpecific(SceneSpecificConfig(goal="vanish", losses={"classification": "-"})).objective(sample())
