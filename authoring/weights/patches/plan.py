@@ -28,6 +28,9 @@ FIRST_SEEDS = {"train": 40_000, "val": 41_000, "test": 42_000}
 """Of the first scene's splits; every further scene has the next ones."""
 
 SAMPLES = {"train": 24, "val": 4, "test": 24}
+SAMPLES_OF = {"stereo3d": {"train": 48, "val": 8, "test": 96}}
+"""Of tasks whose pictures say less each: a street has few cars, and many pictures only some that a patch can reach."""
+
 STEPS = 120
 STEPS_OF = {"stereo3d": 300}
 """Of tasks whose networks need more to give in."""
@@ -189,7 +192,9 @@ def plans(
     if steps < 1 or (samples is not None and samples < 1):
         raise GearError("samples and steps must be at least 1")
     chosen = (*TRAINING_OPTIONS[task], *PICTURES.get(task, ()), *settings)
-    counts = SAMPLES if samples is None else {"train": samples, "val": max(1, samples // 6), "test": samples}
+    counts = SAMPLES_OF.get(task, SAMPLES)
+    if samples is not None:
+        counts = {"train": samples, "val": max(1, samples // 6), "test": samples}
     known = [(town, scene) for town in dict.fromkeys((*TOWNS, *towns)) for scene in patched_scenes(town)]
     here = [(number, place) for number, place in enumerate(known) if place[0] in towns]
     for scene in scenes:
