@@ -9,7 +9,6 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from isal import isal_zlib
 
 from gear.values.scene import Weather
 from gear.values.serial import from_json, to_json
@@ -19,6 +18,7 @@ from gear.world.classes import GeomClasses
 from gear.world.compose import Slot, compose, slots_of
 from gear.world.instances import FaceName
 from gear.world.memory import keep_no_assets, release_memory
+from gear.world.mjb import read_model, write_model
 from gear.world.models import placement_model, render_model
 from gear.world.pool import plan_pool
 from gear.world.scene_spec import SceneSpec
@@ -46,14 +46,14 @@ class Compiled:
 
     def save(self, folder: Path) -> None:
         """Writes it into an empty folder."""
-        mujoco.mj_saveModel(self.model, str(folder / _SEEN), None)
-        mujoco.mj_saveModel(self.placement_model, str(folder / _FELT), None)
+        crc32 = {_SEEN: write_model(self.model, folder / _SEEN)}
+        crc32[_FELT] = write_model(self.placement_model, folder / _FELT)
         facts = {
             "faces": to_json(self.faces),
             "label_code": self.classes.label_code.tolist(),
             "is_paint": self.classes.is_paint.tolist(),
             "is_face": self.classes.is_face.tolist(),
-            "crc32": {name: _crc32(folder / name) for name in (_SEEN, _FELT)},
+            "crc32": crc32,
         }
         (folder / _FACTS).write_text(json.dumps(facts), encoding="utf-8")
 
@@ -66,9 +66,7 @@ class Compiled:
             ValueError, KeyError, GearError: something else lies there, or half of it.
         """
         facts = json.loads((folder / _FACTS).read_text(encoding="utf-8"))
-        for name in (_SEEN, _FELT):
-            if _crc32(folder / name) != facts["crc32"][name]:
-                raise ValueError(f"{folder / name} is not what was written there")
+        model, felt = (read_model(folder / name, facts["crc32"][name]) for name in (_SEEN, _FELT))
         classes = GeomClasses(
             label_code=np.array(facts["label_code"], np.uint8),
             is_paint=np.array(facts["is_paint"], np.bool_),
@@ -77,8 +75,8 @@ class Compiled:
         for array in (classes.label_code, classes.is_paint, classes.is_face):
             array.setflags(write=False)
         return Compiled(
-            model=mujoco.MjModel.from_binary_path(str(folder / _SEEN)),
-            placement_model=mujoco.MjModel.from_binary_path(str(folder / _FELT)),
+            model=model,
+            placement_model=felt,
             classes=classes,
             slots=slots_of(plan_pool(scene, library), carrier_of(scene, library)),
             faces=from_json(tuple[FaceName, ...], facts["faces"]),
@@ -119,12 +117,3 @@ def carrier_of(scene: SceneSpec, library: AssetLibrary) -> ActorFacts | None:
         return None
     library.path("vehicle", scene.truck.asset)
     return library.vehicles[scene.truck.asset]
-
-
-def _crc32(path: Path) -> int:
-    """Of a file's content: a power cut may leave one of the right size."""
-    value = 0
-    with path.open("rb") as file:
-        while chunk := file.read(1 << 20):
-            value = isal_zlib.crc32(chunk, value)
-    return value
