@@ -96,10 +96,11 @@ def compose(
         text, statics = split_town(library.town)
         root = load_mjcf(library.town, text)
         slots = slots_of(pool, carrier)
-        faces = _fill(root, library, statics, boards, slots)
+        parts = AssetParts(root)
+        faces = _fill(root, parts, library, statics, boards, slots)
     apply_weather(root, weather, lighting.result(), statics.worn)
     return Composition(
-        xml=statics.put_into(root.to_xml_string()),
+        xml=statics.put_into(parts.put_defaults_into(root.to_xml_string())),
         assets=root.get_assets(),
         town=library.town,
         slots=slots,
@@ -108,10 +109,14 @@ def compose(
 
 
 def _fill(
-    root: mjcf.RootElement, library: AssetLibrary, statics: Statics, boards: Sequence[BoardSpec], slots: Iterable[Slot]
+    root: mjcf.RootElement,
+    parts: AssetParts,
+    library: AssetLibrary,
+    statics: Statics,
+    boards: Sequence[BoardSpec],
+    slots: Iterable[Slot],
 ) -> tuple[FaceName, ...]:
     """Puts boards and actors into the town's tree."""
-    parts = AssetParts(root)
     faces: list[FaceName] = []
     for index, board in enumerate(boards):
         path = library.path("surface", board.asset)

@@ -9,7 +9,7 @@ from typing import Any
 from gear.values.errors import TownError
 from gear.world.faces import FACE_SIZE_PX
 from gear.world.quiet_mjcf import mjcf
-from gear.world.statics import UNNAMED
+from gear.world.statics import UNNAMED, split_asset
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,6 +58,11 @@ def load_mjcf(path: Path, text: str | None = None) -> mjcf.RootElement:
     return root
 
 
+def class_name(dclass: Any) -> str:
+    """Of an element's default class: dm_control knows it, or has only its name, or there is none."""
+    return dclass if isinstance(dclass, str) else "" if dclass is None else str(dclass.dclass)
+
+
 class AssetParts:
     """The assets that a composition has taken in, each file once."""
 
@@ -65,6 +70,7 @@ class AssetParts:
         self._root = root
         self._models: dict[Path, mjcf.RootElement] = {}
         self._textures: dict[tuple[str, ...], Any] = {}
+        self._defaults: dict[str, str] = {}
 
     def add_instance(self, path: Path, body: Any) -> None:
         """Fills `body` with an instance of the asset that shares everything."""
@@ -79,7 +85,7 @@ class AssetParts:
         """
         self.add_instance(path, body)
         model = self._model(path)
-        faces = [g for g in model.find_all("geom") if g.dclass is not None and g.dclass.dclass.endswith(".face")]
+        faces = [geom for geom in model.find_all("geom") if class_name(geom.dclass).endswith(".face")]
         if len(faces) != 1:
             raise TownError(path, f"must have one geom of a class ending in `.face` to bear a patch, has {len(faces)}")
         face = faces[0]
@@ -102,10 +108,21 @@ class AssetParts:
             for child in list(model.worldbody.all_children()):
                 child.remove()
 
+    def put_defaults_into(self, xml: str) -> str:
+        """MJCF with the default classes that went around dm_control, where it left room for them."""
+        for name, defaults in self._defaults.items():
+            before, room, after = xml.partition(f'<default class="{name}/"/>')
+            assert room  # dm_control writes one for every file
+            xml = before + defaults + after
+        return xml
+
     def _model(self, path: Path) -> mjcf.RootElement:
         """The asset's file, attached when first asked for."""
         if path not in self._models:
-            model = load_mjcf(path)
+            text, defaults = split_asset(path)
+            model = load_mjcf(path, text)
+            if text is not None:
+                self._defaults[model.model] = defaults
             try:
                 self._root.attach(model)
             except ValueError as error:
@@ -144,7 +161,7 @@ class AssetParts:
             height=height,
             rgb1=(1, 1, 1),
         )
-        attributes = material.get_attributes()
+        attributes = _attributes_outside(material)
         attributes.update(name=name, texture=texture, rgba=(1.0, 1.0, 1.0, 1.0))
         own = self._root.asset.add("material", **attributes)
         for layer in material.all_children():
@@ -155,8 +172,17 @@ class AssetParts:
         return own
 
 
+def _attributes_outside(element: Any) -> dict[str, Any]:
+    """Attributes that mean the same in the tree that the element's file is attached to."""
+    attributes: dict[str, Any] = element.get_attributes()
+    for reference in ("dclass", "childclass"):
+        if isinstance(attributes.get(reference), str):
+            attributes[reference] = f"{element.root.model}/{attributes[reference]}"
+    return attributes
+
+
 def _copy(element: Any, parent: Any, prefix: str) -> None:
-    attributes = element.get_attributes()
+    attributes = _attributes_outside(element)
     attributes["name"] = f"{prefix}_{element.name}"
     copy = parent.add(element.tag, **attributes)
     if element.tag == "body":

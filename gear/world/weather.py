@@ -13,6 +13,7 @@ from gear.config.reader import read_node
 from gear.values.frames import UInt8Image
 from gear.values.resources import data_dir
 from gear.values.scene import Weather
+from gear.world.instances import class_name
 from gear.world.light import FACE_ORDER, FILAMENT_LUX, Floats, Lighting, encode_srgb, lighting_of
 from gear.world.quiet_mjcf import mjcf
 
@@ -158,11 +159,7 @@ def _open_materials(root: mjcf.RootElement, worn: Sequence[Worn]) -> list[Any]:
         for name, own in worn
         if _is_open(name)
     ]
-    pairs += [
-        (geom.dclass, geom.material)
-        for geom in root.find_all("geom")
-        if geom.dclass is not None and _is_open(geom.dclass.dclass)
-    ]
+    pairs += [(geom.dclass, geom.material) for geom in root.find_all("geom") if _is_open(class_name(geom.dclass))]
     found = (own if own is not None else _inherited_material(default) for default, own in pairs)
     return list({material.full_identifier: material for material in found if material is not None}.values())
 
@@ -173,7 +170,8 @@ def _is_open(class_name: str) -> bool:
 
 def _inherited_material(default: Any) -> Any:
     """The material that a default class, or one that it stands in, gives its geoms."""
-    while default is not None and default.tag == "default":
+    # Of a class that went around dm_control only the name is here, and such a one gives no material.
+    while default is not None and not isinstance(default, str) and default.tag == "default":
         if default.geom is not None and default.geom.material is not None:
             return default.geom.material
         default = default.parent
