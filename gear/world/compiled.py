@@ -97,7 +97,6 @@ def compile_world(library: AssetLibrary, scene: SceneSpec, weather: Weather) -> 
         ).laid_out(Path(folder))
         release_memory()
         model, classes = render_model(composition)
-        release_memory()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     types = actor_types(model, data, classes, composition.slots)

@@ -8,6 +8,8 @@ ten equal cars cost one mesh. Only faces that take a patch get a material and a 
 from __future__ import annotations
 
 import math
+import os
+import shutil
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -22,7 +24,7 @@ from gear.world.instances import AssetParts, FaceName, load_mjcf
 from gear.world.light import lighting_of
 from gear.world.quiet_mjcf import mjcf
 from gear.world.scene_spec import BoardSpec
-from gear.world.statics import Statics, split_town
+from gear.world.statics import Place, Statics, split_town
 from gear.world.weather import apply_weather
 
 PARKED_DEPTH_M = 60.0
@@ -50,7 +52,7 @@ class Composition:
 
     Attributes:
         xml: the whole of it as MJCF.
-        assets: files that it refers to, by name.
+        assets: files that it refers to, by name; of meshes, where they lie.
         folder: where those of them lie that are no longer in `assets`.
         town: path of the town's MJCF.
         slots: the pool.
@@ -67,8 +69,18 @@ class Composition:
     def laid_out(self, folder: Path) -> Composition:
         """The same with its files written into a folder: MuJoCo copies what is in memory, all of it at once."""
         for name, content in self.assets.items():
-            (folder / name).write_bytes(content)
+            if isinstance(content, Place):
+                _put(Path(os.fsdecode(content)), folder / name)
+            else:
+                (folder / name).write_bytes(content)
         return replace(self, assets={}, folder=folder)
+
+
+def _put(place: Path, link: Path) -> None:
+    try:
+        link.symlink_to(place)
+    except OSError:  # not every system lets everybody make links
+        shutil.copyfile(place, link)
 
 
 def compose(
@@ -94,7 +106,7 @@ def compose(
     with ThreadPoolExecutor(1) as aside:
         lighting = aside.submit(lighting_of, weather)
         text, statics = split_town(library.town)
-        root = load_mjcf(library.town, text)
+        root = load_mjcf(library.town, text, statics.places)
         slots = slots_of(pool, carrier)
         parts = AssetParts(root)
         faces = _fill(root, parts, library, statics, boards, slots)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 from gear.values.errors import TownError
 from gear.world.faces import FACE_SIZE_PX
 from gear.world.quiet_mjcf import mjcf
-from gear.world.statics import UNNAMED, split_asset
+from gear.world.statics import UNNAMED, Place, split_asset
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,12 +33,13 @@ class FaceName:
     neutral_material: str
 
 
-def load_mjcf(path: Path, text: str | None = None) -> mjcf.RootElement:
+def load_mjcf(path: Path, text: str | None = None, places: Mapping[str, Place] | None = None) -> mjcf.RootElement:
     """Reads one file; its model is named after the file and everything in it has a name.
 
     Args:
         path: of the file.
         text: what is read in its place.
+        places: files of the text that stay where they are.
 
     Raises:
         TownError: dm_control cannot read it.
@@ -46,7 +48,7 @@ def load_mjcf(path: Path, text: str | None = None) -> mjcf.RootElement:
         if text is None:
             root = mjcf.from_path(str(path))
         else:
-            root = mjcf.from_xml_string(text, model_dir=str(path.parent))
+            root = mjcf.from_xml_string(text, model_dir=str(path.parent), assets=places)
     except (ValueError, OSError, AttributeError, KeyError, SyntaxError) as error:
         raise TownError(path, f"cannot be read as MJCF: {error}") from error
     root.model = path.stem
@@ -119,10 +121,10 @@ class AssetParts:
     def _model(self, path: Path) -> mjcf.RootElement:
         """The asset's file, attached when first asked for."""
         if path not in self._models:
-            text, defaults = split_asset(path)
-            model = load_mjcf(path, text)
-            if text is not None:
-                self._defaults[model.model] = defaults
+            split = split_asset(path)
+            model = load_mjcf(path, split.text, split.places)
+            if split.text is not None:
+                self._defaults[model.model] = split.defaults
             try:
                 self._root.attach(model)
             except ValueError as error:

@@ -1,11 +1,16 @@
-"""What stays as its file says and goes around dm_control, which would change nothing: geoms and bodies of a town, half a
-millisecond for each of them, and default classes of assets, five milliseconds each."""
+"""What stays as its file says and goes around dm_control, which would change nothing.
+
+Geoms and bodies of a town cost it half a millisecond each, default classes of assets five. Meshes it would read, hash
+and have written again: it gets their paths for their content.
+"""
 
 from __future__ import annotations
 
+import os
 import re
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from gear.values.errors import TownError
@@ -20,6 +25,10 @@ _PLAIN_STEM = re.compile(r"[\w.-]+")
 _WORLD = "<worldbody>"
 
 
+class Place(bytes):
+    """Where a file lies, for its content."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Statics:
     """Elements of a town's worldbody, in their order.
@@ -28,11 +37,13 @@ class Statics:
         xml: as MJCF; every geom has a name.
         body_names: of the bodies.
         worn: default class and own material, if it has one, of the geoms; each pair once, in the order of the file.
+        places: of the meshes, by what the rest of the town calls their files.
     """
 
     xml: str = ""
     body_names: frozenset[str] = frozenset()
     worn: tuple[tuple[str, str | None], ...] = ()
+    places: Mapping[str, Place] = field(default_factory=dict)
 
     def put_into(self, xml: str) -> str:
         """MJCF with them before everything else in its worldbody."""
@@ -64,17 +75,31 @@ def split_town(path: Path) -> tuple[str | None, Statics]:
         xml="".join(ET.tostring(child, encoding="unicode") for child in taken),
         body_names=frozenset(body.get("name", "") for child in taken for body in child.iter("body")),
         worn=tuple(dict.fromkeys((geom.get("class", ""), geom.get("material")) for geom in geoms)),
+        places=_meshes_in_place(root, path),
     )
     return ET.tostring(root, encoding="unicode"), statics
 
 
-def split_asset(path: Path) -> tuple[str | None, str]:
-    """An asset's MJCF without its default classes, and those, named as dm_control names them in a town.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SplitAsset:
+    """An asset's MJCF in two.
 
-    A file whose classes are more than geoms and meshes without references is left whole: the text is None.
+    Attributes:
+        text: without its default classes; None where it is to be read whole.
+        defaults: those, named as dm_control names them in a town.
+        places: of the meshes, by what `text` calls their files.
+    """
+
+    text: str | None = None
+    defaults: str = ""
+    places: Mapping[str, Place] = field(default_factory=dict)
+
+
+def split_asset(path: Path) -> SplitAsset:
+    """Takes out default classes of geoms and meshes; a file whose classes refer to anything is left whole.
 
     Raises:
-        TownError: it is no XML, or cannot be read.
+        TownError: it is no XML, or a file cannot be read.
     """
     root = _parsed(path)
     sections = root.findall("default")
@@ -85,11 +110,33 @@ def split_asset(path: Path) -> tuple[str | None, str]:
         or not _PLAIN_STEM.fullmatch(path.stem)
         or not all(part.tag in _PLAIN_DEFAULTS and _REFERENCES.isdisjoint(part.keys()) for part in sections[0].iter())
     ):
-        return None, ""
+        return SplitAsset()
     root.remove(sections[0])
     for default in sections[0].iter("default"):
         default.set("class", f"{path.stem}/{default.get('class', '')}")
-    return ET.tostring(root, encoding="unicode"), ET.tostring(sections[0], encoding="unicode").strip()
+    places = _meshes_in_place(root, path)
+    return SplitAsset(
+        text=ET.tostring(root, encoding="unicode"),
+        defaults=ET.tostring(sections[0], encoding="unicode").strip(),
+        places=places,
+    )
+
+
+def _meshes_in_place(root: ET.Element, path: Path) -> dict[str, Place]:
+    """Has meshes named by their whole paths, and where those lead to."""
+    folders = {name: folder for part in root.iter("compiler") for name, folder in part.items()}
+    base = path.parent / folders.get("meshdir", folders.get("assetdir", ""))
+    places: dict[str, Place] = {}
+    for mesh in root.iterfind("asset/mesh[@file]"):
+        file = (base / mesh.get("file", "")).absolute()
+        try:
+            # MuJoCo is the one to read it: whether that is possible, and which file it is, shows here.
+            with file.open("rb"):
+                places[str(file)] = Place(os.fsencode(file))
+        except OSError as error:
+            raise TownError(path, f"cannot be read as MJCF: {error}") from error
+        mesh.set("file", str(file))
+    return places
 
 
 def _parsed(path: Path) -> ET.Element:

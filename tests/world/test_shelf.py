@@ -83,6 +83,15 @@ def test_a_world_with_files_from_afar_is_not_kept(tmp_path: Path, town: Path) ->
     assert not worlds(tmp_path)
 
 
+def test_a_world_with_a_mesh_from_afar_is_not_kept(tmp_path: Path, town: Path) -> None:
+    (tmp_path / "far.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    text = town.read_text()
+    assert "<asset>" in text
+    town.write_text(text.replace("<asset>", '<asset><mesh name="far" file="../../far.obj"/>', 1))
+    assert take(tmp_path, town).model.mesh("far").id >= 0
+    assert not worlds(tmp_path)
+
+
 def test_half_a_world_is_made_anew(tmp_path: Path) -> None:
     whole = model_bytes(take(tmp_path).model)
     (name,) = worlds(tmp_path)

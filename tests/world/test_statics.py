@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from gear.testing.tiny_town import CLEAR, TINY_TOWN, tiny_scenes
-from gear.world import compose
+from gear.values.errors import TownError
+from gear.world import compose, instances
 from gear.world.assets import AssetLibrary
 from gear.world.compiled import Compiled, compile_world
-from gear.world.statics import Statics, split_town
+from gear.world.statics import Place, SplitAsset, Statics, split_asset, split_town
 
 WET = dataclasses.replace(CLEAR, wetness=100.0)
 FIELDS = (
@@ -37,6 +38,7 @@ def compiled(monkeypatch: pytest.MonkeyPatch, town: Path, *, is_whole: bool) -> 
     with monkeypatch.context() as patch:
         if is_whole:
             patch.setattr(compose, "split_town", lambda path: (None, Statics()))
+            patch.setattr(instances, "split_asset", lambda path: SplitAsset())
         return compile_world(AssetLibrary.for_town(town), tiny_scenes().scenes["board"], WET)
 
 
@@ -71,3 +73,48 @@ def test_a_town_with_anything_else_is_left_whole(thing: str, tmp_path: Path) -> 
     left, statics = split_town(town)
     assert left is None and statics == Statics()
     assert statics.put_into("<worldbody><light/></worldbody>") == "<worldbody><light/></worldbody>"
+
+
+ASSET = """<mujoco model="cart">
+  <compiler meshdir="parts"/>
+  <default><default class="seen"><mesh inertia="shell"/><default class="car.paint"/></default></default>
+  <asset><mesh class="seen" name="box" file="box.obj"/></asset>
+  <worldbody><geom class="car.paint" mesh="box"/></worldbody>
+</mujoco>"""
+
+
+def asset(folder: Path, text: str = ASSET) -> Path:
+    (folder / "parts").mkdir()
+    (folder / "parts" / "box.obj").write_text("v 0 0 0\n")
+    (folder / "cart.xml").write_text(text)
+    return folder / "cart.xml"
+
+
+def test_an_asset_keeps_its_classes_and_its_meshes_stay_where_they_are(tmp_path: Path) -> None:
+    split = split_asset(asset(tmp_path))
+    assert split.text is not None and "<default" not in split.text
+    assert split.defaults.startswith('<default class="cart/"><default class="cart/seen"><mesh')
+    assert '<default class="cart/car.paint"' in split.defaults
+    mesh = str(tmp_path / "parts" / "box.obj")
+    assert split.places == {mesh: Place(mesh.encode())} and f'file="{mesh}"' in split.text
+
+
+@pytest.mark.parametrize(
+    "found, put",
+    [
+        ("</default></default>", '<geom material="red"/></default></default>'),
+        ("</default></default>", "<site/></default></default>"),
+        ('<default><default class="seen">', '<default class="main"><default class="seen">'),
+        ("<worldbody>", '<include file="more.xml"/><worldbody>'),
+        ("<default><default", "<default/><default><default"),
+    ],
+    ids=["reference", "site", "named", "include", "two"],
+)
+def test_an_asset_with_anything_else_is_left_whole(found: str, put: str, tmp_path: Path) -> None:
+    assert split_asset(asset(tmp_path, ASSET.replace(found, put, 1))) == SplitAsset()
+
+
+def test_a_mesh_that_is_not_there_is_named(tmp_path: Path) -> None:
+    path = asset(tmp_path, ASSET.replace("box.obj", "ball.obj"))
+    with pytest.raises(TownError, match=r"ball\.obj"):
+        split_asset(path)
