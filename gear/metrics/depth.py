@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -24,8 +24,14 @@ CROPS: dict[str, tuple[float, float, float, float]] = {
 
 MIN_DEPTH_M = 1e-3
 
-PIECE = 1 << 15
+PIECE = 1 << 16
 """Pixels at a time: few enough that what is worked out of them stays in the processor's cache."""
+
+EVERYDAY_M = 1e5
+"""Depths up to here, and down to its inverse, are worked on in single precision."""
+
+UNSURE = 1e-6
+"""Logarithms of quotients in single precision are off by a few times 1e-7 at most."""
 
 
 class DepthTruth(Protocol):
@@ -60,31 +66,26 @@ class DepthEvaluator:
         truth_m, prediction = sample.depth_m, np.asarray(prediction, np.float32)  # as it is kept in files
         if prediction.shape != truth_m.shape:
             raise ValueError(f"prediction must have shape {truth_m.shape}, got {prediction.shape}")
-        everywhere, near = _Sums(), _Sums()
-        window = self._window(truth_m.shape).reshape(-1)
-        flat_truth_m, flat_found_m = truth_m.reshape(-1), prediction.reshape(-1)
-        for start in range(0, truth_m.size, PIECE):
-            piece = slice(start, start + PIECE)
-            known = np.flatnonzero(np.isfinite(flat_truth_m[piece]))
-            if not known.size:
-                continue
-            found_m, seen_m = flat_found_m[piece].take(known), flat_truth_m[piece].take(known)
-            if not np.isfinite(found_m).all() or (found_m <= 0).any():
-                raise ValueError("prediction must be positive and finite wherever there is ground truth")
-            pair = _Pair.of(seen_m.astype(np.float64), found_m.astype(np.float64))
-            if self._wants_devkit:
-                everywhere.add(_devkit_sums(pair))
-            looked_at = (seen_m > MIN_DEPTH_M) & (seen_m < self.max_depth_m)
-            if self.crop != "none":
-                looked_at &= window[piece].take(known)
-            near.add(_eigen_sums(pair.where(looked_at).clipped(MIN_DEPTH_M, self.max_depth_m)))
-        found = _devkit(everywhere) if self._wants_devkit else {}
-        found |= _eigen(near)
+        near = (truth_m > MIN_DEPTH_M) & (truth_m < self.max_depth_m)
+        if self.crop != "none":
+            near &= self._window(truth_m.shape)
+        both = near & (prediction >= MIN_DEPTH_M) & (prediction <= self.max_depth_m)
+        others = np.isfinite(truth_m) & ~both
+        other_truth_m, other_found_m = truth_m[others], prediction[others]
+        if not np.isfinite(other_found_m).all() or (other_found_m <= 0).any():
+            raise ValueError("prediction must be positive and finite wherever there is ground truth")
+        shared = _summed(truth_m[both], prediction[both])  # most pixels, and worked on once for both kinds of figures
+        found = {}
+        if self._wants_devkit:
+            found = _devkit(shared + _summed(other_truth_m, other_found_m))
+        strays = near[others]
+        clipped_m = other_found_m[strays].clip(MIN_DEPTH_M, self.max_depth_m)
+        found |= _eigen(shared + _summed(other_truth_m[strays], clipped_m))
         for name, value in found.items():
             self.figures.setdefault(name, []).append(value)
         return found
 
-    def _window(self, shape: tuple[int, ...]) -> np.ndarray:
+    def _window(self, shape: tuple[int, ...]) -> npt.NDArray[np.bool_]:
         height, width = shape[0], shape[1]
         top, bottom, left, right = CROPS[self.crop]
         window = np.zeros((height, width), dtype=np.bool_)
@@ -137,43 +138,15 @@ def _renamed(figures: Mapping[str, float]) -> dict[str, float]:
     return first | plain
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Pair:
-    """Depth of the same pixels, (N,) float64 metres, and what several figures are made of."""
-
-    truth_m: Array
-    found_m: Array
-    error_m: Array
-    relative: Array
-    log: Array
-
-    @classmethod
-    def of(cls, truth_m: Array, found_m: Array) -> _Pair:
-        error_m = found_m - truth_m
-        return cls(truth_m, found_m, error_m, error_m / truth_m, np.log(found_m) - np.log(truth_m))
-
-    def where(self, chosen: npt.NDArray[np.bool_]) -> _Pair:
-        if chosen.all():
-            return self
-        places = np.flatnonzero(chosen)
-        parts = (self.truth_m, self.found_m, self.error_m, self.relative, self.log)
-        return _Pair(*(part.take(places) for part in parts))
-
-    def clipped(self, least_m: float, most_m: float) -> _Pair:
-        if not self.found_m.size or (self.found_m.min() >= least_m and self.found_m.max() <= most_m):
-            return self
-        return _Pair.of(self.truth_m, np.clip(self.found_m, least_m, most_m))
-
-
 class _Sums:
-    """Sums over pixels, by name, piece after piece."""
+    """Sums over pixels, by name."""
 
-    def __init__(self) -> None:
-        self._sums: dict[str, float] = {}
+    def __init__(self, sums: Mapping[str, float] | None = None) -> None:
+        self._sums = dict(sums or {})
 
-    def add(self, sums: Mapping[str, float]) -> None:
-        for name, value in sums.items():
-            self._sums[name] = self._sums.get(name, 0.0) + float(value)
+    def __add__(self, other: _Sums) -> _Sums:
+        names = self._sums | other._sums
+        return _Sums({name: self._sums.get(name, 0.0) + other._sums.get(name, 0.0) for name in names})
 
     def mean(self, name: str) -> float:
         """NaN where there were no pixels."""
@@ -181,20 +154,56 @@ class _Sums:
         return self._sums[name] / pixels if pixels else float("nan")
 
 
-def _devkit_sums(pair: _Pair) -> dict[str, float]:
-    inverse = pair.relative / pair.found_m
-    return {
-        "pixels": pair.truth_m.size,
-        "error": np.abs(pair.error_m).sum(),
-        "error_square": np.square(pair.error_m).sum(),
-        "inverse": np.abs(inverse).sum(),
-        "inverse_square": np.square(inverse).sum(),
-        "log": pair.log.sum(),
-        "log_size": np.abs(pair.log).sum(),
-        "log_square": np.square(pair.log).sum(),
-        "relative": np.abs(pair.relative).sum(),
-        "relative_square": np.square(pair.relative).sum(),
-    }
+def _summed(truth_m: FloatImage, found_m: FloatImage) -> _Sums:
+    """Over pixels with (N,) metres."""
+    sums = _Sums()
+    for start in range(0, truth_m.size, PIECE):
+        sums += _sums_of_piece(truth_m[start : start + PIECE], found_m[start : start + PIECE])
+    return sums
+
+
+def _sums_of_piece(truth_m: FloatImage, found_m: FloatImage) -> _Sums:
+    """Single precision pixel by pixel, as depths are kept, but sums in double, as OpenCV makes them without a copy.
+
+    So the variance in `silog` stays right where it is the small difference of large means.
+    """
+    most, least = max(truth_m.max(), found_m.max()), min(truth_m.min(), found_m.min())
+    if most > EVERYDAY_M or least < 1 / EVERYDAY_M:  # their squares and quotients may leave single precision's range
+        truth_m, found_m = truth_m.astype(np.float64), found_m.astype(np.float64)
+    error_m = found_m - truth_m
+    relative = error_m / truth_m
+    inverse = relative / found_m
+    log = cv2.log(found_m / truth_m).reshape(-1)
+    log_size = np.abs(log)
+    return _Sums(
+        {
+            "pixels": truth_m.size,
+            "error": cv2.norm(error_m, cv2.NORM_L1),
+            "error_square": cv2.norm(error_m, cv2.NORM_L2SQR),
+            "inverse": cv2.norm(inverse, cv2.NORM_L1),
+            "inverse_square": cv2.norm(inverse, cv2.NORM_L2SQR),
+            "log": cv2.sumElems(log)[0],
+            "log_size": cv2.sumElems(log_size)[0],
+            "log_square": cv2.norm(log, cv2.NORM_L2SQR),
+            "relative": cv2.norm(relative, cv2.NORM_L1),
+            "relative_square": cv2.norm(relative, cv2.NORM_L2SQR),
+            "error_relative": cv2.sumElems(error_m * relative)[0],
+            "d1": _count_within(1.25, log_size, truth_m, found_m),
+            "d2": _count_within(1.25**2, log_size, truth_m, found_m),
+            "d3": _count_within(1.25**3, log_size, truth_m, found_m),
+        }
+    )
+
+
+def _count_within(ratio: float, log_size: Array, truth_m: FloatImage, found_m: FloatImage) -> int:
+    """Pixels whose depths differ by less than a factor; those that single precision cannot tell are looked at again."""
+    bound = math.log(ratio)
+    count = int(np.count_nonzero(log_size < bound - UNSURE))
+    if np.count_nonzero(log_size < bound + UNSURE) == count:
+        return count
+    places = np.flatnonzero(np.abs(log_size - bound) <= UNSURE)
+    truth_m, found_m = truth_m.take(places).astype(np.float64), found_m.take(places).astype(np.float64)
+    return count + int(np.count_nonzero(np.maximum(truth_m / found_m, found_m / truth_m) < ratio))
 
 
 def _devkit(sums: _Sums) -> dict[str, float]:
@@ -208,22 +217,6 @@ def _devkit(sums: _Sums) -> dict[str, float]:
         "silog": 100 * _root(sums.mean("log_square") - sums.mean("log") ** 2),
         "abs_rel": sums.mean("relative"),
         "sq_rel": sums.mean("relative_square"),
-    }
-
-
-def _eigen_sums(pair: _Pair) -> dict[str, float]:
-    ratio = np.maximum(pair.truth_m / pair.found_m, pair.found_m / pair.truth_m)
-    return {
-        "pixels": pair.truth_m.size,
-        "d1": np.count_nonzero(ratio < 1.25),
-        "d2": np.count_nonzero(ratio < 1.25**2),
-        "d3": np.count_nonzero(ratio < 1.25**3),
-        "relative": np.abs(pair.relative).sum(),
-        "error_relative": (pair.error_m * pair.relative).sum(),
-        "error_square": np.square(pair.error_m).sum(),
-        "log": pair.log.sum(),
-        "log_size": np.abs(pair.log).sum(),
-        "log_square": np.square(pair.log).sum(),
     }
 
 
