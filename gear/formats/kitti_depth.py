@@ -17,8 +17,10 @@ MAX_PNG_DEPTH_M = 65535 / UNITS_PER_M
 
 def to_units(depth_m: FloatImage) -> npt.NDArray[np.uint16]:
     """(H, W) metres, NaN for nothing, to 1/256 m; 0 stands for no ground truth (sky, beyond range)."""
-    units = np.rint(depth_m * np.float32(UNITS_PER_M))
-    return np.where((units >= 1) & (units <= 65535), units, 0).astype(np.uint16)  # what is not finite is neither
+    units = depth_m * np.float32(UNITS_PER_M)
+    np.rint(units, out=units)
+    np.copyto(units, 0, where=~((units >= 1) & (units <= 65535)))  # what is not finite is neither
+    return units.astype(np.uint16)
 
 
 def from_units(units: npt.NDArray[np.uint16]) -> FloatImage:
@@ -33,7 +35,9 @@ def to_metres_file(depth_m: FloatImage) -> FloatImage:
 
 def from_metres_file(stored: FloatImage) -> FloatImage:
     """(H, W) metres with NaN for nothing."""
-    return np.where(stored > 0, stored, np.nan).astype(np.float32)
+    depth_m = stored.astype(np.float32)
+    np.copyto(depth_m, np.nan, where=~(stored > 0))
+    return depth_m
 
 
 def file_list(pairs: Sequence[tuple[str, str]]) -> bytes:

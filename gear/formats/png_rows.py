@@ -9,6 +9,7 @@ from __future__ import annotations
 import struct
 from typing import Any
 
+import fpng
 import numpy as np
 import numpy.typing as npt
 from isal import isal_zlib
@@ -57,11 +58,16 @@ def decode_rows(data: bytes) -> npt.NDArray[Any] | None:
 def encode_deep(values: npt.NDArray[np.uint16]) -> bytes:
     """(H, W) uint16 to a grey PNG of 16 bits, for values that seldom repeat; processors may differ in its bytes.
 
-    A third of OpenCV's time and size for a predicted depth map. What is to be the same file everywhere goes through
-    `gear.formats.png`.
+    A seventh of OpenCV's time for a predicted depth map, and a quarter more bytes. Where rows can be cut into pixels
+    of three or four bytes, fpng takes them for colours: its filter and its deflating know nothing but bytes. What is to
+    be the same file everywhere goes through `gear.formats.png`.
     """
     height, width = values.shape
     rows = values.astype(">u2").view(np.uint8).reshape(height, -1)
+    for channels in (3, 4):
+        if rows.shape[1] % channels == 0:
+            colours = fpng.from_ndarray(rows.reshape(height, -1, channels))
+            return whole(width, height, 16, 0, _chunks(colours)[b"IDAT"])
     filtered = np.empty((height, rows.shape[1] + 1), np.uint8)
     filtered[:, 0] = UP
     filtered[0, 1:] = rows[0]
