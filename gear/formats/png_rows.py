@@ -106,11 +106,14 @@ def _unfiltered(filtered: npt.NDArray[np.uint8], pixel_bytes: int) -> npt.NDArra
     filters = filtered[:, 0]
     if filters.max() > UP:
         return None
-    rows = filtered[:, 1:].copy()
+    rows = np.empty((len(filtered), filtered.shape[1] - 1), np.uint8)
     for row, kind in enumerate(filters.tolist()):
+        stored, pixels = filtered[row, 1:], rows[row]
         if kind == UP and row:  # above the first row all is 0
-            np.add(rows[row - 1], rows[row], out=rows[row])
+            np.add(rows[row - 1], stored, out=pixels)
         elif kind == SUB:
-            pixels = rows[row].reshape(-1, pixel_bytes)
-            np.add.accumulate(pixels, axis=0, dtype=np.uint8, out=pixels)
+            shape = (-1, pixel_bytes)
+            np.add.accumulate(stored.reshape(shape), axis=0, dtype=np.uint8, out=pixels.reshape(shape))
+        else:
+            pixels[:] = stored
     return rows

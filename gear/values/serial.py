@@ -44,6 +44,8 @@ def from_json(kind: type[T], value: Json, where: str = "") -> T:
 
 
 def _read(kind: Any, value: Json, where: str) -> Any:
+    if type(value) is kind:  # most of what there is: numbers and words
+        return value
     origin = get_origin(kind)
     if kind is Any:
         return value
@@ -86,7 +88,8 @@ def _read_dataclass(kind: Any, value: Json, where: str) -> Any:
     for key in value:
         if key not in fields:
             raise FieldError(f"{where}.{key}".lstrip("."), "unknown key")
-    given = {key: _read(hints[key], item, f"{where}.{key}".lstrip(".")) for key, item in value.items()}
+    prefix = f"{where}." if where else ""
+    given = {key: _read(hints[key], item, prefix + key) for key, item in value.items()}
     for name, field in fields.items():
         has_default = field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING
         if name not in given and not has_default:
