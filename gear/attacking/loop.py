@@ -24,6 +24,11 @@ from gear.values.rng import derive_rng
 
 BETAS, EPSILON = (0.9, 0.999), 1e-8
 
+NO_GRADIENT = (
+    "no gradient reaches the patch: it is seen in no sample, nothing is left to be harmed, or the model passes none "
+    "(gear plugins show MODEL says whether it has gradients)"
+)
+
 
 class TextureOptimiser:
     """Textures, Adam's moments and the number of steps done: all that must be kept to go on later."""
@@ -145,7 +150,7 @@ def climb(
     settings, count = problem.settings, len(problem.dataset)
     saved = watch.resume() if watch is not None else None
     optimiser = TextureOptimiser(problem.surfaces(), settings, rng, saved)
-    silent = 0
+    silent, felt, begun = 0, False, optimiser.done
     with frozen(problem.model):
         while optimiser.done < budget.steps:
             done = optimiser.done
@@ -155,15 +160,15 @@ def climb(
             textures = optimiser.textures.clone().requires_grad_(True)
             direction, figures = ascend(textures, problem.seen(textures, indexes, done, optimiser.seed))
             silent = silent + 1 if figures.get("gradient") == 0 else 0
+            felt |= figures.get("gradient", 0.0) > 0
             if silent * settings.batch >= 2 * count + settings.batch:
-                raise GearError(
-                    "no gradient reaches the patch: it is seen in no sample, or the model passes none "
-                    "(gear plugins show MODEL says whether it has gradients)"
-                )
+                raise GearError(NO_GRADIENT)
             share = 0.5 * (1 + math.cos(math.pi * done / budget.steps)) if settings.decay else 1.0
             optimiser.step(direction, share)
             if watch is not None and watch.step(optimiser.done, figures, optimiser.patches, optimiser.state):
                 break
+    if optimiser.done > begun and not felt:
+        raise GearError(NO_GRADIENT)
     return optimiser.patches()
 
 

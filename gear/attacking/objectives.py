@@ -1,7 +1,8 @@
 """What an attack maximises: the terms of each task, from a model's outputs or losses.
 
-Every term is a number that grows with the harm. Pixels on the patch never count: an attack is judged by what it does
-elsewhere.
+Every term is a number that grows with the harm. In segmentation and depth, pixels on the patch never count: an attack
+is judged by what it does elsewhere. The losses of detectors and stereo networks are of the whole picture, as they are
+trained; there is no labelled object on a board.
 """
 
 from __future__ import annotations

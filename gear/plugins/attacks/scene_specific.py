@@ -149,6 +149,8 @@ class SceneSpecific:
         for name in self._config.losses:
             if name not in known:
                 raise GearError(f"option losses.{name}: no loss of the model; it has {', '.join(known)}")
+        if all(self._config.losses.get(name) == "0" for name in known):
+            raise GearError(f"option losses: all of {', '.join(known)} are left out; nothing is left to be changed")
 
     def _detection_goal(self, sample: Any) -> Objective:
         from gear.plugins.attacks.detection_goals import DetectionGoal

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from safetensors import SafetensorError
 from safetensors.numpy import load as from_bytes
 
 from gear.attacking.objectives import default_objective
@@ -28,12 +29,13 @@ from gear.plugins.build import NO_OPTIONS, blamed, build, find
 from gear.values.errors import DatasetError, GearError, PluginError
 from gear.values.rng import derive_rng
 from gear.values.serial import Json
-from gear.verbs.attack.data import check_joined
+from gear.verbs.attack.data import check_joined, scenes_of
 from gear.verbs.attack.models import build_model, check_attack, choose_defense, choose_models
 from gear.verbs.attack.outputs import as_picture, write_curves, write_patches, write_samples
 from gear.verbs.attack.report import AttackReport
 from gear.verbs.attack.scenes import Scenes
 from gear.verbs.attack.watch import CHECKPOINT, Recorder
+from gear.verbs.collect.patches import read_patch
 from gear.verbs.evaluate.player import weights_digest
 from gear.verbs.train.data import open_all, root_and_split
 
@@ -42,6 +44,8 @@ Progress = Callable[[int, int], None]
 
 STEPS = 300
 """Where neither steps nor queries are given."""
+
+AGAIN = "is gone, damaged or of other patches; --force makes them again"
 
 TRAINING = ("train", "finetuning", "debug")
 VALIDATION = ("val",)
@@ -111,10 +115,11 @@ def attack(
     found, options = find("attack", attack), with_overrides(NO_OPTIONS, settings)
     config = read_node(found.spec.config, options, "")
     surfaces = len(datasets[0].sidecar(0).record.surfaces)
-    check_attack(found, chosen, task, surfaces, queries)
+    spec = check_attack(found, chosen, task, surfaces, queries)
+    compositor = _compositor(compositor, spec, [*datasets, *validation])
     if steps is None:
         steps = STEPS if queries is None else queries  # a step costs at least one
-    if {one.plan.content_key for one in datasets} & {one.plan.content_key for one in validation}:
+    if {scenes_of(one) for one in datasets} & {scenes_of(one) for one in validation}:
         raise GearError("--data and --val hold the same samples; give --val another split")
     product = build(found, options)
     network = build_model(chosen, guard)
@@ -173,14 +178,14 @@ def attack(
     _check_patches(last, surfaces, f"{found.spec.name} ({found.owner.package} {found.owner.version})")
     if weights_digest(network) != before:
         raise PluginError(found.spec.name, "optimise", "the attack changed the model; nothing was written")
-    assert isinstance(found.spec, AttackSpec)
-    is_control = found.spec.is_control
-    done = 0 if is_control else max((len(curve) for curve in recorder.curves.values()), default=steps)
+    if queries is not None and not recorder.curves:
+        raise GearError(f"{queries} queries are too few for one step; give more with --queries N")
+    done = 0 if spec.is_control else max((len(curve) for curve in recorder.curves.values()), default=steps)
     if not recorder.stopped:
         recorder.finish(done, last)
     patches = recorder.best or last
     seconds = recorder.clock()
-    promised, kept = (0.0, 0.0) if is_control else seen.masking(network, objective, patches)
+    promised, kept = (0.0, 0.0) if spec.is_control else seen.masking(network, objective, patches)
     facts: Json = {
         "gear": importlib.metadata.version("mujoco-gear"),
         "torch": str(torch.__version__),
@@ -217,24 +222,68 @@ def _begin(root: Path, plan: Json, *, force: bool) -> Json | None:
     """
     finished = root / "attack.json"
     if force:
-        for path in (finished, root / CHECKPOINT, *root.glob("patch_*.png")):
-            path.unlink(missing_ok=True)
+        with explained(root):
+            for path in (finished, root / CHECKPOINT, *root.glob("patch_*.png")):
+                path.unlink(missing_ok=True)
         shutil.rmtree(root / VERIFY, ignore_errors=True)  # what the patches that go did in the world
     if finished.exists():
-        there = load_json(finished)
+        there = _read_notes(finished)
         if any(there.get(key) != json.loads(json.dumps(value)) for key, value in plan.items()):
             raise DatasetError(
                 root, "holds patches that were made otherwise; use another --out, or --force to replace them"
             )
+        _check_whole(root, there)
         return there
     with explained(root):
         root.mkdir(parents=True, exist_ok=True)
     return None
 
 
+def _read_notes(path: Path) -> Json:
+    try:
+        there = json.loads(read_bytes(path))
+    except ValueError:
+        there = None
+    if not isinstance(there, dict):
+        raise DatasetError(path, AGAIN)
+    return there
+
+
+def _check_whole(root: Path, notes: Json) -> None:
+    """Whether the pictures are those that the notes speak of.
+
+    Raises:
+        DatasetError: one is not, or is gone.
+    """
+    for name, digest in notes["patches"].items():
+        path = root / f"{name}.png"
+        if not path.is_file() or sha256(read_patch(path).tobytes()) != digest:
+            raise DatasetError(path, AGAIN)
+
+
 def _read_patches(root: Path) -> tuple[Patch, ...]:
-    arrays = from_bytes(read_bytes(root / "patch.safetensors"))
+    path = root / "patch.safetensors"
+    try:
+        arrays = from_bytes(path.read_bytes())
+    except (OSError, SafetensorError) as error:
+        raise DatasetError(path, AGAIN) from error
     return tuple(Patch(name=name, rgb=arrays[name]) for name in sorted(arrays))
+
+
+def _compositor(name: str, spec: AttackSpec[Any], datasets: Sequence[Dataset[Any]]) -> str:
+    """The one that is asked for; homography where transport lacks probes that the attack does not need.
+
+    Raises:
+        DatasetError: the attack needs them.
+    """
+    lacking = next((dataset for dataset in datasets if not dataset.plan.auxiliary), None)
+    if name != "transport" or lacking is None:
+        return name
+    if spec.needs_probes:
+        raise DatasetError(
+            lacking.root, "has no probes; collect it with --probes, or attack with --compositor homography"
+        )
+    return "homography"
 
 
 def _check_patches(patches: Any, surfaces: int, owner: str) -> None:
@@ -268,6 +317,7 @@ def _facts(dataset: Dataset[Any]) -> Json:
         "weather": dataset.manifest["weather"]["name"],
         "samples": len(dataset),
         "content": dataset.plan.content_key,
+        "sha256": sha256(dump_json(dataset.manifest["samples"])),
     }
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from gear.dataset.sidecar import load_json
 from gear.opening import open_dataset
 from gear.values.errors import DatasetError, GearError
+from gear.verbs.attack.data import check_joined, scenes_of
 from gear.verbs.attack.run import VERIFY
 from gear.verbs.gap.report import GapReport
 from gear.verbs.gap.run import gap
@@ -16,19 +16,22 @@ from gear.verbs.train.data import root_and_split
 
 
 def check_held_out(data: Sequence[str | Path], held: str | Path) -> None:
-    """Whether a dataset is there and none that patches are made on.
+    """Whether a dataset is there, has probes, fits the patches, and shows none of the scenes that they are made on.
 
     Raises:
         GearError: it is not.
     """
-    root, split = root_and_split(held)
-    wanted = open_dataset(root, split).plan.content_key
+    wanted = open_dataset(*root_and_split(held))
+    if not wanted.plan.auxiliary:
+        raise DatasetError(wanted.root, "has no probes, which --verify needs; collect it with --probes")
     for one in data:
-        with contextlib.suppress(DatasetError):  # a folder of datasets, say: the attack knows what is wrong
-            if open_dataset(*root_and_split(one)).plan.content_key == wanted:
-                raise GearError(
-                    f"{held}: no patch may be made on what --verify names; give it another split than --data"
-                )
+        try:
+            made_on = open_dataset(*root_and_split(one))
+        except DatasetError:
+            continue  # a folder of datasets, say: the attack knows what is wrong
+        check_joined([made_on, wanted])
+        if scenes_of(made_on) == scenes_of(wanted):
+            raise GearError(f"{held}: no patch may be made on what --verify names; give it another split than --data")
 
 
 def verify(
@@ -67,9 +70,10 @@ def verify(
         GearError: anything that the user can put right; its text is one line.
     """
     root, split = root_and_split(data)
-    made_on = {one["content"] for one in load_json(Path(out) / "attack.json")["data"]}
-    plan = open_dataset(root, split).plan
-    if plan.content_key in made_on:
+    made_on = {(one["scene"], one["seed"]) for one in load_json(Path(out) / "attack.json")["data"]}
+    dataset = open_dataset(root, split)
+    plan = dataset.plan
+    if scenes_of(dataset) in made_on:
         raise DatasetError(root, f"is what {out} was made on; verify it on other samples")
     place = Path(out) / VERIFY / f"{Path(plan.info.scene).name}-{plan.info.split}-{plan.content_key[:6]}"
     texts, defense_texts, reports = list(settings), list(defense_settings), {}

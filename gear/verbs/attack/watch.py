@@ -103,7 +103,7 @@ class Recorder:
             self._validate(done, patches())
         self._queries_left = figures.get("queries_left")
         now = time.monotonic()
-        if now - self._saved >= SECONDS_BETWEEN:
+        if now - self._saved >= SECONDS_BETWEEN and not self.stopped:  # what resumes is to come to the same end
             self.save(done, state())
         self.tell(done, self._queries_left)
         return bool(self.stopped)

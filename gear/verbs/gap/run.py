@@ -78,6 +78,8 @@ def gap(
     clean = open_dataset(dataset, split)
     if (patch is None) == (twin is None):
         raise DatasetError(clean.root, "say one of: --twin DIR, a rendered twin; or --patch PATCH, to render one")
+    if samples is not None and samples < 1:
+        raise DatasetError(clean.root, f"samples must be at least 1, got {samples}")
     if patch is None and (town is not None or scenes is not None):
         raise DatasetError(clean.root, "--town and --scenes say what to render; with --twin nothing is rendered")
     if patch is not None and out is None:

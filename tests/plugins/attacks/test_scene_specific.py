@@ -122,6 +122,9 @@ def test_names_of_losses_are_those_of_the_model(monkeypatch: pytest.MonkeyPatch)
 
     contract = Contract()
     assert len(contract.attack(WithLosses(TinyConfig()), contract.dataset(), steps=1)) == 1
+    Contract.options = {**SMALL, "losses": {"one": "0", "two": "0"}}
+    with pytest.raises(GearError, match="all of one, two are left out"):
+        contract.attack(WithLosses(TinyConfig()), contract.dataset(), steps=1)
     Contract.options = {**SMALL, "losses": {"tow": "0"}}
     with pytest.raises(GearError, match=r"losses.tow: no loss of the model; it has one, two"):
         contract.attack(WithLosses(TinyConfig()), contract.dataset(), steps=1)
