@@ -7,6 +7,7 @@ from typing import Any
 
 from torch import Tensor, nn
 
+from gear.attacking.borrowed import networks_of
 from gear.contracts.defenses import Defense
 from gear.contracts.models import Model
 from gear.values.frames import UInt8Image
@@ -22,7 +23,7 @@ class Group(nn.Module):
     def __init__(self, members: Mapping[str, Model]) -> None:
         super().__init__()
         self.members = dict(members)
-        self.networks = nn.ModuleList([member for member in members.values() if isinstance(member, nn.Module)])
+        self.networks = _networks(*members.values())
 
     def predict(self, views: Mapping[str, UInt8Image]) -> dict[str, Any]:
         """Every member's prediction by its name."""
@@ -47,6 +48,7 @@ class Defended(nn.Module):
     def __init__(self, model: Model, defense: Defense) -> None:
         super().__init__()
         self.model, self.defense = model, defense
+        self.networks = _networks(*([] if isinstance(model, nn.Module) else [model]))
 
     def predict(self, views: Mapping[str, UInt8Image]) -> Any:
         """The guarded model's own, without the defense: attacks optimise `forward`."""
@@ -59,6 +61,11 @@ class Defended(nn.Module):
     def taps(self) -> Mapping[str, nn.Module]:
         """The model's."""
         return self.model.taps()
+
+
+def _networks(*models: Model) -> nn.ModuleList:
+    """What models that are no modules themselves hold counts too, where weights are frozen and hashed."""
+    return nn.ModuleList([network for model in models for _, network in networks_of(model)])
 
 
 def members_of(model: Model) -> Mapping[str, Model]:

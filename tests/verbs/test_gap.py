@@ -90,6 +90,10 @@ def test_what_does_not_suit_is_said_before_anything_is_rendered(pair: tuple[Path
         gear.gap(clean, defense="median", **places)
     with pytest.raises(GearError, match="defense"):
         gear.gap(clean, model="ddrnet23_slim", settings=["weights=random"], defense="no_such", **places)
+    with pytest.raises(DatasetError, match="has 1 surfaces for patches, none has 0; give one for each"):
+        gear.gap(clean, **{**places, "patch": "none"})
+    with pytest.raises(DatasetError, match="samples must be at least 1"):
+        gear.gap(clean, **places, samples=0)
     assert not (tmp_path / "gap").exists()
 
 

@@ -69,4 +69,7 @@ def collect_twin(
         raise DatasetError(clean.root, f"cannot be collected again ({error}); {files}{remedy}") from error
     if job.plan.twin_key != clean.plan.twin_key:
         raise DatasetError(clean.root, f"this gear would not make the same scenes again; {remedy}")
+    surfaces, patches = len(clean.sidecar(0).record.surfaces), len(job.patch.images)
+    if patches < surfaces:
+        raise DatasetError(clean.root, f"has {surfaces} surfaces for patches, {patch} has {patches}; give one for each")
     run_job(job)

@@ -1,0 +1,60 @@
+"""Models put together: what they hold is frozen and hashed, whether they are torch modules themselves or not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import pytest
+import torch
+from torch import nn
+
+from gear.attacking.borrowed import frozen
+from gear.attacking.group import Defended, Group
+from gear.testing.tiny_networks import TinyConfig, TinySegmenter
+from gear.verbs.evaluate.player import weights_digest
+
+
+class Plain:
+    """A model that holds a network and is none."""
+
+    def __init__(self) -> None:
+        self.network = TinySegmenter(TinyConfig())
+
+    def predict(self, views: Any) -> Any:
+        return self.network.predict(views)
+
+    def forward(self, views: Any, targets: Any | None = None) -> Any:
+        return self.network.forward(views, targets)
+
+    def taps(self) -> Mapping[str, nn.Module]:
+        return {"trunk": self.network.trunk}
+
+
+class Nothing:
+    """A defense that does nothing."""
+
+    def forward(self, views: Any) -> Any:
+        return views
+
+
+@pytest.mark.parametrize(
+    "put_together",
+    [
+        lambda model: Group({"one": model, "two": TinySegmenter(TinyConfig(seed=1))}),
+        lambda model: Defended(model, Nothing()),  # type: ignore[arg-type]
+    ],
+    ids=["group", "defended"],
+)
+@pytest.mark.parametrize("is_plain", [True, False])
+def test_what_is_held_is_frozen_and_hashed(put_together: Callable[[Any], nn.Module], is_plain: bool) -> None:
+    model: Any = Plain() if is_plain else TinySegmenter(TinyConfig())
+    network = model.network if is_plain else model
+    whole = put_together(model)
+    before = weights_digest(whole)
+    with frozen(whole):
+        assert not any(parameter.requires_grad for parameter in network.parameters())
+    assert all(parameter.requires_grad for parameter in network.parameters())
+    with torch.no_grad():
+        next(network.parameters()).add_(1.0)
+    assert before is not None and weights_digest(whole) != before
