@@ -23,6 +23,7 @@ from gear.attacking.group import members_of
 from gear.contracts.models import Model
 from gear.formats import rle
 from gear.formats.cityscapes import IGNORED_TRAIN_ID, LABELS
+from gear.values.frames import UInt8Image
 
 TRAIN_IDS = torch.tensor([label.train_id for label in LABELS if label.id >= 0])
 TRAIN_CLASSES = 19
@@ -172,9 +173,8 @@ class DepthObjective:
     def _answer(self, model: Model, sample: Any, index: int, view: str) -> Tensor:
         key = (id(model), index)
         if key not in self._clean:
-            picture = torch.from_numpy(sample.images[view].copy()).permute(2, 0, 1)[None].float() / 255
             with torch.no_grad():
-                self._clean[key] = model.forward({view: picture})["depth_m"][0].cpu()
+                self._clean[key] = model.forward({view: _as_batch(sample.images[view])})["depth_m"][0].cpu()
         return self._clean[key]
 
 
@@ -199,10 +199,7 @@ class LossObjective:
 
 def loss_names(model: Model, sample: Any) -> list[str]:
     """What a model calls its losses, of a group all members', in the order that they come in."""
-    views = {
-        name: torch.from_numpy(picture.copy()).permute(2, 0, 1)[None].float() / 255
-        for name, picture in sample.images.items()
-    }
+    views = {name: _as_batch(picture) for name, picture in sample.images.items()}
     with torch.no_grad(), frozen(model):
         found = [name for member in members_of(model).values() for name in member.forward(views, [sample])]
     return list(dict.fromkeys(found))
@@ -226,6 +223,11 @@ def train_labels(samples: Sequence[Any], classes: int) -> Tensor:
 def class_of(label_id: int, classes: int) -> int:
     """The channel of a label id."""
     return int(TRAIN_IDS[label_id]) if classes == TRAIN_CLASSES else label_id
+
+
+def _as_batch(picture: UInt8Image) -> Tensor:
+    """(1, 3, H, W) in 0..1 of a stored picture."""
+    return torch.from_numpy(picture.copy()).permute(2, 0, 1)[None].float() / 255
 
 
 @functools.lru_cache(maxsize=64)

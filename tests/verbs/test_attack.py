@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import sys
-import types
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
@@ -24,13 +21,11 @@ from gear.cli.main import main
 from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
 from gear.contracts.attacks import Patch
-from gear.contracts.hookspecs import hookimpl
-from gear.contracts.specs import AttackSpec, ModelSpec
+from gear.contracts.specs import AttackSpec
 from gear.plugins import build as building
 from gear.plugins.attacks.scene_specific import SceneSpecificConfig
-from gear.plugins.manager import discover
 from gear.testing.compare import difference
-from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_depth, tiny_segmenter
+from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import DatasetError, GearError, PluginError
 from gear.verbs.attack.run import attack
@@ -41,15 +36,6 @@ from gear.verbs.collect.run import collect
 from tests.verbs.conftest import size_settings
 
 SMALL = ["height_px=12", "width_px=24", "batch=1"]
-other_segmenter = ModelSpec(
-    name="other_segmenter",
-    summary="The tiny one with other weights.",
-    config=TinyConfig,
-    build=lambda config: TinySegmenter(TinyConfig(seed=config.seed + 7, width=config.width)),
-    tasks=("semseg",),
-    views=("left",),
-    taps=("stem", "trunk"),
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,42 +58,6 @@ class Bad:
 
 def bad(what: str) -> AttackSpec[Any]:
     return AttackSpec(name="bad", summary="Bad.", config=Nothing, build=lambda config: Bad(what))
-
-
-@pytest.fixture
-def install(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
-    def put(*specs: Any) -> None:
-        module = types.ModuleType("odd_attacks")
-        for hook, kind in (("gear_models", ModelSpec), ("gear_attacks", AttackSpec)):
-            chosen = [spec for spec in specs if isinstance(spec, kind)]
-            setattr(module, hook, hookimpl(lambda chosen=chosen: chosen, specname=hook))
-        sys.modules["odd_attacks"] = module
-        found = discover([EntryPoint(name="odd", value="odd_attacks", group="gear")])
-        monkeypatch.setattr(building, "catalogue", lambda: found)
-
-    put(tiny_segmenter, tiny_depth, other_segmenter)
-    yield put
-    sys.modules.pop("odd_attacks", None)
-
-
-@pytest.fixture(scope="module")
-def small(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
-    """Datasets with probes, which tests share and only read."""
-    made: dict[tuple[Any, ...], Path] = {}
-
-    def root(
-        task: str = "semseg", scene: str = "board", split: str = "train", probes: bool = True, seed: int | None = None
-    ) -> Path:
-        key = (task, scene, split, probes, seed)
-        if key not in made:
-            made[key] = tmp_path_factory.mktemp("data") / f"{task}-{scene}-{split}-{seed}"
-            collect(
-                task, town=TINY_TOWN, scene=scene, split=split, samples=2, renderer="classic", quality="fast",
-                probes=probes, seed=seed, out=made[key], settings=[f"scenes={TINY_SCENES}", *size_settings(task)],
-            )  # fmt: skip
-        return made[key]
-
-    return root
 
 
 Small = Callable[..., Path]
@@ -391,11 +341,6 @@ def test_a_folder_that_is_not_whole_is_not_taken_for_it(small: Small, install: I
         attack(small(), out=tmp_path / "file", **facts, force=True)
 
 
-def test_too_few_queries_are_said(small: Small, install: Install, tmp_path: Path) -> None:
-    with pytest.raises(GearError, match="1 queries are too few for one step"):
-        attack(small(), model="tiny_segmenter", out=tmp_path, attack="nes", queries=1, settings=SMALL[:2])
-
-
 def test_patches_against_other_weights_are_others(small: Small, install: Install, tmp_path: Path) -> None:
     out = tmp_path / "p"
     first = attack(small(), model="tiny_segmenter", out=out, steps=2, settings=SMALL)
@@ -413,52 +358,6 @@ def test_patches_against_other_weights_are_others(small: Small, install: Install
     second = attack(small(), model="tiny_segmenter", out=out, steps=2, settings=SMALL, force=True)
     assert second.facts["weights_sha256"] != first.facts["weights_sha256"]
     assert not (out / "patch_1.png").exists() and not (out / "verify").exists()
-
-
-def test_queries_that_end_between_two_looks_are_judged_too(small: Small, install: Install, tmp_path: Path) -> None:
-    report = attack(
-        small(), model="tiny_segmenter", val=small(split="val"), out=tmp_path, attack="square", queries=7, every=50,
-        settings=SMALL[:2],
-    )  # fmt: skip
-    (judged,) = report.facts["validation_harm"]
-    assert judged[0] == report.facts["steps_done"] < 50
-
-
-def test_queries_alone_decide_how_long_it_takes(small: Small, install: Install, tmp_path: Path) -> None:
-    seen: list[tuple[int, int]] = []
-    report = attack(
-        small(), model="tiny_segmenter", out=tmp_path / "a", attack="square", queries=401, settings=SMALL[:2],
-        progress=lambda *done: seen.append(done),
-    )  # fmt: skip
-    assert 301 < report.facts["steps_done"] < 401 and report.facts["curves"]["queries_left"][-1] == 0
-    assert seen[0] == (0, 401) and seen[-1] == (401, 401), "progress counts queries"
-    capped = attack(
-        small(), model="tiny_segmenter", out=tmp_path / "b", attack="nes", queries=401, steps=2, settings=SMALL[:2]
-    )
-    assert capped.facts["steps_done"] == 2
-    with pytest.raises(GearError, match="takes steps; --queries is for"):
-        attack(small(), model="tiny_segmenter", out=tmp_path / "c", queries=10)
-
-
-@pytest.mark.parametrize("name", ["square", "nes"])
-def test_a_killed_search_pays_no_query_twice(
-    small: Small, install: Install, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
-    """Depth costs one query more for every sample seen for the first time, also when it goes on."""
-    settings = [*SMALL[:2], "pairs=2"] if name == "nes" else SMALL[:2]
-    facts: dict[str, Any] = {"model": "tiny_depth", "attack": name, "queries": 40, "settings": settings}
-    whole = attack(small("depth"), out=tmp_path / "whole", **facts)
-    monkeypatch.setattr("gear.verbs.attack.watch.SECONDS_BETWEEN", 0.0)
-
-    def killed(done: int, total: int) -> None:
-        if done > 15:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        attack(small("depth"), out=tmp_path / "cut", **facts, progress=killed)
-    resumed = attack(small("depth"), out=tmp_path / "cut", **facts)
-    assert resumed.facts["curves"] == whole.facts["curves"]
-    assert not difference(resumed.patches, whole.patches, "patches")
 
 
 def lucky(config: TinyConfig) -> TinySegmenter:

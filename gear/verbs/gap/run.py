@@ -88,7 +88,7 @@ def gap(
         raise DatasetError(clean.root, "a defense guards a model: name one with --model")
     root = Path(twin) if twin is not None else Path(out or "") / "twin"
     if patch is None:
-        checked_twin(clean, open_dataset(root, clean.plan.info.split))
+        pairs = checked_twin(clean, open_dataset(root, clean.plan.info.split))
     # What does not suit the dataset is to be found before a twin is rendered.
     engines = {name: open_compositor(name, clean, rounding=True) for name in compositors}
     effect = (
@@ -98,7 +98,7 @@ def gap(
     )
     if patch is not None:
         collect_twin(clean, patch, root, town=town, scenes=scenes)
-    pairs = checked_twin(clean, open_dataset(root, clean.plan.info.split))
+        pairs = checked_twin(clean, open_dataset(root, clean.plan.info.split))
     count = min(len(pairs), samples or len(pairs))
     images = shown_patches(pairs.second, len(clean.sidecar(0).record.surfaces))
     found: list[SampleGap] = []

@@ -1,0 +1,68 @@
+"""`gear attack` without gradients: what is counted, how long it takes, and what a kill costs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gear.testing.compare import difference
+from gear.values.errors import GearError
+from gear.verbs.attack.run import attack
+
+SMALL = ["height_px=12", "width_px=24", "batch=1"]
+Small = Callable[..., Path]
+Install = Callable[..., None]
+
+
+def test_too_few_queries_are_said(small: Small, install: Install, tmp_path: Path) -> None:
+    with pytest.raises(GearError, match="1 queries are too few for one step"):
+        attack(small(), model="tiny_segmenter", out=tmp_path, attack="nes", queries=1, settings=SMALL[:2])
+
+
+def test_queries_that_end_between_two_looks_are_judged_too(small: Small, install: Install, tmp_path: Path) -> None:
+    report = attack(
+        small(), model="tiny_segmenter", val=small(split="val"), out=tmp_path, attack="square", queries=7, every=50,
+        settings=SMALL[:2],
+    )  # fmt: skip
+    (judged,) = report.facts["validation_harm"]
+    assert judged[0] == report.facts["steps_done"] < 50
+
+
+def test_queries_alone_decide_how_long_it_takes(small: Small, install: Install, tmp_path: Path) -> None:
+    seen: list[tuple[int, int]] = []
+    report = attack(
+        small(), model="tiny_segmenter", out=tmp_path / "a", attack="square", queries=401, settings=SMALL[:2],
+        progress=lambda *done: seen.append(done),
+    )  # fmt: skip
+    assert 301 < report.facts["steps_done"] < 401 and report.facts["curves"]["queries_left"][-1] == 0
+    assert seen[0] == (0, 401) and seen[-1] == (401, 401), "progress counts queries"
+    capped = attack(
+        small(), model="tiny_segmenter", out=tmp_path / "b", attack="nes", queries=401, steps=2, settings=SMALL[:2]
+    )
+    assert capped.facts["steps_done"] == 2
+    with pytest.raises(GearError, match="takes steps; --queries is for"):
+        attack(small(), model="tiny_segmenter", out=tmp_path / "c", queries=10)
+
+
+@pytest.mark.parametrize("name", ["square", "nes"])
+def test_a_killed_search_pays_no_query_twice(
+    small: Small, install: Install, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """Depth costs one query more for every sample seen for the first time, also when it goes on."""
+    settings = [*SMALL[:2], "pairs=2"] if name == "nes" else SMALL[:2]
+    facts: dict[str, Any] = {"model": "tiny_depth", "attack": name, "queries": 40, "settings": settings}
+    whole = attack(small("depth"), out=tmp_path / "whole", **facts)
+    monkeypatch.setattr("gear.verbs.attack.watch.SECONDS_BETWEEN", 0.0)
+
+    def killed(done: int, total: int) -> None:
+        if done > 15:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        attack(small("depth"), out=tmp_path / "cut", **facts, progress=killed)
+    resumed = attack(small("depth"), out=tmp_path / "cut", **facts)
+    assert resumed.facts["curves"] == whole.facts["curves"]
+    assert not difference(resumed.patches, whole.patches, "patches")
