@@ -122,8 +122,7 @@ class SemsegObjective:
             gamma = float(right.sum() / counts.sum().clamp_min(1))
         else:
             gamma = self.gamma
-        terms = {"correct": (right, gamma), "wrong": (wrong, 1 - gamma)}
-        return {n: Term(value=_mean(loss, where), weight=w) for n, (where, w) in terms.items() if w and where.any()}
+        return _split(loss, {"correct": (right, gamma), "wrong": (wrong, 1 - gamma)})
 
     def _targeted(self, logits: Tensor, labels: Tensor, counts: Tensor) -> Mapping[str, Term]:
         assert self.target is not None
@@ -166,9 +165,8 @@ class DepthObjective:
             change = depth_m.clamp_min(1e-3).log() - clean.clamp_min(1e-3).log()
             return {self._direction: Term(value=sign * _mean(change, free))}
         error = functional.smooth_l1_loss(depth_m, clean, reduction="none")
-        small = free & ((depth_m - clean).detach().abs() <= self._split_m)
-        terms = {"small": (small, self._gamma), "large": (free & ~small, 1 - self._gamma)}
-        return {n: Term(value=_mean(error, where), weight=w) for n, (where, w) in terms.items() if w and where.any()}
+        small = free & ((depth_m.detach() - clean).abs_() <= self._split_m)
+        return _split(error, {"small": (small, self._gamma), "large": (free & ~small, 1 - self._gamma)})
 
     def _answer(self, model: Model, sample: Any, index: int, view: str) -> Tensor:
         key = (id(model), index)
@@ -237,6 +235,15 @@ def _mask(counts: str, height: int, width: int) -> npt.NDArray[np.bool_]:
     return mask
 
 
+def _split(values: Tensor, parts: Mapping[str, tuple[Tensor, float]]) -> Mapping[str, Term]:
+    """A term for the mean over each part, which is where it lies and its weight; none for what is empty or weightless.
+
+    Counting is several times as fast as asking whether there is any.
+    """
+    return {n: Term(value=_mean(values, where), weight=w) for n, (where, w) in parts.items() if w and where.sum()}
+
+
 def _mean(values: Tensor, where: Tensor) -> Tensor:
     """Over the chosen; 0 with a gradient of 0 where nothing is chosen."""
-    return (values * where).sum() / where.sum().clamp_min(1)
+    # As a number: a product with bools converts them in every direction that it goes.
+    return (values * where.to(values.dtype)).sum() / where.sum().clamp_min(1)

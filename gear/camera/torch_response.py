@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import torch
+from torch.autograd.function import once_differentiable
 
 from gear.camera.optics import LensMap
 from gear.camera.response import Response
 
 
 def apply(response: Response, light: torch.Tensor) -> torch.Tensor:
-    """`Response.curve` on tensors, differentiable.
+    """`Response.curve` on tensors, differentiable once.
 
     Args:
         response: the camera setting.
@@ -18,16 +21,37 @@ def apply(response: Response, light: torch.Tensor) -> torch.Tensor:
     Returns:
         (...) of the same dtype, picture values 0..1, not rounded to bytes.
     """
-    x = light.clamp(0.0, 1.0)
-    y = x * response.exposure / (1 + (response.exposure - 1) * x)
-    # A power has no finite gradient at 0.
-    z = y.clamp_min(1e-12) ** response.contrast if response.contrast != 1 else y
-    return encode_srgb(z) if response.encoding == "srgb" else z
+    with torch.no_grad():
+        x = light.clamp(0.0, 1.0)
+        share = 1 / (1 + (response.exposure - 1) * x)
+        values, slope = x * response.exposure * share, response.exposure * share.square()
+        if response.contrast != 1:
+            # A power has no finite gradient at 0.
+            safe = values.clamp_min(1e-12)
+            bent = safe**response.contrast
+            slope *= torch.where(values < 1e-12, 0.0, response.contrast * bent / safe)
+            values = bent
+        if response.encoding == "srgb":
+            values, last = _encoded(values)
+            slope *= last
+        slope *= x == light
+    return _curve(light, values, slope)
 
 
 def face_light(renderer_name: str, face: torch.Tensor) -> torch.Tensor:
     """`gear.camera.face_light` on picture values 0..1, differentiable."""
     return face if renderer_name == "classic" else decode_srgb(face)
+
+
+def decode_srgb(values: torch.Tensor) -> torch.Tensor:
+    """sRGB values 0..1 to linear light 0..1; differentiable once."""
+    with torch.no_grad():
+        base = (values.clamp_min(0.04045) + 0.055) / 1.055
+        bent = base**2.4
+        is_dark = values <= 0.04045
+        light = torch.where(is_dark, values / 12.92, bent)
+        slope = torch.where(is_dark, 1 / 12.92, bent / base * (2.4 / 1.055))
+    return _curve(values, light, slope)
 
 
 def vignetted(light: torch.Tensor, share: torch.Tensor) -> torch.Tensor:
@@ -44,13 +68,30 @@ def through_lens(light: torch.Tensor, lens: LensMap) -> torch.Tensor:
     return torch.nn.functional.grid_sample(light, grid, mode="bilinear", padding_mode="border", align_corners=True)
 
 
-def encode_srgb(light: torch.Tensor) -> torch.Tensor:
-    """Linear light 0..1 to sRGB values 0..1."""
-    bent = 1.055 * light.clamp_min(0.0031308) ** (1 / 2.4) - 0.055
-    return torch.where(light <= 0.0031308, light * 12.92, bent)
+def _encoded(light: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """Linear light 0..1 to sRGB values 0..1, and the slopes there."""
+    base = light.clamp_min(0.0031308)
+    power = base ** (1 / 2.4)
+    is_dark = light <= 0.0031308
+    values = torch.where(is_dark, light * 12.92, 1.055 * power - 0.055)
+    return values, torch.where(is_dark, 12.92, power / base * (1.055 / 2.4))
 
 
-def decode_srgb(values: torch.Tensor) -> torch.Tensor:
-    """sRGB values 0..1 to linear light 0..1."""
-    bent = ((values.clamp_min(0.04045) + 0.055) / 1.055) ** 2.4
-    return torch.where(values <= 0.04045, values / 12.92, bent)
+def _curve(given: torch.Tensor, values: torch.Tensor, slope: torch.Tensor) -> torch.Tensor:
+    curve: torch.Tensor = _Curve.apply(given, values, slope)  # type: ignore[no-untyped-call]
+    return curve
+
+
+class _Curve(torch.autograd.Function):
+    """An elementwise curve whose slopes are known: an attack goes back through it twice a step, by one product each."""
+
+    @staticmethod
+    def forward(ctx: Any, given: torch.Tensor, values: torch.Tensor, slope: torch.Tensor) -> torch.Tensor:
+        ctx.save_for_backward(slope)
+        return values
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, gradient: torch.Tensor) -> tuple[torch.Tensor, None, None]:
+        (slope,) = ctx.saved_tensors
+        return gradient * slope, None, None
