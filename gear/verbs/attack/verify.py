@@ -9,7 +9,7 @@ from gear.dataset.sidecar import load_json
 from gear.opening import open_dataset
 from gear.values.errors import DatasetError, GearError
 from gear.verbs.attack.data import check_joined, scenes_of
-from gear.verbs.attack.run import VERIFY
+from gear.verbs.attack.folder import VERIFY
 from gear.verbs.gap.report import GapReport
 from gear.verbs.gap.run import gap
 from gear.verbs.train.data import root_and_split

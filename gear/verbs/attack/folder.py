@@ -1,0 +1,96 @@
+"""The folder that patches are made in: what is there already, what is left of another time, what goes in the end."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import shutil
+from pathlib import Path
+
+from safetensors import SafetensorError
+from safetensors.numpy import load as from_bytes
+
+from gear.contracts.attacks import Patch
+from gear.dataset.files import clear_scratch, explained, read_bytes, sha256
+from gear.dataset.layout import GEAR
+from gear.values.errors import DatasetError
+from gear.values.serial import Json
+from gear.verbs.attack.watch import CHECKPOINT
+from gear.verbs.collect.patches import read_patch
+
+VERIFY = "verify"
+"""Folder of the rendered check, in that of the patches."""
+
+NOTES = "attack.json"
+
+AGAIN = "is gone, damaged or of other patches; --force makes them again"
+
+
+def begin(root: Path, plan: Json, *, force: bool) -> Json | None:
+    """The notes of patches that are there already and whole, or nothing, and then the folder is there.
+
+    Raises:
+        DatasetError: something else is there, or the disk refuses.
+    """
+    finished = root / NOTES
+    if force:
+        with explained(root):
+            for path in (finished, root / CHECKPOINT, *root.glob("patch_*.png")):
+                path.unlink(missing_ok=True)
+        shutil.rmtree(root / VERIFY, ignore_errors=True)  # what the patches that go did in the world
+    if finished.exists():
+        there = _read_notes(finished)
+        if any(there.get(key) != json.loads(json.dumps(value)) for key, value in plan.items()):
+            raise DatasetError(
+                root, "holds patches that were made otherwise; use another --out, or --force to replace them"
+            )
+        _check_whole(root, there)
+        return there
+    with explained(root):
+        root.mkdir(parents=True, exist_ok=True)
+    return None
+
+
+def read_patches(root: Path) -> tuple[Patch, ...]:
+    """The exact values of patches that are there.
+
+    Raises:
+        DatasetError: they are gone or damaged.
+    """
+    path = root / "patch.safetensors"
+    try:
+        arrays = from_bytes(path.read_bytes())
+    except (OSError, SafetensorError) as error:
+        raise DatasetError(path, AGAIN) from error
+    return tuple(Patch(name=name, rgb=arrays[name]) for name in sorted(arrays))
+
+
+def tidy(root: Path) -> None:
+    """Takes away what only an unfinished attack needs."""
+    with contextlib.suppress(FileNotFoundError):
+        (root / CHECKPOINT).unlink()
+    clear_scratch(root)
+    with contextlib.suppress(OSError):
+        (root / GEAR).rmdir()
+
+
+def _read_notes(path: Path) -> Json:
+    try:
+        there = json.loads(read_bytes(path))
+    except ValueError:
+        there = None
+    if not isinstance(there, dict):
+        raise DatasetError(path, AGAIN)
+    return there
+
+
+def _check_whole(root: Path, notes: Json) -> None:
+    """Whether the pictures are those that the notes speak of.
+
+    Raises:
+        DatasetError: one is not, or is gone.
+    """
+    for name, digest in notes["patches"].items():
+        path = root / f"{name}.png"
+        if not path.is_file() or sha256(read_patch(path).tobytes()) != digest:
+            raise DatasetError(path, AGAIN)
