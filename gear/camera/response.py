@@ -12,7 +12,8 @@ Nothing in it depends on the picture: a patch cannot change how the rest of a sc
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -30,7 +31,7 @@ class Response:
     """One camera setting.
 
     Attributes:
-        exposure: gain in the shadows, at least 1.
+        exposure: gain in the shadows, more than 0; below 1 it darkens.
         contrast: exponent of the tone curve, 0.5 to 2.
         encoding: `none` for frames that hold display values already.
     """
@@ -41,8 +42,8 @@ class Response:
     _table: UInt8Image = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        if not self.exposure >= 1:
-            raise ValueError(f"exposure must be at least 1, got {self.exposure}")
+        if not 0 < self.exposure < math.inf:
+            raise ValueError(f"exposure must be more than 0, got {self.exposure}")
         if not 0.5 <= self.contrast <= 2:
             raise ValueError(f"contrast must be 0.5 to 2, got {self.contrast}")
         light = np.arange(LINEAR_FULL_SCALE + 1) / LINEAR_FULL_SCALE
@@ -79,18 +80,25 @@ class Response:
 IDENTITY = Response(encoding="none")
 """For frames that hold display values: the picture is the frame."""
 
+NIGHT_EXPOSURE, CLASSIC_NIGHT_EXPOSURE = 0.35, 0.1
+"""Of linear frames and of display values: a grey wall is just to be seen."""
+
 
 def response_for(renderer_name: str, weather: Weather) -> Response:
     """The camera setting for a renderer's frames in a weather: fixed, as if set once by hand for that light.
 
     A low sun leaves streets in shadow and needs more lift; under clouds contrast is low by itself and gets a little
-    more.
+    more. Frames of a night are as bright as those of a day, so that they have as many levels; here it becomes dark.
     """
+    night = weather.night
     if renderer_name == "classic":
-        return IDENTITY
+        return replace(IDENTITY, exposure=CLASSIC_NIGHT_EXPOSURE**night) if night else IDENTITY
     low_sun = float(np.clip((40 - weather.sun_altitude_deg) / 30, 0, 1))
     clouds = max(weather.cloudiness, 80.0 if weather.precipitation > 0 else 0.0) / 100
-    return Response(exposure=round(4.5 + 1.2 * low_sun - 2.0 * clouds, 3), contrast=round(1.43 + 0.05 * clouds, 3))
+    exposure = 4.5 + 1.2 * low_sun - 2.0 * clouds
+    if night:
+        exposure = exposure ** (1 - night) * NIGHT_EXPOSURE**night
+    return Response(exposure=round(exposure, 3), contrast=round(1.43 + 0.05 * clouds, 3))
 
 
 def face_light(renderer_name: str, face: UInt8Image) -> Floats:

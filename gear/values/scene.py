@@ -71,6 +71,10 @@ def _quat_from_rotation(rotation: np.ndarray) -> np.ndarray:
     return -q if q[0] < 0 else q
 
 
+NIGHT_DEG = 10.0
+"""So far below the horizon the sun leaves nothing of itself in the sky."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Weather:
     """CARLA's weather parameters with CARLA's meaning and units.
@@ -98,6 +102,12 @@ class Weather:
     scattering_intensity: float = 1.0
     mie_scattering_scale: float = 0.03
     rayleigh_scattering_scale: float = 0.0331
+
+    @property
+    def night(self) -> float:
+        """0 while the sun is up, 1 once its light is gone from the sky, 10 degrees below the horizon."""
+        depth = min(max(-self.sun_altitude_deg / NIGHT_DEG, 0.0), 1.0)
+        return depth * depth * (3 - 2 * depth)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

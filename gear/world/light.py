@@ -39,6 +39,9 @@ STREET_SUNLIT = 0.45
 BOUNCE_GAIN = 1.25
 """Light that streets and houses throw back and forth, which no renderer of ours follows."""
 
+NIGHT_SKY_SHARE = 0.2
+"""How bright the night's sky looks beside the light that streets have then: that is mostly a town's own."""
+
 FACE_ORDER = "RLUDFB"
 _INTEGRATION_PX = 16
 
@@ -70,7 +73,7 @@ def lighting_of(weather: Weather, *, sky_face_px: int = SKY_FACE_PX) -> Lighting
     """Light of a weather."""
     sky = Sky.of(weather)
     exposure, from_above = _exposure(sky)
-    faces = encode_srgb(exposure * sky.radiance(face_directions(sky_face_px)))
+    faces = encode_srgb(exposure * _looks(sky) * sky.radiance(face_directions(sky_face_px)))
     return Lighting(
         towards_sun=sky.towards_sun,
         sun=exposure * sky.sun_klx,
@@ -93,7 +96,7 @@ def mirrored_light(weather: Weather, rows: int, columns: int) -> Floats:
     )
     level = np.cos(elevation)
     directions = np.stack([np.cos(azimuth) * level, np.sin(azimuth) * level, np.sin(elevation)], axis=-1)
-    return np.minimum(_exposure(sky)[0] * _in_street(sky, directions), 1.0)
+    return np.minimum(_exposure(sky)[0] * _looks(sky) * _in_street(sky, directions), 1.0)
 
 
 def _in_street(sky: Sky, directions: Floats) -> Floats:
@@ -111,7 +114,12 @@ def _in_street(sky: Sky, directions: Floats) -> Floats:
 def horizon_light(weather: Weather) -> Floats:
     """(`HORIZON_AZIMUTHS`, 3) light of distant air by azimuth, counter-clockwise from east, in units of the frame."""
     sky = Sky.of(weather)
-    return np.minimum(_exposure(sky)[0] * sky.horizon_radiance(HORIZON_AZIMUTHS), 1.0)
+    return np.minimum(_exposure(sky)[0] * _looks(sky) * sky.horizon_radiance(HORIZON_AZIMUTHS), 1.0)
+
+
+def _looks(sky: Sky) -> float:
+    """How bright the sky looks for the light that it stands for."""
+    return float(NIGHT_SKY_SHARE**sky.night)
 
 
 def _exposure(sky: Sky) -> tuple[float, Floats]:

@@ -22,6 +22,7 @@ Floats = npt.NDArray[np.float64]
 _MIN_ALTITUDE_RAD = math.radians(1.5)
 """The formulas hold for a sun above the horizon; a lower one lights the sky as if it stood here, only more weakly."""
 
+_NIGHT_TINT = np.array([0.72, 0.84, 1.0])
 _GROUND_ALBEDO = np.array([0.16, 0.15, 0.13])
 _SUN_KLX = 128.0 * np.array([1.03, 1.0, 0.96])
 _WAVELENGTHS_UM = np.array([0.610, 0.550, 0.465])
@@ -60,6 +61,7 @@ class Sky:
         cloud_cover: 0..1, what clouds and rain together cover.
         turbidity: haziness of the clear air; 2 is very clear.
         blueness: how saturated the clear sky is; 1 is the model's own.
+        night: 0 while the sun is up, 1 once its light is gone from the sky.
     """
 
     towards_sun: Floats
@@ -67,6 +69,7 @@ class Sky:
     cloud_cover: float
     turbidity: float
     blueness: float
+    night: float
 
     @staticmethod
     def of(weather: Weather) -> Sky:
@@ -95,6 +98,7 @@ class Sky:
             cloud_cover=cover,
             turbidity=turbidity,
             blueness=float(np.clip(weather.rayleigh_scattering_scale / 0.0331, 0.0, 1.5)),
+            night=weather.night,
         )
 
     def radiance(self, directions: Floats) -> Floats:
@@ -140,11 +144,12 @@ class Sky:
         zenith_angle = math.acos(float(np.clip(self.towards_sun[2], -1, 1)))
         cos_view = np.maximum(directions[:, 2], 0.01)
         cos_sun = np.clip(directions @ self.towards_sun, -1, 1)
+        zeniths = _zenith(self.turbidity, zenith_angle)
         values = {
             name: zenith
             * _perez(name, self.turbidity, cos_view, cos_sun)
             / _perez_zenith(name, self.turbidity, zenith_angle)
-            for name, zenith in _zenith(self.turbidity, zenith_angle).items()
+            for name, zenith in zeniths.items()
         }
         luminance, x, y = values["Y"], values["x"], values["y"]
         # The model's horizon is too red under a high sun: what the eye sees there is whitish.
@@ -152,7 +157,11 @@ class Sky:
         tint = self.blueness * (1 - 0.8 * whitish)
         x, y = _D65[0] + tint * (x - _D65[0]), _D65[1] + tint * (y - _D65[1])
         xyz = np.column_stack([luminance * x / y, luminance, luminance * (1 - x - y) / y])
-        return np.asarray(np.maximum(xyz @ _RGB_FROM_XYZ.T, 0.0))
+        day = np.maximum(xyz @ _RGB_FROM_XYZ.T, 0.0)
+        if not self.night:
+            return np.asarray(day)
+        # The glow about where the sun went down fades away with it.
+        return np.asarray(day + self.night * (_NIGHT_TINT * zeniths["Y"] - day))
 
     def _cloud_base(self) -> Floats:
         """(3,) mean radiance of clouds: bright when they are few, a third as bright when they cover everything."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 import torch
@@ -15,7 +17,7 @@ from gear.world.weather import PRESETS
 
 RESPONSES = st.builds(
     Response,
-    exposure=st.floats(1, 8),
+    exposure=st.floats(0.05, 8),
     contrast=st.floats(0.5, 2),
     encoding=st.sampled_from(["srgb", "none"]),
 )
@@ -81,10 +83,24 @@ def test_every_weather_has_a_fixed_setting() -> None:
         assert 75 < 255 * setting.curve(0.1) < 140
         assert 225 < 255 * setting.curve(0.85) < 252
     assert all(response_for("classic", weather) == IDENTITY for weather in PRESETS.values())
-    assert response_for("filament", Weather(name="x", sun_altitude_deg=-5)).exposure < 6
+
+
+@pytest.mark.parametrize("name", ["filament", "classic"])
+def test_pictures_darken_as_the_sun_goes_down(name: str) -> None:
+    light = np.linspace(0.05, 0.9, 20)
+    shown = [
+        response_for(name, Weather(name="x", sun_altitude_deg=float(a))).curve(light) for a in (0, -2, -5, -8, -10)
+    ]
+    assert all((later < earlier).all() for earlier, later in itertools.pairwise(shown))
+    night = response_for(name, Weather(name="x", sun_altitude_deg=-10))
+    assert response_for(name, Weather(name="x", sun_altitude_deg=-90)) == night
+    assert response_for(name, Weather(name="x", sun_altitude_deg=0)) == response_for(
+        name, Weather(name="x", sun_altitude_deg=0.5)
+    )
+    assert 10 < 255 * night.curve(0.3) < 70
 
 
 def test_settings_out_of_range_are_refused() -> None:
-    for wrong in ({"exposure": 0.5}, {"exposure": float("nan")}, {"contrast": 3.0}):
+    for wrong in ({"exposure": 0.0}, {"exposure": float("inf")}, {"exposure": float("nan")}, {"contrast": 3.0}):
         with pytest.raises(ValueError, match="must be"):
             Response(**wrong)

@@ -166,6 +166,20 @@ def test_a_low_sun_is_red_and_weak() -> None:
     assert Sky.of(Weather(name="x", sun_altitude_deg=-10)).sun_klx.sum() < 0.05 * noon.sum()
 
 
+def test_the_glow_of_the_sun_leaves_the_sky_at_night() -> None:
+    directions = face_directions(32).reshape(-1, 3)
+    above = directions[directions[:, 2] > 0.05]
+    dusk, night = (Sky.of(Weather(name="x", sun_altitude_deg=a)) for a in (-1, -30))
+    towards = above @ dusk.towards_sun > 0.9
+    glow = [sky.radiance(above)[towards].mean() / sky.radiance(above)[~towards].mean() for sky in (dusk, night)]
+    assert glow[0] > 1.5 and glow[1] == pytest.approx(1, abs=0.02)
+    evening = lighting_of(Weather(name="x", sun_altitude_deg=0), sky_face_px=16)
+    dark = lighting_of(Weather(name="x", sun_altitude_deg=-30), sky_face_px=16)
+    assert dark.sky_faces.mean() < 0.7 * evening.sky_faces.mean()
+    assert dark.sun.mean() < 0.1 * dark.ambient.mean(), "nothing casts a shadow"
+    assert dark.ambient.mean() > 0.5 * evening.ambient.mean(), "the frame keeps its levels; the camera darkens it"
+
+
 @pytest.mark.parametrize("name", sorted(PRESETS))
 def test_white_walls_do_not_clip_and_shadows_keep_their_levels(name: str) -> None:
     light = lighting_of(PRESETS[name], sky_face_px=32)
