@@ -241,11 +241,15 @@ def open_folder(options: FolderOptions, auto: str) -> nn.Module:
         with _without_bars():
             if options.weights == FOLDER:
                 loaded, found = kind.from_pretrained(
-                    folder, local_files_only=True, use_safetensors=True, output_loading_info=True
+                    folder,
+                    local_files_only=True,
+                    use_safetensors=True,
+                    trust_remote_code=False,  # left open, transformers asks, and runs the folder's code at a "y"
+                    output_loading_info=True,
                 )
                 return _complete(loaded, found["missing_keys"], folder)
             with seeded(options.seed):
-                config = transformers.AutoConfig.from_pretrained(folder, local_files_only=True)
+                config = transformers.AutoConfig.from_pretrained(folder, local_files_only=True, trust_remote_code=False)
                 graph: nn.Module = kind.from_config(config)
     except (OSError, ValueError, SafetensorError) as error:
         wanted = auto.removeprefix("AutoModelFor")
