@@ -20,7 +20,7 @@ from gear.losses.semantic import train_ids
 from gear.nn.depth_packages import need_transformers
 from gear.nn.huggingface_labels import match
 from gear.nn.huggingface_options import FOLDER, DepthFolderOptions, DetectorFolderOptions, FolderOptions
-from gear.nn.huggingface_processor import read_processor
+from gear.nn.huggingface_processor_file import read_processor
 from gear.nn.network import Network
 from gear.nn.options import NONE
 from gear.nn.runtime import seeded
@@ -55,11 +55,16 @@ class FolderNetwork(Network):
 
     def __init__(self, graph: nn.Module, options: FolderOptions) -> None:
         super().__init__(graph, options, views=(VIEW,))
-        self.processor = read_processor(Path(options.folder))
+        self.processor = read_processor(Path(options.folder), resizes=options.input_size == "processor")
 
     def seen(self, pictures: Mapping[str, Tensor]) -> Tensor:
         """(B, 3, h, w) as the network wants it."""
-        return self.processor.apply(pictures[VIEW], resizes=self.options.input_size == "processor")
+        return self.processor.apply(pictures[VIEW])
+
+    def restored(self, maps: Tensor, pictures: Mapping[str, Tensor], mode: str) -> Tensor:
+        """(B, C, H, W) at the size of the pictures, without the margins that the network saw."""
+        size = (int(pictures[VIEW].shape[2]), int(pictures[VIEW].shape[3]))
+        return self.processor.restore(maps, size, mode)
 
     def matched(self, known: Mapping[str, int], whose: str) -> dict[int, int]:
         """Our numbers of the network's classes, by name; what matches nothing goes to `unmatched` and the log.
@@ -95,7 +100,7 @@ class FolderSegmenter(FolderNetwork):
         theirs = self.their_logits(self.seen(pictures)).float()
         nothing = torch.full_like(theirs[:, 0], UNKNOWN_LOGIT)
         ours = [theirs[:, indexes].logsumexp(1) if indexes else nothing for indexes in self._indexes]
-        return {LOGITS: resized(torch.stack(ours, dim=1), pictures[VIEW])}
+        return {LOGITS: self.restored(torch.stack(ours, dim=1), pictures, "bilinear")}
 
     def their_logits(self, seen: Tensor) -> Tensor:
         """(B, classes, h, w) over the network's own classes, for pictures as it wants them."""
@@ -136,7 +141,7 @@ class FolderDepth(FolderNetwork):
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """At the picture's size."""
         said = self.graph(pixel_values=self.seen(pictures)).predicted_depth.float()
-        said = resized(said[:, None], pictures[VIEW])[:, 0]
+        said = self.restored(said[:, None], pictures, "bicubic")[:, 0]  # as transformers does
         if self.options.inverse_scale:
             inverse = self.options.inverse_scale * said + self.options.inverse_shift
             said = 1 / inverse.clamp(min=1e-3)
@@ -283,11 +288,3 @@ def _without_bars() -> Iterator[None]:
     finally:
         if was:
             settings.enable_progress_bar()
-
-
-def resized(maps: Tensor, pictures: Tensor) -> Tensor:
-    """(B, C, h, w) at the size of the pictures."""
-    size = (int(pictures.shape[2]), int(pictures.shape[3]))
-    if tuple(maps.shape[2:]) == size:
-        return maps
-    return functional.interpolate(maps, size=size, mode="bilinear", align_corners=False)

@@ -2,124 +2,129 @@
 
 from __future__ import annotations
 
-import json
+import math
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 from torch import Tensor
 from torch.nn import functional
 
 from gear.nn.network import IMAGENET_MEAN, IMAGENET_STD, Normalise
-from gear.values.errors import GearError
 
 Size = tuple[int, int]
 """Height and width."""
 
-RESAMPLING = {0: "nearest", 2: "bilinear", 3: "bicubic"}
-"""By Pillow's numbers."""
-
-FILE = "preprocessor_config.json"
+Channels = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Processor:
-    """Resizing and normalisation.
+    """Resizing, normalisation and margins.
 
     Attributes:
         mean, std: of each channel of a picture in 0..1.
         size: as the file has it: `height` and `width`, or `shortest_edge` and perhaps `longest_edge`; empty for none.
         mode: of interpolation.
-        multiple_px: sides are multiples of this.
+        multiple_px: sides are multiples of this, which may be a fraction.
         keeps_ratio: whether `height` and `width` are a frame that the picture is fitted to by the lesser change.
         rounds_down: whether sides are cut down to the multiple rather than rounded.
+        pads_to_px: what is left to a multiple of this is filled with zeros on all sides, after all else; 0 for nothing.
+        has_margin: whether the picture is mirrored beyond its edges, before all else.
+        aligns_corners: of interpolation, which has no anti-aliasing then.
+        is_bgr: whether the network takes blue first.
     """
 
-    mean: tuple[float, float, float] = IMAGENET_MEAN
-    std: tuple[float, float, float] = IMAGENET_STD
+    mean: Channels = IMAGENET_MEAN
+    std: Channels = IMAGENET_STD
     size: dict[str, int] | None = None
     mode: str = "bilinear"
-    multiple_px: int = 1
+    multiple_px: float = 1
     keeps_ratio: bool = False
     rounds_down: bool = False
+    pads_to_px: int = 0
+    has_margin: bool = False
+    aligns_corners: bool = False
+    is_bgr: bool = False
 
     def target(self, picture_px: Size) -> Size:
-        """Height and width that a picture is resized to."""
-        height, width = float(picture_px[0]), float(picture_px[1])
+        """Height and width that a picture, with its mirrored margin, is resized to."""
+        height, width = picture_px
         size = self.size or {}
         if "shortest_edge" in size:
-            short, long = min(picture_px), max(picture_px)
-            edge, most = size["shortest_edge"], size.get("longest_edge")
-            if most and long / short * edge > most:
-                edge = round(most * short / long)
-            height, width = (edge if side == short else int(edge * side / short) for side in picture_px)
-        elif self.keeps_ratio and size:
-            scales = (size["height"] / height, size["width"] / width)
-            scale = min(scales, key=lambda each: abs(1 - each))
-            height, width = height * scale, width * scale
-        elif size:
-            height, width = size["height"], size["width"]
-        return self._multiple(height), self._multiple(width)
+            height, width = _with_edges(picture_px, size["shortest_edge"], size.get("longest_edge"))
+            return self._multiple(height), self._multiple(width)
+        scales = (size["height"] / height, size["width"] / width) if size else (1.0, 1.0)
+        if self.keeps_ratio:
+            scales = (min(scales, key=lambda each: abs(1 - each)),) * 2
+        return self._multiple(scales[0] * height), self._multiple(scales[1] * width)
 
-    def apply(self, pictures: Tensor, *, resizes: bool = True) -> Tensor:
-        """(B, 3, H, W) in 0..1, resized with anti-aliasing and normalised."""
-        picture_px = (int(pictures.shape[2]), int(pictures.shape[3]))
-        target = self.target(picture_px) if resizes else (self._multiple(picture_px[0]), self._multiple(picture_px[1]))
-        if target != picture_px:
-            if self.mode == "nearest":
-                pictures = functional.interpolate(pictures, target, mode="nearest")
-            else:
-                pictures = functional.interpolate(pictures, target, mode=self.mode, antialias=True).clamp(0, 1)
-        normalise: Tensor = Normalise(self.mean, self.std).to(pictures.device)(pictures)
-        return normalise
+    def apply(self, pictures: Tensor) -> Tensor:
+        """(B, 3, h, w) as the network wants them, from (B, 3, H, W) in 0..1."""
+        rows, columns = self._margin(_size(pictures))
+        if rows or columns:
+            pictures = functional.pad(pictures, (columns, columns, rows, rows), mode="reflect")
+        seen: Tensor = Normalise(self.mean, self.std).to(pictures.device)(self._resized(pictures))
+        if self.is_bgr:
+            seen = seen.flip(1)
+        top, bottom, left, right = self._filled(_size(seen))
+        return functional.pad(seen, (left, right, top, bottom))
+
+    def restore(self, maps: Tensor, picture_px: Size, mode: str) -> Tensor:
+        """(B, C, H, W) over the picture, from (B, C, h, w) over what the network saw: the margins are cut off."""
+        rows, columns = self._margin(picture_px)
+        wide = (picture_px[0] + 2 * rows, picture_px[1] + 2 * columns)
+        height, width = self.target(wide)
+        top, bottom, left, right = self._filled((height, width))
+        if top + bottom + left + right:
+            maps = _interpolated(maps, (top + height + bottom, left + width + right), mode)
+            maps = maps[:, :, top : top + height, left : left + width]
+        maps = _interpolated(maps, wide, mode)
+        return maps[:, :, rows : rows + picture_px[0], columns : columns + picture_px[1]]
+
+    def _resized(self, pictures: Tensor) -> Tensor:
+        target = self.target(_size(pictures))
+        if target == _size(pictures):
+            return pictures
+        if self.mode == "nearest-exact":
+            return functional.interpolate(pictures, target, mode=self.mode)
+        if self.aligns_corners:
+            return functional.interpolate(pictures, target, mode=self.mode, align_corners=True)
+        # Theirs are whole levels, which cannot overshoot as a bicubic does.
+        return functional.interpolate(pictures, target, mode=self.mode, antialias=True).clamp(0, 1)
 
     def _multiple(self, side_px: float) -> int:
         steps = side_px / self.multiple_px
-        return max(1, int(steps) if self.rounds_down else round(steps)) * self.multiple_px
+        return max(1, int(max(1, int(steps) if self.rounds_down else round(steps)) * self.multiple_px))
+
+    def _margin(self, picture_px: Size) -> Size:
+        """Rows above and below, columns left and right."""
+        rows, columns = (int(math.sqrt(side / 2) * 3) if self.has_margin else 0 for side in picture_px)
+        return rows, columns
+
+    def _filled(self, seen_px: Size) -> tuple[int, int, int, int]:
+        """Rows above and below, columns left and right."""
+        rows, columns = (-side % self.pads_to_px if self.pads_to_px else 0 for side in seen_px)
+        return rows // 2, rows - rows // 2, columns // 2, columns - columns // 2
 
 
-def read_processor(folder: Path) -> Processor:
-    """The image processor of a folder; without one, ImageNet's normalisation and no resizing.
-
-    Raises:
-        GearError: it is not JSON, or asks for what gear does not do.
-    """
-    path = folder / FILE
-    if not path.is_file():
-        return Processor()
-    try:
-        facts: dict[str, Any] = json.loads(path.read_text())
-    except json.JSONDecodeError as error:
-        raise GearError(f"{path}:{error.lineno}: not JSON: {error.msg}") from error
-    if not isinstance(facts, dict):
-        raise GearError(f"{path}: a mapping is wanted, got {facts!r}")
-    try:
-        return _processor(facts, path)
-    except (TypeError, ValueError) as error:
-        raise GearError(f"{path}: a value is not of the kind that it should be ({error})") from error
+def _size(pictures: Tensor) -> Size:
+    return int(pictures.shape[2]), int(pictures.shape[3])
 
 
-def _processor(facts: dict[str, Any], path: Path) -> Processor:
-    resizes, resample = facts.get("do_resize", True), facts.get("resample", 2)
-    if resizes and resample not in RESAMPLING:
-        raise GearError(f"{path}: resample {resample} is not supported; nearest (0), bilinear (2) and bicubic (3) are")
-    divisor = facts.get("size_divisor")
-    normalises = facts.get("do_normalize", divisor is None)
-    return Processor(
-        mean=tuple(facts.get("image_mean") or IMAGENET_MEAN) if normalises else (0.0, 0.0, 0.0),
-        std=tuple(facts.get("image_std") or IMAGENET_STD) if normalises else (1.0, 1.0, 1.0),
-        size=_size(facts.get("size"), path) if resizes and divisor is None else None,
-        mode=RESAMPLING.get(resample, "bilinear"),
-        multiple_px=int(divisor or facts.get("ensure_multiple_of") or 1),
-        keeps_ratio=bool(facts.get("keep_aspect_ratio", False)),
-        rounds_down=divisor is not None,
-    )
+def _interpolated(maps: Tensor, size_px: Size, mode: str) -> Tensor:
+    if _size(maps) == size_px:
+        return maps
+    return functional.interpolate(maps, size=size_px, mode=mode, align_corners=False)
 
 
-def _size(size: Any, path: Path) -> dict[str, int] | None:
-    if size is None or isinstance(size, dict):
-        known = {"height", "width"}, {"shortest_edge"}
-        if size and not any(names <= size.keys() for names in known):
-            raise GearError(f"{path}: size {size} is not supported; height and width, or shortest_edge are")
-        return {name: int(value) for name, value in size.items() if value is not None} if size else None
-    return {"height": int(size), "width": int(size)}
+def _with_edges(picture_px: Size, edge_px: int, most_px: int | None) -> Size:
+    """The picture's shorter edge brought to `edge_px`, or as near as the longer one stays within `most_px`."""
+    short, long = min(picture_px), max(picture_px)
+    exact: float = edge_px
+    if most_px and long / short * edge_px > most_px:
+        exact = most_px * short / long
+    rounded = round(exact)
+    if rounded == short:
+        return picture_px
+    # Theirs rounds the shorter side only: the longer one follows from what it was before.
+    height, width = (rounded if side == short else int(exact * side / short) for side in picture_px)
+    return height, width

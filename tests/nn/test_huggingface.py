@@ -15,12 +15,10 @@ from gear.contracts.models import Model
 from gear.nn import vision
 from gear.nn.huggingface_labels import match
 from gear.nn.huggingface_options import DepthFolderOptions, DetectorFolderOptions, FolderOptions
-from gear.nn.huggingface_processor import Processor, read_processor
 from gear.nn.weights import write
 from gear.plugins.models.huggingface import depth, detect2d, semseg
 from gear.testing.model_contract import ModelContract
 from gear.values.errors import FieldError, GearError
-from gear.values.rng import derive_rng
 from tests.nn.detector_samples import SMALL, street_samples
 
 vision.prepare()
@@ -179,48 +177,10 @@ def test_detections_are_those_of_the_processor(make: Any, post: str, tmp_path: P
     assert all(0 <= one.box_px[0] <= one.box_px[2] <= 128 for one in found)
 
 
-PROCESSORS: list[tuple[str, dict[str, Any]]] = [
-    ("SegformerImageProcessor", {"size": {"height": 48, "width": 40}}),
-    ("DetrImageProcessor", {"size": {"shortest_edge": 50, "longest_edge": 83}}),
-    ("DetrImageProcessor", {"size": {"shortest_edge": 50, "longest_edge": 600}}),
-    ("RTDetrImageProcessor", {"size": {"height": 64, "width": 96}}),
-    ("DPTImageProcessor", {"size": {"height": 70, "width": 70}, "keep_aspect_ratio": True, "ensure_multiple_of": 14}),
-    ("GLPNImageProcessor", {}),
-]
-
-
-@pytest.mark.parametrize(("name", "options"), PROCESSORS)
-def test_pictures_are_prepared_as_the_image_processor_does(name: str, options: dict[str, Any], tmp_path: Path) -> None:
-    kind = getattr(transformers, f"{name}Pil", None) or getattr(transformers, name)
-    processor = kind(**options)
-    processor.save_pretrained(tmp_path)
-    smooth = derive_rng(1, "processor").integers(0, 256, (9, 15, 3)).astype(np.float32)
-    picture = torch.nn.functional.interpolate(
-        torch.from_numpy(smooth).permute(2, 0, 1)[None], (90, 150), mode="bicubic"
-    )
-    levels = picture.clamp(0, 255).round()[0].permute(1, 2, 0).byte().numpy()
-    wanted = torch.as_tensor(np.asarray(processor(images=levels, return_tensors="np")["pixel_values"]))
-    found = read_processor(tmp_path).apply(torch.from_numpy(levels).permute(2, 0, 1)[None].float() / 255)
-    assert found.shape == wanted.shape
-    assert float((found - wanted).abs().mean()) < 0.012  # theirs rounds to whole levels in between
-    assert float((found - wanted).abs().max()) < 0.1
-
-
 def test_names_are_matched() -> None:
     known = {"road": 0, "car": 13, "motorcycle": 17, "vegetation": 8}
     names = {0: "Road, route", 1: "auto; car", 2: "minibike", 3: "tree", 4: "cheese", 5: "motorcycle"}
     assert match(names, known) == ({0: 0, 1: 13, 2: 17, 3: 8, 5: 17}, ("cheese",))
-
-
-def test_processors_that_are_not_there_or_not_known(tmp_path: Path) -> None:
-    assert read_processor(tmp_path) == Processor()
-    path = tmp_path / "preprocessor_config.json"
-    for text, message in (("{", "not JSON"), ('{"resample": 5}', "resample 5"), ('{"size": {"max": 3}}', "size")):
-        path.write_text(text)
-        with pytest.raises(GearError, match=message):
-            read_processor(tmp_path)
-    path.write_text('{"size": 32}')
-    assert read_processor(tmp_path).target((90, 150)) == (32, 32)
 
 
 @pytest.mark.parametrize("folder", ["", "nowhere"])
@@ -250,8 +210,6 @@ def test_a_folder_without_the_head_is_refused_rather_than_given_a_random_one(tmp
     [
         ("model.safetensors", b"\x08\0\0\0\0\0\0\0half", "no network for SemanticSegmentation"),
         ("preprocessor_config.json", b"[1]", "a mapping is wanted"),
-        ("preprocessor_config.json", b'{"size": {"height": "a", "width": 3}}', "not of the kind that it should be"),
-        ("preprocessor_config.json", b'{"image_mean": 3}', "not of the kind that it should be"),
     ],
 )
 def test_a_damaged_folder_gets_one_line(tmp_path: Path, name: str, content: bytes, problem: str) -> None:
