@@ -2,30 +2,24 @@
 
 from __future__ import annotations
 
-import contextlib
 import logging
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from safetensors import SafetensorError
 from torch import Tensor, nn
 from torch.nn import functional
 
 from gear.formats.cityscapes import LABELS
 from gear.formats.coco import CATEGORY_NAMES, Detection
 from gear.losses.semantic import train_ids
-from gear.nn.depth_packages import need_transformers
 from gear.nn.huggingface_labels import match
-from gear.nn.huggingface_options import FOLDER, DepthFolderOptions, DetectorFolderOptions, FolderOptions
+from gear.nn.huggingface_options import DepthFolderOptions, DetectorFolderOptions, FolderOptions
 from gear.nn.huggingface_processor_file import read_processor
 from gear.nn.network import Network
-from gear.nn.options import NONE
-from gear.nn.runtime import seeded
 from gear.nn.semseg import CLASSES, LABEL_ID_OF_TRAIN_ID
-from gear.nn.weights import OPTIONAL, load_into
 from gear.values.errors import GearError
 from gear.values.frames import FloatImage
 
@@ -70,10 +64,15 @@ class FolderNetwork(Network):
         """Our numbers of the network's classes, by name; what matches nothing goes to `unmatched` and the log.
 
         Raises:
-            GearError: nothing matches.
+            GearError: nothing matches, or the network's classes have no names.
         """
         config: Any = self.graph.config
-        found, self.unmatched = match({int(index): name for index, name in config.id2label.items()}, known)
+        theirs: dict[int, str] = config.id2label
+        if not all(isinstance(name, str) and 0 <= index < len(theirs) for index, name in theirs.items()):
+            raise GearError(
+                f"{self.options.folder}/config.json: id2label must be names by number, from 0, got {theirs!r:.80}"
+            )
+        found, self.unmatched = match(theirs, known)
         if not found:
             names = ", ".join(self.unmatched[:10])
             raise GearError(f"{self.options.folder}: none of its classes is one of {whose} ({names})")
@@ -223,68 +222,3 @@ class FolderDetector(FolderNetwork):
         boxes = torch.cat([(edges[:, :2] + edges[:, 2:]) / 2, edges[:, 2:] - edges[:, :2]], dim=1)
         classes = torch.tensor([index_of[thing.category_id] for thing in things], dtype=torch.int64)
         return {"class_labels": classes.to(self.device), "boxes": boxes.to(self.device)}
-
-
-def open_folder(options: FolderOptions, auto: str) -> nn.Module:
-    """The graph of a folder, without the net and without pickles.
-
-    Args:
-        options: of the network.
-        auto: name of the class of transformers that opens this kind of network.
-
-    Raises:
-        GearError: there is no network of this kind in the folder.
-    """
-    folder = Path(options.folder)
-    if not options.folder or not (folder / "config.json").is_file():
-        raise GearError(f"folder {options.folder!r} has no config.json; set folder to what save_pretrained wrote")
-    need_transformers()
-    import transformers
-
-    kind: Any = getattr(transformers, auto)
-    try:
-        with _without_bars():
-            if options.weights == FOLDER:
-                loaded, found = kind.from_pretrained(
-                    folder,
-                    local_files_only=True,
-                    use_safetensors=True,
-                    trust_remote_code=False,  # left open, transformers asks, and runs the folder's code at a "y"
-                    output_loading_info=True,
-                )
-                return _complete(loaded, found["missing_keys"], folder)
-            with seeded(options.seed):
-                config = transformers.AutoConfig.from_pretrained(folder, local_files_only=True, trust_remote_code=False)
-                graph: nn.Module = kind.from_config(config)
-    except (OSError, ValueError, SafetensorError) as error:
-        wanted = auto.removeprefix("AutoModelFor")
-        raise GearError(f"{folder}: no network for {wanted}: {str(error).splitlines()[0]}") from error
-    if options.weights != NONE:
-        load_into(graph, options.weights)
-    return graph
-
-
-def _complete(graph: nn.Module, missing: Collection[str], folder: Path) -> nn.Module:
-    """The graph, unless transformers made up weights that the folder lacks: a classifier has no head for depth.
-
-    Raises:
-        GearError: it did.
-    """
-    lost = sorted(key for key in missing if not key.endswith(OPTIONAL))
-    if lost:
-        raise GearError(f"{folder}: {len(lost)} weights of {type(graph).__name__} are not there, such as {lost[0]}")
-    return graph
-
-
-@contextlib.contextmanager
-def _without_bars() -> Iterator[None]:
-    """Inside, transformers draws no progress bars: reading a file takes no time that is worth one."""
-    from transformers.utils import logging as settings
-
-    was = settings.is_progress_bar_enabled()
-    settings.disable_progress_bar()
-    try:
-        yield
-    finally:
-        if was:
-            settings.enable_progress_bar()

@@ -183,18 +183,6 @@ def test_names_are_matched() -> None:
     assert match(names, known) == ({0: 0, 1: 13, 2: 17, 3: 8, 5: 17}, ("cheese",))
 
 
-@pytest.mark.parametrize("folder", ["", "nowhere"])
-def test_a_missing_folder_gets_one_line(folder: str) -> None:
-    with pytest.raises(GearError, match="save_pretrained"):
-        semseg.build(FolderOptions(folder=folder))
-
-
-def test_a_folder_of_another_kind_gets_one_line(tmp_path: Path) -> None:
-    saved(glpn, tmp_path)
-    with pytest.raises(GearError, match="no network for ObjectDetection"):
-        detect2d.build(DetectorFolderOptions(folder=str(tmp_path)))
-
-
 def test_a_folder_without_the_head_is_refused_rather_than_given_a_random_one(tmp_path: Path) -> None:
     folder = saved(segformer, tmp_path)
     state = load_file(folder / "model.safetensors")
@@ -203,21 +191,6 @@ def test_a_folder_without_the_head_is_refused_rather_than_given_a_random_one(tmp
     )
     with pytest.raises(GearError, match="weights of SegformerForSemanticSegmentation are not there, such as decode"):
         semseg.build(FolderOptions(folder=str(folder)))
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "problem"),
-    [
-        ("model.safetensors", b"\x08\0\0\0\0\0\0\0half", "no network for SemanticSegmentation"),
-        ("preprocessor_config.json", b"[1]", "a mapping is wanted"),
-    ],
-)
-def test_a_damaged_folder_gets_one_line(tmp_path: Path, name: str, content: bytes, problem: str) -> None:
-    folder = saved(segformer, tmp_path)
-    (folder / name).write_bytes(content)
-    with pytest.raises(GearError, match=problem) as caught:
-        semseg.build(FolderOptions(folder=str(folder)))
-    assert "\n" not in str(caught.value)
 
 
 def test_relative_depth_must_be_made_metres_and_metric_depth_must_not(tmp_path: Path) -> None:

@@ -18,21 +18,24 @@ RECIPE = Recipe(learning_rate=6e-5, weight_decay=1e-2, batch=8, epochs=20, gradi
 
 def build_semseg(options: FolderOptions) -> FolderSegmenter:
     """SegFormer and its like."""
-    from gear.nn.huggingface import FolderSegmenter, open_folder
+    from gear.nn.huggingface import FolderSegmenter
+    from gear.nn.huggingface_folder import open_folder
 
     return FolderSegmenter(open_folder(options, "AutoModelForSemanticSegmentation"), options)
 
 
 def build_depth(options: DepthFolderOptions) -> FolderDepth:
     """GLPN, Depth Anything and their like."""
-    from gear.nn.huggingface import FolderDepth, open_folder
+    from gear.nn.huggingface import FolderDepth
+    from gear.nn.huggingface_folder import open_folder
 
     return FolderDepth(open_folder(options, "AutoModelForDepthEstimation"), options)
 
 
 def build_detect2d(options: DetectorFolderOptions) -> FolderDetector:
     """DETR, RT-DETR and their like."""
-    from gear.nn.huggingface import FolderDetector, open_folder
+    from gear.nn.huggingface import FolderDetector
+    from gear.nn.huggingface_folder import open_folder
 
     return FolderDetector(open_folder(options, "AutoModelForObjectDetection"), options)
 
