@@ -18,6 +18,8 @@ from gear.nn.runtime import seeded
 from gear.nn.weights import OPTIONAL, load_into
 from gear.values.errors import GearError
 
+ADAPTER = "write an adapter (docs/write-a-model.md)"
+
 SHOWN = 240
 """Characters of what transformers says."""
 
@@ -90,6 +92,11 @@ def _need_safetensors(folder: Path) -> None:
 
 
 def _refused(folder: Path, auto: str, error: Exception) -> GearError:
+    if "trust_remote_code" in str(error):
+        return GearError(
+            f"{folder}: its network is code of the folder's own (auto_map in config.json), which gear never runs; "
+            f"save a network that transformers itself has, or {ADAPTER}"
+        )
     said = " ".join(str(error).split())
     reason = f"{type(error).__name__}: {said if len(said) <= SHOWN else said[:SHOWN] + '...'}"
     wanted = auto.removeprefix("AutoModelFor")

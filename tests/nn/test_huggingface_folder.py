@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import builtins
 import json
 import pickle
 from collections.abc import Callable
@@ -142,6 +143,52 @@ def test_a_pickle_is_not_opened(tmp_path: Path, is_listed: bool) -> None:
         (folder / "model.safetensors.index.json").write_text(json.dumps(listed))
     message = refused(folder)
     assert "save it again with save_pretrained" in message and str(folder) in message and "\n" not in message
+    assert not marker.exists()
+
+
+CODE = """
+from pathlib import Path
+Path({marker!r}).touch()
+from transformers import PretrainedConfig, PreTrainedModel
+class OwnConfig(PretrainedConfig):
+    model_type = "own"
+class OwnModel(PreTrainedModel):
+    config_class = OwnConfig
+"""
+
+
+@pytest.mark.parametrize("model_type", ["own", "bert"])
+@pytest.mark.parametrize("weights", ["folder", "none"])
+def test_a_folders_own_code_is_never_run(
+    tmp_path: Path, model_type: str, weights: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def asked(prompt: str = "") -> str:
+        raise AssertionError(f"transformers asked: {prompt}")
+
+    monkeypatch.setattr(builtins, "input", asked)
+    folder, marker = saved(segformer, tmp_path / "folder"), tmp_path / "ran"
+    (folder / "modeling_own.py").write_text(CODE.format(marker=str(marker)))
+    classes = {"AutoModelForSemanticSegmentation": "modeling_own.OwnModel"}
+    if model_type == "own":
+        classes["AutoConfig"] = "modeling_own.OwnConfig"
+    (folder / "config.json").write_text(json.dumps({"model_type": model_type, "auto_map": classes}))
+    assert refused(folder, weights=weights) == (
+        f"{folder}: its network is code of the folder's own (auto_map in config.json), which gear never runs; save a "
+        "network that transformers itself has, or write an adapter (docs/write-a-model.md)"
+    )
+    assert not marker.exists()
+
+
+def test_code_beside_a_network_that_transformers_has_is_left_alone(tmp_path: Path) -> None:
+    folder, marker = saved(segformer, tmp_path / "folder"), tmp_path / "ran"
+    (folder / "modeling_own.py").write_text(CODE.format(marker=str(marker)))
+    changed(auto_map={"AutoModelForSemanticSegmentation": "modeling_own.OwnModel"})(folder)
+    processor = {
+        "image_processor_type": "SegformerImageProcessor",
+        "auto_map": {"AutoImageProcessor": "modeling_own.A"},
+    }
+    (folder / "preprocessor_config.json").write_text(json.dumps(processor))
+    assert semseg.build(FolderOptions(folder=str(folder), device="cpu"))
     assert not marker.exists()
 
 
