@@ -24,6 +24,12 @@ EVERYWHERE: Mapping[str, Any] = MappingProxyType(
 )  # fmt: skip
 
 
+NEEDED_PX: Mapping[str, int] = MappingProxyType(
+    {"glpn": 32, "rt_detr": 32, "rt_detr_v2": 32, "d_fine": 32, "deimv2": 32}
+)
+"""By `model_type`: what sides must be multiples of, or a network's maps of several scales do not fit one another."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Family:
     """One class of image processors.
@@ -104,7 +110,7 @@ FAMILIES: Mapping[str, Family] = MappingProxyType(
 )  # fmt: skip
 
 
-def family_of(said: Mapping[str, Any], model_type: object, path: Path) -> str:
+def family_of(said: Mapping[str, Any], model_type: str, path: Path) -> str:
     """The name in `FAMILIES` of the image processor of a folder.
 
     Args:

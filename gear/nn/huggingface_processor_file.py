@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeGuard
 
-from gear.nn.huggingface_families import FAMILIES, Family, family_of
+from gear.nn.huggingface_families import FAMILIES, NEEDED_PX, Family, family_of
 from gear.nn.huggingface_processor import Channels, Processor
 from gear.values.errors import GearError
 
@@ -36,16 +36,16 @@ def read_processor(folder: Path, *, resizes: bool = True) -> Processor:
     Raises:
         GearError: it is not JSON, or asks for what gear does not do.
     """
-    path = folder / FILE
+    path, config = folder / FILE, folder / "config.json"
+    model_type = str(read_mapping(config).get("model_type")) if config.is_file() else ""
+    needed_px = NEEDED_PX.get(model_type, 1)
     if not path.is_file():
-        return Processor()
+        return Processor(multiple_px=needed_px, rounds_down=model_type == "glpn")
     said = read_mapping(path)
-    config = folder / "config.json"
-    model_type = read_mapping(config).get("model_type") if config.is_file() else None
     name = family_of(said, model_type, path)
     facts = _Facts(FAMILIES[name], said, path)
     facts.check_steps()
-    return _processor(name, facts, resizes=resizes)
+    return _processor(name, facts, needed_px, resizes=resizes)
 
 
 def read_mapping(path: Path) -> dict[str, Any]:
@@ -147,7 +147,7 @@ class _Facts:
 _EDGES = {"shortest_edge", "longest_edge"}
 
 
-def _processor(name: str, facts: _Facts, *, resizes: bool) -> Processor:
+def _processor(name: str, facts: _Facts, needed_px: int, *, resizes: bool) -> Processor:
     does_resize = facts.flag("do_resize")
     if resizes and facts.flag("do_center_crop"):
         # What lies outside would have no answer, and answers are held against labels of the whole picture.
@@ -157,12 +157,15 @@ def _processor(name: str, facts: _Facts, *, resizes: bool) -> Processor:
     mean, std = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
     if facts.flag("do_normalize") and name != "MobileViT":  # whose class never does
         mean, std = facts.channels("image_mean", is_positive=False), facts.channels("image_std", is_positive=True)
+    multiple_px = _multiple_px(name, facts, size) if does_resize else 1
+    if not (does_resize and resizes):
+        multiple_px = max(multiple_px, needed_px)
     return Processor(
         mean=_divided(mean, scale),
         std=_divided(std, scale),
         size=size if resizes else None,
         mode=facts.mode() if does_resize else "bilinear",
-        multiple_px=_multiple_px(name, facts, size) if does_resize else 1,
+        multiple_px=multiple_px,
         keeps_ratio=name in ("DPT", "ZoeDepth") and facts.flag("keep_aspect_ratio"),
         rounds_down=name in ("GLPN", "Yolos"),
         pads_to_px=facts.pixels("size_divisor") if name == "DPT" and facts.flag("do_pad") else 0,

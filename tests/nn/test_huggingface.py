@@ -2,89 +2,22 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any, ClassVar
 
-import numpy as np
 import pytest
 import torch
 from safetensors.torch import load_file, save_file
 
 from gear.contracts.models import Model
-from gear.nn import vision
 from gear.nn.huggingface_labels import match
-from gear.nn.huggingface_options import DepthFolderOptions, DetectorFolderOptions, FolderOptions
+from gear.nn.huggingface_options import DepthFolderOptions, FolderOptions
 from gear.nn.weights import write
 from gear.plugins.models.huggingface import depth, detect2d, semseg
 from gear.testing.model_contract import ModelContract
 from gear.values.errors import FieldError, GearError
-from tests.nn.detector_samples import SMALL, street_samples
-
-vision.prepare()
-
-import transformers  # noqa: E402
-
-CITY = {0: "road", 1: "sidewalk", 2: "van", 3: "car", 4: "banana"}
-COCO = {0: "person", 1: "motorbike", 2: "traffic light", 3: "unicorn"}
-
-
-def segformer() -> Any:
-    sizes: dict[str, Any] = {"depths": [1] * 4, "hidden_sizes": [8, 8, 16, 16], "num_attention_heads": [1, 1, 2, 2]}
-    return transformers.SegformerForSemanticSegmentation(
-        transformers.SegformerConfig(id2label=CITY, decoder_hidden_size=16, **sizes)
-    )
-
-
-def glpn() -> Any:
-    sizes: dict[str, Any] = {"depths": [1] * 4, "hidden_sizes": [8, 8, 16, 16], "num_attention_heads": [1, 1, 2, 2]}
-    return transformers.GLPNForDepthEstimation(transformers.GLPNConfig(decoder_hidden_size=16, **sizes))
-
-
-def depth_anything(kind: str = "relative") -> Any:
-    backbone = transformers.Dinov2Config(
-        hidden_size=16, num_hidden_layers=4, num_attention_heads=2, image_size=70, patch_size=14,
-        out_indices=[1, 2, 3, 4], apply_layernorm=True, reshape_hidden_states=False,
-    )  # fmt: skip
-    return transformers.DepthAnythingForDepthEstimation(
-        transformers.DepthAnythingConfig(
-            backbone_config=backbone, reassemble_hidden_size=16, neck_hidden_sizes=[8] * 4, fusion_hidden_size=8,
-            head_hidden_size=8, depth_estimation_type=kind, max_depth=80,
-        )
-    )  # fmt: skip
-
-
-def yolos() -> Any:
-    return transformers.YolosForObjectDetection(
-        transformers.YolosConfig(
-            hidden_size=16, num_hidden_layers=1, num_attention_heads=2, intermediate_size=16, image_size=[64, 128],
-            num_detection_tokens=6, use_mid_position_embeddings=False, id2label=COCO,
-        )
-    )  # fmt: skip
-
-
-def rt_detr() -> Any:
-    backbone = transformers.RTDetrResNetConfig(
-        embedding_size=8, hidden_sizes=[8, 8, 16, 16], depths=[1, 1, 1, 1], layer_type="basic",
-        out_features=["stage2", "stage3", "stage4"]
-    )  # fmt: skip
-    return transformers.RTDetrForObjectDetection(
-        transformers.RTDetrConfig(
-            backbone_config=backbone, encoder_in_channels=[8, 16, 16], encoder_hidden_dim=16, encoder_ffn_dim=16,
-            encoder_attention_heads=2, feat_strides=[8, 16, 32], d_model=16, decoder_in_channels=[16] * 3,
-            decoder_ffn_dim=16, decoder_layers=2, decoder_attention_heads=2, num_queries=8, num_denoising=0,
-            id2label=COCO,
-        )
-    )  # fmt: skip
-
-
-def saved(make: Any, folder: Path, **processor: Any) -> Path:
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(3)
-        make().save_pretrained(folder)
-    if processor:
-        (folder / "preprocessor_config.json").write_text(json.dumps(processor))
-    return folder
+from tests.nn.detector_samples import SMALL
+from tests.nn.huggingface_networks import depth_anything, glpn, rt_detr, saved, segformer, yolos
 
 
 class FolderContract(ModelContract):
@@ -147,34 +80,6 @@ class TestRtDetr(FolderContract):
     processor: ClassVar[dict[str, Any]] = {"size": {"height": 64, "width": 64}, "do_normalize": False}
     extra: ClassVar[dict[str, Any]] = {"least_score": 0.0}
     task_options = SMALL
-
-
-@pytest.mark.parametrize(("make", "post"), [(yolos, "YolosImageProcessorPil"), (rt_detr, "RTDetrImageProcessorPil")])
-def test_detections_are_those_of_the_processor(make: Any, post: str, tmp_path: Path) -> None:
-    model: Any = detect2d.build(
-        DetectorFolderOptions(folder=str(saved(make, tmp_path)), device="cpu", input_size="picture", least_score=0.2)
-    )
-    sample = street_samples(128, 64, 1)[0]
-    with torch.no_grad():
-        out = model.graph(
-            pixel_values=model.seen(
-                {"left": torch.from_numpy(sample.images["left"].copy()).permute(2, 0, 1)[None] / 255}
-            )
-        )
-    processor = getattr(transformers, post, None) or getattr(transformers, post.removesuffix("Pil"))
-    theirs = processor().post_process_object_detection(out, threshold=0.2, target_sizes=[(64, 128)])[0]
-    wanted = [
-        (score, model._categories[label])
-        for score, label in zip(theirs["scores"].tolist(), theirs["labels"].tolist(), strict=True)
-        if label in model._categories
-    ]
-    found = model.predict({"left": sample.images["left"]})
-    assert model.unmatched == ("unicorn",)
-    assert {one.category_id for one in found} <= {1, 4, 10}
-    ours = [(one.score, one.category_id) for one in found]
-    assert len(wanted) > 3
-    np.testing.assert_allclose(sorted(ours), sorted(wanted), atol=1e-4)
-    assert all(0 <= one.box_px[0] <= one.box_px[2] <= 128 for one in found)
 
 
 def test_names_are_matched() -> None:

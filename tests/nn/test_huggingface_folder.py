@@ -17,7 +17,7 @@ from safetensors.torch import load_file, save_file
 from gear.nn.huggingface_options import DetectorFolderOptions, FolderOptions
 from gear.plugins.models.huggingface import detect2d, semseg
 from gear.values.errors import GearError
-from tests.nn.test_huggingface import glpn, saved, segformer, yolos
+from tests.nn.huggingface_networks import glpn, saved, segformer, yolos
 
 CLASSIFIER = "decode_head.classifier.weight"
 

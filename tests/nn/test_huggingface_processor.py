@@ -245,6 +245,21 @@ def test_pictures_that_are_not_resized_are_not_cut_either(tmp_path: Path) -> Non
     assert read_processor(tmp_path, resizes=False).target((375, 1242)) == (352, 1216)
 
 
+@pytest.mark.parametrize(
+    ("model_type", "wanted"), [("glpn", (352, 1216)), ("rt_detr", (384, 1248)), ("bert", (375, 1242))]
+)
+@pytest.mark.parametrize("said", [None, '{"do_resize": false}', "{}"])
+def test_pictures_that_keep_their_size_fit_the_network(
+    model_type: str, wanted: tuple[int, int], said: str | None, tmp_path: Path
+) -> None:
+    (tmp_path / "config.json").write_text(json.dumps({"model_type": model_type}))
+    if said is not None and model_type != "bert":
+        (tmp_path / "preprocessor_config.json").write_text(said)
+    assert read_processor(tmp_path, resizes=False).target((375, 1242)) == wanted
+    if said != "{}":
+        assert read_processor(tmp_path).target((375, 1242)) == wanted
+
+
 def test_without_a_file_nothing_is_resized(tmp_path: Path) -> None:
     assert read_processor(tmp_path) == Processor()
     (tmp_path / "config.json").write_text('{"model_type": "bert"}')
