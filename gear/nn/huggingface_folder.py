@@ -42,7 +42,7 @@ def open_folder(options: FolderOptions, auto: str) -> nn.Module:
         _need_safetensors(folder)
     need_transformers()
     try:
-        with _quietly():
+        with _quietly(), _offline():
             graph, found = _opened(options, auto)
     except Exception as error:  # transformers lets out whatever a broken file happens to raise
         raise _refused(folder, auto, error) from error
@@ -97,6 +97,11 @@ def _refused(folder: Path, auto: str, error: Exception) -> GearError:
             f"{folder}: its network is code of the folder's own (auto_map in config.json), which gear never runs; "
             f"save a network that transformers itself has, or {ADAPTER}"
         )
+    if type(error).__name__ == "OfflineModeIsEnabled":
+        return GearError(
+            f"{folder}: config.json leaves something to the net, such as a backbone that it only names, and gear "
+            "fetches nothing; open it with transformers where there is a net and save it again with save_pretrained"
+        )
     said = " ".join(str(error).split())
     reason = f"{type(error).__name__}: {said if len(said) <= SHOWN else said[:SHOWN] + '...'}"
     wanted = auto.removeprefix("AutoModelFor")
@@ -122,6 +127,19 @@ def _check(graph: nn.Module, found: Mapping[str, Any], folder: Path) -> None:
     for key, weights in graph.state_dict().items():
         if not bool(weights.isfinite().all()):
             raise GearError(f"{folder}: {key} holds NaN or infinity; fetch the folder or train the network again")
+
+
+@contextlib.contextmanager
+def _offline() -> Iterator[None]:
+    """Inside, nothing of Hugging Face's asks the net: `local_files_only` does not hold for backbones."""
+    from huggingface_hub import constants
+
+    was = constants.HF_HUB_OFFLINE
+    constants.HF_HUB_OFFLINE = True
+    try:
+        yield
+    finally:
+        constants.HF_HUB_OFFLINE = was
 
 
 @contextlib.contextmanager

@@ -5,6 +5,7 @@ from __future__ import annotations
 import builtins
 import json
 import pickle
+import socket
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from safetensors.torch import load_file, save_file
 from gear.nn.huggingface_options import DetectorFolderOptions, FolderOptions
 from gear.plugins.models.huggingface import detect2d, semseg
 from gear.values.errors import GearError
-from tests.nn.huggingface_networks import glpn, saved, segformer, yolos
+from tests.nn.huggingface_networks import detr, glpn, saved, segformer, yolos
 
 CLASSIFIER = "decode_head.classifier.weight"
 
@@ -190,6 +191,23 @@ def test_code_beside_a_network_that_transformers_has_is_left_alone(tmp_path: Pat
     (folder / "preprocessor_config.json").write_text(json.dumps(processor))
     assert semseg.build(FolderOptions(folder=str(folder), device="cpu"))
     assert not marker.exists()
+
+
+@pytest.mark.parametrize("backbone", ["resnet18", "someone/resnet"])
+def test_the_net_is_not_asked_for_a_backbone(tmp_path: Path, backbone: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[object] = []
+
+    def fail(host: object, *rest: object, **more: object) -> None:
+        asked.append(host)
+        raise OSError("there is no net in tests")
+
+    folder = saved(detr, tmp_path)
+    changed(backbone_config=None, backbone=backbone, backbone_kwargs={"out_indices": [1, 2, 3, 4]})(folder)
+    monkeypatch.setattr(socket, "getaddrinfo", fail)
+    monkeypatch.delenv("HF_HUB_OFFLINE", raising=False)
+    with pytest.raises(GearError, match="gear fetches nothing") as caught:
+        detect2d.build(DetectorFolderOptions(folder=str(folder), device="cpu"))
+    assert not asked and str(folder) in str(caught.value) and "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("folder", ["", "nowhere"])
