@@ -17,7 +17,7 @@ class FolderOptions(NetworkOptions):
 
     Attributes:
         folder: where `save_pretrained` wrote it: config.json, model.safetensors and, where there is one,
-            preprocessor_config.json. Nothing is downloaded.
+            preprocessor_config.json. Nothing is downloaded, and neither a pickle nor code of the folder's own is run.
         weights: `folder` are the folder's own, `none` are random ones from `seed`, anything else is the path of a
             safetensors file that gear has trained.
         input_size: `processor` resizes pictures as the folder's image processor says, `picture` leaves them as they
