@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -129,6 +130,9 @@ class FolderDepth(FolderNetwork):
         super().__init__(graph, options)
         config: Any = graph.config
         metric = config.model_type in METRIC_TYPES or getattr(config, "depth_estimation_type", "") == "metric"
+        most_m = getattr(config, "max_depth", None)
+        if metric and most_m is not None and not 0 < most_m < math.inf:
+            raise GearError(f"{options.folder}/config.json: max_depth must be a number of metres above 0, got {most_m}")
         if metric == bool(options.inverse_scale):
             raise GearError(
                 f"{options.folder}: says metres, so leave inverse_scale at 0"

@@ -15,8 +15,8 @@ import pytest
 import torch
 from safetensors.torch import load_file, save_file
 
-from gear.nn.huggingface_options import DetectorFolderOptions, FolderOptions
-from gear.plugins.models.huggingface import detect2d, semseg
+from gear.nn.huggingface_options import DepthFolderOptions, DetectorFolderOptions, FolderOptions
+from gear.plugins.models.huggingface import depth, detect2d, semseg
 from gear.values.errors import GearError
 from tests.nn.huggingface_networks import detr, glpn, saved, segformer, yolos
 
@@ -220,6 +220,13 @@ def test_a_folder_of_another_kind_gets_one_line(tmp_path: Path) -> None:
     saved(glpn, tmp_path)
     with pytest.raises(GearError, match="no network for ObjectDetection"):
         detect2d.build(DetectorFolderOptions(folder=str(tmp_path)))
+
+
+@pytest.mark.parametrize("most", [0, -3])
+def test_the_farthest_depth_must_be_some_metres(tmp_path: Path, most: int) -> None:
+    changed(max_depth=most)(saved(glpn, tmp_path))
+    with pytest.raises(GearError, match=f"config.json: max_depth must be a number of metres above 0, got {most}"):
+        depth.build(DepthFolderOptions(folder=str(tmp_path), device="cpu"))
 
 
 @pytest.mark.parametrize("weights", ["folder", "none"])
