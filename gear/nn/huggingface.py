@@ -16,6 +16,7 @@ from torch.nn import functional
 from gear.formats.cityscapes import LABELS
 from gear.formats.coco import CATEGORY_NAMES, Detection
 from gear.losses.semantic import train_ids
+from gear.nn.huggingface_folder import in_one_line
 from gear.nn.huggingface_labels import match
 from gear.nn.huggingface_options import DepthFolderOptions, DetectorFolderOptions, FolderOptions
 from gear.nn.huggingface_processor_file import read_processor
@@ -55,6 +56,22 @@ class FolderNetwork(Network):
     def seen(self, pictures: Mapping[str, Tensor]) -> Tensor:
         """(B, 3, h, w) as the network wants it."""
         return self.processor.apply(pictures[VIEW])
+
+    def said(self, seen: Tensor, **labels: Any) -> Any:
+        """What the graph makes of pictures as it wants them.
+
+        Raises:
+            GearError: it does not run on them, as with a config.json whose sizes can be built but do not fit.
+        """
+        try:
+            return self.graph(pixel_values=seen, **labels)
+        except torch.OutOfMemoryError:
+            raise
+        except (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeError, ValueError) as error:
+            raise GearError(
+                f"{self.options.folder}: the network does not run on {seen.shape[3]} x {seen.shape[2]} pixels; see to "
+                f"config.json and preprocessor_config.json there: {in_one_line(error)}"
+            ) from error
 
     def restored(self, maps: Tensor, pictures: Mapping[str, Tensor], mode: str) -> Tensor:
         """(B, C, H, W) at the size of the pictures, without the margins that the network saw."""
@@ -104,7 +121,7 @@ class FolderSegmenter(FolderNetwork):
 
     def their_logits(self, seen: Tensor) -> Tensor:
         """(B, classes, h, w) over the network's own classes, for pictures as it wants them."""
-        logits: Tensor = self.graph(pixel_values=seen).logits
+        logits: Tensor = self.said(seen).logits
         return logits
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
@@ -143,7 +160,7 @@ class FolderDepth(FolderNetwork):
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """At the picture's size."""
-        said = self.graph(pixel_values=self.seen(pictures)).predicted_depth.float()
+        said = self.said(self.seen(pictures)).predicted_depth.float()
         said = self.restored(said[:, None], pictures, "bicubic")[:, 0]  # as transformers does
         if self.options.inverse_scale:
             inverse = self.options.inverse_scale * said + self.options.inverse_shift
@@ -174,7 +191,7 @@ class FolderDetector(FolderNetwork):
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """One row a query."""
-        said = self.graph(pixel_values=self.seen(pictures))
+        said = self.said(self.seen(pictures))
         return {LOGITS: said.logits, BOXES: said.pred_boxes}
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
@@ -186,7 +203,7 @@ class FolderDetector(FolderNetwork):
         """The network's own set loss against the objects of classes that it has."""
         height, width = outputs[PICTURE][0].tolist()
         labels = [self._labels(sample, torch.tensor([width, height] * 2)) for sample in targets]
-        return {"set_loss": self.graph(pixel_values=outputs["seen"], labels=labels).loss}
+        return {"set_loss": self.said(outputs["seen"], labels=labels).loss}
 
     def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[Detection, ...]]:
         """Sure enough boxes of classes that COCO has, surest first."""

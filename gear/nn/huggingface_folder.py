@@ -102,10 +102,16 @@ def _refused(folder: Path, auto: str, error: Exception) -> GearError:
             f"{folder}: config.json leaves something to the net, such as a backbone that it only names, and gear "
             "fetches nothing; open it with transformers where there is a net and save it again with save_pretrained"
         )
-    said = " ".join(str(error).split())
-    reason = f"{type(error).__name__}: {said if len(said) <= SHOWN else said[:SHOWN] + '...'}"
     wanted = auto.removeprefix("AutoModelFor")
-    return GearError(f"{folder}: no network for {wanted}; see to config.json and model.safetensors there: {reason}")
+    return GearError(
+        f"{folder}: no network for {wanted}; see to config.json and model.safetensors there: {in_one_line(error)}"
+    )
+
+
+def in_one_line(error: Exception) -> str:
+    """Its kind and the beginning of what it says."""
+    said = " ".join(str(error).split())
+    return f"{type(error).__name__}: {said if len(said) <= SHOWN else said[:SHOWN] + '...'}"
 
 
 def _check(graph: nn.Module, found: Mapping[str, Any], folder: Path) -> None:

@@ -18,7 +18,7 @@ from safetensors.torch import load_file, save_file
 from gear.nn.huggingface_options import DepthFolderOptions, DetectorFolderOptions, FolderOptions
 from gear.plugins.models.huggingface import depth, detect2d, semseg
 from gear.values.errors import GearError
-from tests.nn.huggingface_networks import detr, glpn, saved, segformer, yolos
+from tests.nn.huggingface_networks import depth_anything, detr, glpn, saved, segformer, yolos
 
 CLASSIFIER = "decode_head.classifier.weight"
 
@@ -227,6 +227,15 @@ def test_the_farthest_depth_must_be_some_metres(tmp_path: Path, most: int) -> No
     changed(max_depth=most)(saved(glpn, tmp_path))
     with pytest.raises(GearError, match=f"config.json: max_depth must be a number of metres above 0, got {most}"):
         depth.build(DepthFolderOptions(folder=str(tmp_path), device="cpu"))
+
+
+@pytest.mark.parametrize("facts", [{"patch_size": -1}, {"patch_size": 0}, {"reassemble_factors": []}], ids=str)
+def test_a_network_that_is_built_but_does_not_run_gets_one_line(tmp_path: Path, facts: dict[str, Any]) -> None:
+    changed(**facts)(saved(lambda: depth_anything("metric"), tmp_path))
+    model: Any = depth.build(DepthFolderOptions(folder=str(tmp_path), device="cpu"))
+    with pytest.raises(GearError, match="the network does not run on 128 x 64 pixels; see to ") as caught:
+        model.predict({"left": np.zeros((64, 128, 3), np.uint8)})
+    assert str(caught.value).startswith(str(tmp_path)) and "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("weights", ["folder", "none"])
