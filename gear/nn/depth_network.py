@@ -13,7 +13,6 @@ from torch.nn import functional
 
 from gear.nn.depth_options import DepthOptions
 from gear.nn.network import Network
-from gear.nn.shipped import trained_option
 from gear.values.frames import FloatImage
 
 VIEW = "left"
@@ -69,16 +68,6 @@ class DepthNetwork(Network):
     @abstractmethod
     def depth_losses(self, outputs: Mapping[str, Tensor], depth_m: Tensor) -> Mapping[str, Tensor]:
         """Named losses against (B, H, W) metres, NaN where unknown."""
-
-
-def trained_scale(options: DepthOptions, name: str, habit: float = 1.0) -> float:
-    """The `input_scale` that the weights of network `name` were trained for, or its habit.
-
-    Raises:
-        GearError: there are no such weights.
-    """
-    said = trained_option(options.weights, name, "input_scale")
-    return float(said) if isinstance(said, (int, float)) else habit
 
 
 def resized(maps: Tensor, height: int, width: int) -> Tensor:

@@ -9,8 +9,8 @@ from torch import Tensor, nn
 
 from gear.formats.kitti_object import KittiLabel
 from gear.losses.stereo import Grid, LabelledPair, centre_losses, centre_targets
+from gear.nn.input_scale import input_scale_of
 from gear.nn.network import Network, Normalise
-from gear.nn.shipped import trained_option
 from gear.nn.stereo_centre import KINDS, STRIDE, StereoCentre, StereoCentreShape, fit_to_network, in_picture_px
 from gear.nn.stereo_decode import Peaks, decode
 from gear.nn.stereo_options import LEFT, RIGHT, StereoCentreOptions
@@ -32,7 +32,7 @@ class StereoCentreNetwork(Network):
         graph = build_graph(lambda: StereoCentre(StereoCentreShape(width=options.width)), options, NAME)
         super().__init__(graph, options, views=(LEFT, RIGHT))
         self.normalise = Normalise().to(self.device)
-        self.input_scale = options.input_scale or trained_option(options.weights, NAME, "input_scale") or INPUT_SCALE
+        self.input_scale = input_scale_of(options, NAME, INPUT_SCALE)
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """The graph's maps."""

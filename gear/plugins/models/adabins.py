@@ -24,11 +24,11 @@ def build(options: AdaBinsOptions) -> Model:
     """
     from gear.nn.adabins import AdaBins
     from gear.nn.adabins_graph import AdaBinsGraph
-    from gear.nn.depth_network import trained_scale
+    from gear.nn.input_scale import input_scale_of
     from gear.nn.weights import build_graph
 
     graph = build_graph(lambda: AdaBinsGraph(options), options, NAME)
-    return AdaBins(graph, options, input_scale=trained_scale(options, NAME))
+    return AdaBins(graph, options, input_scale=input_scale_of(options, NAME))
 
 
 def convert(state: Mapping[str, Tensor]) -> Mapping[str, Any]:

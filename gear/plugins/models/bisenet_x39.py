@@ -24,15 +24,15 @@ def build(options: SegmentationOptions) -> SemsegNetwork:
     """The network with its weights."""
     from gear.losses.semantic import SegmentationLosses
     from gear.nn.bisenet import BiSeNetX39
+    from gear.nn.input_scale import input_scale_of
     from gear.nn.semseg import CLASSES, SemsegNetwork
-    from gear.nn.shipped import trained_option
     from gear.nn.weights import build_graph
 
     return SemsegNetwork(
         build_graph(lambda: BiSeNetX39(CLASSES, auxiliary=options.auxiliary), options, NAME),
         options,
         SegmentationLosses(easy=EASY, least=LEAST, auxiliary_weight=AUXILIARY_WEIGHT),
-        input_scale=trained_option(options.weights, NAME, "input_scale") or 1.0,
+        input_scale=input_scale_of(options, NAME),
     )
 
 

@@ -24,15 +24,15 @@ def build(options: SegmentationOptions) -> SemsegNetwork:
     """The network with its weights."""
     from gear.losses.semantic import SegmentationLosses
     from gear.nn.ddrnet import DDRNet23Slim
+    from gear.nn.input_scale import input_scale_of
     from gear.nn.semseg import CLASSES, SemsegNetwork
-    from gear.nn.shipped import trained_option
     from gear.nn.weights import build_graph
 
     return SemsegNetwork(
         build_graph(lambda: DDRNet23Slim(CLASSES, auxiliary=options.auxiliary), options, NAME),
         options,
         SegmentationLosses(easy=EASY, least=LEAST, auxiliary_weight=AUXILIARY_WEIGHT),
-        input_scale=trained_option(options.weights, NAME, "input_scale") or 1.0,
+        input_scale=input_scale_of(options, NAME),
     )
 
 

@@ -20,11 +20,11 @@ def build(options: DepthOptions) -> Model:
         GearError: the weights are not there.
     """
     from gear.nn.ddrnet_depth import DdrnetDepth, ddrnet_depth_graph
-    from gear.nn.depth_network import trained_scale
+    from gear.nn.input_scale import input_scale_of
     from gear.nn.weights import build_graph
 
     graph = build_graph(ddrnet_depth_graph, options, NAME)
-    return DdrnetDepth(graph, options, input_scale=trained_scale(options, NAME, HABIT))
+    return DdrnetDepth(graph, options, input_scale=input_scale_of(options, NAME, HABIT))
 
 
 spec = ModelSpec(

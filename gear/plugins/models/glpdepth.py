@@ -22,12 +22,12 @@ def build(options: GlpnOptions) -> Model:
     Raises:
         GearError: transformers or the weights are not there.
     """
-    from gear.nn.depth_network import trained_scale
     from gear.nn.glpn import Glpn, glpn_graph
+    from gear.nn.input_scale import input_scale_of
     from gear.nn.weights import build_graph
 
     graph = build_graph(lambda: glpn_graph(options), options, NAME)
-    return Glpn(graph, options, input_scale=trained_scale(options, NAME))
+    return Glpn(graph, options, input_scale=input_scale_of(options, NAME))
 
 
 def convert(state: Mapping[str, Tensor]) -> Mapping[str, Any]:

@@ -58,11 +58,9 @@ def build_lite0(options: ReferenceDetectorOptions) -> RetinaNetDetector:
 
 def scale_of(options: ReferenceDetectorOptions, name: str) -> float:
     """The input's scale: what the options say, or else the weights, or else one half."""
-    from gear.nn.shipped import trained_option
+    from gear.nn.input_scale import input_scale_of
 
-    if options.input_scale is not None:
-        return options.input_scale
-    return trained_option(options.weights, name, "input_scale") or INPUT_SCALE
+    return input_scale_of(options, name, INPUT_SCALE)
 
 
 def start_from_imagenet(model: Any) -> None:
