@@ -66,8 +66,7 @@ def inspect(path: str | Path) -> WeightsFile:
         GearError: there is no such file, or it is no safetensors.
     """
     file = Path(path)
-    if not file.is_file():
-        raise GearError(f"{file}: there is no such weights file")
+    check_file(file)
     try:
         with safe_open(str(file), framework="numpy") as opened:
             shapes = {key: tuple(opened.get_slice(key).get_shape()) for key in opened.keys()}  # noqa: SIM118
@@ -75,6 +74,18 @@ def inspect(path: str | Path) -> WeightsFile:
     except (SafetensorError, OSError) as error:
         raise not_safetensors(file, error) from error
     return WeightsFile(path=file, size_mb=file.stat().st_size / 1e6, shapes=shapes, metadata=metadata)
+
+
+def check_file(path: Path) -> None:
+    """Whether there is such a file.
+
+    Raises:
+        GearError: there is not.
+    """
+    if path.is_dir():
+        raise GearError(f"{path}: is a folder; name the safetensors file in it")
+    if not path.is_file():
+        raise GearError(f"{path}: there is no such weights file")
 
 
 def not_safetensors(path: str | Path, error: Exception) -> GearError:

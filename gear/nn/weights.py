@@ -15,7 +15,7 @@ from torch import Tensor, nn
 from gear.dataset.files import write_alone
 from gear.nn.options import NetworkOptions
 from gear.nn.runtime import seeded
-from gear.nn.shipped import not_safetensors, resolve
+from gear.nn.shipped import check_file, not_safetensors, resolve
 from gear.values.errors import GearError
 
 OPTIONAL = "num_batches_tracked"
@@ -63,7 +63,8 @@ def load_into(network: nn.Module, path: str | Path) -> dict[str, str]:
 
 
 def mismatches(wanted: Mapping[str, Tensor], given: Mapping[str, Tensor]) -> list[str]:
-    """What keeps a state from being loaded: keys that are missing, keys too many, shapes that differ."""
+    """What keeps a state from being loaded: keys that are missing or too many, other shapes or kinds of numbers, and
+    numbers that are none."""
     missing = [key for key in wanted if key not in given and not key.endswith(OPTIONAL)]
     surplus = [key for key in given if key not in wanted]
     shapes = [
@@ -71,7 +72,18 @@ def mismatches(wanted: Mapping[str, Tensor], given: Mapping[str, Tensor]) -> lis
         for key in wanted
         if key in given and given[key].shape != wanted[key].shape
     ]
-    found = {"missing": missing, "not known": surplus, "of another shape": shapes}
+    shared = [
+        key for key in wanted if key in given and given[key].shape == wanted[key].shape and not key.endswith(OPTIONAL)
+    ]
+    kinds = [key for key in shared if given[key].is_floating_point() != wanted[key].is_floating_point()]
+    broken = [key for key in shared if key not in kinds and not _finite(given[key])]
+    found = {
+        "missing": missing,
+        "not known": surplus,
+        "of another shape": shapes,
+        "of integers where fractions belong, or the other way round": kinds,
+        "with numbers that are not finite": broken,
+    }
     return [f"{len(keys)} {what} ({_few(keys)})" for what, keys in found.items() if keys]
 
 
@@ -81,8 +93,7 @@ def read(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
     Raises:
         GearError: there is no such file, or it is no safetensors.
     """
-    if not Path(path).is_file():
-        raise GearError(f"{path}: there is no such weights file")
+    check_file(Path(path))
     try:
         with safe_open(str(path), framework="pt") as opened:
             metadata = dict(opened.metadata() or {})
@@ -115,6 +126,11 @@ def _in_order(data: bytes) -> bytes:
     text = json.dumps(header, separators=(",", ":")).encode()
     text += b" " * (-len(text) % HEADER_AT)  # tensors begin at multiples of eight
     return len(text).to_bytes(HEADER_AT, "little") + text + data[HEADER_AT + length :]
+
+
+def _finite(tensor: Tensor) -> bool:
+    """Shapes without numbers, as lists of published keys have them, have none that are broken."""
+    return tensor.is_meta or bool(torch.isfinite(tensor).all())
 
 
 def _may_halve(tensor: Tensor) -> bool:

@@ -71,6 +71,20 @@ def test_another_networks_file_is_refused_with_the_reason(tmp_path: Path) -> Non
     assert torch.equal(graph[0].weight, before)
 
 
+def test_numbers_that_are_none_are_refused(tmp_path: Path) -> None:
+    state = small().state_dict()
+    state["0.weight"][1, 0, 0, 0] = float("nan")
+    state["1.weight"] = torch.ones(4, dtype=torch.int64)
+    write(tmp_path / "a.safetensors", state, {})
+    with pytest.raises(GearError) as caught:
+        load_into(small(), tmp_path / "a.safetensors")
+    text = str(caught.value)
+    assert "1 of integers where fractions belong, or the other way round (1.weight)" in text
+    assert "1 with numbers that are not finite (0.weight)" in text
+    with pytest.raises(GearError, match="is a folder"):
+        load_into(small(), tmp_path)
+
+
 def test_files_older_than_the_counter_load(tmp_path: Path) -> None:
     state = small().state_dict()
     del state["1.num_batches_tracked"]

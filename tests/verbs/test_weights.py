@@ -8,11 +8,13 @@ import pytest
 import torch
 
 from gear.cli.main import main
+from gear.config.overrides import with_overrides
 from gear.nn import shipped
 from gear.nn.bisenet import BiSeNetX39
 from gear.nn.ddrnet import DDRNet23Slim
-from gear.nn.weights import read
-from gear.values.errors import GearError
+from gear.nn.weights import read, write
+from gear.plugins.build import NO_OPTIONS, build, find
+from gear.values.errors import GearError, UnknownNameError
 from gear.verbs.weights.convert import convert_weights
 from gear.verbs.weights.show import show_weights
 
@@ -74,6 +76,35 @@ def test_what_does_not_fit_is_refused_and_nothing_is_written(official: dict[str,
         convert_weights("bisenet_x39", out, out)
 
 
+def test_what_a_file_says_of_itself_is_kept_and_options_are_noted(official: dict[str, Path], tmp_path: Path) -> None:
+    first, second = tmp_path / "a.safetensors", tmp_path / "b.safetensors"
+    state = read(_converted(official, tmp_path))[0]
+    state = {key: value for key, value in state.items() if not key.startswith(("heads.0", "heads.1"))}
+    write(first, state, {"model": "bisenet_x39", "seed": "7", "options": json.dumps({"input_scale": 0.75})})
+    convert_weights("bisenet_x39", first, second, settings=["auxiliary=false"], halves=True)
+    metadata = read(second)[1]
+    assert metadata["seed"] == "7" and metadata["source"] == "a.safetensors"
+    assert json.loads(metadata["options"]) == {"auxiliary": False, "input_scale": 0.75}
+    (network,) = [
+        build(find("model", "bisenet_x39"), with_overrides(NO_OPTIONS, [f"weights={second}", "auxiliary=false"]))
+    ]
+    assert network.input_scale == 0.75
+
+
+@pytest.mark.parametrize("said", [0, -1, 9, "much", True, [0.5]])
+def test_a_size_that_is_none_is_refused(official: dict[str, Path], tmp_path: Path, said: Any) -> None:
+    path = tmp_path / "a.safetensors"
+    write(path, read(_converted(official, tmp_path))[0], {"options": json.dumps({"input_scale": said})})
+    with pytest.raises(GearError, match=r"a\.safetensors: says input_scale .* say --set input_scale="):
+        build(find("model", "bisenet_x39"), with_overrides(NO_OPTIONS, [f"weights={path}"]))
+    own = build(find("model", "bisenet_x39"), with_overrides(NO_OPTIONS, [f"weights={path}", "input_scale=0.5"]))
+    assert own.input_scale == 0.5
+
+
+def _converted(official: dict[str, Path], folder: Path) -> Path:
+    return convert_weights("bisenet_x39", official["bisenet"], folder / "published.safetensors").path
+
+
 def test_show_prints_what_the_file_says(
     official: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -84,5 +115,9 @@ def test_show_prints_what_the_file_says(
     assert "461 tensors" in text and "source: bisenet.pth" in text
     monkeypatch.setattr(shipped, "shipped_folders", lambda: (tmp_path,))
     assert show_weights("bisenet_x39").file.path == out
+    with pytest.raises(UnknownNameError, match="no model named 'bisenet_x38'; did you mean bisenet_x39"):
+        show_weights("bisenet_x38")
+    with pytest.raises(GearError, match="is a folder; name the safetensors file in it"):
+        show_weights(str(tmp_path))
     assert main(["weights", "show", str(official["bisenet"])]) == 2
     assert "gear weights convert" in capsys.readouterr().err

@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from gear.config.dump import to_plain
 from gear.config.overrides import with_overrides
+from gear.config.reader import read_node
 from gear.contracts.specs import ModelSpec
 from gear.dataset.files import read_bytes, sha256
 from gear.nn.checkpoints import read_published
 from gear.nn.options import NONE
+from gear.nn.shipped import inspect
 from gear.nn.weights import mismatches, write
 from gear.plugins.build import NO_OPTIONS, blamed, build, find
 from gear.plugins.catalogue import Found
 from gear.plugins.manager import DISTRIBUTION
 from gear.values.errors import GearError
+from gear.values.serial import Json
 
 SUFFIX = ".safetensors"
 
@@ -58,6 +63,7 @@ def convert_weights(
     """Makes a safetensors file of a published one, strictly checked against the network.
 
     Nothing in the published file is run; what of it is not the network (an optimiser's state, criteria) is left out.
+    What a safetensors file says of itself is kept, and options that are given are noted beside.
 
     Args:
         model: name of a model plugin.
@@ -74,7 +80,7 @@ def convert_weights(
         raise GearError(f"{target}: the file to write is to end in {SUFFIX}")
     if target.exists() and origin.exists() and target.samefile(origin):
         raise GearError(f"{target}: is the file to read; write another one")
-    found = find("model", model)
+    found, settings = find("model", model), tuple(settings)
     graph = _graph(found, settings)
     state: Mapping[str, Any] = read_published(origin)
     spec = found.spec
@@ -89,13 +95,16 @@ def convert_weights(
             f" (options that change the graph are given by --set; gear plugins show {model})"
         )
     published = read_bytes(origin)
-    metadata = {
+    metadata = _said(origin) | {
         "model": spec.name,
         "package": found.owner.package,
         "source": origin.name,
         "source_sha256": sha256(published),
         "gear": _version(),
     }
+    options = _options(spec, settings, metadata.get("options", ""))
+    if options:
+        metadata["options"] = json.dumps(options, sort_keys=True)
     write(target, state, metadata, halves=halves)
     data = read_bytes(target)
     return ConvertReport(model=spec.name, path=target, sha256=sha256(data), size_mb=len(data) / 1e6, tensors=len(state))
@@ -114,6 +123,22 @@ def _graph(found: Found, settings: Iterable[str]) -> Any:
     if module is None:
         raise GearError(f"model {found.spec.name!r} has no module whose weights could be converted")
     return module()
+
+
+def _said(origin: Path) -> dict[str, str]:
+    """What the file says of itself."""
+    return dict(inspect(origin).metadata) if origin.suffix == SUFFIX else {}
+
+
+def _options(spec: ModelSpec[Any], settings: Iterable[str], said: str) -> dict[str, Json]:
+    """Of the model: those that the file named, and those that are given, which go before."""
+    try:
+        options = json.loads(said)
+    except ValueError:
+        options = {}
+    plain = to_plain(read_node(spec.config, with_overrides(NO_OPTIONS, settings), ""))
+    given = {text.partition("=")[0].partition(".")[0] for text in settings}
+    return (options if isinstance(options, dict) else {}) | {key: plain[key] for key in plain if key in given}
 
 
 def _version() -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from gear.nn.options import SHIPPED
 from gear.nn.shipped import WeightsFile, inspect, resolve
+from gear.plugins.build import find
 from gear.values.serial import Json
 
 CHUNK_BYTES = 1 << 20
@@ -44,11 +45,12 @@ def show_weights(name: str) -> WeightsFacts:
         name: a safetensors file, or the name of a model whose shipped weights are meant.
 
     Raises:
+        UnknownNameError: it is no file and no model.
         GearError: there is no such file, nothing is shipped under that name, or it is no safetensors.
     """
     path = Path(name)
-    if not path.suffix and not path.exists():
-        path = resolve(SHIPPED, name) or path
+    if not path.exists() and not path.suffix and path.name == name:
+        path = resolve(SHIPPED, find("model", name).spec.name) or path
     file = inspect(path)
     digest = hashlib.sha256()
     with path.open("rb") as stream:
