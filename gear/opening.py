@@ -12,7 +12,7 @@ from gear.dataset.store import plan_of, splits_of
 from gear.plugins.build import build_task
 from gear.values.errors import DatasetError
 
-__all__ = ["Dataset", "Twins", "open_dataset", "open_twins"]
+__all__ = ["Dataset", "Twins", "open_dataset", "open_twins", "root_and_split"]
 
 
 def open_dataset(path: str | Path, split: str | None = None) -> Dataset[Any]:
@@ -40,6 +40,14 @@ def open_dataset(path: str | Path, split: str | None = None) -> Dataset[Any]:
     manifest = read_manifest(root, split)
     _, task = build_task(plan.task["name"], parse_text(_as_yaml(plan.options), f"{root} options"))
     return Dataset(root=root, plan=plan, task=task, manifest=manifest)
+
+
+def root_and_split(path: str | Path) -> tuple[Path, str | None]:
+    """What `DIR` or `DIR:SPLIT` means."""
+    if not Path(path).exists() and ":" in str(path):
+        text, _, split = str(path).rpartition(":")
+        return Path(text), split
+    return Path(path), None
 
 
 def open_twins(first: str | Path, second: str | Path, split: str | None = None) -> Twins[Sample]:

@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = EXAMPLE
     parser.add_argument("--model", required=True, metavar="NAME", help="model plugin; gear plugins --kind model")
     parser.add_argument(
-        "--data", required=True, nargs="+", metavar="DIR", help="datasets of its task, twins among them"
+        "--data", required=True, nargs="+", metavar="DIR", help="datasets of its task, twins among them; DIR:SPLIT"
     )
     parser.add_argument("--split", help="of the datasets, where they have several")
     parser.add_argument("--defense", metavar="NAME", help="defense plugin; gear plugins --kind defense")

@@ -416,6 +416,7 @@ def test_bad_input_is_refused_before_anything_is_built(tmp_path: Path, small: Sm
         (GearError, "at least 1", {"batch": 0}),
         (DatasetError, "no gear/<split>/plan.json", {"data": tmp_path / "nowhere"}),
         (DatasetError, "is a dataset", {"out": data}),
+        (DatasetError, "no split 'val'", {"data": f"{data}:val"}),
     ]
     for kind, message, changes in cases:
         arguments = {"data": data, "model": "tiny_segmenter", "out": tmp_path / "x"} | changes

@@ -15,6 +15,7 @@ from gear.contracts.specs import AttackSpec
 from gear.dataset.files import sha256
 from gear.dataset.reading import Dataset
 from gear.dataset.sidecar import dump_json, load_json
+from gear.opening import root_and_split
 from gear.plugins.build import NO_OPTIONS, find
 from gear.plugins.catalogue import Found
 from gear.values.errors import DatasetError, GearError
@@ -22,7 +23,7 @@ from gear.values.serial import Json
 from gear.verbs.attack.data import check_joined, scenes_of
 from gear.verbs.attack.models import check_attack, choose_defense, choose_models
 from gear.verbs.evaluate.choice import Chosen
-from gear.verbs.train.data import open_all, root_and_split
+from gear.verbs.train.data import open_all
 
 STEPS = 300
 """Where neither steps nor queries are given."""

@@ -6,13 +6,12 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from gear.dataset.sidecar import load_json
-from gear.opening import open_dataset
+from gear.opening import open_dataset, root_and_split
 from gear.values.errors import DatasetError, GearError
 from gear.verbs.attack.data import check_joined, scenes_of
 from gear.verbs.attack.folder import VERIFY
 from gear.verbs.gap.report import GapReport
 from gear.verbs.gap.run import gap
-from gear.verbs.train.data import root_and_split
 
 
 def check_held_out(data: Sequence[str | Path], held: str | Path) -> None:

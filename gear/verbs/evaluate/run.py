@@ -17,7 +17,7 @@ from gear.dataset.layout import GEAR
 from gear.dataset.plan import differences
 from gear.dataset.reading import Dataset
 from gear.dataset.sidecar import dump_json, load_json
-from gear.opening import open_dataset
+from gear.opening import open_dataset, root_and_split
 from gear.values.errors import DatasetError, GearError
 from gear.values.serial import Json
 from gear.verbs.evaluate.choice import (
@@ -64,7 +64,7 @@ def evaluate(
     nothing but their patch are compared sample by sample. Intervals are of 95 %, by bootstrap over samples.
 
     Args:
-        data: roots of datasets, all of one task.
+        data: roots of datasets, all of one task; `DIR:SPLIT` says which split of one.
         model: name of a model plugin.
         settings: `KEY=VALUE` texts for the model's options.
         defense: name of a defense plugin.
@@ -150,7 +150,8 @@ def _opened(
 ) -> list[Dataset[Any]]:
     if not paths:
         raise GearError("there is nothing to evaluate on; give at least one dataset")
-    datasets = [open_dataset(path, split) for path in paths]
+    places = [root_and_split(path) for path in paths]
+    datasets = [open_dataset(root, own or split) for root, own in places]
     first = datasets[0].plan
     for one in datasets:
         if one.plan.task["name"] != first.task["name"]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Any, overload
 
 from gear.dataset.reading import Dataset
 from gear.dataset.store import splits_of
-from gear.opening import open_dataset
+from gear.opening import open_dataset, root_and_split
 from gear.values.errors import DatasetError, GearError
 from gear.values.rng import derive_rng
 from gear.values.serial import Json
@@ -77,10 +78,14 @@ def open_all(
 
     Raises:
         DatasetError: there is none, one is of another task, or not finished.
-        GearError: it is a test split.
+        GearError: it is a test split, or two are of the same samples.
     """
     found = [dataset for path in paths for dataset in _open(path, names)]
+    known: dict[tuple[str, str], Dataset[Any]] = {}
     for dataset in found:
+        same = known.setdefault((dataset.plan.twin_key, json.dumps(dataset.plan.patch, sort_keys=True)), dataset)
+        if same is not dataset:
+            raise GearError(f"{same.root} and {dataset.root} hold the same samples; give them once")
         split = dataset.plan.info.split
         if dataset.plan.task["name"] != task:
             raise DatasetError(dataset.root, f"holds a {dataset.plan.task['name']} dataset, not {task}")
@@ -90,14 +95,6 @@ def open_all(
                 "split such as finetuning, or say --allow-test-data if nothing will be reported on it"
             )
     return tuple(found)
-
-
-def root_and_split(path: str | Path) -> tuple[Path, str | None]:
-    """What `DIR` or `DIR:SPLIT` means."""
-    if not Path(path).exists() and ":" in str(path):
-        text, _, split = str(path).rpartition(":")
-        return Path(text), split
-    return Path(path), None
 
 
 def _open(path: str | Path, names: Sequence[str]) -> list[Dataset[Any]]:
@@ -133,13 +130,14 @@ def spread(samples: Samples, most: int) -> Samples:
 
 
 def keep_some(samples: Samples, share: float, seed: int) -> tuple[Samples, Samples]:
-    """Samples to train on and samples to validate on. Whole sequences go to either side, so that a picture's neighbour
-    is never on the other.
+    """Samples to train on and samples to validate on. Whole sequences go to either side, with their twins, so that what
+    a picture shows is never seen on the other.
 
     Raises:
         GearError: there are too few.
     """
-    sequences = [_sequence(samples, place) for place in samples.places]
+    streets = _streets(samples.datasets)
+    sequences = [_sequence(samples, place, streets) for place in samples.places]
     groups = sorted(set(sequences))
     count = max(1, round(share * len(groups)))
     if count >= len(groups):
@@ -151,7 +149,14 @@ def keep_some(samples: Samples, share: float, seed: int) -> tuple[Samples, Sampl
     return Samples(samples.datasets, train), Samples(samples.datasets, val)
 
 
-def _sequence(samples: Samples, place: tuple[int, int]) -> tuple[int, int]:
+def _streets(datasets: Sequence[Dataset[Any]]) -> list[int]:
+    """For each dataset the number of the first one that differs from it in nothing but the patch: twins show the same
+    streets."""
+    keys = [dataset.plan.twin_key for dataset in datasets]
+    return [keys.index(key) for key in keys]
+
+
+def _sequence(samples: Samples, place: tuple[int, int], streets: Sequence[int]) -> tuple[int, int]:
     """Which drive a sample is of; most are one picture long."""
     frames = int(samples.datasets[place[0]].plan.content["frames"])
-    return place[0], place[1] // frames
+    return streets[place[0]], place[1] // frames

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -39,6 +39,9 @@ MOST_VALIDATIONS = 8
 """In that time."""
 
 MOST_BROKEN_STEPS = 20
+
+ONE_VALUE = "more than 1 value per channel"
+"""What torch says where a batch has nothing to normalise over."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -106,6 +109,7 @@ class Training:
     def run(self) -> Progress:
         """Trains to the end."""
         _train_mode(self._parts.model, True)
+        _train_mode(self._parts.twin, False)
         while not self._is_over:
             self._make_patches()
             with contextlib.closing(self._parts.feed.from_position(self.progress.position)) as batches:
@@ -162,7 +166,7 @@ class Training:
         views = {name: picture.contiguous(memory_format=self._memory) for name, picture in batch.views.items()}
         with seeded(int(derive_rng(config.seed, "step", progress.step).integers(2**31))):
             with autocast(self._device, config.precision):
-                loss = total(self._parts.model.forward(views, batch.samples))
+                loss = self._loss(views, batch)
             self._optimiser.zero_grad(set_to_none=True)
             loss.backward()  # type: ignore[no-untyped-call]
         norm = clip_gradients(self._module, config.gradient_norm)
@@ -177,6 +181,17 @@ class Training:
             point = {"step": progress.step, "loss": math.fsum(progress.open_losses) / len(progress.open_losses)}
             progress.steps.append(point | {"rate": config.learning_rate * factor})
             progress.open_losses.clear()
+
+    def _loss(self, views: Mapping[str, torch.Tensor], batch: Batch) -> torch.Tensor:
+        try:
+            return total(self._parts.model.forward(views, batch.samples))
+        except ValueError as error:
+            if len(batch.samples) == 1 and ONE_VALUE in str(error):
+                raise GearError(
+                    "this network normalises over the samples of a batch, and there is one; train on two samples or "
+                    "more, with --batch 2 or more"
+                ) from error
+            raise
 
     def _count_broken(self, is_finite: bool, loss: torch.Tensor) -> None:
         """A step that overflows is left out; a training that only overflows is over."""

@@ -15,7 +15,7 @@ from gear.dataset.layout import GEAR
 from gear.nn.runtime import device_of, prepare
 from gear.plugins.build import blamed, find
 from gear.plugins.catalogue import Found
-from gear.values.errors import GearError
+from gear.values.errors import DatasetError, GearError
 from gear.values.serial import Json
 from gear.verbs.look import look_of
 from gear.verbs.train.adversary import Adversary
@@ -126,6 +126,8 @@ def train(
     share = picture_share(training, spec)
     config = with_scale(found, config, share)
     root = Path(out)
+    if any(root.glob(f"{GEAR}/*/plan.json")):
+        raise DatasetError(root, "is a dataset; train into a folder of its own")
     with explained(root):
         root.mkdir(parents=True, exist_ok=True)
     clear_scratch(root)
@@ -235,11 +237,13 @@ def _samples(
     training = all_of(open_all(data, task, names=TRAINING, allow_tests=allow_tests))
     if val:
         held_out = all_of(open_all(val, task, names=VALIDATION, allow_tests=allow_tests))
-        shared = {one.plan.content_key for one in training.datasets} & {
-            one.plan.content_key for one in held_out.datasets
-        }
-        if shared:
-            raise GearError("--data and --val hold the same samples; give --val another split, or leave it out")
+        streets = {one.plan.twin_key: one.root for one in training.datasets}
+        for one in held_out.datasets:
+            if one.plan.twin_key in streets:
+                raise GearError(
+                    f"--val {one.root} shows the same streets as --data {streets[one.plan.twin_key]}; give --val "
+                    "another split, or leave it out"
+                )
     else:
         training, held_out = keep_some(training, config.validation_share, config.seed)
     return training, spread(held_out, config.validation_samples)

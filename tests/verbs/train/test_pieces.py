@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,7 +19,7 @@ from gear.cli.train import budget
 from gear.config.nodes import Mapping, Place
 from gear.config.reader import read_node
 from gear.contracts.models import Recipe
-from gear.values.errors import ConfigError
+from gear.values.errors import ConfigError, GearError
 from gear.verbs.train.config import TrainConfig, read_config
 from gear.verbs.train.data import Samples, all_of, keep_some, open_all, spread
 from gear.verbs.train.feed import Cache, Feed, Position
@@ -143,8 +144,8 @@ def test_what_fits_is_decoded_once() -> None:
 
 
 def test_folders_of_roots_and_single_splits(street: Callable[..., Path], tmp_path: Path) -> None:
-    for name in ("one", "two"):
-        (tmp_path / name).symlink_to(street("semseg"))
+    for name, split in (("one", "train"), ("two", "finetuning")):
+        (tmp_path / name).symlink_to(street("semseg", split))
     assert [d.root.name for d in open_all([tmp_path], "semseg", names=("train",))] == ["one", "two"]
     (found,) = open_all([f"{street('semseg')}:train"], "semseg", names=("val",))
     assert found.plan.info.split == "train"
@@ -152,6 +153,23 @@ def test_folders_of_roots_and_single_splits(street: Callable[..., Path], tmp_pat
     assert len(samples) == 12 and samples[7].record.index == 1
     assert [fact["samples"] for fact in samples[:8].facts()] == [6, 2]  # type: ignore[call-overload,index]
     assert [place[1] for place in spread(samples, 4).places] == [0, 3, 0, 3]
+
+
+def test_the_same_samples_are_not_taken_twice(street: Callable[..., Path], tmp_path: Path) -> None:
+    (tmp_path / "again").symlink_to(street("semseg"))
+    with pytest.raises(GearError, match=r"hold the same samples; give them once"):
+        open_all([street("semseg"), tmp_path / "again"], "semseg", names=("train",))
+
+
+def test_twins_are_kept_together(street: Callable[..., Path]) -> None:
+    (dataset,) = open_all([street("semseg")], "semseg", names=("train",))
+    plan = dataclasses.replace(dataset.plan, patch={"label": "random", "sha256": "0" * 64})
+    twin = dataclasses.replace(dataset, plan=plan)
+    assert plan.twin_key == dataset.plan.twin_key and plan.content_key != dataset.plan.content_key
+    for seed in range(5):
+        train, val = keep_some(all_of((dataset, twin)), 0.4, seed=seed)
+        shown = [{place[1] for place in side.places} for side in (train, val)]
+        assert not shown[0] & shown[1] and len(train) == 8 and len(val) == 4
 
 
 def test_sequences_are_kept_together(street: Callable[..., Path]) -> None:

@@ -199,8 +199,10 @@ def test_what_cannot_be_trained_is_said_in_a_line(street: Street, tmp_path: Path
         quick(street, out, init="imagenet")
     with pytest.raises(GearError, match="no such file"):
         quick(street, out, init="nothing.safetensors")
-    with pytest.raises(GearError, match="hold the same samples"):
+    with pytest.raises(GearError, match=r"^--val .* shows the same streets as --data"):
         quick(street, out, val=street("semseg"))
+    with pytest.raises(DatasetError, match="is a dataset; train into a folder of its own"):
+        quick(street, street("semseg"))
     with pytest.raises(GearError, match="too few to keep some"):
         train("semseg", "tiny_segmenter", street("semseg", "train", 1), out=out)
     install(replace(tiny_segmenter, recipe=None))
@@ -264,6 +266,25 @@ class Overflowing(TinySegmenter):
 class Cropping(TinySegmenter):
     def predict(self, views: Any) -> Any:
         return super().predict(views)[1:]
+
+
+class Normalising(TinySegmenter):
+    """Normalises what is left of a picture in one cell, as the context of DDRNet does."""
+
+    def __init__(self, config: TinyConfig) -> None:
+        super().__init__(config)
+        self.context = torch.nn.BatchNorm2d(3)
+
+    def forward(self, views: Any, targets: Any = None) -> Any:
+        self.context(views["left"].mean((2, 3), keepdim=True))
+        return super().forward(views, targets)
+
+
+def test_a_batch_of_one_that_cannot_be_normalised_is_said(street: Street, tmp_path: Path, install: Any) -> None:
+    install(replace(tiny_segmenter, build=Normalising))
+    with pytest.raises(GearError, match="with --batch 2 or more"):
+        quick(street, tmp_path / "out", batch=1)
+    assert quick(street, tmp_path / "two", batch=2, epochs=1).steps == 2
 
 
 def test_a_loss_that_is_no_number_ends_it(street: Street, tmp_path: Path, install: Any) -> None:
