@@ -54,11 +54,13 @@ def batches(
         workers: processes that read ahead; 0 reads here. They change nothing but time.
 
     Raises:
-        ValueError: `size` is below 1, or pictures of a batch differ in size.
+        ValueError: `size` is below 1, `start` is negative, or pictures of a batch differ in size.
         DatasetError: a sample cannot be read.
     """
     if size < 1:
         raise ValueError(f"size must be at least 1, got {size}")
+    if start < 0:
+        raise ValueError(f"start counts batches that are left out, 0 or more, got {start}")
     dataset.epoch = epoch
     indices = order(len(dataset), seed=seed, epoch=epoch)
     groups = [indices[i : i + size] for i in range(0, len(indices), size)]
@@ -74,6 +76,15 @@ def batches(
     )
     for items in reader:
         yield _finished(items)
+
+
+def collate(items: Sequence[Item]) -> Batch:
+    """A batch of items, as the `collate_fn` of torch's own `DataLoader`.
+
+    Raises:
+        ValueError: their pictures differ in size.
+    """
+    return _finished(_collate(items))
 
 
 def as_pictures(views: Mapping[str, Tensor]) -> dict[str, Tensor]:

@@ -13,6 +13,7 @@ from torch import Tensor
 
 from gear.contracts.tasks import Sample
 from gear.opening import Dataset, open_dataset
+from gear.values.errors import UnknownNameError
 from gear.values.frames import UInt8Image
 from gear.values.rng import derive_rng
 
@@ -37,6 +38,9 @@ class Item:
 
 class TorchDataset(torch.utils.data.Dataset[Item]):
     """One finished split of any task, sample by sample, for torch's own `DataLoader` or for `gear.readers.batches`.
+
+    Items are not tensors, so torch's own loader is to be told how a batch is made of them: `batch_size=None` leaves
+    them as they are, `collate_fn=gear.readers.collate` makes a `Batch`.
 
     Item i depends on (split, seed, epoch, i) alone, whoever reads it. It can be sent to worker processes.
 
@@ -63,10 +67,15 @@ class TorchDataset(torch.utils.data.Dataset[Item]):
 
         Raises:
             DatasetError: there is no such dataset or split, or it is not finished.
+            UnknownNameError: its samples have no such camera.
         """
         self.dataset = dataset if isinstance(dataset, Dataset) else open_dataset(dataset, split)
         self.epoch = 0
         self._views = None if views is None else tuple(views)
+        cameras = [camera.name for camera in self.dataset.task.rig().cameras]
+        for name in self._views or ():
+            if name not in cameras:
+                raise UnknownNameError(f"camera in {self.dataset.root}", name, cameras)
         self._change = change
         self._seed = seed
 

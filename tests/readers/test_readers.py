@@ -12,10 +12,10 @@ import pytest
 import torch
 
 import gear
-from gear.readers import TorchDataset, batches, order
+from gear.readers import TorchDataset, batches, collate, order
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
-from gear.values.errors import DatasetError
+from gear.values.errors import DatasetError, UnknownNameError
 from gear.verbs.collect.run import CollectReport, collect
 from tests.verbs.conftest import size_settings
 
@@ -128,3 +128,15 @@ def test_what_cannot_be_read_is_said(tmp_path: Path, roots: Callable[[str], Path
         TorchDataset(roots("semseg"), "train")
     with pytest.raises(ValueError, match="at least 1"):
         list(batches(TorchDataset(roots("semseg")), size=0))
+    with pytest.raises(ValueError, match="0 or more, got -1"):
+        list(batches(TorchDataset(roots("semseg")), size=1, start=-1))
+    with pytest.raises(UnknownNameError, match=r"no camera in .* named 'lefd'; did you mean left"):
+        TorchDataset(roots("semseg"), views=["lefd"])
+
+
+def test_torchs_own_loader_takes_it(roots: Callable[[str], Path]) -> None:
+    dataset = TorchDataset(roots("semseg"))
+    (own,) = batches(dataset, size=3)
+    (batch,) = torch.utils.data.DataLoader(dataset, batch_size=3, collate_fn=collate)
+    assert batch.indices == own.indices and torch.equal(batch.views["left"], own.views["left"])
+    assert [item.index for item in torch.utils.data.DataLoader(dataset, batch_size=None)] == [0, 1, 2]
