@@ -30,22 +30,56 @@ _STRIP_ROWS = 32
 _LEAST_FALL = np.float32(3e-4)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fog:
+    """Drops in the air: a fog, or the veil of rain.
+
+    Attributes:
+        per_m: extinction at height 0.
+        from_m: where it begins, along a ray.
+        thinning_per_m: rate at which it thins with height; 0 for a fog without a top.
+    """
+
+    per_m: float
+    from_m: float
+    thinning_per_m: float
+
+    def thickness(self, length_m: FloatImage, rise: FloatImage, height_m: float) -> FloatImage:
+        """Optical thickness along rays: the integral of exp(-k height), solved.
+
+        Between two heights a density that falls exponentially adds up to (1 - exp(-x)) / x of what it is at the
+        lower end, x being the fall.
+
+        Args:
+            length_m: (h, w) of the rays.
+            rise: (h, w) how they climb, a metre of ray.
+            height_m: of where they begin.
+        """
+        inside_m = np.maximum(length_m - np.float32(self.from_m), 0)
+        if self.thinning_per_m <= 0:
+            return np.asarray(np.float32(self.per_m) * inside_m)
+        rate = np.float32(self.thinning_per_m)
+        # Nothing is denser than the fog on the ground, also where a sky is seen below the horizon.
+        start = np.maximum(rate * (np.float32(height_m) + np.float32(self.from_m) * rise), 0)
+        fall = np.maximum(rate * rise * inside_m, -start)
+        np.copyto(fall, _LEAST_FALL, where=np.abs(fall) < _LEAST_FALL)
+        density = np.exp(-start)
+        density *= (1 - np.exp(-fall)) / fall
+        return np.asarray(density * inside_m * np.float32(self.per_m))
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Air:
     """What the air does to light.
 
     Attributes:
-        fog_per_m: extinction of the fog at height 0.
-        fog_from_m: where it begins.
-        fog_thinning_per_m: rate at which it thins with height; 0 for a fog without a top.
+        fogs: what floats in it; each thins, begins and takes its share by itself.
         clear_per_m: (3,) extinction of the air itself, by channel, the same at every height. It dims no sky, which the
             sky's picture has in it.
         ring: (N, 3) light of the air by azimuth, counter-clockwise from east; 1.0 is the frame's full scale.
     """
 
-    fog_per_m: float
-    fog_from_m: float
-    fog_thinning_per_m: float
+    fogs: tuple[Fog, ...]
     clear_per_m: Array
     ring: Array
 
@@ -60,7 +94,7 @@ class Air:
         Returns:
             (H, W, 3) uint16, a new array, rounded.
         """
-        if self.fog_per_m <= 0 and not self.clear_per_m.any():
+        if not self.fogs and not self.clear_per_m.any():
             return linear_rgb.copy()
         rays, glow = self._directions(camera)
         planes = [np.empty(depth_m.shape, np.uint16) for _ in range(3)]
@@ -89,27 +123,11 @@ class Air:
         seen = depth_m == depth_m
         rise = rays[1] / rays[0]
         length_m = np.where(seen, depth_m * rays[0], np.float32(SKY_DISTANCE_M))
-        tau = self._fog(length_m, rise, height_m)
+        tau = np.zeros_like(length_m)
+        for fog in self.fogs:
+            tau += fog.thickness(length_m, rise, height_m)
         length_m *= seen
         return [np.exp(length_m * np.float32(-per_m) - tau) for per_m in self.clear_per_m]
-
-    def _fog(self, length_m: FloatImage, rise: FloatImage, height_m: float) -> FloatImage:
-        """Optical thickness of the fog along rays: the integral of exp(-k height), solved.
-
-        Between two heights a density that falls exponentially adds up to (1 - exp(-x)) / x of what it is at the
-        lower end, x being the fall.
-        """
-        inside_m = np.maximum(length_m - np.float32(self.fog_from_m), 0)
-        if self.fog_thinning_per_m <= 0:
-            return np.asarray(np.float32(self.fog_per_m) * inside_m)
-        rate = np.float32(self.fog_thinning_per_m)
-        # Nothing is denser than the fog on the ground, also where a sky is seen below the horizon.
-        start = np.maximum(rate * (np.float32(height_m) + np.float32(self.fog_from_m) * rise), 0)
-        fall = np.maximum(rate * rise * inside_m, -start)
-        np.copyto(fall, _LEAST_FALL, where=np.abs(fall) < _LEAST_FALL)
-        density = np.exp(-start)
-        density *= (1 - np.exp(-fall)) / fall
-        return np.asarray(density * inside_m * np.float32(self.fog_per_m))
 
     def _directions(self, camera: CameraRecord) -> tuple[FloatImage, list[FloatImage]]:
         """(2, H, W) metres of ray and of climb a metre of depth, and (H, W) light of the air a channel.

@@ -34,9 +34,11 @@ def run(args: argparse.Namespace) -> int:
     """Lists towns, or draws one."""
     from gear.values.errors import GearError
     from gear.verbs.towns.facts import read_town, town_names
+    from gear.verbs.towns.write import check_pictures
 
     if args.town is None and (args.out or args.scenes):
         raise GearError("gear towns needs a town for --out and --scenes, such as: gear towns town10 --out maps/")
+    check_pictures(renderer=args.renderer, quality=args.quality, weather=args.weather, seed=args.seed)
     if args.out is not None:
         return draw(args)
     names = [args.town] if args.town else town_names()

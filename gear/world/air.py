@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
 
-from gear.camera.air import Air
+from gear.camera.air import Air, Fog
 from gear.camera.develop import Darkroom
 from gear.camera.puddles import Puddles
 from gear.camera.rain import Rain
@@ -20,6 +21,9 @@ DENSEST_FOG_PER_M = 0.05
 
 RAIN_PER_M = 0.0035
 """Extinction of the hardest rain."""
+
+RAIN_FROM_M, RAIN_FALLOFF = 0.75, 0.1
+"""Where its veil begins and how it thins, in the terms of CARLA's fog: as its presets have the fog in rain."""
 
 AEROSOL_PER_M = 1.6e-4
 """Extinction of a town's clear air by dust and vapour: 24 km of sight, as on a good day."""
@@ -79,15 +83,33 @@ def air_of(weather: Weather, renderer_name: str) -> Air:
     aerosol = AEROSOL_PER_M * weather.mie_scattering_scale / 0.03
     molecules = np.array(MOLECULES_PER_M) * weather.rayleigh_scattering_scale / 0.0331
     return Air(
-        fog_per_m=fog_per_m(weather),
-        fog_from_m=weather.fog_distance_m,
-        fog_thinning_per_m=FALLOFF_PER_M * weather.fog_falloff,
+        fogs=fogs_of(weather),
         clear_per_m=weather.scattering_intensity * (aerosol + molecules),
         ring=_shown(horizon_light(weather), renderer_name),
     )
 
 
-def fog_per_m(weather: Weather) -> float:
-    """Extinction of the fog on the ground. CARLA's percent run from clear air to a thick fog; rain adds its veil."""
+def fogs_of(weather: Weather) -> tuple[Fog, ...]:
+    """The fog and the veil of rain, in the order of what they take of light; none that is not there.
+
+    CARLA's percent run from clear air to a thick fog. Where the fog begins and how it thins are its own: the veil hangs
+    as a usual fog does, and both are one where the fog is a usual one.
+    """
     fog = DENSEST_FOG_PER_M * (weather.fog_density / 100) ** 1.5
-    return float(weather.scattering_intensity * (fog + RAIN_PER_M * math.pow(weather.precipitation / 100, 1.5)))
+    rain = RAIN_PER_M * math.pow(weather.precipitation / 100, 1.5)
+    usual = Fog(
+        per_m=float(weather.scattering_intensity * rain), from_m=RAIN_FROM_M, thinning_per_m=_thinning(RAIN_FALLOFF)
+    )
+    own = Fog(
+        per_m=float(weather.scattering_intensity * fog),
+        from_m=weather.fog_distance_m,
+        thinning_per_m=_thinning(weather.fog_falloff),
+    )
+    if (own.from_m, own.thinning_per_m) == (usual.from_m, usual.thinning_per_m):
+        both = dataclasses.replace(own, per_m=float(weather.scattering_intensity * (fog + rain)))
+        return tuple(one for one in (both,) if one.per_m > 0)
+    return tuple(one for one in (own, usual) if one.per_m > 0)
+
+
+def _thinning(falloff: float) -> float:
+    return FALLOFF_PER_M * falloff

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gear.camera.air import SKY_DISTANCE_M, Air
+from gear.camera.air import SKY_DISTANCE_M, Air, Fog
 from gear.values.frames import LINEAR_FULL_SCALE
 from gear.values.geometry import CAMERA_FROM_ACTOR_AXES, RigidTransform
 from gear.values.scene import CameraRecord, Pose
@@ -26,11 +27,10 @@ def camera(height_m: float = 1.6, yaw_deg: float = 0.0) -> CameraRecord:
     )  # fmt: skip
 
 
-def air(**changes: object) -> Air:
-    values: dict[str, object] = {
-        "fog_per_m": 0.02, "fog_from_m": 0.0, "fog_thinning_per_m": 0.0, "clear_per_m": np.zeros(3),
-        "ring": np.full((8, 3), 0.5),
-    }  # fmt: skip
+def air(**changes: Any) -> Air:
+    fog = {"per_m": 0.02, "from_m": 0.0, "thinning_per_m": 0.0}
+    fog |= {name.removeprefix("fog_"): changes.pop(name) for name in list(changes) if name.startswith("fog_")}
+    values: dict[str, object] = {"fogs": (Fog(**fog),), "clear_per_m": np.zeros(3), "ring": np.full((8, 3), 0.5)}
     return Air(**(values | changes))  # type: ignore[arg-type]
 
 
@@ -120,3 +120,12 @@ def test_thick_fog_shows_the_light_of_its_direction() -> None:
 def test_clear_air_without_fog_changes_nothing() -> None:
     frame = np.random.default_rng(1).integers(0, 1021, (HEIGHT, WIDTH, 3)).astype(np.uint16)
     assert np.array_equal(air(fog_per_m=0.0).veil(frame, wall(80.0), camera()), frame)
+
+
+def test_two_fogs_take_their_shares_one_after_the_other() -> None:
+    low, high = (Fog(per_m=0.02, from_m=start, thinning_per_m=thin) for start, thin in ((5.0, 0.05), (0.75, 0.007)))
+    depth = wall(60.0)
+    both = air(fogs=(low, high)).transmittance(depth, camera())
+    each = [air(fogs=(fog,)).transmittance(depth, camera()) for fog in (low, high)]
+    np.testing.assert_allclose(both, each[0] * each[1], rtol=1e-6)
+    assert np.array_equal(air(fogs=()).transmittance(depth, camera()), np.ones_like(both))

@@ -240,6 +240,9 @@ def test_the_command_draws(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
         (["town10", "--out", "maps", "--weather", "ClearNon"], "did you mean ClearNoon?"),
         (["town10", "--out", "maps", "--quality", "best"], "no quality named"),
         (["town10", "--out", "maps", "--seed", "-1"], "must not be negative"),
+        (["town10", "--renderer", "clasic"], "did you mean classic?"),
+        (["--weather", "ClearNon"], "did you mean ClearNoon?"),
+        (["town10", "--out", "/dev/null/maps"], "a file is where a folder should be; choose another --out"),
     ],
 )
 def test_the_command_tells_in_one_line(words: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -13,7 +13,7 @@ from gear.contracts.rendering import Stage
 from gear.render import RENDERERS, open_renderer
 from gear.values.geometry import Intrinsics, RigidTransform
 from gear.values.scene import CameraRecord, Pose, Weather
-from gear.world.air import air_of, darkroom_of, fog_per_m
+from gear.world.air import RAIN_PER_M, air_of, darkroom_of, fogs_of
 from gear.world.light import FACE_ORDER, WHITE_ALBEDO, face_directions, horizon_light, lighting_of, mirrored_light
 from gear.world.quiet_mjcf import mjcf
 from gear.world.sky import Sky
@@ -212,6 +212,18 @@ def test_water_darkens_and_smooths_open_ground_only() -> None:
     assert wet.mat_roughness[brick] == dry.mat_roughness[brick]
 
 
+def fog_per_m(weather: Weather) -> float:
+    return sum(fog.per_m for fog in fogs_of(weather))
+
+
+def test_the_veil_of_rain_does_not_follow_the_fog() -> None:
+    for changes in ({"fog_distance_m": 200.0}, {"fog_falloff": 5.0}, {"fog_distance_m": 90.0, "fog_density": 40.0}):
+        *_, veil = fogs_of(Weather(name="x", precipitation=100, **changes))  # type: ignore[arg-type]
+        assert (veil.per_m, veil.from_m, veil.thinning_per_m) == (RAIN_PER_M, 0.75, pytest.approx(0.00693))
+    for name, weather in PRESETS.items():
+        assert len(fogs_of(weather)) == 1, f"{name}: fog and rain are one"
+
+
 def test_wetness_and_fog_follow_their_parameters() -> None:
     assert wetness(PRESETS["ClearNoon"]) == 0 < wetness(PRESETS["SoftRainNoon"]) < wetness(PRESETS["HardRainNoon"]) == 1
     assert wetness(Weather(name="x", wetness=30)) == pytest.approx(0.3)
@@ -260,6 +272,6 @@ def test_water_mirrors_houses_below_and_the_sky_above() -> None:
 def test_a_weather_says_what_the_camera_adds() -> None:
     dry, wet = (darkroom_of(PRESETS[name], "filament", "t") for name in ("ClearNoon", "HardRainNoon"))
     assert dry.puddles.share == 0 == dry.rain.intensity and wet.puddles.share > 0.2 and wet.rain.intensity == 1
-    assert wet.air.fog_per_m > 5 * dry.air.fog_per_m
+    assert wet.air.fogs[0].per_m > 5 * dry.air.fogs[0].per_m
     still = darkroom_of(Weather(name="x", scattering_intensity=0, fog_density=50), "filament", "t").air
-    assert still.fog_per_m == 0 and not still.clear_per_m.any()
+    assert still.fogs == () and not still.clear_per_m.any()

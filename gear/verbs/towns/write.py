@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -72,17 +73,14 @@ def write_town(
         TownError: the town breaks the conventions.
         DatasetError: `out` cannot be written.
     """
-    describe(renderer)
-    if weather not in PRESETS:
-        raise UnknownNameError("weather", weather, PRESETS)
-    if quality not in QUALITIES:
-        raise UnknownNameError("quality", quality, QUALITIES)
-    if seed < 0:
-        raise GearError(f"--seed must not be negative, got {seed}")
+    check_pictures(renderer=renderer, quality=quality, weather=weather, seed=seed)
     found = read_town(town, scenes)
     if progress is not None and found.scenes is not None:
         progress(0, len(found.scenes.scenes))
     folder = Path(out)
+    with explained(folder):  # before minutes are spent on drawing
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
     map_path = _write(folder / f"{found.name}_map.png", draw_map(found, Relief.of(found.library.town)))
     sheet_path: Path | None = None
     problems: list[PlacementError] = []
@@ -95,10 +93,25 @@ def write_town(
     return TownReport(town=found, map=map_path, sheet=sheet_path, problems=tuple(problems))
 
 
+def check_pictures(*, renderer: str, quality: str, weather: str, seed: int) -> None:
+    """Whether thumbnails can be asked for in that way; see `write_town`.
+
+    Raises:
+        UnknownNameError: there is no such renderer, quality or weather.
+        GearError: the seed is negative.
+    """
+    describe(renderer)
+    if weather not in PRESETS:
+        raise UnknownNameError("weather", weather, PRESETS)
+    if quality not in QUALITIES:
+        raise UnknownNameError("quality", quality, QUALITIES)
+    if seed < 0:
+        raise GearError(f"--seed must not be negative, got {seed}")
+
+
 def _write(target: Path, picture: UInt8Image) -> Path:
     data = cv2.imencode(".png", picture[..., ::-1])[1].tobytes()
     with explained(target):
-        target.parent.mkdir(parents=True, exist_ok=True)
         temporary = target.with_name(f".{target.name}.part")
         temporary.write_bytes(data)
         temporary.replace(target)
