@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import cv2
@@ -13,18 +13,10 @@ from gear.config.reader import read_node
 from gear.values.frames import UInt8Image
 from gear.values.resources import data_dir
 from gear.values.scene import Weather
-from gear.world.instances import class_name
 from gear.world.light import FACE_ORDER, FILAMENT_LUX, Floats, Lighting, encode_srgb, lighting_of
 from gear.world.quiet_mjcf import mjcf
+from gear.world.wet import Worn, wet_ground
 
-Worn = tuple[str, str | None]
-"""A default class, and a material that a geom has besides."""
-
-WET_LABELS = frozenset({"road", "road_marking", "sidewalk", "parking", "ground"})
-"""What lies open to the rain and holds its water."""
-
-_WET_DARKENING = 0.45
-_WET_SMOOTHING = 0.7
 _CLASSIC_WHITE = 1.1
 _CLASSIC_SKY_SHARE = (0.48, 0.95)
 _CLASSIC_TINT = 0.2
@@ -53,7 +45,7 @@ def apply_weather(
     """Puts a weather into a composed world, in place of the light that its town came with.
 
     - a light `sun`, a texture `sky` as the sky's picture, and the same picture as a light for Filament;
-    - wet materials: what lies open to the rain is darker and smoother;
+    - wet ground: what lies open to the rain is darker and smoother;
     - colours of materials and geoms are read as linear albedo by both renderers.
 
     Args:
@@ -68,7 +60,7 @@ def apply_weather(
     _add_sun(root, lighting)
     amount = wetness(weather)
     if amount > 0:
-        _wet(_open_materials(root, worn), amount)
+        wet_ground(root, amount, worn)
     root.custom.add("text", name="filament.material.base_color_type", data="linear")
     # Gear's renderers have their own, which costs less and loses no memory.
     root.custom.add("numeric", name="filament.ao.enabled", data=[0])
@@ -140,39 +132,3 @@ def _add_sun(root: mjcf.RootElement, lighting: Lighting) -> None:
 
 def _display(light: Floats) -> Floats:
     return encode_srgb(light).astype(np.float64) / 255
-
-
-def _wet(materials: Iterable[Any], amount: float) -> None:
-    """Water fills the pores: less light comes back from inside, and the surface mirrors more sharply."""
-    for material in materials:
-        rgba = np.array(material.rgba if material.rgba is not None else (1.0, 1.0, 1.0, 1.0))
-        rgba[:3] *= 1 - _WET_DARKENING * amount
-        material.rgba = rgba
-        if material.roughness is not None and material.roughness >= 0:
-            material.roughness = float(material.roughness * (1 - _WET_SMOOTHING * amount))
-
-
-def _open_materials(root: mjcf.RootElement, worn: Sequence[Worn]) -> list[Any]:
-    """Materials of geoms whose label is in `WET_LABELS`, each once."""
-    pairs: list[tuple[Any, Any]] = [
-        (root.find("default", name), None if own is None else root.find("material", own))
-        for name, own in worn
-        if _is_open(name)
-    ]
-    pairs += [(geom.dclass, geom.material) for geom in root.find_all("geom") if _is_open(class_name(geom.dclass))]
-    found = (own if own is not None else _inherited_material(default) for default, own in pairs)
-    return list({material.full_identifier: material for material in found if material is not None}.values())
-
-
-def _is_open(class_name: str) -> bool:
-    return class_name.rsplit("/", 1)[-1].partition(".")[0] in WET_LABELS
-
-
-def _inherited_material(default: Any) -> Any:
-    """The material that a default class, or one that it stands in, gives its geoms."""
-    # Of a class that went around dm_control only the name is here, and such a one gives no material.
-    while default is not None and not isinstance(default, str) and default.tag == "default":
-        if default.geom is not None and default.geom.material is not None:
-            return default.geom.material
-        default = default.parent
-    return None
