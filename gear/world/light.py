@@ -112,9 +112,18 @@ def _in_street(sky: Sky, directions: Floats) -> Floats:
 
 
 def horizon_light(weather: Weather) -> Floats:
-    """(`HORIZON_AZIMUTHS`, 3) light of distant air by azimuth, counter-clockwise from east, in units of the frame."""
+    """(`HORIZON_AZIMUTHS`, 3) light of distant air by azimuth, counter-clockwise from east, in units of the frame.
+
+    Once the sun is down it no longer reaches the air of the street, which has the colour of the light from the whole
+    sky: the glow low in the west does not dye a fog.
+    """
     sky = Sky.of(weather)
-    return np.minimum(_exposure(sky)[0] * _looks(sky) * sky.horizon_radiance(HORIZON_AZIMUTHS), 1.0)
+    exposure, roof_klx = _exposure(sky)
+    ring = exposure * _looks(sky) * sky.horizon_radiance(HORIZON_AZIMUTHS)
+    if sky.night:
+        grey = ring.mean(axis=1, keepdims=True) * roof_klx / roof_klx.mean()
+        ring += min(2 * sky.night, 1.0) * (grey - ring)
+    return np.minimum(ring, 1.0)
 
 
 def _looks(sky: Sky) -> float:

@@ -296,6 +296,17 @@ def test_water_mirrors_houses_below_and_the_sky_above() -> None:
     assert light[20, 48, 2] > 1.3 * light[20, 48, 0] and light[0, 48, 2] < 1.3 * light[0, 48, 0]
 
 
+def test_fog_at_dusk_has_the_colour_of_the_streets_light() -> None:
+    def yellower(altitude_deg: float) -> float:
+        weather = Weather(name="x", fog_density=60, sun_altitude_deg=altitude_deg)
+        ring, ambient = horizon_light(weather).mean(axis=0), lighting_of(weather, sky_face_px=32).ambient
+        return float(ring[0] / ring[2] / (ambient[0] / ambient[2]))
+
+    steps = [yellower(altitude) for altitude in (0, -2, -4, -6, -10)]
+    assert all(before > after for before, after in pairwise(steps[:4])), "the glow goes with the sun"
+    assert steps[0] > 3 and steps[3] == pytest.approx(1, abs=0.03) and steps[4] == pytest.approx(1, abs=0.03)
+
+
 def test_a_weather_says_what_the_camera_adds() -> None:
     dry, wet = (darkroom_of(PRESETS[name], "filament", "t") for name in ("ClearNoon", "HardRainNoon"))
     assert dry.puddles.share == 0 == dry.rain.intensity and wet.puddles.share > 0.2 and wet.rain.intensity == 1
