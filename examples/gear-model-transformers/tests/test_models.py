@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar
@@ -165,3 +166,25 @@ def test_absurd_options_are_refused() -> None:
         DepthConfig(inverse_scale=-1.0)
     with pytest.raises(FieldError, match="least_score"):
         DetectorConfig(least_score=2.0)
+
+
+def test_a_folder_with_code_of_its_own_never_runs_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder, marker = tiny_folders.segformer(tmp_path), tmp_path / "ran"
+    (folder / "own.py").write_text(f"open({str(marker)!r}, 'w').close()\nclass Config: ...\nclass Net: ...\n")
+    config = json.loads((folder / "config.json").read_text())
+    config |= {
+        "model_type": "own",
+        "auto_map": {"AutoConfig": "own.Config", "AutoModelForSemanticSegmentation": "own.Net"},
+    }
+    (folder / "config.json").write_text(json.dumps(config))
+    monkeypatch.setattr("builtins.input", lambda *_: "y")
+    with pytest.raises(GearError, match="no network for SemanticSegmentation"):
+        semseg.build(LabelledConfig(folder=str(folder), device="cpu"))
+    assert not marker.exists()
+
+
+def test_halved_weights_are_used_whole(tmp_path: Path) -> None:
+    folder = tiny_folders.segformer(tmp_path)
+    transformers.AutoModelForSemanticSegmentation.from_pretrained(folder).half().save_pretrained(folder)
+    model = semseg.build(LabelledConfig(folder=str(folder), device="cpu", classes={"tarmac": "terrain"}))
+    assert model.predict({"left": np.zeros((*SIZE, 3), np.uint8)}).shape == SIZE

@@ -88,18 +88,20 @@ def open_folder(folder: Path, kinds: Sequence[str]) -> tuple[nn.Module, Any]:
     import transformers
 
     transformers.utils.logging.disable_progress_bar()
+    # What a folder brings along as code is never run: it would be anybody's.
+    local: dict[str, Any] = {"local_files_only": True, "trust_remote_code": False}
     problem = ""
     for kind in kinds:
         try:
             network, found = getattr(transformers, kind).from_pretrained(
-                folder, local_files_only=True, use_safetensors=True, output_loading_info=True
+                folder, use_safetensors=True, output_loading_info=True, dtype=torch.float32, **local
             )
             if found["missing_keys"]:  # transformers would make them up: a classifier has no head that says depth
                 problem = problem or f"{len(found['missing_keys'])} weights of {type(network).__name__} are not there"
                 continue
-            processor: Any = transformers.AutoImageProcessor.from_pretrained(folder, local_files_only=True)
-        except (OSError, ValueError) as error:
-            problem = problem or str(error).splitlines()[0]
+            processor: Any = transformers.AutoImageProcessor.from_pretrained(folder, **local)
+        except (OSError, ValueError, TypeError, KeyError, AttributeError, RuntimeError) as error:
+            problem = problem or str(error).partition("\n")[0]
         else:
             return network, processor
     wanted = " or ".join(kind.removeprefix("AutoModelFor") for kind in kinds)
