@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
+from gear.groundtruth.bent import Bend
 from gear.groundtruth.raster import Window, bounds, fill, project_mesh
 from gear.groundtruth.visible import PartKey, VisiblePart, visible_parts
 from gear.values.frames import GeomTable, SceneObject, View
@@ -32,7 +33,7 @@ def observe_objects(
 
     A silhouette inside the picture is exact to the pixel. Of one that leaves the picture, the part inside is exact
     and the part outside is sampled at a step that grows with it; what lies less than 10 cm before the camera is left
-    out.
+    out. Behind a lens silhouettes are bent as the ids are; outside of the picture edges stay straight between corners.
 
     Args:
         view: the id buffer and its camera.
@@ -54,13 +55,14 @@ def observe_objects(
                 for code in codes:
                     wanted.setdefault((thing.id, int(code)), EMPTY)
     vertices: dict[int, Array] = {}
+    bend = Bend.of(view.camera)
     truths = []
     for (object_id, code), part in sorted(wanted.items(), key=lambda item: item[0]):
         thing = objects[object_id]
         if object_id not in vertices:
             vertices[object_id] = in_camera(thing, view.camera)
         faces = thing.shape.faces[thing.shape.face_label_code == code] if by_label else thing.shape.faces
-        truth = _measure(object_id, code, part, vertices[object_id], faces, view.camera)
+        truth = _measure(object_id, code, part, vertices[object_id], faces, view.camera, bend)
         if part.count_px or truth.amodal_in_image_px:
             truths.append(truth)
     return tuple(truths)
@@ -79,17 +81,28 @@ def _measure(
     vertices_camera_m: Array,
     faces: npt.NDArray[np.int32],
     camera: CameraRecord,
+    bend: Bend | None,
 ) -> ObjectTruth:
     triangles_px = project_mesh(vertices_camera_m, faces, camera.intrinsics)
     whole = bounds(triangles_px)
+    picture: Window = (0, 0, camera.width_px, camera.height_px)
     rows, columns = part.mask.shape
     visible_box: BoxPx | None = None
     if part.count_px:
         left, top = part.left_px, part.top_px
         visible_box = (float(left), float(top), float(left + columns), float(top + rows))
-    picture: Window = (0, 0, camera.width_px, camera.height_px)
-    inside = _common(_cover(whole, visible_box), picture)
-    mask = fill(triangles_px, inside)
+    if bend is None:
+        inside = _common(_cover(whole, visible_box), picture)
+        mask = fill(triangles_px, inside)
+    else:
+        seen = _common(whole, picture)
+        inside = _cover(bend.window(seen), visible_box)
+        mask = bend.mask(fill(triangles_px, seen), seen, inside)
+        triangles_px = bend.points(triangles_px)
+        whole = bounds(triangles_px)
+        if mask.any():
+            # A curved edge may bulge beyond its ends.
+            whole = _cover(whole, _tight(mask, inside))
     if part.count_px:
         # The GPU's own rounding may show a pixel that the triangles just miss; what is seen is part of the whole.
         y, x = part.top_px - inside[1], part.left_px - inside[0]

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from gear.formats import rle
+from gear.groundtruth.bent import Bend
 from gear.groundtruth.raster import NEAR_M
 from gear.values.frames import GeomTable, View
 from gear.values.geometry import Array
@@ -16,6 +17,9 @@ from gear.values.truth import SurfaceTruth
 
 UNIT_CORNERS = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
 """Patch coordinates of the corners: top left, top right, bottom right, bottom left."""
+
+CURVE_STEPS = 32
+"""Straight pieces of an edge that a lens bends."""
 
 
 def observe_surfaces(view: View, geoms: GeomTable, record: SceneRecord) -> tuple[SurfaceTruth, ...]:
@@ -63,7 +67,7 @@ def _observe(view: View, geoms: GeomTable, record: SceneRecord, index: int, surf
 
 
 def _area_px2(corners_m: Array, view: View) -> float:
-    """Area of the projected face, cut at the near plane, inside and outside the picture."""
+    """Area of the projected face as the picture shows it, cut at the near plane, inside and outside the picture."""
     polygon: list[Array] = []
     for a, b in zip(corners_m, np.roll(corners_m, -1, axis=0), strict=True):
         if a[2] >= NEAR_M:
@@ -72,5 +76,12 @@ def _area_px2(corners_m: Array, view: View) -> float:
             polygon.append(a + (NEAR_M - a[2]) / (b[2] - a[2]) * (b - a))
     if len(polygon) < 3:
         return 0.0
-    x, y = view.camera.intrinsics.project(np.array(polygon)).T
+    bend = Bend.of(view.camera)
+    if bend is None:
+        x, y = view.camera.intrinsics.project(np.array(polygon)).T
+    else:
+        # Behind a lens edges are curves.
+        steps = np.linspace(0, 1, CURVE_STEPS, endpoint=False)[:, None]
+        curve = [a + steps * (b - a) for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True)]
+        x, y = bend.points(view.camera.intrinsics.project(np.concatenate(curve))).T
     return abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1))) / 2

@@ -7,14 +7,18 @@ against a renderer. Texture is painted on the things themselves, so that two cam
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
+from gear.camera.optics import lens_map, through_lens
+from gear.contracts.rendering import RawView
 from gear.testing.things import Part, Thing, street
 from gear.values.frames import LINEAR_FULL_SCALE, Frame, GeomTable, SceneObject, Shape, View
 from gear.values.geometry import Array, RigidTransform
 from gear.values.labels import LABEL_BY_NAME, LABELS
+from gear.values.optics import Lens, LensRecord
 from gear.values.rig import Rig
 from gear.values.scene import ActorRecord, CameraRecord, Pose, SceneRecord, SurfaceRecord, Weather
 
@@ -63,6 +67,29 @@ def synthetic_frame(
     objects = {thing.object_id: _scene_object(thing) for thing in placed if thing.object_id >= 0}
     record = _record(placed, cameras, world_from_ego, index=index, seed=seed)
     return Frame(views=views, geoms=geoms, objects=objects), record
+
+
+def behind_lens(frame: Frame, lens: Lens) -> Frame:
+    """The frame as cameras with a lens show it: everything is bent, and every camera says by what.
+
+    Raises:
+        ValueError: the distortion folds a picture over.
+    """
+    views = {}
+    for name, view in frame.views.items():
+        found = lens_map(lens, view.camera.width_px, view.camera.height_px, view.camera.focal_px)
+        seen = through_lens(
+            RawView(linear_rgb=view.linear_rgb, depth_m=view.depth_m, geom_id=view.geom_id), view.camera, lens
+        )
+        assert seen.linear_rgb is not None and seen.depth_m is not None and seen.geom_id is not None
+        views[name] = View(
+            camera=replace(view.camera, lens=LensRecord(k1=lens.k1, k2=lens.k2, focal_px=found.focal_px)),
+            linear_rgb=seen.linear_rgb,
+            rgb=view.rgb[np.rint(found.y).astype(np.intp), np.rint(found.x).astype(np.intp)],
+            depth_m=seen.depth_m,
+            geom_id=seen.geom_id,
+        )
+    return replace(frame, views=views)
 
 
 def _moved(thing: Thing, world_from_ego: RigidTransform) -> Thing:

@@ -4,8 +4,11 @@
         town = "my/towns/port.xml"
         scenes = "my/scenes/port.yml"
 
-Everything of `docs/mjcf-conventions.md` is checked, then that gear composes the town, plans samples of every scene with
-the boards in view, and that rendered ids and depth are those of rays. Messages name the geom, the lane or the scene.
+The town's own file is held against `docs/mjcf-conventions.md`: labels, what is seen and felt, materials, lanes, walks,
+bays, bounds and depth. Then gear composes the town, plans samples of every scene with the boards in view, and rendered
+ids and depth must be those of rays. Boards, vehicles and people are read as far as the first scene is composed of them,
+which tells what gear cannot use, and their materials are looked at; how well collision geoms fit, how many triangles
+there are and how meshes are rounded is not. Messages name the geom, the lane or the scene.
 """
 
 from __future__ import annotations
@@ -14,7 +17,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import ClassVar
 
-from gear.testing import town_scenes, town_streets
+from gear.testing import town_materials, town_scenes, town_streets
 from gear.testing.town_facts import TownUnderTest, town_under_test
 from gear.values.labels import LABEL_BY_NAME
 from gear.world.classes import FIRST_HIDDEN_GROUP, own_class
@@ -44,6 +47,7 @@ class TownContract:
     wheel_m: half the track of a car, which must stand on the road as well.
     near_m, far_m: least and most distance of the near clipping plane, least of the far one.
     min_visible: share of each board that must be seen in each sample.
+    albedo: most that a visible geom gives back, of any colour.
     min_agreement: share of pixels away from edges whose id and depth must be those of rays.
     """
 
@@ -62,6 +66,7 @@ class TownContract:
     near_m: ClassVar[tuple[float, float]] = (0.005, 0.5)
     far_m: ClassVar[float] = 500.0
     min_visible: ClassVar[float] = 0.1
+    albedo: ClassVar[float] = 0.9
     min_agreement: ClassVar[float] = 0.98
 
     def under_test(self) -> TownUnderTest:
@@ -90,12 +95,18 @@ class TownContract:
         ])  # fmt: skip
 
     def test_what_is_seen_is_not_felt(self) -> None:
-        """Visible geoms touch nothing; collision geoms are hidden primitives."""
+        """Visible geoms touch nothing; collision geoms are primitives of group 3, and nothing else is hidden."""
         problems = []
         for geom in self.under_test().compiled[0].geoms:
             is_collision = _label(geom.classname.name) == COLLISION_CLASS
             if is_collision and geom.group < FIRST_HIDDEN_GROUP:
                 problems.append(f"geom {geom.name!r} of class collision is in group {geom.group}, so it is seen")
+            elif is_collision and geom.group != FIRST_HIDDEN_GROUP:
+                problems.append(f"geom {geom.name!r} of class collision is in group {geom.group}, not 3")
+            elif not is_collision and geom.group >= FIRST_HIDDEN_GROUP:
+                problems.append(
+                    f"geom {geom.name!r} is in group {geom.group} and not of class collision: neither seen nor felt"
+                )
             elif is_collision and geom.type.name not in PRIMITIVES:
                 problems.append(
                     f"geom {geom.name!r} of class collision is a {geom.type.name[7:].lower()}, no primitive"
@@ -106,14 +117,20 @@ class TownContract:
 
     def test_nothing_is_transparent(self) -> None:
         """Ids and depth know every pixel, so nothing shines through."""
-        _, model, _ = self.under_test().compiled
-        problems = []
-        for geom in range(model.ngeom):
-            material = int(model.geom_matid[geom])
-            alpha = float(model.geom_rgba[geom, 3] if material < 0 else model.mat_rgba[material, 3])
-            if model.geom_group[geom] < FIRST_HIDDEN_GROUP and alpha < 1:
-                problems.append(f"geom {model.geom(geom).name!r} has an alpha of {alpha:g}")
-        tell("visible geoms are transparent", problems)
+        town = self.under_test()
+        # What the town's own file holds is told by the names that it has there.
+        problems = town_materials.transparent(town.compiled[1])
+        tell("visible geoms are transparent", problems or town_materials.transparent(town.first_world[0].model))
+
+    def test_materials_are_physical(self) -> None:
+        """Renderers can show every texture, colours are marked as such, and nothing gives back more light than it
+        gets."""
+        town = self.under_test()
+        problems = town_materials.unphysical(town.compiled[1], self.albedo)
+        if not problems:
+            world = town.first_world[0]
+            problems = town_materials.unphysical(world.model, self.albedo, world.classes.is_face)
+        tell("materials are not physical", problems)
 
     def test_every_class_of_a_street_is_there(self) -> None:
         """No class that networks know from streets is missing."""

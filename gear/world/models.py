@@ -11,6 +11,7 @@ import mujoco
 from gear.values.errors import TownError
 from gear.world.classes import GeomClasses, classify, own_class
 from gear.world.compose import Composition
+from gear.world.materials import refuse_deadly
 
 COLLISION_CLASS = "collision"
 GROUND_PREFIX = "ground"
@@ -50,12 +51,13 @@ def render_model(composition: Composition) -> tuple[mujoco.MjModel, GeomClasses]
     """Compiles what is seen: no collision geoms, actors are mocap bodies.
 
     Raises:
-        TownError: MuJoCo refuses it, or a visible geom has no label.
+        TownError: MuJoCo refuses it, a visible geom has no label, or a material would end Filament.
     """
     tree = ET.fromstring(composition.xml)
     for parent, geom in _geoms(tree, _collides):
         parent.remove(geom)
     spec, model = _compile(composition, tree, composition.assets)
+    refuse_deadly(model, composition.town)
     return model, classify(spec, composition.town)
 
 

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from gear.groundtruth.objects import observe_objects
-from gear.testing.synthetic import synthetic_frame
+from gear.testing.synthetic import behind_lens, synthetic_frame
 from gear.testing.things import CAR, CYCLIST, TRUCK, Thing, board, street
 from gear.values.frames import Frame
 from gear.values.labels import LABEL_BY_NAME
+from gear.values.optics import Lens
 from gear.values.rig import CameraMount, Rig
 
 RIG = Rig(cameras=(CameraMount(name="left", width_px=612, height_px=185),))
@@ -96,3 +97,38 @@ def test_hidden_objects_appear_on_request_alone() -> None:
 def test_the_ego_car_is_no_object() -> None:
     ego = Thing(parts=CAR, position_m=(9.0, 0.0, 0.0), object_id=1, role="ego")
     assert observe(synthetic_frame(RIG, [ego])[0], include_hidden=True) == ()
+
+
+@pytest.mark.parametrize("k1", [-0.3, -0.1, 0.1, 0.3])
+def test_behind_a_lens_what_nothing_covers_is_not_occluded(k1: float) -> None:
+    lens = Lens(k1=k1)
+    for parts, ahead_m, left_m in ((CAR, 16.0, 8.0), (TRUCK, 26.0, -9.0), (CAR, 30.0, -3.0), (CYCLIST, 12.0, 6.0)):
+        (truth,) = observe(behind_lens(synthetic_frame(RIG, [thing(parts, ahead_m, left_m)])[0], lens), by_label=False)
+        assert truth.occluded_fraction < 0.005 and truth.truncated_fraction == 0
+        assert truth.amodal_box == truth.visible_box
+
+
+@pytest.mark.parametrize("k1", [-0.3, 0.3])
+def test_behind_a_lens_silhouettes_are_what_objects_show_alone(k1: float) -> None:
+    things, lens = street(7, 1), Lens(k1=k1)
+    truths = observe(behind_lens(synthetic_frame(RIG, things)[0], lens), by_label=False)
+    whole = [truth for truth in truths if truth.truncated_fraction == 0]
+    assert len(whole) > 5 and max(truth.occluded_fraction for truth in whole) > 0.1
+    for truth in whole:
+        alone = behind_lens(synthetic_frame(RIG, [t for t in things if t.object_id == truth.object_id])[0], lens)
+        (single,) = observe(alone, by_label=False)
+        assert truth.amodal_in_image_px == single.visible_px
+        assert truth.amodal_box == single.visible_box
+
+
+@pytest.mark.parametrize("k1", [-0.3, 0.2])
+def test_behind_a_lens_what_leaves_the_picture_is_counted_outside_it(k1: float) -> None:
+    truck = [thing(TRUCK, 9.5, 5.5)]
+    frame = behind_lens(synthetic_frame(RIG, truck)[0], Lens(k1=k1))
+    (cut,) = observe(frame)
+    assert cut.amodal_in_image_px == cut.visible_px
+    assert 0.1 < cut.truncated_fraction < 0.9
+    assert cut.amodal_box[1] < 0 or cut.amodal_box[0] < 0
+    (beside,) = observe(behind_lens(synthetic_frame(RIG, [thing(TRUCK, 3.5, 3.4, 0.0)])[0], Lens(k1=k1)))
+    assert beside.amodal_px >= beside.amodal_in_image_px >= beside.visible_px > 1000
+    assert beside.truncated_fraction > 0.8

@@ -5,8 +5,9 @@ import pytest
 
 from gear.formats import rle
 from gear.groundtruth.surfaces import observe_surfaces
-from gear.testing.synthetic import synthetic_frame
+from gear.testing.synthetic import behind_lens, synthetic_frame
 from gear.testing.things import CAR, Part, Thing, board
+from gear.values.optics import Lens
 from gear.values.rig import CameraMount, Rig
 from gear.values.truth import SurfaceTruth
 
@@ -83,3 +84,17 @@ def test_a_surface_rides_on_its_actor() -> None:
     xs, ys = [c[0] for c in truth.corners_px], [c[1] for c in truth.corners_px]
     assert (columns.min(), columns.max()) == pytest.approx((min(xs), max(xs)), abs=1)
     assert (rows.min(), rows.max()) == pytest.approx((min(ys), max(ys)), abs=1)
+
+
+@pytest.mark.parametrize("k1", [-0.3, 0.3])
+def test_behind_a_lens_the_visible_share_is_of_the_bent_face(k1: float) -> None:
+    car = Thing(parts=CAR, position_m=(9.0, 2.0, 0.0), object_id=2, role="npc")
+    truths = []
+    for things in ([board(18.0, 5.0)], [board(18.0, 5.0), car]):
+        frame, record = synthetic_frame(RIG, things)
+        frame = behind_lens(frame, Lens(k1=k1))
+        truths += observe_surfaces(frame.views["left"], frame.geoms, record)
+    clear, covered = truths
+    assert clear.visible_fraction == pytest.approx(1.0, abs=0.02)
+    assert covered.visible_px < 0.9 * clear.visible_px
+    assert covered.visible_fraction == pytest.approx(covered.visible_px / clear.visible_px, abs=0.02)

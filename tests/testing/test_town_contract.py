@@ -69,6 +69,10 @@ GRASS = '<geom name="terrain" class="terrain" material="grass"'
 BOUNDS = '<numeric name="town.bounds" data="-80 -60 80 60"/>'
 EAST_TO_SOUTH = 'data="3.5 5  26.5 -1.75 0  27.4 -2.1 0  28 -2.75 0  28.25 -3.5 0"'
 
+STEEL = '<material name="steel" rgba="0.30 0.31 0.32 1" metallic="0" roughness="0.5"/>'
+CUBE = '<texture name="cube" type="cube" builtin="flat" rgb1="0.3 0.3 0.3" width="16" height="96"/>'
+FLAT = '<texture name="flat" type="2d" builtin="flat" rgb1="0.8 0.8 0.8" width="16" height="16" colorspace="sRGB"/>'
+
 BREAKS: dict[str, tuple[tuple[tuple[str, str], ...], str, str]] = {
     "a geom without a label": (
         ((LAMP, '<geom name="lamp_post" class="seen"'),), "test_what_is_seen_is_labelled", "geom 'lamp_post'.*'seen'"
@@ -80,9 +84,54 @@ BREAKS: dict[str, tuple[tuple[tuple[str, str], ...], str, str]] = {
         (('<geom name="post.lamp" class="collision"', '<geom name="post.lamp" class="collision" group="1"'),),
         "test_what_is_seen_is_not_felt", "geom 'post.lamp' of class collision is in group 1",
     ),
+    "a collision geom in another group": (
+        (('<geom name="post.lamp" class="collision"', '<geom name="post.lamp" class="collision" group="4"'),),
+        "test_what_is_seen_is_not_felt", "geom 'post.lamp' of class collision is in group 4, not 3",
+    ),
+    "a geom neither seen nor felt": (
+        ((LAMP, LAMP + ' group="3"'),),
+        "test_what_is_seen_is_not_felt", "geom 'lamp_post' is in group 3 and not of class collision",
+    ),
     "a pane of glass": (
         ((LAMP + ' material="steel"', LAMP + ' rgba="1 1 1 0.5"'),),
         "test_nothing_is_transparent", "geom 'lamp_post' has an alpha of 0.5",
+    ),
+    "a pane of tinted glass": (
+        ((LAMP + ' material="steel"', LAMP + ' material="steel" rgba="0.2 0.3 0.2 0.5"'),),
+        "test_nothing_is_transparent", "geom 'lamp_post' has an alpha of 0.5",
+    ),
+    "a cube for a texture": (
+        (('<material name="steel"', CUBE + '<material name="steel" texture="cube"'),),
+        "test_materials_are_physical", "material 'steel' of geom 'lamp_post' has a cube texture, texture 'cube'",
+    ),
+    "a cube that would end the process": (
+        (('<material name="steel"', CUBE + '<material name="steel" texture="cube"'),),
+        "test_gear_composes_it", "'steel' of geom 'lamp_post' has metallic or roughness and a cube texture, 'cube'",
+    ),
+    "colours taken for numbers": (
+        (('<material name="steel"', FLAT.replace(' colorspace="sRGB"', "") + '<material name="steel" texture="flat"'),),
+        "test_materials_are_physical", "has colours in texture 'flat' that are not marked colorspace",
+    ),
+    "numbers taken for colours": (
+        ((STEEL, FLAT + STEEL.replace("/>", '><layer role="orm" texture="flat"/></material>')),),
+        "test_materials_are_physical", "has numbers in texture 'flat' that are marked colorspace",
+    ),
+    "an odd texture": (
+        (('<material name="steel"', FLAT.replace('"16"', '"12"') + '<material name="steel" texture="flat"'),),
+        "test_materials_are_physical", "has texture 'flat' with a side of 12 px",
+    ),
+    "paint that is whiter than snow": (
+        (('<material name="paint" rgba="0.70 0.70 0.70 1"', '<material name="paint" rgba="0.70 0.95 0.70 1"'),),
+        "test_materials_are_physical", "geom 'centre_line_west' has an albedo of 0.95, above 0.9",
+    ),
+    "a lamp post whiter than its texture": (
+        (('<material name="paint"', FLAT + '<material name="paint" texture="flat"'),
+         (LAMP + ' material="steel"', LAMP + ' material="paint" rgba="2 2 2 1"')),
+        "test_materials_are_physical", "geom 'lamp_post' has an albedo of 1.21",
+    ),
+    "a sun of a lamp": (
+        (('<material name="steel"', '<material name="steel" emission="3"'),),
+        "test_materials_are_physical", "material 'steel' of geom 'lamp_post' has emission 3",
     ),
     "no plants": (
         (('<geom name="hedge" class="vegetation"', '<geom name="hedge" class="terrain"'),),
@@ -239,6 +288,25 @@ def test_a_board_behind_a_wall_that_nobody_feels_is_noticed(broken: Callable[...
     type(contract).planned_scenes = ("board",)
     with pytest.raises(AssertionError, match="scene board: surface_0 shows only 0% of itself in sample 0"):
         run(contract, "test_every_scene_can_be_planned_with_its_boards_in_view")
+
+
+@pytest.mark.parametrize(
+    ("colour", "check", "message"),
+    [
+        ("0.4 0.4 0.4 0.5", "test_nothing_is_transparent", "geom '.*' has an alpha of 0.5"),
+        ("0.4 1.0 0.4 1", "test_materials_are_physical", "geom '.*' has an albedo of 1.00"),
+    ],
+)
+def test_a_board_is_looked_at_as_well(
+    broken: Callable[..., TownContract], colour: str, check: str, message: str
+) -> None:
+    contract = broken()
+    board = Path(type(contract).town).parents[1] / "surfaces" / "billboard.xml"
+    text, count = re.subn(r'(<geom name="post[^>]*) material="[^"]*"', rf'\1 rgba="{colour}"', board.read_text("utf-8"))
+    assert count
+    board.write_text(text, encoding="utf-8")
+    with pytest.raises(AssertionError, match=message):
+        run(contract, check)
 
 
 def test_every_check_has_a_town_that_fails_it() -> None:

@@ -88,6 +88,11 @@ def test_labels_follow_the_first_part_of_the_class() -> None:
     assert rider == LABEL_BY_NAME["rider"].code
 
 
+STEEL = '<material name="steel" '
+SIDES = '<texture name="sides" type="cube" builtin="flat" width="16" height="96"/>'
+DEADLY_CUBE = (STEEL, SIDES + STEEL + 'texture="sides" ')
+
+
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
@@ -95,6 +100,7 @@ def test_labels_follow_the_first_part_of_the_class() -> None:
         ('name="hedge" class="vegetation"', 'name="hedge"', "geom 'hedge' can be seen but has no class"),
         ('<body name="bench_0" pos="5 -6.1 0.15">', "<frame>", "cannot be read as MJCF"),
         ('size="80 3.5 0.25"', 'size="80 3.5 -1"', "MuJoCo cannot compile it"),
+        (*DEADLY_CUBE, "material 'steel' of geom 'lamp_post' has metallic or roughness and a cube texture, 'sides'"),
         ("next=lane.main_east_b", "next=lane.moon", "lane.x_east: next names lane.moon"),
     ],
 )

@@ -1,0 +1,72 @@
+"""Materials of a compiled model: what colour geoms have, and what a renderer would die of."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from gear.values.errors import TownError
+from gear.values.geometry import Array
+from gear.world.classes import FIRST_HIDDEN_GROUP
+
+TEXTURE_KINDS = {
+    mujoco.mjtTexture.mjTEXTURE_2D: "2D",
+    mujoco.mjtTexture.mjTEXTURE_CUBE: "cube",
+    mujoco.mjtTexture.mjTEXTURE_SKYBOX: "skybox",
+}
+"""As messages name them."""
+
+NO_OWN_RGBA = (0.5, 0.5, 0.5, 1.0)
+"""MuJoCo's default: a geom of this colour wears its material's."""
+
+
+def effective_rgba(model: mujoco.MjModel) -> Array:
+    """(ngeom, 4) what geoms are coloured with: their own rgba goes before their material's, as MuJoCo draws them."""
+    rgba: Array = model.geom_rgba.astype(np.float64)
+    plain = (model.geom_rgba == np.array(NO_OWN_RGBA, np.float32)).all(axis=1) & (model.geom_matid >= 0)
+    rgba[plain] = model.mat_rgba[model.geom_matid[plain]]
+    return rgba
+
+
+def seen_materials(model: mujoco.MjModel) -> dict[int, int]:
+    """A visible geom, the first, for each material that one wears."""
+    worn: dict[int, int] = {}
+    for geom in np.flatnonzero((model.geom_group < FIRST_HIDDEN_GROUP) & (model.geom_matid >= 0)).tolist():
+        worn.setdefault(int(model.geom_matid[geom]), geom)
+    return worn
+
+
+def textures_of(model: mujoco.MjModel, material: int) -> list[tuple[int, int]]:
+    """(role, texture id) of the textures of a material."""
+    return [(role, int(texture)) for role, texture in enumerate(model.mat_texid[material]) if texture >= 0]
+
+
+def refuse_deadly(model: mujoco.MjModel, path: Path) -> None:
+    """Filament ends the process, without a word, over a cube texture on a material with metallic or roughness.
+
+    Args:
+        model: compiled.
+        path: the town's file, for the error.
+
+    Raises:
+        TownError: a visible geom wears such a material.
+    """
+    for material, geom in seen_materials(model).items():
+        if model.mat_metallic[material] < 0 and model.mat_roughness[material] < 0:
+            continue
+        for _, texture in textures_of(model, material):
+            if model.tex_type[texture] != mujoco.mjtTexture.mjTEXTURE_2D:
+                names = (model.mat(material).name, model.geom(geom).name, model.tex(texture).name)
+                wearing, geom_name, cube = (_own(name) for name in names)
+                raise TownError(
+                    path,
+                    f"material {wearing!r} of geom {geom_name!r} has metallic or roughness and a cube texture,"
+                    f" {cube!r}, which Filament cannot draw; give it a 2D texture",
+                )
+
+
+def _own(name: str) -> str:
+    """As its own file names it."""
+    return name.rpartition("/")[2]
