@@ -54,7 +54,7 @@ def read_published(path: str | Path) -> dict[str, Tensor]:
     """
     file = Path(path)
     if not file.is_file():
-        raise GearError(f"{file}: there is no such file")
+        raise GearError(f"{file}: {'is a folder; name the file in it' if file.is_dir() else 'there is no such file'}")
     if file.suffix == ".safetensors":
         state, _ = read(file)
     else:
