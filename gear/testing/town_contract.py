@@ -17,7 +17,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import ClassVar
 
-from gear.testing import town_materials, town_scenes, town_streets
+from gear.testing import town_clear, town_materials, town_scenes, town_streets
 from gear.testing.town_facts import TownUnderTest, town_under_test
 from gear.values.labels import LABEL_BY_NAME
 from gear.world.classes import FIRST_HIDDEN_GROUP, own_class
@@ -164,12 +164,13 @@ class TownContract:
         tell("lanes are off the road", town_streets.lanes_off_the_road(self.under_test(), self.ground_m, self.wheel_m))
 
     def test_lanes_are_clear(self) -> None:
-        """Nothing of the town stands on a lane."""
-        tell("lanes are blocked", town_streets.blocked_lanes(self.under_test()))
+        """Nothing stands or hangs on a lane, felt or only seen, as wide and as high as what drives there."""
+        tell("lanes are blocked", town_clear.blocked_lanes(self.under_test()))
 
     def test_people_can_walk(self) -> None:
-        """Sidewalks and crosswalks lie on the ground; crosswalks join sidewalks across lanes."""
+        """Sidewalks and crosswalks lie on the ground and let people pass; crosswalks join sidewalks across lanes."""
         tell("walks are in the air", town_streets.walks_off_the_ground(self.under_test(), self.ground_m))
+        tell("walks are blocked", town_clear.blocked_walks(self.under_test()))
         tell("crosswalks lead nowhere", town_streets.idle_crosswalks(self.under_test().graph))
 
     def test_cars_can_park(self) -> None:

@@ -26,6 +26,9 @@ from gear.world.world import World
 DOWN = np.array([0.0, 0.0, -1.0])
 SEEN_GROUPS = (0, 1, 2)
 
+LOOK_FROM_M = 0.6
+"""Ground is looked for from so far above where it should be: higher than kerbs, lower than whatever hangs above."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rays:

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from itertools import pairwise
 
 import numpy as np
 
-from gear.testing.town_facts import DOWN, Rays, TownUnderTest
+from gear.testing.town_facts import DOWN, LOOK_FROM_M, Rays, TownUnderTest
 from gear.values.geometry import Array, wrap_angle_rad
 from gear.world.classes import own_class
 from gear.world.lanes import Lane, LaneGraph, ParkingBay
 from gear.world.polyline import Polyline
 
 STEP_M = 2.0
-LOOK_FROM_M = 0.6
-"""Ground is looked for from so far above where it should be: higher than kerbs, lower than whatever hangs above."""
-
 BUMPER_M = 0.6
-"""Obstacles on lanes are looked for at this height."""
+"""Obstacles in parking bays are looked for at this height."""
 
 KERB_M = 0.2
 """In a tight turn a wheel may go over the kerb; it may not elsewhere."""
@@ -124,19 +120,6 @@ def _wheels_off(town: TownUnderTest, lane: Lane, tolerance_m: float, wheel_m: fl
             if problem := _off_ground(town.ground, point_m, step_m):
                 return [f"{lane.name} {problem} below the {side} wheels of a car at {place}"]
     return []
-
-
-def blocked_lanes(town: TownUnderTest) -> list[str]:
-    """Lanes on which something stands."""
-    problems = []
-    for lane in town.graph.lanes.values():
-        points = np.array([point for point, _ in _along(lane.line)]) - BUMPER_M * DOWN
-        for start_m, end_m in pairwise(points):
-            share, geom = town.obstacles.first(start_m, end_m - start_m)
-            if share <= 1:
-                problems.append(f"{lane.name} is blocked by {town.obstacles.name(geom)!r} at {_place(start_m)}")
-                break
-    return problems
 
 
 def walks_off_the_ground(town: TownUnderTest, tolerance_m: float) -> list[str]:

@@ -195,6 +195,26 @@ BREAKS: dict[str, tuple[tuple[tuple[str, str], ...], str, str]] = {
         (add_geom('<geom name="bollard" class="collision" pos="-40 1.75 0.5" size="0.1 0.1 0.5"/>'),),
         "test_lanes_are_clear", "lane.main_west_b is blocked by .*bollard",
     ),
+    "a kerb stone beside the middle of a lane": (
+        (add_geom('<geom name="stone" class="collision" pos="-40 2.9 0.2" size="0.2 0.1 0.2"/>'),),
+        "test_lanes_are_clear", "lane.main_west_b is blocked by .*stone",
+    ),
+    "a barrier at the height of a windscreen": (
+        (add_geom('<geom name="barrier" class="collision" pos="-40 1.75 1.3" size="0.05 1.5 0.05"/>'),),
+        "test_lanes_are_clear", "lane.main_west_b is blocked by .*barrier",
+    ),
+    "a skip on a lane that nobody feels": (
+        (add_geom('<geom name="skip" class="building.plaster" pos="-40 1.75 0.5" size="1 0.5 0.5"/>'),),
+        "test_lanes_are_clear", "lane.main_west_b is blocked by .*skip",
+    ),
+    "a fence across a sidewalk": (
+        (add_geom('<geom name="fence" class="collision" pos="-40 -5 1" size="0.05 1.5 1"/>'),),
+        "test_people_can_walk", "sidewalk.south_west is blocked by .*fence.* at .-40",
+    ),
+    "a wall across a sidewalk that nobody feels": (
+        (add_geom('<geom name="sheet" class="building.plaster" pos="-40 -5 1" size="0.05 1.5 1"/>'),),
+        "test_people_can_walk", "sidewalk.south_west is blocked by .*sheet",
+    ),
     "a sidewalk in the air": (
         (('data="3 -78 -5 0.15  26 -5 0.15"', 'data="3 -78 -5 0.35  26 -5 0.35"'),),
         "test_people_can_walk", r"sidewalk.south_west is \+0.20 m",
@@ -314,6 +334,12 @@ def test_every_check_has_a_town_that_fails_it() -> None:
     failed = {check for _, check, _ in BREAKS.values()}
     failed |= {"test_scenes_belong_to_the_town", "test_every_scene_can_be_planned_with_its_boards_in_view"}
     assert checks == failed
+
+
+def test_one_can_walk_round_what_stands_on_a_sidewalk(broken: Callable[..., TownContract]) -> None:
+    stop = '<geom name="stop" class="collision" pos="-40 -4.5 1" size="2 0.6 1"/>'
+    kiosk = '<geom name="kiosk" class="collision" pos="-35 -5.5 1" size="2 0.6 1"/>'
+    run(broken(add_geom(stop), add_geom(kiosk)), "test_people_can_walk")
 
 
 def test_what_a_town_needs_not_can_be_left_out(broken: Callable[..., TownContract]) -> None:
