@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from gear.world.instances import class_name
+from gear.world.materials import NO_OWN_RGBA
 from gear.world.quiet_mjcf import mjcf
 
 WET_LABELS = frozenset({"road", "road_marking", "sidewalk", "parking", "ground"})
@@ -21,8 +22,6 @@ Worn = tuple[str, str | None]
 
 _DARKENING = 0.45
 _SMOOTHING = 0.7
-_MUJOCO_GREY = (0.5, 0.5, 0.5, 1.0)
-"""Of what has neither a material nor a colour; as a geom's own colour it means that there is none."""
 
 
 def wet_ground(root: mjcf.RootElement, amount: float, worn: Sequence[Worn] = ()) -> None:
@@ -57,10 +56,10 @@ def _own_colours(root: mjcf.RootElement, geoms: Sequence[Any], worn: Sequence[Wo
             yield default.geom, colour
     for geom in geoms:
         colour = geom.rgba if geom.rgba is not None else _inherited(geom.dclass, "rgba")
-        if colour is not None and tuple(colour) != _MUJOCO_GREY:
+        if colour is not None and tuple(colour) != NO_OWN_RGBA:
             yield geom, colour
         elif geom.material is None and _inherited(geom.dclass, "material") is None:
-            yield geom, _MUJOCO_GREY
+            yield geom, NO_OWN_RGBA
 
 
 def _open_materials(root: mjcf.RootElement, geoms: Sequence[Any], worn: Sequence[Worn]) -> list[Any]:
