@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 import torch
@@ -29,7 +30,8 @@ class SegmentedSample(Protocol):
 
 def train_ids(samples: Sequence[SegmentedSample], device: torch.device) -> Tensor:
     """(B, H, W) int64 train ids of samples of one size; 255 for what is not evaluated."""
-    ids = TRAIN_ID_OF_LABEL_ID[np.stack([sample.label_ids for sample in samples])]
+    labels = (np.ascontiguousarray(sample.label_ids) for sample in samples)
+    ids = np.stack([cv2.LUT(one, TRAIN_ID_OF_LABEL_ID) for one in labels])
     return torch.from_numpy(ids).to(device).long()
 
 

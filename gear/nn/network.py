@@ -67,7 +67,7 @@ class Network(nn.Module, ABC):
         for size in dict.fromkeys(sizes):
             chosen = [index for index, other in enumerate(sizes) if other == size]
             with torch.inference_mode():
-                outputs = self(as_batch([samples[index] for index in chosen], self._views))
+                outputs = self(as_batch([samples[index] for index in chosen], self._views, self.device))
                 for index, answer in zip(chosen, self.answers(outputs, size), strict=True):
                     answers[index] = answer
         return answers
@@ -105,8 +105,13 @@ class Normalise(nn.Module):
         return (pictures - self.mean) / self.std
 
 
-def as_batch(samples: Sequence[Mapping[str, UInt8Image]], views: Sequence[str]) -> dict[str, Tensor]:
-    """Pictures of one size as `Model.forward` takes them: (B, 3, H, W) float32 in 0..1 by camera name."""
+def as_batch(
+    samples: Sequence[Mapping[str, UInt8Image]], views: Sequence[str], device: torch.device | None = None
+) -> dict[str, Tensor]:
+    """Pictures of one size as `Model.forward` takes them: (B, 3, H, W) float32 in 0..1 by camera name.
+
+    They go to the device, if there is one, as bytes, and become numbers there.
+    """
     # Channels first in memory too: torch's CPU backward pass of small strided convolutions fails on channels last.
     stacked = {name: np.stack([sample[name] for sample in samples]).transpose(0, 3, 1, 2) for name in views}
-    return {name: torch.from_numpy(np.ascontiguousarray(one)).float() / 255 for name, one in stacked.items()}
+    return {name: torch.from_numpy(np.ascontiguousarray(one)).to(device).float() / 255 for name, one in stacked.items()}

@@ -93,4 +93,4 @@ class TorchDataset(torch.utils.data.Dataset[Item]):
 
 def picture_tensor(picture: UInt8Image) -> Tensor:
     """(H, W, 3) to (3, H, W) uint8, its own memory."""
-    return torch.from_numpy(np.ascontiguousarray(picture.transpose(2, 0, 1)).copy())
+    return torch.from_numpy(np.array(picture.transpose(2, 0, 1), order="C"))

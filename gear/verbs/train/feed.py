@@ -82,13 +82,20 @@ class Feed:
     """Batches from a position on. What a batch holds follows from the seed, the position and the samples alone."""
 
     def __init__(
-        self, samples: Sequence[Any], config: TrainConfig, views: Sequence[str], change: Change | None = None
+        self,
+        samples: Sequence[Any],
+        config: TrainConfig,
+        views: Sequence[str],
+        change: Change | None = None,
+        *,
+        device: torch.device | str = "cpu",
     ) -> None:
         """Args:
         samples: to train on.
         config: batch size, seed, framing, augmentation, threads.
         views: cameras that the network looks at.
         change: applied before augmentation.
+        device: where pictures are to be: they go there as bytes and become numbers there.
 
         Raises:
             GearError: there is not even one sample.
@@ -96,6 +103,7 @@ class Feed:
         if not len(samples):
             raise GearError("there is no sample to train on")
         self._samples, self._config, self._views, self._change = samples, config, tuple(views), change
+        self._device = torch.device(device)
         self._size = min(config.batch, len(samples))
         self.batches = len(samples) // self._size
 
@@ -121,19 +129,21 @@ class Feed:
         start = position.batch * self._size
         return tuple(shuffled[start : start + self._size])
 
-    def _sample(self, epoch: int, index: int) -> Any:
+    def _sample(self, epoch: int, index: int) -> tuple[Any, dict[str, torch.Tensor]]:
+        """An augmented sample, and its pictures as tensors of uint8."""
         sample = self._samples[index]
         if self._change is not None:
             sample = self._change(sample, index, derive_rng(self._config.seed, "change", epoch, index))
         rng = derive_rng(self._config.seed, "augment", epoch, index)
-        return augment(sample, self._config.augmentation, self._config.framing, rng)
+        shown = augment(sample, self._config.augmentation, self._config.framing, rng)
+        return shown, {name: picture_tensor(shown.images[name]) for name in self._views}
 
-    def _batch(self, indices: tuple[int, ...], samples: list[Any]) -> Batch:
+    def _batch(self, indices: tuple[int, ...], made: list[tuple[Any, dict[str, torch.Tensor]]]) -> Batch:
         tensors = {}
         for name in self._views:
-            pictures = [sample.images[name] for sample in samples]
-            sizes = sorted({picture.shape[:2] for picture in pictures})
+            pictures = [views[name] for _, views in made]
+            sizes = sorted({tuple(picture.shape[1:]) for picture in pictures})
             if len(sizes) > 1:
                 raise GearError(f"training pictures differ in size ({sizes}); say --set crop_px=[HEIGHT, WIDTH]")
-            tensors[name] = torch.stack([picture_tensor(picture) for picture in pictures])
-        return Batch(views=as_pictures(tensors), samples=tuple(samples), indices=indices)
+            tensors[name] = torch.stack(pictures).to(self._device)
+        return Batch(views=as_pictures(tensors), samples=tuple(sample for sample, _ in made), indices=indices)

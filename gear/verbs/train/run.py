@@ -193,6 +193,7 @@ def _parts(found: Found, spec: TaskSpec[Any], origin: Origin, root: Path) -> Par
     training = Cache(origin.training, limit)
     with blamed(found, "module"):
         twin.module()
+        weights = next(iter(model.module().parameters()), None)
     adversary = None
     if config.adversarial.attack:
         adversary = Adversary(
@@ -209,7 +210,13 @@ def _parts(found: Found, spec: TaskSpec[Any], origin: Origin, root: Path) -> Par
         twin=twin,
         views=views,
         validation=validation,
-        feed=Feed(training, config, views, None if adversary is None else adversary.change),
+        feed=Feed(
+            training,
+            config,
+            views,
+            None if adversary is None else adversary.change,
+            device="cpu" if weights is None else weights.device,
+        ),
         adversary=adversary,
         root=root,
         plan=_plan(origin),

@@ -134,6 +134,12 @@ def test_batches_depend_on_the_position_alone(workers: int) -> None:
     assert len(set(first)) == 9 and first != [index for batch in whole[3:6] for index in batch]
 
 
+def test_pictures_become_numbers_where_they_are_wanted() -> None:
+    (batch,) = [next(Feed(Numbers(3), plain(), ("left",), device="meta").from_position(Position()))]
+    assert batch.views["left"].device.type == "meta" and batch.views["left"].dtype == torch.float32
+    assert batch.views["left"].shape == (3, 3, 32, 32)
+
+
 def test_what_fits_is_decoded_once() -> None:
     numbers, tight = Numbers(6), Numbers(6)
     for cache in (Cache(numbers, 1e9), Cache(tight, 3 * 32 * 32 * 3)):
