@@ -44,27 +44,35 @@ def textures_of(model: mujoco.MjModel, material: int) -> list[tuple[int, int]]:
 
 
 def refuse_deadly(model: mujoco.MjModel, path: Path) -> None:
-    """Filament ends the process, without a word, over a cube texture on a material with metallic or roughness.
+    """Filament ends the process, without a word, over some textures.
 
     Args:
         model: compiled.
         path: the town's file, for the error.
 
     Raises:
-        TownError: a visible geom wears such a material.
+        TownError: a visible geom wears such a texture.
     """
     for material, geom in seen_materials(model).items():
-        if model.mat_metallic[material] < 0 and model.mat_roughness[material] < 0:
-            continue
         for _, texture in textures_of(model, material):
-            if model.tex_type[texture] != mujoco.mjtTexture.mjTEXTURE_2D:
-                names = (model.mat(material).name, model.geom(geom).name, model.tex(texture).name)
-                wearing, geom_name, cube = (_own(name) for name in names)
-                raise TownError(
-                    path,
-                    f"material {wearing!r} of geom {geom_name!r} has metallic or roughness and a cube texture,"
-                    f" {cube!r}, which Filament cannot draw; give it a 2D texture",
-                )
+            deadly = _deadly(model, material, texture)
+            if deadly:
+                wearing, wearer = _own(model.mat(material).name), _own(model.geom(geom).name)
+                raise TownError(path, f"material {wearing!r} of geom {wearer!r} has {deadly}")
+
+
+def _deadly(model: mujoco.MjModel, material: int, texture: int) -> str:
+    """What a material has of a texture that Filament cannot draw, and what to do; empty if it can."""
+    name = _own(model.tex(texture).name)
+    is_physical = model.mat_metallic[material] >= 0 or model.mat_roughness[material] >= 0
+    if is_physical and model.tex_type[texture] != mujoco.mjtTexture.mjTEXTURE_2D:
+        return f"metallic or roughness and a cube texture, {name!r}, which Filament cannot draw; give it a 2D texture"
+    if model.tex_nchannel[texture] == 1 and model.tex_colorspace[texture] == mujoco.mjtColorSpace.mjCOLORSPACE_SRGB:
+        return (
+            f'a texture of one channel, {name!r}, that is marked colorspace="sRGB", which Filament cannot draw; '
+            "give it three channels"
+        )
+    return ""
 
 
 def _own(name: str) -> str:

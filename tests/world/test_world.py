@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -91,6 +92,8 @@ def test_labels_follow_the_first_part_of_the_class() -> None:
 STEEL = '<material name="steel" '
 SIDES = '<texture name="sides" type="cube" builtin="flat" width="16" height="96"/>'
 DEADLY_CUBE = (STEEL, SIDES + STEEL + 'texture="sides" ')
+GREY = '<texture name="grey" type="2d" file="grey.png" nchannel="1" colorspace="sRGB"/>'
+DEADLY_GREY = (STEEL, GREY + STEEL + 'texture="grey" ')
 
 
 @pytest.mark.parametrize(
@@ -101,6 +104,7 @@ DEADLY_CUBE = (STEEL, SIDES + STEEL + 'texture="sides" ')
         ('<body name="bench_0" pos="5 -6.1 0.15">', "<frame>", "cannot be read as MJCF"),
         ('size="80 3.5 0.25"', 'size="80 3.5 -1"', "MuJoCo cannot compile it"),
         (*DEADLY_CUBE, "material 'steel' of geom 'lamp_post' has metallic or roughness and a cube texture, 'sides'"),
+        (*DEADLY_GREY, "material 'steel' of geom 'lamp_post' has a texture of one channel, 'grey', that is marked"),
         ("next=lane.main_east_b", "next=lane.moon", "lane.x_east: next names lane.moon"),
     ],
 )
@@ -110,6 +114,7 @@ def test_a_town_that_breaks_the_rules_is_refused(tmp_path: Path, old: str, new: 
     town = tmp_path / "towns" / "odd.xml"
     town.parent.mkdir()
     town.write_text(text.replace(old, new))
+    cv2.imwrite(str(town.parent / "grey.png"), np.full((16, 16), 90, np.uint8))
     for kind in ("vehicles", "pedestrians", "surfaces"):
         (tmp_path / kind).symlink_to(TINY_TOWN.parents[1] / kind)
     with pytest.raises(TownError, match=told) as caught:
