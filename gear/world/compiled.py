@@ -22,6 +22,8 @@ from gear.world.mjb import read_model, write_model
 from gear.world.models import placement_model, render_model
 from gear.world.pool import plan_pool
 from gear.world.scene_spec import SceneSpec
+from gear.world.weather import wetness
+from gear.world.wet import wet_own_colours
 
 _SEEN, _FELT, _FACTS = "seen.mjb", "felt.mjb", "facts.json"
 
@@ -97,6 +99,7 @@ def compile_world(library: AssetLibrary, scene: SceneSpec, weather: Weather) -> 
         ).laid_out(Path(folder))
         release_memory()
         model, classes = render_model(composition)
+    wet_own_colours(model, classes.label_code, wetness(weather))
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     types = actor_types(model, data, classes, composition.slots)

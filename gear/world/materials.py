@@ -6,6 +6,7 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 
 from gear.values.errors import TownError
 from gear.values.geometry import Array
@@ -22,10 +23,16 @@ NO_OWN_RGBA = (0.5, 0.5, 0.5, 1.0)
 """MuJoCo's default: a geom of this colour wears its material's."""
 
 
+def has_own_colour(model: mujoco.MjModel) -> npt.NDArray[np.bool_]:
+    """(ngeom,) whether a geom's own rgba colours it, and not its material's: as MuJoCo draws them."""
+    is_said = (model.geom_rgba != np.array(NO_OWN_RGBA, np.float32)).any(axis=1)
+    return np.asarray(is_said | (model.geom_matid < 0), np.bool_)
+
+
 def effective_rgba(model: mujoco.MjModel) -> Array:
-    """(ngeom, 4) what geoms are coloured with: their own rgba goes before their material's, as MuJoCo draws them."""
+    """(ngeom, 4) what geoms are coloured with."""
     rgba: Array = model.geom_rgba.astype(np.float64)
-    plain = (model.geom_rgba == np.array(NO_OWN_RGBA, np.float32)).all(axis=1) & (model.geom_matid >= 0)
+    plain = ~has_own_colour(model)
     rgba[plain] = model.mat_rgba[model.geom_matid[plain]]
     return rgba
 

@@ -55,8 +55,8 @@ def split_town(path: Path) -> tuple[str | None, Statics]:
     """A town's MJCF without its geoms and bodies, and those.
 
     Nothing is taken out of a town whose geoms and bodies are not all plain ones: such with joints, cameras or sites in
-    them, geoms without a class or with a colour of their own, or files that include others. dm_control reads such a
-    file itself: the text is None.
+    them, geoms without a class of their own, or files that include others. dm_control reads such a file itself: the
+    text is None.
 
     Raises:
         TownError: it is no XML, or cannot be read.
@@ -150,7 +150,6 @@ def _is_plain(element: ET.Element) -> bool:
     return all(
         part.tag in _PLAIN
         and part.get("childclass") is None
-        and part.get("rgba") is None
         and not part.get("name", "").startswith(UNNAMED)
         and part.get("class" if part.tag == "geom" else "name") is not None
         for part in element.iter()

@@ -15,7 +15,7 @@ from gear.values.resources import data_dir
 from gear.values.scene import Weather
 from gear.world.light import FACE_ORDER, FILAMENT_LUX, Floats, Lighting, encode_srgb, lighting_of
 from gear.world.quiet_mjcf import mjcf
-from gear.world.wet import Worn, wet_ground
+from gear.world.wet import Worn, wet_materials
 
 _CLASSIC_WHITE = 1.1
 _CLASSIC_SKY_SHARE = (0.48, 0.95)
@@ -45,7 +45,7 @@ def apply_weather(
     """Puts a weather into a composed world, in place of the light that its town came with.
 
     - a light `sun`, a texture `sky` as the sky's picture, and the same picture as a light for Filament;
-    - wet ground: what lies open to the rain is darker and smoother;
+    - wet materials: what lies open to the rain is darker and smoother;
     - colours of materials and geoms are read as linear albedo by both renderers.
 
     Args:
@@ -60,7 +60,7 @@ def apply_weather(
     _add_sun(root, lighting)
     amount = wetness(weather)
     if amount > 0:
-        wet_ground(root, amount, worn)
+        wet_materials(root, amount, worn)
     root.custom.add("text", name="filament.material.base_color_type", data="linear")
     # Gear's renderers have their own, which costs less and loses no memory.
     root.custom.add("numeric", name="filament.ao.enabled", data=[0])

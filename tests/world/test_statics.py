@@ -61,11 +61,10 @@ def test_the_compiled_world_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None
         '<body name="group" childclass="building"><geom size="1"/></body>',
         '<body><geom class="building" size="1"/></body>',
         '<geom name="bare" size="1"/>',
-        '<geom class="building" rgba="1 0 0 1" size="1"/>',
         '<geom name="unnamed_geom_7" class="building" size="1"/>',
         '<body name="more"><include file="more.xml"/></body>',
     ],
-    ids=["joint", "site", "childclass", "nameless body", "no class", "own colour", "taken name", "include"],
+    ids=["joint", "site", "childclass", "nameless body", "no class", "taken name", "include"],
 )
 def test_a_town_with_anything_else_is_left_whole(thing: str, tmp_path: Path) -> None:
     town = tmp_path / "town.xml"

@@ -44,8 +44,8 @@ TOWN = """
 """
 
 
-def world(weather: Weather, town: str = TOWN) -> mujoco.MjModel:
-    root = mjcf.from_xml_string(town)
+def world(weather: Weather) -> mujoco.MjModel:
+    root = mjcf.from_xml_string(TOWN)
     apply_weather(root, weather)
     return mujoco.MjModel.from_xml_string(root.to_xml_string(), root.get_assets())
 
@@ -210,33 +210,6 @@ def test_water_darkens_and_smooths_open_ground_only() -> None:
     assert wet.mat_roughness[asphalt] < 0.5 * dry.mat_roughness[asphalt]
     assert np.array_equal(wet.mat_rgba[brick], dry.mat_rgba[brick])
     assert wet.mat_roughness[brick] == dry.mat_roughness[brick]
-
-
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        ('class="road.lane" type', 'class="road.lane" rgba="0.3 0.4 0.5 1" type'),
-        ('<default class="road.lane"/>', '<default class="road.lane"><geom rgba="0.3 0.4 0.5 1"/></default>'),
-        ('<default class="road"><geom material="asphalt"/>', '<default class="road"><geom rgba="0.3 0.4 0.5 1"/>'),
-        ('<default class="road"><geom material="asphalt"/>', '<default class="road"><geom/>'),
-    ],
-)
-def test_ground_is_wet_whoever_colours_it(old: str, new: str) -> None:
-    assert old in TOWN
-    shown = []
-    for weather in ("ClearNoon", "HardRainNoon"):
-        model = world(PRESETS[weather], TOWN.replace(old, new))
-        shown.append(model.geom_rgba[0].copy())
-        assert tuple(model.geom("pillar").rgba) == (0.5, 0.5, 0.5, 1)
-    np.testing.assert_allclose(shown[1], shown[0] * (0.55, 0.55, 0.55, 1), rtol=1e-5)
-
-
-def test_ground_that_is_not_in_the_tree_is_wet_by_its_class() -> None:
-    root = mjcf.from_xml_string(TOWN.replace('<default class="road.lane"/>',
-        '<default class="road.lane"><geom rgba="0.3 0.4 0.5 1"/></default>'))  # fmt: skip
-    root.find_all("geom")[0].remove()
-    apply_weather(root, PRESETS["HardRainNoon"], worn=[("road.lane", None), ("building", "brick")])
-    np.testing.assert_allclose(root.find("default", "road.lane").geom.rgba, [0.165, 0.22, 0.275, 1])
 
 
 def fog_per_m(weather: Weather) -> float:

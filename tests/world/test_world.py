@@ -16,6 +16,7 @@ from gear.values.labels import LABEL_BY_NAME
 from gear.values.scene import ActorRecord, Pose, SceneRecord
 from gear.world.classes import NEVER_SEEN
 from gear.world.faces import FACE_SIZE_PX
+from gear.world.weather import PRESETS
 from gear.world.world import World
 
 POSE = Pose(position_m=(10.0, -1.75, 0.0), quat_wxyz=(0.8660254, 0.0, 0.0, 0.5))
@@ -120,6 +121,33 @@ def test_a_town_that_breaks_the_rules_is_refused(tmp_path: Path, old: str, new: 
     with pytest.raises(TownError, match=told) as caught:
         World.build(town=town, scene_name="board", scene=tiny_scenes().scenes["board"], weather=CLEAR)
     assert "odd.xml" in str(caught.value)
+
+
+def test_rain_wets_ground_that_has_a_colour_of_its_own(tmp_path: Path) -> None:
+    """With a material or without one; what rain runs off, such as a lamp post, keeps its colour."""
+    text = TINY_TOWN.read_text()
+    for name, old, new in (
+        ("main_road", 'material="asphalt"', 'material="asphalt" rgba="0.2 0.1 0.1 1"'),
+        ("cross_south", 'material="asphalt"', 'rgba="0.2 0.2 0.2 1"'),
+        ("lamp_post", 'material="steel"', 'rgba="0.2 0.2 0.2 1"'),
+    ):
+        before, found, after = text.partition(f'<geom name="{name}"')
+        assert found and old in after
+        text = before + found + after.replace(old, new, 1)
+    town = tmp_path / "towns" / "own.xml"
+    town.parent.mkdir()
+    town.write_text(text)
+    for kind in ("vehicles", "pedestrians", "surfaces"):
+        (tmp_path / kind).symlink_to(TINY_TOWN.parents[1] / kind)
+    scene = tiny_scenes().scenes["board"]
+    dry, wet = (
+        World.build(town=town, scene_name="board", scene=scene, weather=PRESETS[name]).model
+        for name in ("ClearNoon", "HardRainNoon")
+    )
+    for name, share in (("main_road", 0.55), ("cross_south", 0.55), ("lamp_post", 1.0), ("cross_north", 1.0)):
+        np.testing.assert_allclose(wet.geom(name).rgba[:3], share * dry.geom(name).rgba[:3], rtol=1e-6)
+        assert wet.geom(name).rgba[3] == 1
+    assert wet.material("asphalt").rgba[0] == pytest.approx(0.55 * dry.material("asphalt").rgba[0])
 
 
 def test_unknown_names_are_told_with_what_was_meant() -> None:
