@@ -9,11 +9,25 @@ from typing import Any
 
 from gear.contracts.tasks import Auxiliary, Encoded, Sample, Sidecar, Task
 from gear.dataset.files import clear_scratch, explained, inside, sha256, sync_folder, write_whole
-from gear.dataset.layout import manifest_path, patch_path, plan_path, sidecar_path, split_folder
+from gear.dataset.layout import GEAR, manifest_path, patch_path, plan_path, sidecar_path, split_folder
 from gear.dataset.plan import Plan, begin, read_plan
 from gear.dataset.sidecar import dump_json, load_json, read_sidecar, sidecar_bytes
 from gear.values.errors import DatasetError
 from gear.values.serial import Json
+
+
+def refuse_dataset(root: Path, instead: str) -> None:
+    """Keeps results out of a dataset.
+
+    Args:
+        root: where they are to be written.
+        instead: what to do, for the message.
+
+    Raises:
+        DatasetError: a dataset is there.
+    """
+    if any(root.glob(f"{GEAR}/*/plan.json")):
+        raise DatasetError(root, f"is a dataset; {instead}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,6 +22,7 @@ from gear.dataset.files import clear_scratch, explained, inside, write_whole
 from gear.dataset.layout import GEAR
 from gear.dataset.reading import Dataset
 from gear.dataset.sidecar import dump_json, load_json
+from gear.dataset.store import refuse_dataset
 from gear.formats.png import encode_labels
 from gear.opening import open_dataset
 from gear.plugins.build import NO_OPTIONS, blamed, build, find
@@ -95,8 +96,7 @@ def defend(
     opened = open_dataset(dataset, split)
     spec = suitable(found, opened.plan.task["name"])
     root, name = Path(out), opened.plan.info.split
-    if root.resolve() == opened.root.resolve() or any(root.glob(f"{GEAR}/*/plan.json")):
-        raise DatasetError(root, "is a dataset; write the cleaned pictures into a folder of their own")
+    refuse_dataset(root, "write the cleaned pictures into a folder of their own")
     plan: Json = {
         "defense": {"name": spec.name, "package": found.owner.package, "version": found.owner.version},
         "options": to_plain(config),

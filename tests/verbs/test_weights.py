@@ -117,7 +117,7 @@ def test_show_prints_what_the_file_says(
     assert show_weights("bisenet_x39").file.path == out
     with pytest.raises(UnknownNameError, match="no model named 'bisenet_x38'; did you mean bisenet_x39"):
         show_weights("bisenet_x38")
-    with pytest.raises(GearError, match="is a folder; name the safetensors file in it"):
+    with pytest.raises(GearError, match="is a folder; name the file in it"):
         show_weights(str(tmp_path))
     assert main(["weights", "show", str(official["bisenet"])]) == 2
     assert "gear weights convert" in capsys.readouterr().err

@@ -17,6 +17,7 @@ from gear.dataset.layout import GEAR
 from gear.dataset.plan import differences
 from gear.dataset.reading import Dataset
 from gear.dataset.sidecar import dump_json, load_json
+from gear.dataset.store import refuse_dataset
 from gear.opening import open_dataset, root_and_split
 from gear.values.errors import DatasetError, GearError
 from gear.values.serial import Json
@@ -103,8 +104,7 @@ def evaluate(
         if out is not None
         else Path("evaluations", task, model.replace("/", "-") + f"+{defense}" * bool(defense))
     )
-    if any(root.glob(f"{GEAR}/*/plan.json")):
-        raise DatasetError(root, "is a dataset; write the evaluation into a folder of its own")
+    refuse_dataset(root, "write the evaluation into a folder of its own")
     player = Player(chosen, guard, clean=learnt[0], patched=learnt[1], seed=seed)
     facts = {
         "task": datasets[0].plan.task,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -81,9 +80,9 @@ def open_all(
         GearError: it is a test split, or two are of the same samples.
     """
     found = [dataset for path in paths for dataset in _open(path, names)]
-    known: dict[tuple[str, str], Dataset[Any]] = {}
+    known: dict[Any, Dataset[Any]] = {}
     for dataset in found:
-        same = known.setdefault((dataset.plan.twin_key, json.dumps(dataset.plan.patch, sort_keys=True)), dataset)
+        same = known.setdefault((dataset.plan.twin_key, *sorted(dataset.plan.patch.items())), dataset)
         if same is not dataset:
             raise GearError(f"{same.root} and {dataset.root} hold the same samples; give them once")
         split = dataset.plan.info.split

@@ -12,10 +12,11 @@ from gear.config.dump import to_plain
 from gear.contracts.specs import ModelSpec, TaskSpec
 from gear.dataset.files import clear_scratch, explained
 from gear.dataset.layout import GEAR
+from gear.dataset.store import refuse_dataset
 from gear.nn.runtime import device_of, prepare
 from gear.plugins.build import blamed, find
 from gear.plugins.catalogue import Found
-from gear.values.errors import DatasetError, GearError
+from gear.values.errors import GearError
 from gear.values.serial import Json
 from gear.verbs.look import look_of
 from gear.verbs.train.adversary import Adversary
@@ -126,8 +127,7 @@ def train(
     share = picture_share(training, spec)
     config = with_scale(found, config, share)
     root = Path(out)
-    if any(root.glob(f"{GEAR}/*/plan.json")):
-        raise DatasetError(root, "is a dataset; train into a folder of its own")
+    refuse_dataset(root, "train into a folder of its own")
     with explained(root):
         root.mkdir(parents=True, exist_ok=True)
     clear_scratch(root)
