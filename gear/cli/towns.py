@@ -38,9 +38,9 @@ def run(args: argparse.Namespace) -> int:
 
     if args.town is None and (args.out or args.scenes):
         raise GearError("gear towns needs a town for --out and --scenes, such as: gear towns town10 --out maps/")
-    check_pictures(renderer=args.renderer, quality=args.quality, weather=args.weather, seed=args.seed)
     if args.out is not None:
         return draw(args)
+    check_pictures(renderer=args.renderer, quality=args.quality, weather=args.weather, seed=args.seed)
     names = [args.town] if args.town else town_names()
     found = [read_town(name, args.scenes) for name in names]
     if args.json:

@@ -14,6 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from gear.nn.shipped import check_file
 from gear.nn.weights import read
 from gear.values.errors import GearError
 
@@ -53,8 +54,7 @@ def read_published(path: str | Path) -> dict[str, Tensor]:
         GearError: there is no such file, nothing can read it, it wants to run something, or it holds no network.
     """
     file = Path(path)
-    if not file.is_file():
-        raise GearError(f"{file}: {'is a folder; name the file in it' if file.is_dir() else 'there is no such file'}")
+    check_file(file)
     if file.suffix == ".safetensors":
         state, _ = read(file)
     else:

@@ -83,7 +83,7 @@ def check_file(path: Path) -> None:
         GearError: there is not.
     """
     if path.is_dir():
-        raise GearError(f"{path}: is a folder; name the safetensors file in it")
+        raise GearError(f"{path}: is a folder; name the file in it")
     if not path.is_file():
         raise GearError(f"{path}: there is no such weights file")
 

@@ -67,16 +67,18 @@ def mismatches(wanted: Mapping[str, Tensor], given: Mapping[str, Tensor]) -> lis
     numbers that are none."""
     missing = [key for key in wanted if key not in given and not key.endswith(OPTIONAL)]
     surplus = [key for key in given if key not in wanted]
+    shared = [key for key in wanted if key in given]
     shapes = [
         f"{key} is {tuple(given[key].shape)}, not {tuple(wanted[key].shape)}"
-        for key in wanted
-        if key in given and given[key].shape != wanted[key].shape
+        for key in shared
+        if given[key].shape != wanted[key].shape
     ]
-    shared = [
-        key for key in wanted if key in given and given[key].shape == wanted[key].shape and not key.endswith(OPTIONAL)
+    kinds = [
+        key
+        for key in shared
+        if given[key].is_floating_point() != wanted[key].is_floating_point() and not key.endswith(OPTIONAL)
     ]
-    kinds = [key for key in shared if given[key].is_floating_point() != wanted[key].is_floating_point()]
-    broken = [key for key in shared if key not in kinds and not _finite(given[key])]
+    broken = [key for key in shared if not _finite(given[key])]
     found = {
         "missing": missing,
         "not known": surplus,

@@ -114,5 +114,5 @@ def test_what_holds_no_network_is_refused(tmp_path: Path) -> None:
         torch.save(content, tmp_path / "a.pth")
         with pytest.raises(GearError, match=problem):
             read_published(tmp_path / "a.pth")
-    with pytest.raises(GearError, match="no such file"):
+    with pytest.raises(GearError, match="no such weights file"):
         read_published(tmp_path / "b.pth")
