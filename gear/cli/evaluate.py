@@ -54,6 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Evaluates and prints the table."""
     import json
+    import sys
 
     from gear.cli.progress import ProgressBar
     from gear.verbs.evaluate.run import evaluate
@@ -77,5 +78,8 @@ def run(args: argparse.Namespace) -> int:
             resamples=args.resamples,
             progress=progress,
         )
+    for row in report.rows:
+        for problem in row.damaged:
+            print(f"gear: note: {problem}; the sample was predicted again", file=sys.stderr)
     print(json.dumps(report.as_json(), indent=1, allow_nan=False) if args.json else table(report), end="")
     return 0

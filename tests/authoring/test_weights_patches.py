@@ -162,6 +162,7 @@ def write_results(root: Path, plan: PatchPlan) -> None:
     rows = [
         RowReport(
             name=f"test-{label}", dataset=root, facts={"patch": label}, samples=2, made=2, cost={}, defense={},
+            damaged=(),
             figures={"task": {"miou": Estimate(value=value)}}, per_sample=[],
         )
         for label, value in values.items()

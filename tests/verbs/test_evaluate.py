@@ -183,13 +183,13 @@ def test_it_is_taken_up_again_and_predicts_nothing_twice(
 
 
 @pytest.mark.parametrize("damage", ["note", "half", "key", "prediction"])
-def test_a_damaged_sample_says_what_to_delete_and_is_made_again(
-    tmp_path: Path, small: Small, install: Install, damage: str
+def test_a_sample_whose_result_is_damaged_is_predicted_again_and_that_is_told(
+    tmp_path: Path, small: Small, install: Install, capsys: pytest.CaptureFixture[str], damage: str
 ) -> None:
     data = small("depth")
     install(model_spec(lambda _: Oracle([data]), "depth"))
     out = tmp_path / "out"
-    first = evaluate(data, model="odd", out=out, resamples=0)
+    first, whole = evaluate(data, model="odd", out=out, resamples=0), timeless(out)
     (row,) = sorted(path for path in out.iterdir() if path.is_dir())
     note = row / "samples/000001.json"
     (row / "samples/notes-of-mine.json").write_text("[]")
@@ -198,11 +198,16 @@ def test_a_damaged_sample_says_what_to_delete_and_is_made_again(
             path.write_bytes(b"half")
     else:
         note.write_text({"note": "[]", "half": note.read_text()[:40], "key": '{"index": 1}'}[damage])
-    with pytest.raises(DatasetError, match=r"delete .*000001.json and give the command again"):
-        evaluate(data, model="odd", out=out, resamples=0)
-    note.unlink()
     again = evaluate(data, model="odd", out=out, resamples=0)
     assert again.rows[0].made == 1 and again.rows[0].figures == first.rows[0].figures
+    (told,) = again.rows[0].damaged
+    assert str(row) in told and "0001" in told
+    assert timeless(out) == whole
+    assert evaluate(data, model="odd", out=out, resamples=0).rows[0].made == 0
+    note.write_text("[]")
+    assert main(["evaluate", "--model", "odd", "--data", str(data), "--out", str(out), "--resamples", "0"]) == 0
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"gear: note: {note}: is no note of a sample") and "predicted again" in line
 
 
 def test_the_official_script_finds_the_predictions_and_agrees(
@@ -434,8 +439,8 @@ def boom(views: Views) -> Any:
     [
         (boom, r"odd \(odd_package \?\) failed at predict on sample 0: RuntimeError: boom"),
         (lambda views: sys.exit(3), "SystemExit: 3"),
-        (lambda views: np.zeros((3, 3), np.uint8), r"prediction of sample 0: ValueError: prediction must have shape"),
-        (lambda views: None, "prediction of sample 0: AttributeError"),
+        (lambda views: np.zeros((3, 3), np.uint8), r"prediction of sample \d: ValueError: prediction must have shape"),
+        (lambda views: None, r"prediction of sample \d: AttributeError"),
         (lambda views: views["left"].__setitem__(0, 0), "ValueError: assignment destination is read-only"),
     ],
 )

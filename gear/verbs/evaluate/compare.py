@@ -10,6 +10,7 @@ import numpy as np
 
 from gear.contracts.evaluation import Draws
 from gear.dataset.reading import Dataset
+from gear.values.errors import DatasetError
 from gear.verbs.evaluate.report import Difference, Estimate, PairedTest, RowReport, Together
 from gear.verbs.evaluate.scoring import Note, Scorer
 from gear.verbs.evaluate.spread import Figures, auroc, auroc_interval, bounds, draw, gather, paired_p
@@ -29,6 +30,7 @@ class Measured:
         scorer: that measured it.
         notes: of its samples, in order.
         made: how many of them were predicted now.
+        damaged: what was kept of some of them and could not be read.
     """
 
     name: str
@@ -36,6 +38,7 @@ class Measured:
     scorer: Scorer
     notes: list[Note]
     made: int
+    damaged: tuple[DatasetError, ...]
 
     @property
     def patch(self) -> str:
@@ -64,6 +67,7 @@ def row_report(row: Measured, seed: int, resamples: int) -> RowReport:
         },
         samples=len(notes),
         made=row.made,
+        damaged=tuple(str(error) for error in row.damaged),
         figures=_figures(row.scorer, notes, seed, resamples),
         cost={key: float(np.mean([note.cost[key] for note in notes])) for key in ("model_s", "defense_s")},
         defense={key: _known_mean([mask[key] for mask in masks]) for key in keys},

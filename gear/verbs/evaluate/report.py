@@ -41,6 +41,7 @@ class RowReport:
         facts: its split, town, scene, weather, patch and keys; JSON.
         samples: how many it has.
         made: how many of them this run predicted.
+        damaged: what a former run had kept and could not be read; a line for each sample that was predicted again.
         figures: over all samples.
         cost: mean seconds a sample: `model_s`, `defense_s`.
         defense: mean figures of the defense's mask; empty without one.
@@ -52,6 +53,7 @@ class RowReport:
     facts: Json
     samples: int
     made: int
+    damaged: tuple[str, ...]
     figures: Figures
     cost: Mapping[str, float]
     defense: Mapping[str, float]

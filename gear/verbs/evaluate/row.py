@@ -6,9 +6,11 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
 from typing import Any
 
 from gear.dataset.reading import Dataset
+from gear.values.errors import DatasetError
 from gear.verbs.evaluate.lanes import lanes
 from gear.verbs.evaluate.player import Answer, Player
 from gear.verbs.evaluate.scoring import Note, Scorer
@@ -17,68 +19,107 @@ Told = Callable[[], None]
 """Called after every sample that is whole."""
 
 
-def evaluate_row(
-    dataset: Dataset[Any], scorer: Scorer, player: Player, *, batch: int, workers: int, told: Told
-) -> tuple[list[Note], int]:
-    """Every sample's note, in order, and how many of them were predicted now.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """What became of one dataset.
+
+    Attributes:
+        notes: of every sample, in order.
+        made: how many of them were predicted now.
+        damaged: what a former run kept and could not be read: these samples were predicted again.
+    """
+
+    notes: list[Note]
+    made: int
+    damaged: tuple[DatasetError, ...]
+
+
+def evaluate_row(dataset: Dataset[Any], scorer: Scorer, player: Player, *, batch: int, workers: int, told: Told) -> Row:
+    """Takes up what is kept and predicts the rest.
 
     Pictures are decoded and predictions measured and written in threads, while the model works on a batch, or on one in
     each of its lanes; what waits is bounded, so memory does not grow with the dataset.
     """
-    kept = scorer.kept()
-    missing = [index for index in range(len(dataset)) if index not in kept]
-    notes: dict[int, Future[Note]] = {}
-    count = min(player.lanes, -(-len(missing) // batch)) or 1
-    waiting, one_tells, failed = threading.Semaphore(2 * batch + workers), threading.Lock(), list[BaseException]()
-
-    def tell(done: Future[Note]) -> None:
-        waiting.release()
-        error = None if done.cancelled() else done.exception()
+    desk = _Desk(2 * batch + workers, told)
+    with ThreadPoolExecutor(workers) as readers, ThreadPoolExecutor(workers) as scorers:
         try:
-            if not done.cancelled() and error is None:
-                with one_tells:
-                    told()
-        except BaseException as problem:  # futures keep what is raised here to themselves
-            error = problem
-        if error is not None:
-            failed.append(error)
+            notes, damaged = _taken_up(scorer, scorers, desk)
+            missing = [index for index in range(len(dataset)) if index not in notes]
+            count = min(player.lanes, -(-len(missing) // batch)) or 1
 
-    def play(indices: Sequence[int], samples: Sequence[Any]) -> dict[int, Future[Note]]:
-        answers: Sequence[Answer] = player.play([sample.images for sample in samples], indices)
-        scored = {}
-        for index, sample, answer in zip(indices, samples, answers, strict=True):
-            waiting.acquire()
-            scored[index] = scorers.submit(scorer.first, index, sample, answer)
-            scored[index].add_done_callback(tell)
-        return scored
+            def play(indices: Sequence[int], samples: Sequence[Any]) -> dict[int, Future[Note]]:
+                answers: Sequence[Answer] = player.play([sample.images for sample in samples], indices)
+                return {
+                    index: desk.submit(scorers, scorer.first, index, sample, answer)
+                    for index, sample, answer in zip(indices, samples, answers, strict=True)
+                }
 
-    with (
-        ThreadPoolExecutor(workers) as readers,
-        ThreadPoolExecutor(workers) as scorers,
-        lanes(count) as submit,
-    ):
-        try:
-            for index in sorted(kept):
-                waiting.acquire()
-                notes[index] = scorers.submit(scorer.again, index)
-                notes[index].add_done_callback(tell)
-            played: deque[Future[dict[int, Future[Note]]]] = deque()
-            for indices, samples in _batches(dataset, missing, readers, batch, workers):
-                played.append(submit(play, indices, samples))
-                if len(played) > count:
-                    notes |= played.popleft().result()
-                if failed:  # a sample that failed stops the run now, not at its end
-                    raise failed[0]
-            for one in played:
-                notes |= one.result()
-            done = [notes[index].result() for index in range(len(dataset))]
+            with lanes(count) as submit:
+                played: deque[Future[dict[int, Future[Note]]]] = deque()
+                scored: dict[int, Future[Note]] = {}
+                for indices, samples in _batches(dataset, missing, readers, batch, workers):
+                    played.append(submit(play, indices, samples))
+                    if len(played) > count:
+                        scored |= played.popleft().result()
+                    desk.check()
+                for one in played:
+                    scored |= one.result()
+            notes |= {index: future.result() for index, future in scored.items()}
         except BaseException:
             readers.shutdown(wait=False, cancel_futures=True)
             scorers.shutdown(wait=False, cancel_futures=True)
             raise
-    if failed:  # looked at again now that every callback has ended: that of the last sample may fail too
-        raise failed[0]
-    return done, len(missing)
+    desk.check()  # looked at again now that every callback has ended: that of the last sample may fail too
+    return Row(notes=[notes[index] for index in range(len(dataset))], made=len(missing), damaged=tuple(damaged))
+
+
+class _Desk:
+    """Where samples wait to be measured: so many at a time, and the first failure is remembered."""
+
+    def __init__(self, most: int, told: Told) -> None:
+        self._waiting, self._one_tells, self._told = threading.Semaphore(most), threading.Lock(), told
+        self._failed = list[BaseException]()
+
+    def submit(self, pool: ThreadPoolExecutor, job: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Waits for a place."""
+        self._waiting.acquire()
+        future = pool.submit(job, *arguments)
+        future.add_done_callback(self._tell)
+        return future
+
+    def check(self) -> None:
+        """A sample that failed stops the run now, not at its end."""
+        if self._failed:
+            raise self._failed[0]
+
+    def _tell(self, done: Future[Any]) -> None:
+        self._waiting.release()
+        error = None if done.cancelled() else done.exception()
+        try:
+            if not done.cancelled() and error is None and isinstance(done.result(), Note):
+                with self._one_tells:
+                    self._told()
+        except BaseException as problem:  # futures keep what is raised here to themselves
+            error = problem
+        if error is not None:
+            self._failed.append(error)
+
+
+def _taken_up(scorer: Scorer, scorers: ThreadPoolExecutor, desk: _Desk) -> tuple[dict[int, Note], list[DatasetError]]:
+    """What a former run finished, and what of it cannot be read."""
+    futures: dict[int, Future[Note | DatasetError]] = {}
+    for index in sorted(scorer.kept()):
+        futures[index] = desk.submit(scorers, scorer.again, index)
+        desk.check()
+    notes: dict[int, Note] = {}
+    damaged: list[DatasetError] = []
+    for index, future in futures.items():
+        found = future.result()
+        if isinstance(found, Note):
+            notes[index] = found
+        else:
+            damaged.append(found)
+    return notes, damaged
 
 
 def _batches(

@@ -61,8 +61,9 @@ def evaluate(
     """Runs a model, with or without a defense, over datasets of its task; takes up again what was begun.
 
     Under `out` lie results.json, table.txt, and for each dataset a folder with the predictions in the format's own
-    result layout and a note of each sample. Samples that have one are never predicted again. Datasets that differ in
-    nothing but their patch are compared sample by sample. Intervals are of 95 %, by bootstrap over samples.
+    result layout and a note of each sample. Samples that have one are never predicted again, unless what was kept of
+    them is damaged (`RowReport.damaged`). Datasets that differ in nothing but their patch are compared sample by
+    sample. Intervals are of 95 %, by bootstrap over samples.
 
     Args:
         data: roots of datasets, all of one task; `DIR:SPLIT` says which split of one.
@@ -127,9 +128,11 @@ def evaluate(
     rows = []
     for dataset, name in zip(datasets, names, strict=True):
         scorer = Scorer(dataset, root, name, tuple(reports), chosen.found)
-        done, made = evaluate_row(dataset, scorer, player, batch=batch, workers=workers, told=told)
-        scorer.finish(done)
-        rows.append(Measured(name=name, dataset=dataset, scorer=scorer, notes=done, made=made))
+        row = evaluate_row(dataset, scorer, player, batch=batch, workers=workers, told=told)
+        scorer.finish(row.notes)
+        rows.append(
+            Measured(name=name, dataset=dataset, scorer=scorer, notes=row.notes, made=row.made, damaged=row.damaged)
+        )
     found = EvaluateReport(
         out=root,
         facts=facts | {"reports": list(reports), "resamples": resamples, "versions": _versions(player)},

@@ -116,11 +116,11 @@ class Scorer:
         write_whole(self._root, f"{self._folder}/samples/{index:06d}.json", dump_json(note.as_json()))
         return note
 
-    def again(self, index: int) -> Note:
-        """Measures what a former run predicted.
+    def again(self, index: int) -> Note | DatasetError:
+        """Measures what a former run predicted; or what is wrong with its note or its prediction.
 
         Raises:
-            DatasetError: its note or its prediction cannot be read.
+            DatasetError: the sample itself cannot be read.
         """
         assert self._keeper is not None
         path = inside(self._root, f"{self._folder}/samples/{index:06d}.json")
@@ -133,10 +133,7 @@ class Scorer:
             with explained(path):
                 prediction = self._keeper.decode_prediction(folder, sample, there["facts"], self._dataset.plan.info)
         except DatasetError as error:
-            problem = error.problem.partition(";")[0]
-            raise DatasetError(
-                error.path, f"{problem}; delete {path} and give the command again: the sample is then predicted again"
-            ) from error
+            return DatasetError(error.path, error.problem.partition(";")[0])
         with self._blamed(index):
             figures, parts = self._measure(sample, prediction)
         return Note(
