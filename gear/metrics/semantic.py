@@ -33,6 +33,8 @@ EVALUATED = tuple(label for label in LABELS if label.is_evaluated)
 CATEGORIES = tuple(dict.fromkeys(label.category for label in EVALUATED))
 COUNT = len(LABELS)
 
+PIECE_PX = 1 << 17
+
 
 class SegmentedSample(Protocol):
     """What the metric looks at."""
@@ -68,27 +70,28 @@ class SemanticEvaluator:
             raise ValueError(f"prediction must have shape {sample.label_ids.shape}, got {prediction.shape}")
         if prediction.size and prediction.max() >= COUNT:
             raise ValueError(f"prediction must hold label ids 0..{COUNT - 1}, got {prediction.max()}")
-        pairs = sample.label_ids.astype(np.int32) * COUNT + prediction
-        confusion = np.bincount(pairs.reshape(-1), minlength=COUNT * COUNT).reshape(COUNT, COUNT)
+        confusion = _confusion(sample.label_ids.reshape(-1), prediction.reshape(-1))
         self.confusion += confusion
         self._weigh(sample.instance_ids, prediction)
         return {"miou": _mean(_class_iou(confusion).values())}
 
     def _weigh(self, instances: npt.NDArray[np.uint16], prediction: npt.NDArray[np.uint8]) -> None:
         chosen = instances >= INSTANCE_FACTOR
-        ids, predicted = instances[chosen].astype(np.int64), prediction[chosen]
-        table = np.bincount(ids * COUNT + predicted)
-        for value in np.unique(ids):
+        ids, predicted = instances[chosen].astype(np.intp), prediction[chosen]
+        ids *= COUNT
+        ids += predicted
+        counts = np.bincount(ids)
+        table = np.zeros((-(-len(counts) // COUNT), COUNT), dtype=np.int64)
+        table.reshape(-1)[: len(counts)] = counts
+        for value in np.flatnonzero(table.any(axis=1)):
             label = LABELS[value // INSTANCE_FACTOR]
             if not label.is_evaluated:
                 continue
-            row = np.zeros(COUNT, dtype=np.int64)
-            found = table[value * COUNT : (value + 1) * COUNT]
-            row[: len(found)] = found
+            row = table[value]
             size = int(row.sum())
             weight = AVERAGE_INSTANCE_PX[label.name] / size
             hit = int(row[label.id])
-            near = sum(int(row[other.id]) for other in EVALUATED if other.category == label.category)
+            near = int(row[_ids(label.category)].sum())
             self.weighted_tp[label.id] += hit * weight
             self.weighted_fn[label.id] += (size - hit) * weight
             self.weighted_category_tp[label.id] += near * weight
@@ -171,6 +174,18 @@ def _false_positives(confusion: npt.NDArray[np.int64], ids: list[int]) -> float:
     """Pixels predicted as one of `ids` whose ground truth is evaluated and another."""
     others = [label.id for label in EVALUATED if label.id not in ids]
     return float(confusion[np.ix_(others, ids)].sum())
+
+
+def _confusion(truth: npt.NDArray[np.uint8], prediction: npt.NDArray[np.uint8]) -> npt.NDArray[np.int64]:
+    """(COUNT, COUNT) pixels by label of the ground truth and of the prediction, both (N,); a piece at a time, so that
+    it stays in the cache."""
+    counts = np.zeros(COUNT * COUNT, dtype=np.int64)
+    for start in range(0, truth.size, PIECE_PX):
+        pairs = truth[start : start + PIECE_PX].astype(np.intp)
+        pairs *= COUNT
+        pairs += prediction[start : start + PIECE_PX]
+        counts += np.bincount(pairs, minlength=COUNT * COUNT)
+    return counts.reshape(COUNT, COUNT)
 
 
 def _class_iou(confusion: npt.NDArray[np.int64]) -> dict[str, float]:
