@@ -6,6 +6,7 @@ again, and `gear models` says so.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 from collections.abc import Iterable
@@ -78,15 +79,23 @@ def look_of(plans: Iterable[Plan]) -> Look:
     )
 
 
-def look_now(trained: Look) -> Look:
-    """What the same towns would look like if they were collected now; towns that are not installed are left out."""
-    assets = {}
-    for town in trained.assets:
-        try:
-            assets[town] = assets_digest(AssetLibrary.for_town(town))
-        except GearError:
-            continue
-    return Look(assets=assets, renderers=trained.renderers, light=light_digest(), mujoco=_minor(mujoco.__version__))
+def look_now(trained: Look, digests: dict[str, str] | None = None) -> Look:
+    """What the same towns would look like if they were collected now; towns that are not installed are left out.
+
+    Args:
+        trained: what is to be compared.
+        digests: of the assets of towns that were read already; gets those that are read now.
+    """
+    known = {} if digests is None else digests
+    for town in trained.assets.keys() - known.keys():
+        with contextlib.suppress(GearError):
+            known[town] = assets_digest(AssetLibrary.for_town(town))
+    return Look(
+        assets={town: known[town] for town in trained.assets if town in known},
+        renderers=trained.renderers,
+        light=light_digest(),
+        mujoco=_minor(mujoco.__version__),
+    )
 
 
 def read_look(value: Json) -> Look | None:

@@ -95,8 +95,9 @@ def list_models(task: str | None = None) -> list[ModelFacts]:
     plugins = catalogue()
     if task is not None:
         task = plugins.get("task", task).spec.name
+    digests: dict[str, str] = {}  # reading a town's assets takes a while, and several networks know the same towns
     return [
-        ModelFacts(found=found, missing=_missing(found.spec.needs), shipped=_shipped(found.spec.name))
+        ModelFacts(found=found, missing=_missing(found.spec.needs), shipped=_shipped(found.spec.name, digests))
         for found in plugins.of_kind("model")
         if isinstance(found.spec, ModelSpec) and (task is None or task in found.spec.tasks)
     ]
@@ -106,15 +107,15 @@ def _missing(modules: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(name for name in modules if importlib.util.find_spec(name.partition(".")[0]) is None)
 
 
-def _shipped(name: str) -> ShippedWeights | None:
+def _shipped(name: str, digests: dict[str, str]) -> ShippedWeights | None:
     path = shipped(name)
     if path is None:
         return None
     file = inspect(path)
-    return ShippedWeights(file=file, stale=_changes(file))
+    return ShippedWeights(file=file, stale=_changes(file, digests))
 
 
-def _changes(file: WeightsFile) -> tuple[str, ...] | None:
+def _changes(file: WeightsFile, digests: dict[str, str]) -> tuple[str, ...] | None:
     value = file.facts().get("look")
     if value is None:
         return None
@@ -122,4 +123,4 @@ def _changes(file: WeightsFile) -> tuple[str, ...] | None:
     from gear.verbs.look import look_now, read_look
 
     look = read_look(value)
-    return None if look is None else tuple(look.differences(look_now(look)))
+    return None if look is None else tuple(look.differences(look_now(look, digests)))
