@@ -76,3 +76,12 @@ class Resampled(Protocol):
         May leave figures out.
         """
         ...
+
+
+@runtime_checkable
+class Limited(Protocol):
+    """An evaluator some of whose figures stay below 1 on few samples, however good the predictions are."""
+
+    def ceilings(self) -> Mapping[str, float]:
+        """What perfect predictions of everything gathered would come to, for the figures where that is less than 1."""
+        ...

@@ -1,14 +1,14 @@
 """KITTI's object evaluation: average precision in the picture, from above and in space, and orientation similarity.
 
 By the rules of the devkit: 41 thresholds, neighbours and hard labels ignored, DontCare regions excuse. `r11` is the
-mean over 11 recalls, `r40` the mean over 40 that replaced it in 2019. With fewer than some 40 labels of a class a
-perfect detector stays well below 1 in both, because that many recall steps do not exist; that is the benchmark's own
-definition.
+mean over 11 recalls, `r40` the mean over 40 that replaced it in 2019. With fewer than 41 labels of a class a perfect
+detector stays below 1 in both, because that many recall steps do not exist; that is the benchmark's own definition, and
+`ceilings` says how far it could come.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -99,14 +99,25 @@ class KittiEvaluator(Generic[SampleT]):
         spread["ap_3d_moderate"] = np.where(known.any(axis=0), total / np.maximum(known.sum(axis=0), 1), np.nan)
         return spread
 
+    def ceilings(self) -> Mapping[str, float]:
+        """What perfect detections would come to, where that is less than 1."""
+        most: dict[str, float] = {}
+        for kind in NEIGHBOURS:
+            for overlap in OVERLAPS:
+                for difficulty in DIFFICULTIES:
+                    curve = perfect_curve(choose(picture, kind, difficulty, overlap) for picture in self.pictures)
+                    for name in (overlap, "aos") if overlap == "2d" else (overlap,):
+                        most |= _at_recalls(f"{kind.lower()}_{name}_{difficulty.name}", curve)
+        known = [v for k in NEIGHBOURS if (v := most[f"{k.lower()}_3d_moderate_r40"]) == v]
+        most = {"ap_3d_moderate": float(np.mean(known)) if known else 1.0, **most}
+        return {name: value for name, value in most.items() if value < 1}
+
     def _add(self, figures: dict[str, float], kind: str, difficulty: Difficulty, overlap: Overlap) -> None:
         chosen = [choose(picture, kind, difficulty, overlap) for picture in self.pictures]
         precision, orientation = curves(chosen)
         curve_by_name = {overlap: precision} | ({"aos": orientation} if overlap == "2d" else {})
         for name, curve in curve_by_name.items():
-            stem = f"{kind.lower()}_{name}_{difficulty.name}"
-            figures[f"{stem}_r11"] = float(curve[:: STEPS // 10].mean())
-            figures[f"{stem}_r40"] = float(curve[1:].mean())
+            figures |= _at_recalls(f"{kind.lower()}_{name}_{difficulty.name}", curve)
 
 
 def resampled_r40(chosen: Sequence[Chosen], draws: Draws) -> Array:
@@ -156,6 +167,14 @@ def curves(chosen: Sequence[Chosen]) -> tuple[Array, Array]:
     return _monotone(total.tp / found), _monotone(total.similarity / found)
 
 
+def perfect_curve(chosen: Iterable[Chosen]) -> Array:
+    """(41,) precision as `curves` gives it, of detections that find every label and nothing else."""
+    wanted = sum(int((picture.label_state == 0).sum()) for picture in chosen)
+    if not wanted:
+        return np.full(STEPS + 1, np.nan)
+    return _monotone(np.ones(len(recall_thresholds(range(wanted, 0, -1), wanted))))
+
+
 def recall_thresholds(scores: Sequence[float], wanted: int) -> Array:
     """Scores at which the recall passes each step of 1/40, highest first; at most 41."""
     thresholds = []
@@ -169,6 +188,11 @@ def recall_thresholds(scores: Sequence[float], wanted: int) -> Array:
         thresholds.append(score)
         recall += 1.0 / STEPS
     return np.array(thresholds)
+
+
+def _at_recalls(stem: str, curve: Array) -> dict[str, float]:
+    """Means of a curve over 11 and over 40 recalls."""
+    return {f"{stem}_r11": float(curve[:: STEPS // 10].mean()), f"{stem}_r40": float(curve[1:].mean())}
 
 
 def _monotone(values: Array) -> Array:

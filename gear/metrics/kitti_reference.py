@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from gear.contracts.evaluation import Draws, Spread
-from gear.metrics.kitti_ap import STEPS, KittiEvaluator, SampleT, curves, resampled_r40
+from gear.metrics.kitti_ap import STEPS, KittiEvaluator, SampleT, curves, perfect_curve, resampled_r40
 from gear.metrics.kitti_match import DIFFICULTIES, Chosen, Difficulty, choose
 
 MAX_DISTANCE_M = 40.0
@@ -29,6 +29,12 @@ class NearCars(KittiEvaluator[SampleT]):
     def resampled(self, draws: Draws) -> Spread:
         """All of them."""
         return {_name(one): resampled_r40(self._chosen(one), draws) for one in _moderate_first()}
+
+    def ceilings(self) -> Mapping[str, float]:
+        """What perfect detections would come to, where that is less than 1."""
+        curves_by_name = {_name(one): perfect_curve(self._chosen(one)) for one in _moderate_first()}
+        most = {name: float(curve[1 : STEPS + 1].mean()) for name, curve in curves_by_name.items()}
+        return {name: value for name, value in most.items() if value < 1}
 
     def _chosen(self, difficulty: Difficulty) -> list[Chosen]:
         return [

@@ -11,6 +11,7 @@ import shapely
 
 from gear.formats.kitti_object import KittiLabel, dont_care, label_corners
 from gear.metrics.kitti_ap import KittiEvaluator, recall_thresholds
+from gear.metrics.kitti_reference import NearCars
 
 LEVELS = {"easy": (40, 0, 0.15), "moderate": (25, 1, 0.3), "hard": (25, 2, 0.5)}
 NEIGHBOUR = {"Car": "Van", "Pedestrian": "Person_sitting", "Cyclist": None}
@@ -195,6 +196,18 @@ def test_ground_truth_is_perfect_once_there_are_forty() -> None:
         assert result[f"{name}_r11"] == result[f"{name}_r40"] == 1.0
     assert math.isnan(result["pedestrian_2d_easy_r40"])
     assert result["ap_3d_moderate"] == 1.0
+
+
+@pytest.mark.parametrize("cars", [1, 2, 3, 17, 40, 41])
+@pytest.mark.parametrize("kind", [KittiEvaluator, NearCars])
+def test_the_ceiling_is_what_ground_truth_itself_comes_to(cars: int, kind: type[KittiEvaluator[Any]]) -> None:
+    evaluator = kind(lambda labels: labels)
+    for number in range(cars):
+        evaluator.update([CAR], [replace(CAR, score=1 - number / 100)])
+    ceilings = evaluator.ceilings()
+    assert ceilings == {name: value for name, value in evaluator.result().items() if value < 1}
+    figure = "car_bev_moderate_r40"
+    assert ceilings.get(figure, 1.0) == pytest.approx((cars - 1) / 40)
 
 
 def test_half_found_is_half_as_good() -> None:

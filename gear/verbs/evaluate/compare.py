@@ -97,7 +97,10 @@ def _figures(scorer: Scorer, notes: Sequence[Note], seed: int, resamples: int) -
     figures = {}
     for report, fresh in scorer.makers.items():
         one = gather(fresh, [note.parts[report] for note in notes], draws)
-        figures[report] = {n: Estimate(value=v, interval=one.interval(n)) for n, v in one.overall.items()}
+        figures[report] = {
+            name: Estimate(value=value, interval=one.interval(name), ceiling=one.ceilings.get(name, 1.0))
+            for name, value in one.overall.items()
+        }
     return figures
 
 

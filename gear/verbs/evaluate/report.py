@@ -16,15 +16,18 @@ class Estimate:
     Attributes:
         value: NaN where nothing counts.
         interval: bounds by bootstrap over samples, or None.
+        ceiling: what perfect predictions of the same samples would come to, for figures that count up to 1.
     """
 
     value: float
     interval: tuple[float, float] | None = None
+    ceiling: float = 1.0
 
     def as_json(self) -> Json:
-        """null for NaN."""
+        """null for NaN; the ceiling is left out where it is 1."""
         low, high = self.interval or (None, None)
-        return {"value": self.value if self.value == self.value else None, "low": low, "high": high}
+        value = {"value": self.value if self.value == self.value else None, "low": low, "high": high}
+        return value | ({"ceiling": self.ceiling} if self.ceiling < 1 else {})
 
 
 Figures = Mapping[str, Mapping[str, Estimate]]

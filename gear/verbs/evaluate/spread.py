@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gear.contracts.evaluation import Draws, Resampled
+from gear.contracts.evaluation import Draws, Limited, Resampled
 from gear.contracts.tasks import Evaluator
 from gear.values.rng import derive_rng
 
@@ -35,10 +35,12 @@ class Figures:
     Attributes:
         overall: over all samples.
         spread: (R,) over resampled ones, for the figures that have any.
+        ceilings: what perfect predictions would come to, where that is less than 1.
     """
 
     overall: Mapping[str, float]
     spread: Mapping[str, Values]
+    ceilings: Mapping[str, float]
 
     def interval(self, name: str) -> tuple[float, float] | None:
         """Bounds of 95 %, or None where there is nothing to tell."""
@@ -62,19 +64,19 @@ def gather(fresh: Callable[[], AnyEvaluator], parts: Sequence[AnyEvaluator], dra
     for part in parts:
         whole.merge(part)
     overall = dict(whole.result())
+    ceilings = dict(whole.ceilings()) if isinstance(whole, Limited) else {}
     if not draws.size:
-        return Figures(overall=overall, spread={})
+        return Figures(overall=overall, spread={}, ceilings=ceilings)
     if isinstance(whole, Resampled):
-        return Figures(overall=overall, spread=dict(whole.resampled(draws)))
+        return Figures(overall=overall, spread=dict(whole.resampled(draws)), ceilings=ceilings)
     rows = []
     for drawn in draws:
         one = fresh()
         for index in drawn:
             one.merge(parts[index])
         rows.append(one.result())
-    return Figures(
-        overall=overall, spread={name: np.array([row.get(name, np.nan) for row in rows]) for name in overall}
-    )
+    spread = {name: np.array([row.get(name, np.nan) for row in rows]) for name in overall}
+    return Figures(overall=overall, spread=spread, ceilings=ceilings)
 
 
 def bounds(values: Values) -> tuple[float, float] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 
 from gear.verbs.evaluate.report import Difference, Estimate, EvaluateReport, RowReport
@@ -27,7 +28,7 @@ def table(report: EvaluateReport) -> str:
     guarded = report.facts["defense"]
     title = f"{report.facts['task']['name']}: {report.facts['model']['name']}"
     title += f" guarded by {guarded['name']}" if guarded else ""
-    return "\n".join([title, *text, *_paired(report), *_absent(report)]) + "\n"
+    return "\n".join([title, *text, *_paired(report), *_limited(report, columns), *_absent(report)]) + "\n"
 
 
 def _columns(report: EvaluateReport) -> list[tuple[str, str]]:
@@ -85,15 +86,39 @@ def _number(value: float | None, *, is_signed: bool = False) -> str:
     return f"{value:{sign}.3f}" if abs(value) < 100 else f"{value:{sign}.1f}"
 
 
+def _limited(report: EvaluateReport, columns: Iterable[tuple[str, str]]) -> list[str]:
+    """Columns in which not even perfect predictions would come to 1, because a dataset has too little to be found."""
+    rows = [(row.name, row.figures) for row in report.rows]
+    rows += [(f"all with patch {pooled.patch}", pooled.figures) for pooled in report.together]
+    lines = []
+    for name, figures in rows:
+        known = [(column, figures.get(column[0], {}).get(column[1])) for column in columns]
+        low = [f"{_title(*column)} {_number(one.ceiling)}" for column, one in known if one and one.ceiling < 1]
+        lines += [f"perfect predictions would come to {', '.join(low)} in {name}"] if low else []
+    return lines
+
+
 def _absent(report: EvaluateReport) -> list[str]:
     """What had nothing to be measured on; rows and reports that agree share a line."""
     where: dict[tuple[str, ...], list[str]] = {}
     for row in report.rows:
         for name, figures in row.figures.items():
-            missing = tuple(figure for figure, one in figures.items() if one.value != one.value)
+            missing = _families([figure for figure, one in figures.items() if one.value != one.value], figures)
             if missing:
                 where.setdefault(missing, []).append(row.name if name == TASK else f"{row.name} ({name})")
     return [f"nothing to measure for {', '.join(missing)} in {', '.join(rows)}" for missing, rows in where.items()]
+
+
+def _families(missing: Sequence[str], every: Iterable[str]) -> tuple[str, ...]:
+    """The names, `cyclist_*` for several of one beginning of which none is there."""
+    there = {name.partition("_")[0] for name in set(every) - set(missing)}
+    heads = Counter(name.partition("_")[0] for name in missing)
+    short = [
+        head + "_*" if heads[head] > 1 and head not in there else name
+        for name in missing
+        if (head := name.partition("_")[0])
+    ]
+    return tuple(dict.fromkeys(short))
 
 
 def _aligned(cells: Sequence[Sequence[str]]) -> list[str]:

@@ -1,0 +1,39 @@
+"""What the table of an evaluation says beside its figures."""
+
+from pathlib import Path
+
+from gear.verbs.evaluate.report import Estimate, EvaluateReport, RowReport
+from gear.verbs.evaluate.table import table
+
+NAN = float("nan")
+
+
+def report(figures: dict[str, Estimate]) -> EvaluateReport:
+    row = RowReport(
+        name="test-none-0123", dataset=Path("data"), facts={"patch": "none"}, samples=3, made=3, damaged=(),
+        figures={"task": figures}, cost={"model_s": 0.1, "defense_s": 0.0}, defense={}, per_sample=[],
+    )  # fmt: skip
+    facts = {"task": {"name": "stereo3d"}, "model": {"name": "odd"}, "defense": None}
+    return EvaluateReport(out=Path("out"), facts=facts, rows=(row,), together=(), differences=())
+
+
+def test_it_says_how_far_perfect_predictions_come_where_that_is_not_all_the_way() -> None:
+    figures = {"car_r11": Estimate(value=0.5), "car_r40": Estimate(value=0.05, ceiling=0.075)}
+    lines = table(report(figures)).splitlines()
+    assert lines[-1] == "perfect predictions would come to car_r40 0.075 in test-none-0123"
+    assert not any("perfect" in line for line in table(report({"car_r11": Estimate(value=0.5)})).splitlines())
+
+
+def test_figures_of_one_beginning_without_any_value_are_named_once() -> None:
+    figures = {
+        "car_r40": Estimate(value=0.5), "car_r11": Estimate(value=NAN), "bus_r40": Estimate(value=NAN),
+        "van_r11": Estimate(value=NAN), "van_r40": Estimate(value=NAN),
+    }  # fmt: skip
+    assert table(report(figures)).splitlines()[-1] == (
+        "nothing to measure for car_r11, bus_r40, van_* in test-none-0123"
+    )
+
+
+def test_a_ceiling_is_written_where_there_is_one() -> None:
+    assert Estimate(value=0.05, ceiling=0.075).as_json() == {"value": 0.05, "low": None, "high": None, "ceiling": 0.075}
+    assert "ceiling" not in Estimate(value=0.05).as_json()
