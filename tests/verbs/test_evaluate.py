@@ -11,7 +11,7 @@ import json
 import sys
 import types
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
@@ -423,6 +423,23 @@ def test_bad_input_is_refused_before_anything_is_built(tmp_path: Path, small: Sm
         with pytest.raises(kind, match=message):
             evaluate(arguments.pop("data"), **arguments)
     assert not (tmp_path / "x").exists()
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraConfig(Config):
+    hfov_deg: float = 90.0
+    baseline_m: float = 0.54
+
+
+def test_a_model_that_reckons_with_another_camera_is_refused(tmp_path: Path, small: Small, install: Install) -> None:
+    data = small("stereo3d")
+    install(replace(model_spec(lambda _: Oracle([data]), "stereo3d"), config=CameraConfig))
+    for name, value, taken in (("baseline_m", "0.3", "0.54"), ("hfov_deg", "60", "90")):
+        message = f"collected with {name} {taken}, but model 'odd' reckons with {value}; say --set {name}={taken}"
+        with pytest.raises(GearError, match=message):
+            evaluate(data, model="odd", settings=[f"{name}={value}"], out=tmp_path / "x")
+    assert not (tmp_path / "x").exists()
+    assert evaluate(data, model="odd", out=tmp_path / "x", resamples=0).rows[0].samples == 2
 
 
 def boom(views: Views) -> Any:

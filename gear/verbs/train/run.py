@@ -18,6 +18,7 @@ from gear.plugins.build import blamed, find
 from gear.plugins.catalogue import Found
 from gear.values.errors import GearError
 from gear.values.serial import Json
+from gear.verbs.evaluate.choice import Chosen, check_camera
 from gear.verbs.look import look_of
 from gear.verbs.train.adversary import Adversary
 from gear.verbs.train.config import TrainConfig, read_config
@@ -124,6 +125,8 @@ def train(
     training, validation = _samples(_listed(data), _listed(val), task, config, allow_test_data)
     spec = task_found.spec
     assert isinstance(spec, TaskSpec)
+    for dataset in (*training.datasets, *validation.datasets):
+        check_camera(Chosen(found=found, options=config.options), dataset, "--set options.")
     share = picture_share(training, spec)
     config = with_scale(found, config, share)
     root = Path(out)

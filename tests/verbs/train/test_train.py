@@ -256,6 +256,20 @@ def test_weights_say_at_which_share_of_the_tasks_own_pictures_they_work(
     }
 
 
+@dataclass(frozen=True, kw_only=True)
+class CameraConfig(TinyConfig):
+    """Knows its pictures' camera."""
+
+    hfov_deg: float = 90.0
+
+
+def test_a_network_that_reckons_with_another_camera_is_refused(street: Street, tmp_path: Path, install: Any) -> None:
+    install(replace(tiny_segmenter, config=CameraConfig))
+    with pytest.raises(GearError, match=r"collected with hfov_deg 90, .* 60; say --set options.hfov_deg=90"):
+        quick(street, tmp_path / "out", settings=["options.hfov_deg=60"])
+    assert not (tmp_path / "out").exists()
+
+
 class Overflowing(TinySegmenter):
     """Its loss is no number."""
 
