@@ -27,7 +27,7 @@ def table(report: EvaluateReport) -> str:
     guarded = report.facts["defense"]
     title = f"{report.facts['task']['name']}: {report.facts['model']['name']}"
     title += f" guarded by {guarded['name']}" if guarded else ""
-    return "\n".join([title, *text, *_paired(report), *_absent(report)]) + "\n"
+    return "\n".join([title, *text, *_paired(report), *_absent(report), *report.facts.get("notes", [])]) + "\n"
 
 
 def _columns(report: EvaluateReport) -> list[tuple[str, str]]:

@@ -250,6 +250,7 @@ def test_weights_say_at_which_share_of_the_tasks_own_pictures_they_work(
         return found
 
     assert options("a") == {"input_scale": 128 / 2048} and set(seen) == {1.0}
+    assert "0.0625 times as wide" in (card := (tmp_path / "a" / "card.md").read_text()) and "input_scale=1`" in card
     assert options("b", settings=["options.input_scale=0.5", "options.width=4"]) == {
         "input_scale": 0.5 * 128 / 2048,
         "width": 4,
