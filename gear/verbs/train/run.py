@@ -27,7 +27,7 @@ from gear.verbs.train.data import TRAINING, VALIDATION, Samples, all_of, keep_so
 from gear.verbs.train.feed import Cache, Feed
 from gear.verbs.train.loop import Parts, Training, Watch
 from gear.verbs.train.results import WEIGHTS, Origin, command_of, figures_of, keep_weights, known, write_history
-from gear.verbs.train.starting import begin_with, build_network, picture_share, with_scale
+from gear.verbs.train.starting import begin_with, build_network, check_options, picture_share, with_scale
 
 GIGABYTE = 1e9
 CHANGE_NOTHING = ("workers", "cache_gb", "device")
@@ -122,6 +122,7 @@ def train(
     found, task_found = find("model", model), find("task", task)
     recipe = trainable(found, task)
     config = read_config(recipe, given, settings)
+    check_options(found, config)
     training, validation = _samples(_listed(data), _listed(val), task, config, allow_test_data)
     spec = task_found.spec
     assert isinstance(spec, TaskSpec)

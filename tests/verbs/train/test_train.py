@@ -271,6 +271,12 @@ def test_a_network_that_reckons_with_another_camera_is_refused(street: Street, t
     assert not (tmp_path / "out").exists()
 
 
+def test_what_the_training_sets_is_no_option(street: Street, tmp_path: Path, install: Any) -> None:
+    with pytest.raises(GearError, match=r"options.seed is set by the training; say it with --seed"):
+        quick(street, tmp_path / "out", settings=["options.seed=3"])
+    assert not (tmp_path / "out").exists()
+
+
 class Overflowing(TinySegmenter):
     """Its loss is no number."""
 
