@@ -12,6 +12,8 @@ from gear.values.errors import FieldError
 from gear.values.frames import UInt8Image
 
 LEVELS = np.arange(256, dtype=np.float32) / 255
+MOST_BLUR_PX = 100.0
+"""Nothing is left of a picture long before, and the time of a blur grows with it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,6 +60,8 @@ class Colours:
         for name in ("gamma", "noise_levels", "blur_px"):
             if getattr(self, name) < 0:
                 raise FieldError(name, f"must not be negative, got {getattr(self, name):g}")
+        if self.blur_px > MOST_BLUR_PX:
+            raise FieldError("blur_px", f"must be at most {MOST_BLUR_PX:g}, got {self.blur_px:g}")
         if not 1 <= self.jpeg_quality <= 100:
             raise FieldError("jpeg_quality", f"must be 1 to 100, got {self.jpeg_quality}")
 

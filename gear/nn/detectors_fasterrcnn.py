@@ -50,7 +50,7 @@ class FasterRcnnDetector(Detector):
         (proposals,) = self._proposals(trunk)
         logits, deltas = self._box_heads(trunk, [proposals])
         missing = graph.rpn.post_nms_top_n() - len(proposals)
-        nothing = torch.zeros_like(logits[:1])
+        nothing = logits.new_zeros(1, logits.shape[1])  # there may be no proposal at all
         nothing[:, 0] = SURE_BACKGROUND
         shrinkage = self.shrinkage(size_of(picture))
         return {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -50,6 +51,20 @@ def open_folder(options: FolderOptions, auto: str) -> nn.Module:
     if options.weights not in (FOLDER, NONE):
         load_into(graph, options.weights)
     return graph
+
+
+def start_from(folder_network: Any, auto: str) -> None:
+    """Puts the folder's own weights into a network of that folder, whatever it was built with: `--init folder`.
+
+    Args:
+        folder_network: a `gear.nn.huggingface.FolderNetwork`.
+        auto: as for `open_folder`.
+
+    Raises:
+        GearError: the folder has none that fit.
+    """
+    graph = open_folder(dataclasses.replace(folder_network.options, weights=FOLDER), auto)
+    folder_network.module().load_state_dict(graph.state_dict())
 
 
 def _opened(options: FolderOptions, auto: str) -> tuple[nn.Module, Mapping[str, Any]]:

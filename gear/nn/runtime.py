@@ -61,7 +61,13 @@ def autocast(device: torch.device, precision: Literal["float32", "bfloat16"]) ->
 
 @contextlib.contextmanager
 def seeded(seed: int) -> Iterator[None]:
-    """Layers made inside draw their first weights from `seed`; torch's own generators are as before afterwards."""
+    """Layers made inside draw their first weights from `seed`; torch's own generators are as before afterwards.
+
+    Raises:
+        GearError: torch has no such seed.
+    """
+    if not -(2**63) <= seed < 2**64:
+        raise GearError(f"seed {seed} is beyond what torch takes (-2^63 to 2^64 - 1); take a smaller one")
     with torch.random.fork_rng(devices=range(torch.cuda.device_count())):
         torch.manual_seed(seed)
         yield

@@ -113,7 +113,8 @@ def test_a_stranger_may_say_how(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(("kind", "values"), [(Augmentation, {"flip": 1.5}), (Colours, {"brightness": 1.0}),
-                                              (Colours, {"jpeg_quality": 0}), (Colours, {"gamma": -1.0})])  # fmt: skip
+                                              (Colours, {"blur_px": 1e9}), (Colours, {"jpeg_quality": 0}),
+                                              (Colours, {"gamma": -1.0})])  # fmt: skip
 def test_what_makes_no_sense_is_refused(kind: Any, values: dict[str, float]) -> None:
     with pytest.raises(FieldError, match=next(iter(values))):
         kind(**values)

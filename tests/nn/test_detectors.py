@@ -335,3 +335,13 @@ def test_options_that_make_no_sense(options: dict[str, float]) -> None:
         retinanet_r18.config(**options)
     with pytest.raises(FieldError):
         OfficialDetectorOptions(max_size_px=0)
+
+
+def test_a_picture_without_any_proposal_has_no_detections() -> None:
+    options = OfficialDetectorOptions(weights="none", device="cpu", min_size_px=64, max_size_px=128)
+    model: Any = fasterrcnn_plugin.fasterrcnn.build(options)
+    model.graph.rpn.score_thresh = 2.0  # as where a training came apart: no proposal is finite
+    (sample,) = street_samples(128, 64, count=1)
+    outputs = model.forward(as_batch([sample.images], ("left",)))
+    assert not outputs["proposals_px"].any() and len(outputs["class_logits"][0]) == model.graph.rpn.post_nms_top_n()
+    assert model.predict(sample.images) == ()

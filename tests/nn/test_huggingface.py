@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -120,3 +121,12 @@ def test_other_weights_than_the_folders(tmp_path: Path) -> None:
     options = FolderOptions(folder=folder, weights=str(tmp_path / "trained.safetensors"), device="cpu")
     trained: Any = semseg.build(options)
     assert all(torch.equal(value, first[name]) for name, value in trained.module().state_dict().items())
+
+
+@pytest.mark.parametrize(("spec", "network"), [(semseg, segformer), (depth, glpn), (detect2d, yolos)])
+def test_a_training_can_begin_with_the_folders_own_weights(spec: Any, network: Any, tmp_path: Path) -> None:
+    options = spec.config(folder=str(saved(network, tmp_path)), device="cpu")
+    own, other = spec.build(options).module().state_dict(), spec.build(replace(options, weights="none"))
+    assert any(not torch.equal(value, own[key]) for key, value in other.module().state_dict().items())
+    spec.starts["folder"](other)
+    assert all(torch.equal(value, own[key]) for key, value in other.module().state_dict().items())

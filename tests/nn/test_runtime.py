@@ -6,7 +6,8 @@ import sys
 import pytest
 import torch
 
-from gear.nn.runtime import autocast
+from gear.nn.runtime import autocast, seeded
+from gear.values.errors import GearError
 
 
 @pytest.mark.parametrize(("before", "after"), [(1, 1), (64, None)])
@@ -27,3 +28,10 @@ def test_precision_is_half_only_where_asked_for() -> None:
         assert (a @ a).dtype == torch.float32
     with autocast(torch.device("cpu"), "bfloat16"):
         assert (a @ a).dtype == torch.bfloat16
+
+
+def test_a_seed_that_torch_does_not_have_is_said() -> None:
+    with seeded(2**64 - 1):
+        pass
+    with pytest.raises(GearError, match="seed 18446744073709551616 is beyond what torch takes"), seeded(2**64):
+        pass

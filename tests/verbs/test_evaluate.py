@@ -8,10 +8,11 @@ import hashlib
 import importlib
 import io
 import json
+import re
 import sys
 import types
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+import torch
 
 import gear
 from gear.cli.main import main
@@ -26,11 +28,12 @@ from gear.contracts.defenses import DefenseResult
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import DefenseSpec, ModelSpec
 from gear.formats.kitti_object import parse_labels
+from gear.nn.weights import write as write_weights
 from gear.plugins import build as building
 from gear.plugins.manager import discover
 from gear.testing.tiny_networks import tiny_depth, tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
-from gear.values.errors import ConfigError, DatasetError, GearError, PluginError, UnknownNameError
+from gear.values.errors import ConfigError, DatasetError, FieldError, GearError, PluginError, UnknownNameError
 from gear.values.frames import UInt8Image
 from gear.verbs.collect.run import collect
 from gear.verbs.evaluate.patch_area import patch_masks
@@ -428,6 +431,55 @@ def test_bad_input_is_refused_before_anything_is_built(tmp_path: Path, small: Sm
         with pytest.raises(kind, match=message):
             evaluate(arguments.pop("data"), **arguments)
     assert not (tmp_path / "x").exists()
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraConfig(Config):
+    hfov_deg: float = 90.0
+    baseline_m: float = 0.54
+
+
+def test_a_model_that_reckons_with_another_camera_is_refused(tmp_path: Path, small: Small, install: Install) -> None:
+    data = small("stereo3d")
+    install(replace(model_spec(lambda _: Oracle([data]), "stereo3d"), config=CameraConfig))
+    for name, value, taken in (("baseline_m", "0.3", "0.54"), ("hfov_deg", "60", "90")):
+        message = f"collected with {name} {taken}, but model 'odd' reckons with {value}; say --set {name}={taken}"
+        with pytest.raises(GearError, match=message):
+            evaluate(data, model="odd", settings=[f"{name}={value}"], out=tmp_path / "x")
+    assert not (tmp_path / "x").exists()
+    assert evaluate(data, model="odd", out=tmp_path / "x", resamples=0).rows[0].samples == 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScaledConfig(Config):
+    weights: str = "none"
+    input_scale: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.input_scale is not None and self.input_scale > 4:
+            raise FieldError("input_scale", "is too large")
+
+
+@pytest.mark.parametrize(
+    ("said", "remedy"), [(0.25, "sees them at 80 px; it learnt from 512 px, .* smaller .* --set input_scale=1.6 shows"),
+                         (0.75, "collect larger ones")]
+)  # fmt: skip
+def test_pictures_of_another_size_than_the_weights_are_for_are_noted(
+    tmp_path: Path, small: Small, install: Install, said: float, remedy: str
+) -> None:
+    data, weights = small("semseg"), tmp_path / "net.safetensors"
+    write_weights(weights, {"bias": torch.zeros(1)}, {"options": json.dumps({"input_scale": said})})
+    install(replace(model_spec(lambda _: Oracle([data]), "semseg"), config=ScaledConfig))
+
+    def notes(out: str, *settings: str) -> list[str]:
+        evaluate(data, model="odd", settings=settings, out=tmp_path / out, resamples=0)
+        found: list[str] = json.loads((tmp_path / out / "results.json").read_text())["notes"]
+        assert all(note in (tmp_path / out / "table.txt").read_text() for note in found)
+        return found
+
+    (note,) = notes("weights", f"weights={weights}")
+    assert re.search(remedy, note) and str(data) in note
+    assert notes("none") == notes("given", f"weights={weights}", "input_scale=1") == []
 
 
 def boom(views: Views) -> Any:

@@ -46,7 +46,7 @@ fasterrcnn: ModelSpec[OfficialDetectorOptions] = ModelSpec(
     tasks=("detect2d",),
     views=("left",),
     taps=("layer1", "layer2", "layer3", "layer4"),
-    recipe=Recipe(optimiser="sgd", learning_rate=5e-3, weight_decay=1e-4, batch=4, epochs=12),
+    recipe=Recipe(optimiser="sgd", learning_rate=5e-3, weight_decay=1e-4, batch=4, epochs=12, gradient_norm=10.0),
     published=(
         PublishedWeights(
             data="COCO 2017, 91 outputs (box mAP 37.0)",

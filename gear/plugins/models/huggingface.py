@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from gear.contracts.hookspecs import hookimpl
@@ -12,6 +13,11 @@ from gear.nn.huggingface_options import DepthFolderOptions, DetectorFolderOption
 if TYPE_CHECKING:
     from gear.nn.huggingface import FolderDepth, FolderDetector, FolderSegmenter
 
+SEGMENTER = "AutoModelForSemanticSegmentation"
+DEPTH = "AutoModelForDepthEstimation"
+DETECTOR = "AutoModelForObjectDetection"
+"""Classes of transformers that open the three kinds."""
+
 NORMALISATION = "as the folder's image processor says, ImageNet's without one"
 RECIPE = Recipe(learning_rate=6e-5, weight_decay=1e-2, batch=8, epochs=20, gradient_norm=1.0)
 
@@ -21,7 +27,7 @@ def build_semseg(options: FolderOptions) -> FolderSegmenter:
     from gear.nn.huggingface import FolderSegmenter
     from gear.nn.huggingface_folder import open_folder
 
-    return FolderSegmenter(open_folder(options, "AutoModelForSemanticSegmentation"), options)
+    return FolderSegmenter(open_folder(options, SEGMENTER), options)
 
 
 def build_depth(options: DepthFolderOptions) -> FolderDepth:
@@ -29,7 +35,7 @@ def build_depth(options: DepthFolderOptions) -> FolderDepth:
     from gear.nn.huggingface import FolderDepth
     from gear.nn.huggingface_folder import open_folder
 
-    return FolderDepth(open_folder(options, "AutoModelForDepthEstimation"), options)
+    return FolderDepth(open_folder(options, DEPTH), options)
 
 
 def build_detect2d(options: DetectorFolderOptions) -> FolderDetector:
@@ -37,7 +43,18 @@ def build_detect2d(options: DetectorFolderOptions) -> FolderDetector:
     from gear.nn.huggingface import FolderDetector
     from gear.nn.huggingface_folder import open_folder
 
-    return FolderDetector(open_folder(options, "AutoModelForObjectDetection"), options)
+    return FolderDetector(open_folder(options, DETECTOR), options)
+
+
+def _start(auto: str) -> Mapping[str, Callable[[Any], None]]:
+    """`gear train --init folder`: go on from the folder's own weights."""
+
+    def begin(model: Any) -> None:
+        from gear.nn.huggingface_folder import start_from
+
+        start_from(model, auto)
+
+    return {"folder": begin}
 
 
 COMMON: dict[str, Any] = {
@@ -52,6 +69,7 @@ semseg: ModelSpec[FolderOptions] = ModelSpec(
     summary="Any semantic segmentation network of transformers from a local folder: SegFormer, UPerNet, BEiT.",
     config=FolderOptions,
     build=build_semseg,
+    starts=_start(SEGMENTER),
     tasks=("semseg",),
     **COMMON,
 )
@@ -61,6 +79,7 @@ depth: ModelSpec[DepthFolderOptions] = ModelSpec(
     summary="Any depth network of transformers from a local folder: GLPN, Depth Anything, DPT, ZoeDepth.",
     config=DepthFolderOptions,
     build=build_depth,
+    starts=_start(DEPTH),
     tasks=("depth",),
     **COMMON,
 )
@@ -70,6 +89,7 @@ detect2d: ModelSpec[DetectorFolderOptions] = ModelSpec(
     summary="Any object detector of transformers from a local folder: DETR, RT-DETR, YOLOS.",
     config=DetectorFolderOptions,
     build=build_detect2d,
+    starts=_start(DETECTOR),
     tasks=("detect2d",),
     **COMMON,
 )

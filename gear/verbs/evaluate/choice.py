@@ -21,6 +21,9 @@ from gear.values.serial import Json
 OUTSIDE_PATCH = "outside_patch"
 """The task's own figures with the ground truth on and next to the patch left out."""
 
+CAMERA = ("hfov_deg", "baseline_m")
+"""Options that a model shares with its task, because pictures do not say them."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Chosen:
@@ -73,6 +76,28 @@ def check_model(model: Chosen, dataset: Dataset[Any]) -> None:
     missing = [name for name in spec.views if name not in cameras]
     if missing:
         raise GearError(f"model {spec.name!r} looks at {', '.join(missing)}, which {dataset.root} does not have")
+    check_camera(model, dataset)
+
+
+def check_camera(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> None:
+    """Whether the model reckons with the camera that took the pictures: with another one, metres come out wrong.
+
+    Args:
+        model: with its options.
+        dataset: whose options say how it was collected.
+        flag: how the user sets one of the model's options.
+
+    Raises:
+        GearError: it does not.
+    """
+    config = read_node(model.found.spec.config, model.options, "")
+    for name in CAMERA:
+        assumed, taken = getattr(config, name, None), dataset.plan.options.get(name)
+        if assumed is not None and taken is not None and assumed != taken:
+            raise GearError(
+                f"{dataset.root} was collected with {name} {taken:g}, but model {model.found.spec.name!r} reckons with "
+                f"{assumed:g}; say {flag}{name}={taken:g}"
+            )
 
 
 def check_defense(defense: Chosen, model: Chosen, task: str, *, is_calibrated: bool) -> None:

@@ -162,7 +162,7 @@ class EvaluateReport:
 
     Attributes:
         out: folder of results.json, table.txt and the predictions.
-        facts: model, defense, task, seed, versions; JSON.
+        facts: model, defense, task, seed, versions, notes for whoever reads the figures; JSON.
         rows: the datasets, in the order given.
         together: datasets that differ in more than their patch, by the patch's label.
         differences: between twins.

@@ -34,6 +34,7 @@ from gear.verbs.evaluate.player import Player
 from gear.verbs.evaluate.report import EvaluateReport
 from gear.verbs.evaluate.row import evaluate_row
 from gear.verbs.evaluate.scoring import Scorer
+from gear.verbs.evaluate.shown_size import size_note
 from gear.verbs.evaluate.table import table
 
 Progress = Callable[[int, int], None]
@@ -133,9 +134,11 @@ def evaluate(
         rows.append(
             Measured(name=name, dataset=dataset, scorer=scorer, notes=row.notes, made=row.made, damaged=row.damaged)
         )
+    notes = [note for note in (size_note(chosen, dataset) for dataset in datasets) if note]
+    more = {"reports": list(reports), "resamples": resamples, "versions": _versions(player), "notes": notes}
     found = EvaluateReport(
         out=root,
-        facts=facts | {"reports": list(reports), "resamples": resamples, "versions": _versions(player)},
+        facts=facts | more,
         rows=tuple(row_report(row, seed, resamples) for row in rows),
         together=tuple(together(rows, seed, resamples)),
         differences=tuple(compared(rows, seed, resamples)),

@@ -28,7 +28,8 @@ def table(report: EvaluateReport) -> str:
     guarded = report.facts["defense"]
     title = f"{report.facts['task']['name']}: {report.facts['model']['name']}"
     title += f" guarded by {guarded['name']}" if guarded else ""
-    return "\n".join([title, *text, *_paired(report), *_limited(report, columns), *_absent(report)]) + "\n"
+    notes = [*_paired(report), *_limited(report, columns), *_absent(report), *report.facts.get("notes", [])]
+    return "\n".join([title, *text, *notes]) + "\n"
 
 
 def _columns(report: EvaluateReport) -> list[tuple[str, str]]:

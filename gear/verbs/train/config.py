@@ -15,6 +15,9 @@ from gear.config.reader import read_node
 from gear.contracts.models import Recipe
 from gear.values.errors import FieldError
 
+SCALES, CROPS_PX = (0.1, 100.0), (16, 8192)
+"""Beyond these, windows and pictures need more memory than there is."""
+
 SHARES = ("warm_up", "final_rate", "validation_share")
 
 
@@ -105,10 +108,10 @@ class TrainConfig(Recipe):
             raise FieldError("learning_rate", f"must be above 0, got {self.learning_rate:g}")
         if not 0 <= self.ema < 1:
             raise FieldError("ema", f"must be 0 or more and below 1, got {self.ema:g}")
-        if not 0 < self.scales[0] <= self.scales[1]:
-            raise FieldError("scales", f"must be a range above 0, got {self.scales}")
-        if self.crop_px is not None and min(self.crop_px) < 16:
-            raise FieldError("crop_px", f"must be at least 16 px a side, got {self.crop_px}")
+        if not SCALES[0] <= self.scales[0] <= self.scales[1] <= SCALES[1]:
+            raise FieldError("scales", f"must be a range in {SCALES[0]:g} to {SCALES[1]:g}, got {self.scales}")
+        if self.crop_px is not None and not CROPS_PX[0] <= min(self.crop_px) <= max(self.crop_px) <= CROPS_PX[1]:
+            raise FieldError("crop_px", f"must be {CROPS_PX[0]} to {CROPS_PX[1]} px a side, got {self.crop_px}")
 
     @property
     def framing(self) -> Framing:

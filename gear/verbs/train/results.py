@@ -157,6 +157,7 @@ def card(root: Path, origin: Origin, progress: Progress) -> str:
         f"- {progress.step} steps in {progress.elapsed_s / 60:.1f} minutes; the weights are those after step "
         f"{progress.best_step}",
         f"- look of the data: `{origin.look.hash}`",
+        *_size_lines(origin),
         "",
         "## Training data",
         "",
@@ -179,6 +180,19 @@ def card(root: Path, origin: Origin, progress: Progress) -> str:
         "",
     ]
     return "\n".join(lines)
+
+
+def _size_lines(origin: Origin) -> list[str]:
+    """How weights are used on pictures like those that they learnt from, where these are not of the task's own size."""
+    given = origin.config.options
+    scale = read_node(origin.model.spec.config, given, "options") if isinstance(given, Mapping) else None
+    seen = getattr(scale, SCALE, None)
+    if seen is None or origin.picture_share == 1:
+        return []
+    return [
+        f"- pictures {origin.picture_share:g} times as wide as the task's own: on such pictures use these weights with "
+        f"`--set {SCALE}={seen:g}`, on the task's own as they are"
+    ]
 
 
 def _size(crop_px: tuple[int, int] | None) -> str:

@@ -18,6 +18,7 @@ from gear.plugins.build import blamed, find
 from gear.plugins.catalogue import Found
 from gear.values.errors import GearError
 from gear.values.serial import Json
+from gear.verbs.evaluate.choice import Chosen, check_camera
 from gear.verbs.look import look_of
 from gear.verbs.train.adversary import Adversary
 from gear.verbs.train.config import TrainConfig, read_config
@@ -26,7 +27,7 @@ from gear.verbs.train.data import TRAINING, VALIDATION, Samples, all_of, keep_so
 from gear.verbs.train.feed import Cache, Feed
 from gear.verbs.train.loop import Parts, Training, Watch
 from gear.verbs.train.results import WEIGHTS, Origin, command_of, figures_of, keep_weights, known, write_history
-from gear.verbs.train.starting import begin_with, build_network, picture_share, with_scale
+from gear.verbs.train.starting import begin_with, build_network, check_options, picture_share, with_scale
 
 GIGABYTE = 1e9
 CHANGE_NOTHING = ("workers", "cache_gb", "device")
@@ -121,9 +122,12 @@ def train(
     found, task_found = find("model", model), find("task", task)
     recipe = trainable(found, task)
     config = read_config(recipe, given, settings)
+    check_options(found, config)
     training, validation = _samples(_listed(data), _listed(val), task, config, allow_test_data)
     spec = task_found.spec
     assert isinstance(spec, TaskSpec)
+    for dataset in (*training.datasets, *validation.datasets):
+        check_camera(Chosen(found=found, options=config.options), dataset, "--set options.")
     share = picture_share(training, spec)
     config = with_scale(found, config, share)
     root = Path(out)

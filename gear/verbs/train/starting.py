@@ -23,6 +23,24 @@ SCALE = "input_scale"
 """Option of many networks: at which share of the picture's size they run; null leaves it to the weights."""
 
 
+FLAGS = {"weights": "--init", "seed": "--seed", "device": "--device", "precision": "--precision"}
+"""Options of a network that the training gives it, and what says them."""
+
+
+def check_options(found: Found, config: TrainConfig) -> None:
+    """Whether the network's options are left to the training where the training sets them: weights that were slipped in
+    here would be noted as random ones, and a precision would hold for validation, too.
+
+    Raises:
+        GearError: one of them is given.
+    """
+    fields = {field.name for field in dataclasses.fields(found.spec.config)}
+    given = config.options.entries if isinstance(config.options, Mapping) else {}
+    for name, flag in FLAGS.items():
+        if name in fields and name in given:
+            raise GearError(f"options.{name} is set by the training; say it with {flag}")
+
+
 def picture_share(samples: Samples, spec: TaskSpec[Any]) -> float:
     """Width of the pictures as a share of the width that the task has by itself; 1 where there is no saying."""
     usual = getattr(spec.config(), "width_px", None)
@@ -57,8 +75,7 @@ def build_network(found: Found, config: TrainConfig, *, precision: str) -> Any:
     options = config.options
     place = Place("gear train")
     for name, text in wanted.items():
-        is_given = isinstance(options, Mapping) and name in options.entries
-        if name in fields and not is_given:
+        if name in fields:
             options = with_value(options, (name,), Scalar(text, False, place))
     with seeded(config.seed):  # for those that draw their weights from torch's own generator
         return build(found, options)

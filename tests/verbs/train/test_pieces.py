@@ -85,7 +85,17 @@ def test_settings_go_before_flags_and_flags_before_the_recipe() -> None:
     assert read_config(recipe, {}, ["crop_px=null"]).crop_px is None
     with pytest.raises(ConfigError, match=r"^--lr: .*expected float, got 'nan'"):
         read_config(Recipe(), {"learning_rate": math.nan})
-    for setting in ("batch=0", "ema=1", "scales=[2, 1]", "learning_rate=0", "warm_up=1", "precision=int8"):
+    for setting in (
+        "batch=0",
+        "ema=1",
+        "scales=[2, 1]",
+        "scales=[1e-9, 1]",
+        "scales=[1, 1e9]",
+        "crop_px=[64, 99999]",
+        "learning_rate=0",
+        "warm_up=1",
+        "precision=int8",
+    ):
         with pytest.raises(ConfigError, match=setting.split("=")[0]):
             read_config(recipe, {}, [setting])
 

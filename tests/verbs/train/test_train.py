@@ -250,10 +250,31 @@ def test_weights_say_at_which_share_of_the_tasks_own_pictures_they_work(
         return found
 
     assert options("a") == {"input_scale": 128 / 2048} and set(seen) == {1.0}
+    assert "0.0625 times as wide" in (card := (tmp_path / "a" / "card.md").read_text()) and "input_scale=1`" in card
     assert options("b", settings=["options.input_scale=0.5", "options.width=4"]) == {
         "input_scale": 0.5 * 128 / 2048,
         "width": 4,
     }
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraConfig(TinyConfig):
+    """Knows its pictures' camera."""
+
+    hfov_deg: float = 90.0
+
+
+def test_a_network_that_reckons_with_another_camera_is_refused(street: Street, tmp_path: Path, install: Any) -> None:
+    install(replace(tiny_segmenter, config=CameraConfig))
+    with pytest.raises(GearError, match=r"collected with hfov_deg 90, .* 60; say --set options.hfov_deg=90"):
+        quick(street, tmp_path / "out", settings=["options.hfov_deg=60"])
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_the_training_sets_is_no_option(street: Street, tmp_path: Path, install: Any) -> None:
+    with pytest.raises(GearError, match=r"options.seed is set by the training; say it with --seed"):
+        quick(street, tmp_path / "out", settings=["options.seed=3"])
+    assert not (tmp_path / "out").exists()
 
 
 class Overflowing(TinySegmenter):
