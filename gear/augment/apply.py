@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gear.augment.depth import cut_depth
-from gear.augment.geometry import draw_window
+from gear.augment.geometry import draw_window, whole_window
 from gear.augment.pictures import Colours, recolour
 from gear.augment.registry import geometry_of
 from gear.contracts.tasks import Sample, SampleT
@@ -52,6 +52,22 @@ class Framing:
     scales: tuple[float, float] = (1.0, 1.0)
 
 
+def shrunk(sample: SampleT, share: float) -> SampleT:
+    """The sample as a camera with fewer pixels would have taken it: its whole view at a share of its size.
+
+    Raises:
+        GearError: a third party's samples that nobody can move.
+    """
+    if share == 1:
+        return sample
+    geometry = geometry_of(sample)
+    if geometry is None:
+        raise GearError(f"{_immovable(sample)}; train with picture_scale=1")
+    height, width = next(iter(sample.images.values())).shape[:2]
+    small: SampleT = (geometry.shrink or geometry.cut)(sample, whole_window((height, width), share))
+    return small
+
+
 def augment(sample: SampleT, how: Augmentation, framing: Framing, rng: np.random.Generator) -> SampleT:
     """A new sample whose ground truth is as exact as the given one's.
 
@@ -74,10 +90,7 @@ def _moved(sample: Sample, how: Augmentation, framing: Framing, rng: np.random.G
     is_framed = framing.crop_px is not None or framing.scales != (1.0, 1.0)
     if geometry is None:
         if is_framed:
-            raise GearError(
-                f"{type(sample).__name__} cannot be cropped or resized: its package registers no geometry "
-                "(gear.augment.registry.register); train with crop_px=null and scales=[1, 1]"
-            )
+            raise GearError(f"{_immovable(sample)}; train with crop_px=null and scales=[1, 1]")
         return sample
     if rng.random() < how.flip:
         sample = geometry.flip(sample)
@@ -89,3 +102,10 @@ def _moved(sample: Sample, how: Augmentation, framing: Framing, rng: np.random.G
         window = draw_window(size_px, framing.crop_px or size_px, scale, rng, is_centred=geometry.is_centred)
         sample = geometry.cut(sample, window)
     return sample
+
+
+def _immovable(sample: Sample) -> str:
+    return (
+        f"{type(sample).__name__} cannot be cropped or resized: its package registers no geometry "
+        "(gear.augment.registry.register)"
+    )

@@ -39,6 +39,16 @@ def cut(sample: DepthSample, window: Window) -> DepthSample:
     )
 
 
+def shrink(sample: DepthSample, window: Window) -> DepthSample:
+    """What the window shows, as far away as it was: the same lens before fewer pixels."""
+    return replace(
+        sample,
+        images={name: cut_picture(picture, window) for name, picture in sample.images.items()},
+        surfaces=(),
+        depth_m=cut_map(sample.depth_m, window, np.nan),
+    )
+
+
 def cut_depth(sample: DepthSample, rng: np.random.Generator) -> DepthSample:
     """Vertical CutDepth: the true depth, as grey, in place of a band of columns of the picture.
 
@@ -60,4 +70,4 @@ def _with_band(picture: UInt8Image, depth_m: FloatImage, left: int, right: int) 
     return painted
 
 
-GEOMETRY: Geometry[DepthSample] = Geometry(flip=flip, cut=cut)
+GEOMETRY: Geometry[DepthSample] = Geometry(flip=flip, cut=cut, shrink=shrink)

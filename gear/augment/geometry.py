@@ -62,11 +62,27 @@ class Geometry(Generic[SampleT]):
         cut: what a window shows of it.
         is_centred: whether windows must share the picture's middle, because the ground truth needs a principal point
             that lies there.
+        shrink: what a camera with fewer pixels would have taken, from a window that is the whole picture; `cut` where
+            that is the same.
     """
 
     flip: Callable[[SampleT], SampleT]
     cut: Callable[[SampleT, Window], SampleT]
     is_centred: bool = False
+    shrink: Callable[[SampleT, Window], SampleT] | None = None
+
+
+def whole_window(size_px: tuple[int, int], share: float) -> Window:
+    """The whole of a picture of that height and width, shown at a share of its size."""
+    height, width = size_px
+    return Window(
+        left_px=0,
+        top_px=0,
+        width_px=width,
+        height_px=height,
+        out_width_px=max(1, round(share * width)),
+        out_height_px=max(1, round(share * height)),
+    )
 
 
 def draw_window(

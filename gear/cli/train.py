@@ -90,6 +90,7 @@ def run(args: argparse.Namespace) -> int:
             settings=args.settings,
             allow_test_data=args.allow_test_data,
             watch=bar,
+            noted=lambda text: print(f"gear: note: {text}", file=sys.stderr),
         )
     print(report.summary())
     return 0

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gear.augment.apply import Augmentation, Framing, augment
+from gear.augment.apply import Augmentation, Framing, augment, shrunk
 from gear.augment.geometry import Geometry, flip_array
 from gear.augment.pictures import Colours, recolour
 from gear.augment.registry import geometry_of, register
@@ -118,3 +118,27 @@ def test_a_stranger_may_say_how(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_what_makes_no_sense_is_refused(kind: Any, values: dict[str, float]) -> None:
     with pytest.raises(FieldError, match=next(iter(values))):
         kind(**values)
+
+
+@pytest.mark.parametrize("task", ["semseg", "depth", "detect2d"])
+def test_fewer_pixels_show_the_same_things_at_the_same_distance(task: str) -> None:
+    sample = sample_of(task)
+    assert shrunk(sample, 1) is sample
+    small = shrunk(sample, 0.5)
+    height, width = sample.images["left"].shape[:2]
+    assert small.images["left"].shape == (height // 2, width // 2, 3)
+    blocks = sample.images["left"].astype(float).reshape(height // 2, 2, width // 2, 2, 3).mean(axis=(1, 3))
+    assert np.abs(small.images["left"] - blocks).max() <= 0.5
+    if task == "detect2d":
+        assert small.objects
+        whole = {(thing.object_id, thing.label): thing.box_px for thing in sample.objects}
+        for thing in small.objects:
+            assert np.allclose(np.array(thing.box_px) * 2, whole[thing.object_id, thing.label], atol=4)
+    else:
+        name = "label_ids" if task == "semseg" else "depth_m"
+        assert np.array_equal(getattr(small, name), getattr(sample, name)[1::2, 1::2], equal_nan=True)
+
+
+def test_a_strangers_pictures_stay_as_large_as_they_are() -> None:
+    with pytest.raises(GearError, match=r"OtherSample cannot be cropped or resized.*picture_scale=1"):
+        shrunk(other_sample(), 0.5)

@@ -23,7 +23,15 @@ INPUT_SCALE = 0.5
 LITE_MEAN, LITE_STD = (127 / 255,) * 3, (128 / 255,) * 3
 """What EfficientNet-Lite0 was trained with."""
 
-RECIPE = Recipe(learning_rate=1e-3, weight_decay=1e-2, batch=8, epochs=24, gradient_norm=10.0)
+RECIPE = Recipe(
+    learning_rate=1e-3,
+    weight_decay=1e-2,
+    batch=8,
+    epochs=24,
+    gradient_norm=10.0,
+    crop_px=(384, 640),
+    scales=(0.8, 1.25),
+)
 
 
 def build_r18(options: ReferenceDetectorOptions) -> RetinaNetDetector:

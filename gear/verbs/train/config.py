@@ -64,6 +64,8 @@ class TrainConfig(Recipe):
         device: `auto` takes a GPU where there is one.
         init: what to begin with: "" is random weights, `shipped` the reference weights, a path of a safetensors file,
             or a name that the network knows, such as `imagenet`.
+        picture_scale: share of their size at which pictures are shown, in training and in validation; null is 1, and
+            with a time budget on a CPU what leaves time for enough steps (`gear.verbs.train.sizes`).
         warm_up: share of the training in which the learning rate rises.
         final_rate: learning rate at the end, as a share of the highest.
         ema: weight of the past in the running mean of the weights, which is what is validated and kept; 0 for none.
@@ -82,6 +84,7 @@ class TrainConfig(Recipe):
     precision: Literal["float32", "bfloat16"] = "float32"
     device: Literal["auto", "cpu", "cuda"] = "auto"
     init: str = ""
+    picture_scale: float | None = None
     warm_up: float = 0.03
     final_rate: float = 0.01
     ema: float = 0.998
@@ -104,6 +107,8 @@ class TrainConfig(Recipe):
         for name in SHARES:
             if not 0 <= getattr(self, name) < 1:
                 raise FieldError(name, f"is a share, 0 or more and below 1, got {getattr(self, name):g}")
+        if self.picture_scale is not None and not 0 < self.picture_scale <= 1:
+            raise FieldError("picture_scale", f"is a share, above 0 and at most 1, got {self.picture_scale:g}")
         if not self.learning_rate > 0:
             raise FieldError("learning_rate", f"must be above 0, got {self.learning_rate:g}")
         if not 0 <= self.ema < 1:

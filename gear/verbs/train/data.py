@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, overload
 
+from gear.augment.apply import shrunk
 from gear.dataset.reading import Dataset
 from gear.dataset.store import splits_of
 from gear.opening import open_dataset, root_and_split
@@ -28,10 +29,12 @@ class Samples(Sequence[Any]):
     Attributes:
         datasets: where they come from.
         places: (number of the dataset, index in it) of each.
+        scale: share of their size at which their pictures are shown.
     """
 
     datasets: tuple[Dataset[Any], ...]
     places: tuple[tuple[int, int], ...]
+    scale: float = 1.0
 
     def __len__(self) -> int:
         return len(self.places)
@@ -42,9 +45,9 @@ class Samples(Sequence[Any]):
     def __getitem__(self, index: slice) -> Sequence[Any]: ...
     def __getitem__(self, index: int | slice) -> Any:
         if isinstance(index, slice):
-            return Samples(self.datasets, self.places[index])
+            return replace(self, places=self.places[index])
         dataset, place = self.places[index]
-        return self.datasets[dataset][place]
+        return shrunk(self.datasets[dataset][place], self.scale)
 
     def facts(self) -> list[Json]:
         """What it is made of, without the machine's paths; JSON."""

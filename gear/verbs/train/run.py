@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ from gear.verbs.train.data import TRAINING, VALIDATION, Samples, all_of, keep_so
 from gear.verbs.train.feed import Cache, Feed
 from gear.verbs.train.loop import Parts, Training, Watch
 from gear.verbs.train.results import WEIGHTS, Origin, command_of, figures_of, keep_weights, known, write_history
+from gear.verbs.train.sizes import picture_scale, without_empty_margins
 from gear.verbs.train.starting import begin_with, build_network, check_options, picture_share, with_scale
 
 GIGABYTE = 1e9
@@ -88,6 +89,7 @@ def train(
     settings: Iterable[str] = (),
     allow_test_data: bool = False,
     watch: Watch | None = None,
+    noted: Callable[[str], None] | None = None,
 ) -> TrainReport:
     """Trains a network; takes up again what was begun in `out`, and does nothing where it is finished.
 
@@ -107,6 +109,7 @@ def train(
             own options are `options.KEY`.
         allow_test_data: whether `test` splits may be learnt from.
         watch: told after every step and every validation.
+        noted: told what was chosen for the time that there is.
 
     Raises:
         GearError: anything that the user can put right; its text is one line.
@@ -128,8 +131,15 @@ def train(
     assert isinstance(spec, TaskSpec)
     for dataset in (*training.datasets, *validation.datasets):
         check_camera(Chosen(found=found, options=config.options), dataset, "--set options.")
-    share = picture_share(training, spec)
-    config = with_scale(found, config, share)
+    scale = picture_scale(found, config, training)
+    config = replace(config, picture_scale=scale)
+    training, validation = replace(training, scale=scale), replace(validation, scale=scale)
+    if scale < 1 and noted is not None:
+        noted(
+            f"pictures are shown at {scale:g} of their size; --set picture_scale=1 shows them whole, and takes longer"
+        )
+    share = scale * picture_share(training, spec)
+    config = with_scale(found, without_empty_margins(config, training), share)
     root = Path(out)
     refuse_dataset(root, "train into a folder of its own")
     with explained(root):

@@ -1,0 +1,70 @@
+"""How large pictures and crops are: on a CPU a step over large ones takes longer than it teaches."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from gear.augment.registry import geometry_of
+from gear.config.nodes import Mapping
+from gear.contracts.specs import ModelSpec
+from gear.nn.input_scale import OPTION
+from gear.nn.runtime import device_of
+from gear.plugins.catalogue import Found
+from gear.values.errors import GearError
+from gear.verbs.train.config import TrainConfig
+from gear.verbs.train.data import Samples
+
+PIXELS_A_SECOND = (1 << 18) / 600
+"""Pixels of a picture for each second of the budget: 724 x 362 for ten minutes, in which two cores make some 700 steps
+over batches of eight with a network of DDRNet's size."""
+
+LEAST_PIXELS = 1 << 16
+
+NEARLY_WHOLE = 0.9
+
+
+def picture_scale(found: Found, config: TrainConfig, samples: Samples) -> float:
+    """Share of their size at which pictures are shown.
+
+    What the config says; else 1 without a time budget, on a GPU, where crops are smaller than pictures anyway, and
+    where the weights could not say at which size they are to be used afterwards.
+
+    Raises:
+        GearError: smaller pictures are wanted together with adversarial patches.
+    """
+    if config.picture_scale is not None:
+        if config.picture_scale < 1 and config.adversarial.attack:
+            raise GearError("patches are put into whole pictures; train against them with picture_scale=1")
+        return config.picture_scale
+    if not config.time_budget_s or config.crop_px is not None or config.adversarial.attack:
+        return 1.0
+    if device_of(config.device).type != "cpu" or not _says_its_scale(found, config):
+        return 1.0
+    sample = samples[0]
+    geometry = geometry_of(sample)
+    if geometry is None or geometry.is_centred:  # difficulties of boxes in space are told by pixels
+        return 1.0
+    height, width = next(iter(sample.images.values())).shape[:2]
+    share = math.sqrt(max(PIXELS_A_SECOND * config.time_budget_s, LEAST_PIXELS) / (height * width))
+    return 1.0 if share > NEARLY_WHOLE else round(share, 3)
+
+
+def without_empty_margins(config: TrainConfig, samples: Samples) -> TrainConfig:
+    """Crops no larger than the largest picture is ever shown: beyond there is nothing but padding."""
+    if config.crop_px is None:
+        return config
+    cameras = [camera for dataset in samples.datasets for camera in dataset.sidecar(0).record.cameras]
+    most = samples.scale * config.scales[1]
+    height_px, width_px = (
+        math.ceil(most * max(sizes))
+        for sizes in zip(*((camera.height_px, camera.width_px) for camera in cameras), strict=True)
+    )
+    return replace(config, crop_px=(min(config.crop_px[0], height_px), min(config.crop_px[1], width_px)))
+
+
+def _says_its_scale(found: Found, config: TrainConfig) -> bool:
+    spec = found.spec
+    assert isinstance(spec, ModelSpec)
+    is_given = isinstance(config.options, Mapping) and OPTION in config.options.entries
+    return not is_given and getattr(spec.config(), OPTION, 1.0) is None
