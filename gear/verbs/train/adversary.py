@@ -41,7 +41,8 @@ class Adversary:
             device: of the compositor.
 
         Raises:
-            GearError: the attack cannot attack the task, or no sample has what the compositor needs.
+            GearError: the attack cannot attack the task, is counted in forward passes, makes fewer patches than a scene
+                has surfaces, or no sample has what the compositor needs.
             DatasetError: a scene lacks probes.
         """
         self._samples, self._config, self._seed = samples, config, seed
@@ -50,12 +51,24 @@ class Adversary:
         assert isinstance(spec, AttackSpec)
         if spec.tasks and task not in spec.tasks:
             raise GearError(f"attack {spec.name!r} is for {', '.join(spec.tasks)}, not {task}")
+        if not spec.needs_gradients and not spec.is_control:
+            raise GearError(
+                f"attack {spec.name!r} is counted in forward passes, and a training makes its patches in steps; take "
+                "one with gradients, such as scene_specific"
+            )
         self._attack = build(self._found, config.options)
         places = [samples.places[index] for index in range(len(samples))]
         used = sorted({dataset for dataset, _ in places})
         with_surfaces = [number for number in used if samples.datasets[number].sidecar(0).record.surfaces]
         if not with_surfaces:
             raise GearError("no training scene has a surface for a patch; collect some around a billboard")
+        for number in with_surfaces:
+            surfaces = len(samples.datasets[number].sidecar(0).record.surfaces)
+            if surfaces > spec.max_surfaces:
+                raise GearError(
+                    f"attack {spec.name!r} makes up to {spec.max_surfaces} patches; the scene of "
+                    f"{samples.datasets[number].root} has {surfaces} surfaces"
+                )
         self._compositors = {
             number: open_compositor(config.compositor, samples.datasets[number], device=device, cache_bytes=CACHE_BYTES)
             for number in with_surfaces

@@ -100,11 +100,11 @@ def figures_of(validation: AnyMapping[str, Any]) -> dict[str, float]:
 def command_of(
     task: str, model: str, data: Sequence[str], val: Sequence[str], flags: AnyMapping[str, Any], settings: Sequence[str]
 ) -> str:
-    """The command line that does the same."""
+    """The command line that does the same; a flag that is True has no value, one that is None or False is left out."""
     words = ["gear", "train", "--task", task, "--model", model, "--data", *data, *(["--val", *val] if val else [])]
     for key, value in flags.items():
-        if value is not None:
-            words += [f"--{key.replace('_', '-')}", f"{value}"]
+        if value is not None and value is not False:
+            words += [f"--{key.replace('_', '-')}", *([] if value is True else [f"{value}"])]
     for setting in settings:
         words += ["--set", setting]
     return shlex.join([*words, "--out", "DIR"])

@@ -146,7 +146,7 @@ def train(
         root.mkdir(parents=True, exist_ok=True)
     clear_scratch(root)
     flags = {"epochs": epochs, "time_budget": _budget(time_budget_s), "batch": batch, "lr": lr, "seed": seed,
-             "init": init, "precision": precision}  # fmt: skip
+             "init": init, "precision": precision, "allow_test_data": allow_test_data}  # fmt: skip
     origin = Origin(
         model=found,
         task=task,

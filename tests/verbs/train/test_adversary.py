@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -128,6 +128,23 @@ def test_training_against_patches_is_taken_up_again(
     assert plain.read_bytes() != whole.read_bytes()
     config = json.loads((tmp_path / "whole" / "train.json").read_text())["config"]
     assert config["adversarial"]["attack"] == "painter"
+
+
+@pytest.mark.parametrize(
+    ("facts", "message"),
+    [
+        ({"needs_gradients": False}, "'painter' is counted in forward passes"),
+        ({"max_surfaces": 0}, "'painter' makes up to 0 patches; .* has 1 surfaces"),
+    ],
+)
+def test_attacks_that_cannot_do_it_are_refused(
+    probed: Path, painter: None, monkeypatch: pytest.MonkeyPatch, facts: dict[str, Any], message: str
+) -> None:
+    *others, found = building.catalogue().found
+    odd = Catalogue((*others, replace(found, spec=replace(found.spec, **facts))))
+    monkeypatch.setattr(building, "catalogue", lambda: odd)
+    with pytest.raises(GearError, match=message):
+        adversary_of(probed)
 
 
 def test_what_is_missing_is_said(street: Callable[..., Path], painter: None, tmp_path: Path) -> None:

@@ -182,6 +182,8 @@ def test_test_splits_are_not_learnt_from(street: Street, tmp_path: Path, install
     with pytest.raises(GearError, match="split 'test' is what networks are tested on"):
         train("semseg", "tiny_segmenter", root, out=tmp_path / "out")
     report = train("semseg", "tiny_segmenter", root, out=tmp_path / "out", epochs=1, batch=1, allow_test_data=True)
+    command = json.loads((tmp_path / "out" / "train.json").read_text())["command"]
+    assert "--batch 1 --allow-test-data --out DIR" in command
     assert report.steps == 1
 
 
