@@ -19,6 +19,9 @@ TEXTURE_KINDS = {
 }
 """As messages name them."""
 
+LARGEST_SIDE_PX = 16384
+"""Of a texture, for Vulkan and OpenGL as Mesa has them."""
+
 NO_OWN_RGBA = (0.5, 0.5, 0.5, 1.0)
 """MuJoCo's default: a geom of this colour wears its material's."""
 
@@ -71,6 +74,12 @@ def refuse_deadly(model: mujoco.MjModel, path: Path) -> None:
 def _deadly(model: mujoco.MjModel, material: int, texture: int) -> str:
     """What a material has of a texture that Filament cannot draw, and what to do; empty if it can."""
     name = _own(model.tex(texture).name)
+    width, height = int(model.tex_width[texture]), int(model.tex_height[texture])
+    if width > LARGEST_SIDE_PX or height > LARGEST_SIDE_PX:
+        return (
+            f"a texture, {name!r}, of {width} x {height} pixels, and renderers take {LARGEST_SIDE_PX} a side at most; "
+            "make it smaller"
+        )
     is_physical = model.mat_metallic[material] >= 0 or model.mat_roughness[material] >= 0
     if is_physical and model.tex_type[texture] != mujoco.mjtTexture.mjTEXTURE_2D:
         return f"metallic or roughness and a cube texture, {name!r}, which Filament cannot draw; give it a 2D texture"

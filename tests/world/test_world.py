@@ -95,6 +95,8 @@ SIDES = '<texture name="sides" type="cube" builtin="flat" width="16" height="96"
 DEADLY_CUBE = (STEEL, SIDES + STEEL + 'texture="sides" ')
 GREY = '<texture name="grey" type="2d" file="grey.png" nchannel="1" colorspace="sRGB"/>'
 DEADLY_GREY = (STEEL, GREY + STEEL + 'texture="grey" ')
+VAST = '<texture name="vast" type="2d" builtin="flat" width="16385" height="8"/>'
+TOO_LARGE = (STEEL, VAST + STEEL + 'texture="vast" ')
 
 
 @pytest.mark.parametrize(
@@ -106,6 +108,7 @@ DEADLY_GREY = (STEEL, GREY + STEEL + 'texture="grey" ')
         ('size="80 3.5 0.25"', 'size="80 3.5 -1"', "MuJoCo cannot compile it"),
         (*DEADLY_CUBE, "material 'steel' of geom 'lamp_post' has metallic or roughness and a cube texture, 'sides'"),
         (*DEADLY_GREY, "material 'steel' of geom 'lamp_post' has a texture of one channel, 'grey', that is marked"),
+        (*TOO_LARGE, "steel' of geom 'lamp_post' has a texture, 'vast', of 16385 x 8 pixels, and renderers take 16384"),
         ("next=lane.main_east_b", "next=lane.moon", "lane.x_east: next names lane.moon"),
     ],
 )
