@@ -7,29 +7,25 @@ import importlib.metadata
 import platform
 import sys
 from collections.abc import Callable, Iterable, Sequence
-from itertools import combinations
 from pathlib import Path
-from typing import Any
 
 from gear.config.dump import to_plain
 from gear.dataset.files import clear_scratch, explained, inside, write_whole
 from gear.dataset.layout import GEAR
 from gear.dataset.plan import differences
-from gear.dataset.reading import Dataset
 from gear.dataset.sidecar import dump_json, load_json
 from gear.dataset.store import refuse_dataset
-from gear.opening import open_dataset, root_and_split
+from gear.opening import open_dataset
 from gear.values.errors import DatasetError, GearError
 from gear.values.serial import Json
 from gear.verbs.evaluate.choice import (
-    Chosen,
     check_defense,
     check_model,
-    check_reports,
     chosen_defense,
     chosen_model,
 )
 from gear.verbs.evaluate.compare import Measured, compared, row_report, together
+from gear.verbs.evaluate.opened import opened, row_names
 from gear.verbs.evaluate.player import Player
 from gear.verbs.evaluate.report import EvaluateReport
 from gear.verbs.evaluate.row import evaluate_row
@@ -93,19 +89,16 @@ def evaluate(
         )
     chosen = chosen_model(model, settings)
     guard = chosen_defense(defense, defense_settings) if defense else None
-    datasets = _opened([data] if isinstance(data, (str, Path)) else data, split, chosen, reports)
-    task, names = datasets[0].plan.task["name"], _row_names(datasets)
+    datasets = opened([data] if isinstance(data, (str, Path)) else data, split, chosen, reports)
+    task, names = datasets[0].plan.task["name"], row_names(datasets)
     learnt = [open_dataset(one) if one is not None else None for one in (calibration, calibration_patched)]
     for one in learnt:
         if one is not None:
             check_model(chosen, one)
     if guard is not None:
         check_defense(guard, chosen, task, is_calibrated=learnt[0] is not None)
-    root = (
-        Path(out)
-        if out is not None
-        else Path("evaluations", task, model.replace("/", "-") + f"+{defense}" * bool(defense))
-    )
+    usual = Path("evaluations", task, model.replace("/", "-") + f"+{defense}" * bool(defense))
+    root = usual if out is None else Path(out)
     refuse_dataset(root, "write the evaluation into a folder of its own")
     player = Player(chosen, guard, clean=learnt[0], patched=learnt[1], seed=seed)
     facts = {
@@ -116,16 +109,7 @@ def evaluate(
         "seed": seed,
     }
     _begin(root, facts)
-    total, finished = sum(len(one) for one in datasets), 0
-
-    def told() -> None:
-        nonlocal finished
-        finished += 1
-        if progress is not None:
-            progress(finished, total)
-
-    if progress is not None:
-        progress(0, total)
+    told = _counter(progress, sum(len(one) for one in datasets))
     rows = []
     for dataset, name in zip(datasets, names, strict=True):
         scorer = Scorer(dataset, root, name, tuple(reports), chosen.found)
@@ -143,45 +127,8 @@ def evaluate(
         together=tuple(together(rows, seed, resamples)),
         differences=tuple(compared(rows, seed, resamples)),
     )
-    write_whole(root, "results.json", dump_json(found.as_json()))
-    write_whole(root, "table.txt", table(found).encode())
-    clear_scratch(root)
-    with contextlib.suppress(OSError):
-        (root / GEAR).rmdir()
+    _end(root, found)
     return found
-
-
-def _opened(
-    paths: Sequence[str | Path], split: str | None, model: Chosen, reports: Sequence[str]
-) -> list[Dataset[Any]]:
-    if not paths:
-        raise GearError("there is nothing to evaluate on; give at least one dataset")
-    places = [root_and_split(path) for path in paths]
-    datasets = [open_dataset(root, own or split) for root, own in places]
-    first = datasets[0].plan
-    for one in datasets:
-        if one.plan.task["name"] != first.task["name"]:
-            raise GearError(
-                f"{one.root} is a {one.plan.task['name']} dataset, {datasets[0].root} a {first.task['name']} one"
-            )
-        if not len(one):
-            raise DatasetError(one.root, "has no samples to evaluate on")
-        check_model(model, one)
-        check_reports(reports, one)
-    return datasets
-
-
-def _row_names(datasets: Sequence[Dataset[Any]]) -> list[str]:
-    """Folders that stay the same however datasets are ordered.
-
-    Raises:
-        GearError: a dataset was given twice.
-    """
-    names = [f"{one.plan.info.split}-{one.plan.info.patch_label}-{one.plan.content_key[:8]}" for one in datasets]
-    for one, other in combinations(range(len(names)), 2):
-        if names[one] == names[other]:
-            raise GearError(f"{datasets[one].root} and {datasets[other].root} are the same data; give each once")
-    return names
 
 
 def _begin(root: Path, facts: Json) -> None:
@@ -198,6 +145,30 @@ def _begin(root: Path, facts: Json) -> None:
     if there != plain:
         what = ", ".join(differences(there, plain)[:3])
         raise DatasetError(root, f"holds an evaluation of something else ({what}); use another --out")
+
+
+def _end(root: Path, found: EvaluateReport) -> None:
+    """Writes what was found, and leaves nothing else behind."""
+    write_whole(root, "results.json", dump_json(found.as_json()))
+    write_whole(root, "table.txt", table(found).encode())
+    clear_scratch(root)
+    with contextlib.suppress(OSError):
+        (root / GEAR).rmdir()
+
+
+def _counter(progress: Progress | None, total: int) -> Callable[[], None]:
+    """Tells of each sample that is finished, and of the beginning."""
+    finished = 0
+
+    def told() -> None:
+        nonlocal finished
+        finished += 1
+        if progress is not None:
+            progress(finished, total)
+
+    if progress is not None:
+        progress(0, total)
+    return told
 
 
 def _versions(player: Player) -> Json:
