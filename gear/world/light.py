@@ -134,7 +134,7 @@ def _looks(sky: Sky) -> float:
 def _exposure(sky: Sky) -> tuple[float, Floats]:
     """The frame's share by kcd/m², and (3,) klx that a roof gets from the sky."""
     coarse = face_directions(_INTEGRATION_PX)
-    radiance, solid_angle = sky.radiance(coarse), _solid_angles(_INTEGRATION_PX)
+    radiance, solid_angle = sky.radiance(coarse, with_disc=False), _solid_angles(_INTEGRATION_PX)
     flat_sun = np.array([*sky.towards_sun[:2], 0.0])
     walls = [sky.towards_sun, np.array([0.0, 0.0, 1.0]), flat_sun / np.linalg.norm(flat_sun)]
     from_sky = [_irradiance(radiance, coarse, solid_angle, normal) for normal in walls]

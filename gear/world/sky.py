@@ -101,15 +101,22 @@ class Sky:
             night=weather.night,
         )
 
-    def radiance(self, directions: Floats) -> Floats:
-        """(..., 3) unit vectors to (..., 3) kcd/m²: sky and clouds above the horizon, sunlit ground below it."""
+    def radiance(self, directions: Floats, *, with_disc: bool = True) -> Floats:
+        """(..., 3) unit vectors to (..., 3) kcd/m²: sky and clouds above the horizon, sunlit ground below it.
+
+        Args:
+            directions: into the world.
+            with_disc: also the sun's own disc, where a picture of the sky is wanted; without it, what the sky adds to
+                the sun. A few directions cannot stand for light from a disc so small: one that meets it counts for
+                thirty suns.
+        """
         flat = directions.reshape(-1, 3)
         ground = self._ground()
         result = np.broadcast_to(ground, flat.shape).copy()
         seen = flat[:, 2] > -_HORIZON_BLUR
         rays = flat[seen]
         share = _smooth_step(-_HORIZON_BLUR, 0.0, rays[:, 2])[:, None]
-        result[seen] = share * self._above(rays) + (1 - share) * ground
+        result[seen] = share * self._above(rays, with_disc=with_disc) + (1 - share) * ground
         return result.reshape(directions.shape)
 
     def horizon_radiance(self, azimuths: int) -> Floats:
@@ -126,14 +133,15 @@ class Sky:
         return np.asarray((1 - self.cloud_cover) * mixed + self.cloud_cover * self._cloud_base())
 
     def _ground(self) -> Floats:
-        zenith = self._above(np.array([[0.0, 0.0, 1.0]]))[0]
+        zenith = self._above(np.array([[0.0, 0.0, 1.0]]), with_disc=False)[0]
         return np.asarray(_GROUND_ALBEDO * (self.sun_klx * self.towards_sun[2] / math.pi + zenith))
 
-    def _above(self, directions: Floats) -> Floats:
+    def _above(self, directions: Floats, *, with_disc: bool) -> Floats:
         """(N, 3) radiance where there is no ground."""
         clear = self._clear(directions)
         towards_sun = directions @ self.towards_sun
-        clear[towards_sun > _DISC_COSINE] += self.sun_klx / _DISC_SR
+        if with_disc:
+            clear[towards_sun > _DISC_COSINE] += self.sun_klx / _DISC_SR
         noise = _cloud_noise(directions)
         clouds = self._clouds(noise, directions[:, 2], towards_sun)
         opacity = self._opacity(noise, directions[:, 2])[:, None]

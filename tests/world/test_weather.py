@@ -152,6 +152,15 @@ def test_the_sky_is_brightest_at_the_sun_and_blue_across_from_it() -> None:
     assert (light >= 0).all() and np.isfinite(light).all()
 
 
+def test_the_exposure_does_not_hang_on_where_the_suns_disc_falls() -> None:
+    # 75, 85 and 90 degrees meet directions in which the sky is added up: pictures were black there.
+    altitudes = [60, 65, 70, 75, 80, 85, 87.5, 90]
+    lights = [lighting_of(Weather(name="x", sun_altitude_deg=a), sky_face_px=16) for a in altitudes]
+    suns = np.array([light.sun.max() for light in lights])
+    ambients = np.array([light.ambient.mean() for light in lights])
+    assert np.ptp(suns) < 0.2 * suns.mean() and np.ptp(ambients) < 0.2 * ambients.mean()
+
+
 def test_clouds_grey_the_light() -> None:
     clear, overcast = (lighting_of(Weather(name="x", cloudiness=c), sky_face_px=32) for c in (0, 100))
     assert clear.sun.mean() > 8 * clear.ambient.mean()
