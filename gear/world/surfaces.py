@@ -16,6 +16,7 @@ from gear.values.scene import Pose, SurfaceRecord
 from gear.world.faces import SurfaceAlbedo, face_from_patch, uniform_face
 from gear.world.instances import FaceName
 from gear.world.shapes import geom_triangles
+from gear.world.upright import what_is_wrong
 
 FLATNESS_M = 0.01
 
@@ -67,7 +68,7 @@ def find_faces(model: mujoco.MjModel, data: mujoco.MjData, names: Sequence[FaceN
     """Measures the faces of a compiled model; actors stand at their own origins in `data`.
 
     Raises:
-        TownError: a face is not flat in its `surface` frame.
+        TownError: a face is not flat in its `surface` frame, or would not show a patch upright and whole there.
     """
     return tuple(_face(model, data, number, name, path) for number, name in enumerate(names))
 
@@ -78,14 +79,21 @@ def _face(model: mujoco.MjModel, data: mujoco.MjData, number: int, name: FaceNam
     world_from_surface = RigidTransform.from_parts(
         "world", surface, data.site_xmat[site_id].reshape(3, 3), data.site_xpos[site_id]
     )
+    world_from_geom = RigidTransform.from_parts(
+        "world", "geom", data.geom_xmat[geom_id].reshape(3, 3), data.geom_xpos[geom_id]
+    )
+    surface_from_geom = world_from_surface.inverse() @ world_from_geom
     points, _ = geom_triangles(model, geom_id)
-    world_m = points @ data.geom_xmat[geom_id].reshape(3, 3).T + data.geom_xpos[geom_id]
-    local_m = world_from_surface.inverse().apply(world_m)
+    local_m = surface_from_geom.apply(points)
     low, high = local_m.min(axis=0), local_m.max(axis=0)
     if np.abs(low + high).max() > 2 * FLATNESS_M or high[2] - low[2] > FLATNESS_M:
         raise TownError(
-            path, f"{name.asset}: the face must be flat, with the site {name.site!r} in its middle, z into the board"
+            path,
+            f"{name.asset}: the face must be flat (no thicker than {FLATNESS_M * 100:g} cm), with the site `surface` in"
+            " its middle, z into the board",
         )
+    if wrong := what_is_wrong(model, geom_id, surface_from_geom):
+        raise TownError(path, f"{name.asset}: the face {wrong}")
     body = model.body(name.owner).id
     world_from_owner = RigidTransform.from_parts("world", "actor", data.xmat[body].reshape(3, 3), data.xpos[body])
     owner_from_surface = world_from_owner.inverse() @ world_from_surface

@@ -91,6 +91,12 @@ def test_the_pool_is_enough_for_the_largest_crowd() -> None:
         ('class="billboard.face" type', 'class="billboard.back" type', "has 0"),
         ('name="back" class="billboard.back"', 'name="back" class="billboard.face"', "has 2"),
         ('<body name="billboard">', '<body name="billboard" euler="0 0 90">', r"along its \+x axis"),
+        (' texcoord="0 0 1 0 1 1 0\n    1"', "", "no texture coordinates"),
+        ('texcoord="0 0 1 0 1 1 0\n    1"', 'texcoord="1 0 0 0 0 1 1 1"', "u from left to right"),
+        ('texcoord="0 0 1 0 1 1 0\n    1"', 'texcoord="0 1 1 1 1 0 0 0"', "u from left to right"),
+        ('texcoord="0 0 1 0 1 1 0\n    1"', 'texcoord="0 0 .5 0 .5 1 0 1"', "once and whole"),
+        ('face="0 2 1 0 3 2"', 'face="0 1 2 0 2 3"', "face the other way"),
+        ('type="mesh" mesh="face"', 'type="ellipsoid" size="0.001 3.7 1.85" pos="0 0 2.6"', "a mesh or a box"),
     ],
 )
 def test_a_board_must_keep_the_conventions(tmp_path: Path, old: str, new: str, told: str) -> None:
