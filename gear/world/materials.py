@@ -1,4 +1,4 @@
-"""Materials of a compiled model: what colour geoms have, and what a renderer would die of."""
+"""Materials of a compiled model: what colour geoms have, and what renderers cannot draw."""
 
 from __future__ import annotations
 
@@ -18,6 +18,9 @@ TEXTURE_KINDS = {
     mujoco.mjtTexture.mjTEXTURE_SKYBOX: "skybox",
 }
 """As messages name them."""
+
+LARGEST_TEXTURE_PX = 16384
+"""What every driver can take, a side."""
 
 NO_OWN_RGBA = (0.5, 0.5, 0.5, 1.0)
 """MuJoCo's default: a geom of this colour wears its material's."""
@@ -51,7 +54,7 @@ def textures_of(model: mujoco.MjModel, material: int) -> list[tuple[int, int]]:
 
 
 def refuse_deadly(model: mujoco.MjModel, path: Path) -> None:
-    """Filament ends the process, without a word, over some textures.
+    """Filament ends the process over some textures, mostly without a word; classic shows one that is too large white.
 
     Args:
         model: compiled.
@@ -69,7 +72,7 @@ def refuse_deadly(model: mujoco.MjModel, path: Path) -> None:
 
 
 def _deadly(model: mujoco.MjModel, material: int, texture: int) -> str:
-    """What a material has of a texture that Filament cannot draw, and what to do; empty if it can."""
+    """What a material has of a texture that cannot be drawn, and what to do; empty if it can."""
     name = _own(model.tex(texture).name)
     is_physical = model.mat_metallic[material] >= 0 or model.mat_roughness[material] >= 0
     if is_physical and model.tex_type[texture] != mujoco.mjtTexture.mjTEXTURE_2D:
@@ -78,6 +81,12 @@ def _deadly(model: mujoco.MjModel, material: int, texture: int) -> str:
         return (
             f'a texture of one channel, {name!r}, that is marked colorspace="sRGB", which Filament cannot draw; '
             "give it three channels"
+        )
+    width, height = int(model.tex_width[texture]), int(model.tex_height[texture])
+    if max(width, height) > LARGEST_TEXTURE_PX:
+        return (
+            f"a texture of {width}x{height} pixels, {name!r}, which graphics drivers cannot hold; "
+            f"make it no larger than {LARGEST_TEXTURE_PX} a side"
         )
     return ""
 

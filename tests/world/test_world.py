@@ -96,6 +96,9 @@ DEADLY_CUBE = (STEEL, SIDES + STEEL + 'texture="sides" ')
 GREY = '<texture name="grey" type="2d" file="grey.png" nchannel="1" colorspace="sRGB"/>'
 DEADLY_GREY = (STEEL, GREY + STEEL + 'texture="grey" ')
 
+HUGE = '<texture name="huge" type="2d" builtin="flat" rgb1=".5 .5 .5" width="20000" height="8"/>'
+DEADLY_SIZE = (STEEL, HUGE + STEEL + 'texture="huge" ')
+
 
 @pytest.mark.parametrize(
     ("old", "new", "told"),
@@ -106,6 +109,7 @@ DEADLY_GREY = (STEEL, GREY + STEEL + 'texture="grey" ')
         ('size="80 3.5 0.25"', 'size="80 3.5 -1"', "MuJoCo cannot compile it"),
         (*DEADLY_CUBE, "material 'steel' of geom 'lamp_post' has metallic or roughness and a cube texture, 'sides'"),
         (*DEADLY_GREY, "material 'steel' of geom 'lamp_post' has a texture of one channel, 'grey', that is marked"),
+        (*DEADLY_SIZE, "material 'steel' of geom 'lamp_post' has a texture of 20000x8 pixels, 'huge', which graphics"),
         ("next=lane.main_east_b", "next=lane.moon", "lane.x_east: next names lane.moon"),
     ],
 )
