@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from functools import cached_property
@@ -75,10 +76,12 @@ def read_actor_facts(path: Path) -> ActorFacts:
         raise TownError(path, f"actor.pose must be walk or stand, got {gait!r}")
     weight = _numbers(path, "actor.weight", entries.get("actor.weight", "1"))
     palette = _numbers(path, "paint.palette", entries.get("paint.palette", ""))
-    if len(weight) != 1 or weight[0] < 0:
+    if len(weight) != 1 or not 0 <= weight[0] < math.inf:
         raise TownError(path, f"actor.weight must be one number, not negative, got {entries['actor.weight']!r}")
-    if len(palette) % 4 or any(value < 0 for value in palette):
+    if len(palette) % 4 or not all(0 <= value < math.inf for value in palette):
         raise TownError(path, "paint.palette must be groups of four: r g b weight, none negative")
+    if max((value for i, value in enumerate(palette) if i % 4 < 3), default=0) > 1:
+        raise TownError(path, "paint.palette must be albedo, 0 to 1: r g b weight r g b weight …")
     colours = tuple(((palette[i], palette[i + 1], palette[i + 2]), palette[i + 3]) for i in range(0, len(palette), 4))
     return ActorFacts(
         name=path.stem,

@@ -90,7 +90,7 @@ def actor_types(
     """Every asset of the pool by name, measured on its first instance.
 
     Raises:
-        TownError: an asset has nothing visible, or does not stand at its origin.
+        TownError: an asset has nothing visible, something without bounds, or does not stand at its origin.
     """
     types: dict[str, ActorType] = {}
     for slot in slots:
@@ -101,7 +101,7 @@ def actor_types(
         geoms = visible_geoms(model, body_id, classes.label_code)
         if not geoms:
             raise TownError(facts.path, "has no visible geom")
-        shape = body_shape(model, data, body_id, geoms, classes.label_code)
+        shape = _shape(model, data, body_id, geoms, classes, facts.path)
         extent_m = np.abs(shape.box_centre_m) + shape.box_size_m / 2
         bottom_m = float(shape.box_centre_m[2] - shape.box_size_m[2] / 2)
         if abs(bottom_m) > 0.1:
@@ -110,6 +110,15 @@ def actor_types(
             facts=facts, shape=shape, half_length_m=float(extent_m[0]), half_width_m=float(extent_m[1])
         )
     return types
+
+
+def _shape(
+    model: mujoco.MjModel, data: mujoco.MjData, body_id: int, geoms: Sequence[int], classes: GeomClasses, path: Path
+) -> Shape:
+    try:
+        return body_shape(model, data, body_id, geoms, classes.label_code)
+    except ValueError as error:
+        raise TownError(path, f"{error}; make it of meshes, boxes, cylinders, capsules or ellipsoids") from error
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -131,7 +140,7 @@ def static_objects(
     """Traffic lights, benches and the like: one object a body that holds geoms of such a label.
 
     Raises:
-        TownError: such a geom is not in a body of its own.
+        TownError: such a geom is not in a body of its own, or has no bounds.
     """
     actor_bodies = {body for slot in slots for body in body_tree(model, model.body(slot.body).id)}
     object_id = np.full(model.ngeom, -1, np.int32)
@@ -156,7 +165,7 @@ def static_objects(
             world_from_object=RigidTransform.from_parts(
                 "world", "object", data.xmat[body_id].reshape(3, 3), data.xpos[body_id]
             ),
-            shape=body_shape(model, data, body_id, geoms, classes.label_code),
+            shape=_shape(model, data, body_id, geoms, classes, path),
         )
         objects[thing.id] = thing
         object_id[geoms] = thing.id

@@ -69,7 +69,7 @@ def placement_model(composition: Composition, stances: Mapping[str, Stance]) -> 
         stances: by name of the slot's body.
 
     Raises:
-        TownError: MuJoCo refuses it, or a collision geom is no primitive.
+        TownError: MuJoCo refuses it, a collision geom is no primitive, or an actor has none.
     """
     tree = ET.fromstring(composition.xml)
     for section in list(tree):
@@ -89,8 +89,13 @@ def placement_model(composition: Composition, stances: Mapping[str, Stance]) -> 
     assert worldbody is not None  # dm_control always writes one
     for light in list(worldbody.findall("light")):
         worldbody.remove(light)
+    paths = {slot.body: slot.actor.path for slot in composition.slots}
     for element in worldbody:
         if element.get("name") in stances and element.tag == "body":
+            if next(element.iter("geom"), None) is None:
+                raise TownError(
+                    paths[element.get("name", "")], "has no geom of class collision, so everything could stand in it"
+                )
             _free(element, stances[element.get("name", "")])
         else:
             for geom in element.iter("geom"):

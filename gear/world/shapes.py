@@ -47,7 +47,8 @@ def geom_triangles(model: mujoco.MjModel, geom_id: int) -> Triangles:
         angles = np.concatenate([below, -below[::-1]])
         heights = np.sin(angles) * size[0] + np.sign(np.arange(len(angles)) - len(below) + 0.5) * size[1]
         return _revolved(np.cos(angles) * size[0], heights)
-    raise ValueError(f"geom {geom_id} has no finite surface ({kind.name})")
+    own_name = model.geom(geom_id).name.rpartition("/")[2]
+    raise ValueError(f"geom {own_name!r} is a {kind.name.removeprefix('mjGEOM_').lower()}, which has no finite surface")
 
 
 def _box(half: Array) -> Triangles:

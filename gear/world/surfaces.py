@@ -79,12 +79,12 @@ def _face(model: mujoco.MjModel, data: mujoco.MjData, number: int, name: FaceNam
     world_from_surface = RigidTransform.from_parts(
         "world", surface, data.site_xmat[site_id].reshape(3, 3), data.site_xpos[site_id]
     )
-    world_from_geom = RigidTransform.from_parts(
-        "world", "geom", data.geom_xmat[geom_id].reshape(3, 3), data.geom_xpos[geom_id]
-    )
-    surface_from_geom = world_from_surface.inverse() @ world_from_geom
-    points, _ = geom_triangles(model, geom_id)
-    local_m = surface_from_geom.apply(points)
+    try:
+        points, _ = geom_triangles(model, geom_id)
+    except ValueError as error:
+        raise TownError(path, f"{name.asset}: {error}; make it a mesh or a box") from error
+    world_m = points @ data.geom_xmat[geom_id].reshape(3, 3).T + data.geom_xpos[geom_id]
+    local_m = world_from_surface.inverse().apply(world_m)
     low, high = local_m.min(axis=0), local_m.max(axis=0)
     if np.abs(low + high).max() > 2 * FLATNESS_M or high[2] - low[2] > FLATNESS_M:
         raise TownError(
@@ -92,7 +92,10 @@ def _face(model: mujoco.MjModel, data: mujoco.MjData, number: int, name: FaceNam
             f"{name.asset}: the face must be flat (no thicker than {FLATNESS_M * 100:g} cm), with the site `surface` in"
             " its middle, z into the board",
         )
-    if wrong := what_is_wrong(model, geom_id, surface_from_geom):
+    world_from_geom = RigidTransform.from_parts(
+        "world", "geom", data.geom_xmat[geom_id].reshape(3, 3), data.geom_xpos[geom_id]
+    )
+    if wrong := what_is_wrong(model, geom_id, world_from_surface.inverse() @ world_from_geom):
         raise TownError(path, f"{name.asset}: the face {wrong}")
     body = model.body(name.owner).id
     world_from_owner = RigidTransform.from_parts("world", "actor", data.xmat[body].reshape(3, 3), data.xpos[body])

@@ -54,6 +54,10 @@ def test_a_town_elsewhere_without_assets_of_its_own_uses_those_of_gear(tmp_path:
         ('<text name="actor.kind" data="car"/><numeric name="paint.palette" data="1 1 1"/>', "groups of four"),
         ('<text name="actor.kind" data="car"/><numeric name="paint.palette" data="1 1 x 1"/>', "must be numbers"),
         ('<text name="actor.kind" data="car"/><numeric name="actor.weight" data="-1"/>', "not negative, got '-1'"),
+        ('<text name="actor.kind" data="car"/><numeric name="actor.weight" data="nan"/>', "not negative, got 'nan'"),
+        ('<text name="actor.kind" data="car"/><numeric name="paint.palette" data="nan 0 0 1"/>', "none negative"),
+        ('<text name="actor.kind" data="car"/><numeric name="paint.palette" data="0 0 0 inf"/>', "none negative"),
+        ('<text name="actor.kind" data="car"/><numeric name="paint.palette" data="255 0 0 1"/>', "albedo, 0 to 1"),
         ("<text", "cannot be read as MJCF"),
     ],
 )
@@ -96,6 +100,7 @@ def test_the_pool_is_enough_for_the_largest_crowd() -> None:
         ('texcoord="0 0 1 0 1 1 0\n    1"', 'texcoord="0 1 1 1 1 0 0 0"', "u from left to right"),
         ('texcoord="0 0 1 0 1 1 0\n    1"', 'texcoord="0 0 .5 0 .5 1 0 1"', "once and whole"),
         ('face="0 2 1 0 3 2"', 'face="0 1 2 0 2 3"', "face the other way"),
+        ('type="mesh" mesh="face"', 'type="plane" size="3.7 1.85 1" pos="0 0 2.6"', "a plane, which has no finite"),
         ('type="mesh" mesh="face"', 'type="ellipsoid" size="0.001 3.7 1.85" pos="0 0 2.6"', "a mesh or a box"),
     ],
 )
@@ -111,5 +116,34 @@ def test_a_board_must_keep_the_conventions(tmp_path: Path, old: str, new: str, t
         (tmp_path / folder).mkdir()
         (tmp_path / folder / name).write_text(content)
     town = tmp_path / "towns" / "tiny.xml"
+    with pytest.raises(TownError, match=told):
+        World.build(town=town, scene_name="board", scene=tiny_scenes().scenes["board"], weather=CLEAR)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        (
+            '<geom name="shell" class="collision"',
+            '<geom name="shell" class="car.glass"',
+            "car_saloon.xml: has no geom of class collision",
+        ),
+        ('class="car.glass" material="glass"', 'class="car.glass" type="plane"', "'car_saloon_0_cabin' is a plane"),
+    ],
+)
+def test_a_vehicle_must_keep_the_conventions(tmp_path: Path, old: str, new: str, told: str) -> None:
+    own = TINY_TOWN.parents[1]
+    for folder in ("pedestrians", "surfaces"):
+        (tmp_path / folder).symlink_to(own / folder)
+    for folder in ("vehicles", "towns"):
+        (tmp_path / folder).mkdir()
+    for path in (own / "vehicles").glob("*.xml"):
+        text = path.read_text()
+        if path.stem == "car_saloon":
+            assert old in text
+            text = text.replace(old, new)
+        (tmp_path / "vehicles" / path.name).write_text(text)
+    town = tmp_path / "towns" / "tiny.xml"
+    town.write_text(TINY_TOWN.read_text())
     with pytest.raises(TownError, match=told):
         World.build(town=town, scene_name="board", scene=tiny_scenes().scenes["board"], weather=CLEAR)
