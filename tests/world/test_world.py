@@ -109,6 +109,11 @@ DEADLY_SIZE = (STEEL, HUGE + STEEL + 'texture="huge" ')
         ('"vegetation"', '"shrub"', "geom 'hedge' can be seen but has class 'shrub'"),
         ('name="hedge" class="vegetation"', 'name="hedge"', "geom 'hedge' can be seen but has no class"),
         ('<body name="bench_0" pos="5 -6.1 0.15">', "<frame>", "cannot be read as MJCF"),
+        (
+            "<worldbody>",
+            "<worldbody><frame><body/></frame>",
+            "<frame>: 'frame' is not known here; write bodies",
+        ),
         ('size="80 3.5 0.25"', 'size="80 3.5 -1"', "MuJoCo cannot compile it"),
         (*DEADLY_CUBE, "material 'steel' of geom 'lamp_post' has metallic or roughness and a cube texture, 'sides'"),
         (*DEADLY_GREY, "material 'steel' of geom 'lamp_post' has a texture of one channel, 'grey', that is marked"),
