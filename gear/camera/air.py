@@ -28,6 +28,7 @@ SKY_DISTANCE_M = 2e4
 _COARSE_PX = 16
 _STRIP_ROWS = 32
 _LEAST_FALL = np.float32(3e-4)
+_STEEP = 80.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,7 +65,11 @@ class Fog:
         fall = np.maximum(rate * rise * inside_m, -start)
         np.copyto(fall, _LEAST_FALL, where=np.abs(fall) < _LEAST_FALL)
         density = np.exp(-start)
-        density *= (1 - np.exp(-fall)) / fall
+        if start.max(initial=0) > _STEEP:
+            # The same, where looking down from so high over the fog exp(-fall) is more than a float holds.
+            density = (density - np.exp(-(start + fall))) / fall
+        else:
+            density *= (1 - np.exp(-fall)) / fall
         return np.asarray(density * inside_m * np.float32(self.per_m))
 
 

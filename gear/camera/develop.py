@@ -65,7 +65,10 @@ class Darkroom:
         assert seen.linear_rgb is not None and seen.depth_m is not None and seen.geom_id is not None
         if self.effects.shutter_s > 0:
             speed = record.ego.velocity_world_mps
-            blurred = motion_blurred(seen.linear_rgb, seen.depth_m, camera, speed, self.effects.shutter_s)
+            # What rides along, the ego car's own bonnet, stays as sharp as what is far away.
+            rides_along = np.append(geoms.object_id == record.ego.id, False)[seen.geom_id]
+            passed_m = np.where(rides_along, np.float32(np.inf), seen.depth_m)
+            blurred = motion_blurred(seen.linear_rgb, passed_m, camera, speed, self.effects.shutter_s)
             seen = replace(seen, linear_rgb=blurred)
         if self.effects.lens.bends:
             seen = through_lens(seen, camera, self.effects.lens)

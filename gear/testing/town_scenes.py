@@ -23,17 +23,31 @@ DEPTH_TOLERANCE = 1e-3
 """Relative; a depth buffer of classic is a float in front of a far plane."""
 
 
+BOARD_GROUND_M = 0.4
+"""How far the foot of a board may be from the ground: footings reach a little into it, or stand out."""
+
+BOARD_LOOK_M = 1.2
+"""The ground below a board is looked for from so far above its foot, as placement does."""
+
+
 def misplaced(town: TownUnderTest) -> list[str]:
-    """A library of another town, and boards outside of the bounds."""
+    """A library of another town, and boards outside of the bounds, in the air or in the ground."""
     problems = []
     if town.scenes.town != town.library.town_name:
         problems.append(f"the scene library is for {town.scenes.town!r}, the town is {town.library.town_name!r}")
     xmin, ymin, xmax, ymax = town.graph.bounds_m
     for name, scene in town.scenes.scenes.items():
         for number, board in enumerate(scene.boards):
-            x_m, y_m, _ = board.position_m
+            x_m, y_m, z_m = board.position_m
+            where = f"scene {name}: board {number} at ({x_m:g}, {y_m:g})"
             if not (xmin <= x_m <= xmax and ymin <= y_m <= ymax):
-                problems.append(f"scene {name}: board {number} at ({x_m:g}, {y_m:g}) stands outside of town.bounds")
+                problems.append(f"{where} stands outside of town.bounds")
+                continue
+            ground_m = town.ground.height_m(np.array(board.position_m), BOARD_LOOK_M)
+            if np.isnan(ground_m):
+                problems.append(f"{where} has no ground below it")
+            elif abs(z_m - ground_m) > BOARD_GROUND_M:
+                problems.append(f"{where} has its foot at {z_m:.2f} m, the ground is at {ground_m:.2f} m")
     return problems
 
 

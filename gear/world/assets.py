@@ -149,9 +149,13 @@ class AssetLibrary:
         Raises:
             UnknownNameError: there is none of that name.
         """
-        path = self.folder(kind) / f"{name}.xml"
+        folder = self.folder(kind)
+        path = folder / f"{name}.xml"
         if not path.is_file():
-            raise UnknownNameError(kind, name, _names(path.parent))
+            is_own = folder != data_dir("mjcf") / FOLDERS[kind]
+            raise UnknownNameError(
+                kind, name, _names(folder), f"({folder} takes the place of gear's)" if is_own else ""
+            )
         return path
 
     @cached_property

@@ -49,7 +49,10 @@ def load_mjcf(path: Path, text: str | None = None, places: Mapping[str, Place] |
             root = mjcf.from_path(str(path))
         else:
             root = mjcf.from_xml_string(text, model_dir=str(path.parent), assets=places)
-    except (ValueError, OSError, AttributeError, KeyError, SyntaxError) as error:
+    except KeyError as error:
+        what = f"{error.args[0]} is not known here; write bodies where it says frame, replicate or attach"
+        raise TownError(path, f"cannot be read as MJCF: {what}") from error
+    except (ValueError, OSError, AttributeError, SyntaxError) as error:
         raise TownError(path, f"cannot be read as MJCF: {error}") from error
     root.model = path.stem
     # Writing an element without a name makes dm_control count all elements before it: quadratic in their number.

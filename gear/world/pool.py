@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from gear.values.errors import UnknownNameError
 from gear.world.assets import ActorFacts, AssetLibrary
 from gear.world.scene_spec import SceneSpec
 
@@ -21,8 +20,7 @@ def plan_pool(scene: SceneSpec, library: AssetLibrary) -> list[tuple[ActorFacts,
     Raises:
         UnknownNameError: the town's vehicles hold no ego car.
     """
-    if EGO_ASSET not in library.vehicles:
-        raise UnknownNameError("vehicle", EGO_ASSET, library.vehicles)
+    library.path("vehicle", EGO_ASSET)
     pool = [(library.vehicles[EGO_ASSET], 1)]
     if scene.npc_vehicles.count[1]:
         pool += _shares(library.vehicles, scene.npc_vehicles.count[1])

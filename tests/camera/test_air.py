@@ -88,6 +88,19 @@ def test_the_sky_sees_all_of_the_fog_above() -> None:
     np.testing.assert_allclose(endless, math.exp(-1), rtol=1e-5)
 
 
+@pytest.mark.parametrize("thinning", [100.0, 1e4])
+def test_a_fog_that_lies_far_below_the_camera_is_finite(thinning: float) -> None:
+    climb = ((HEIGHT - 1) / 2 - np.arange(HEIGHT)) / FOCAL_PX
+    depth = wall(30.0)
+    depth[climb < 0] = np.minimum(30.0, 1.6 / -climb[climb < 0])[:, None]
+    through = air(fog_per_m=5.0, fog_thinning_per_m=thinning).transmittance(depth, camera())[..., 0]
+    assert np.isfinite(through).all() and (through[climb > 0] == 1).all()
+    # Rays that end on the ground meet all of the fog, the more of it the less steep they are.
+    ends = climb * 30 < -1.6
+    steep = -climb[ends, None] / ray_lengths(1.0)[ends]
+    np.testing.assert_allclose(np.log(through[ends]), -5.0 / thinning / steep, rtol=2e-3, atol=1e-6)
+
+
 def test_the_veil_is_linear_and_blind_to_the_picture() -> None:
     rng = np.random.default_rng(3)
     depth = rng.uniform(2, 200, (HEIGHT, WIDTH)).astype(np.float32)

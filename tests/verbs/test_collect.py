@@ -293,6 +293,10 @@ def test_camera_effects_bend_picture_and_truth_alike_and_are_written_down(
         gear.open_twins(tmp_path / "plain", tmp_path / "random")
     with pytest.raises(ConfigError, match=r"camera.lens.k1: must be -0.5 to 0.5"):
         collect_small("semseg", tmp_path / "bad", settings=["camera.lens.k1=3"])
+    folding = ["camera.lens.k1=-0.5", "camera.lens.k2=-0.5", "options.hfov_deg=150"]
+    with pytest.raises(ConfigError, match=r"camera: lens: a lens of k1 -0.5 and k2 -0.5 folds"):
+        collect_small("semseg", tmp_path / "folded", settings=folding)
+    assert not (tmp_path / "folded").exists(), "nothing was begun"
 
 
 def test_a_third_partys_task_that_fails_is_named_and_ours_keeps_its_traceback(

@@ -75,6 +75,15 @@ def test_a_person_does_not_park_among_vehicles(tmp_path: Path) -> None:
         _ = AssetLibrary.for_town(tmp_path / "towns" / "t.xml").vehicles
 
 
+def test_a_folder_of_ones_own_must_hold_the_ego_car(tmp_path: Path) -> None:
+    (tmp_path / "towns").mkdir()
+    (tmp_path / "vehicles").mkdir()
+    (tmp_path / "towns" / "t.xml").write_text("<mujoco/>")
+    actor(tmp_path / "vehicles", '<text name="actor.kind" data="car"/>')
+    with pytest.raises(UnknownNameError, match=r"no vehicle named 'car_saloon'.*thing.*takes the place of gear"):
+        plan_pool(SceneSpec(), AssetLibrary.for_town(tmp_path / "towns" / "t.xml"))
+
+
 def test_the_pool_is_enough_for_the_largest_crowd() -> None:
     library = AssetLibrary.for_town(TINY_TOWN)
     scene = SceneSpec(npc_vehicles=VehicleLimits(count=(0, 9)), pedestrians=NpcLimits(count=(0, 30)))

@@ -9,11 +9,14 @@ import cv2
 import numpy as np
 import pytest
 
+from gear.contracts.rendering import RawView
 from gear.testing.tiny_town import CLEAR, SMALL_RIG, TINY_TOWN, build_tiny_world, tiny_scenes, tiny_world
 from gear.values.errors import PlacementError, TownError, UnknownNameError
 from gear.values.frames import STATIC_OBJECT_BASE
 from gear.values.labels import LABEL_BY_NAME
-from gear.values.scene import ActorRecord, Pose, SceneRecord
+from gear.values.optics import CameraEffects
+from gear.values.scene import ActorRecord, Pose, SceneRecord, Weather
+from gear.world.air import darkroom_of
 from gear.world.classes import NEVER_SEEN
 from gear.world.faces import FACE_SIZE_PX
 from gear.world.weather import PRESETS
@@ -105,6 +108,11 @@ TOO_LARGE = (STEEL, VAST + STEEL + 'texture="vast" ')
         ('"vegetation"', '"shrub"', "geom 'hedge' can be seen but has class 'shrub'"),
         ('name="hedge" class="vegetation"', 'name="hedge"', "geom 'hedge' can be seen but has no class"),
         ('<body name="bench_0" pos="5 -6.1 0.15">', "<frame>", "cannot be read as MJCF"),
+        (
+            "<worldbody>",
+            "<worldbody><frame><body/></frame>",
+            "<frame>: 'frame' is not known here; write bodies",
+        ),
         ('size="80 3.5 0.25"', 'size="80 3.5 -1"', "MuJoCo cannot compile it"),
         (*DEADLY_CUBE, "material 'steel' of geom 'lamp_post' has metallic or roughness and a cube texture, 'sides'"),
         (*DEADLY_GREY, "material 'steel' of geom 'lamp_post' has a texture of one channel, 'grey', that is marked"),
@@ -270,3 +278,23 @@ def test_a_record_that_needs_too_much_is_refused() -> None:
     many = [actor(number, "van_small", 5.0 * number) for number in range(2, 30)]
     with pytest.raises(PlacementError, match="one more van_small"):
         world.place(record(world, *many))
+
+
+def test_an_open_shutter_smears_what_the_ego_car_passes_and_not_its_bonnet() -> None:
+    world = tiny_world("no_billboard")
+    shot = record(world)
+    driving = dataclasses.replace(shot.actors[0], velocity_world_mps=(10.0, 0.0, 0.0))
+    shot = dataclasses.replace(shot, actors=(driving,))
+    placed, camera = world.place(shot), shot.cameras[0]
+    size = (camera.height_px, camera.width_px)
+    ids = np.full(size, world.model.geom("main_road").id, np.int32)
+    ids[size[0] // 2 :] = world.model.geom("car_saloon_0_hull").id
+    light = np.random.default_rng(0).integers(0, 1000, (*size, 3)).astype(np.uint16)
+    raw = RawView(linear_rgb=light, depth_m=np.full(size, 1.5, np.float32), geom_id=ids)
+    clear = Weather(name="x", scattering_intensity=0)
+    sharp, smeared = (
+        darkroom_of(clear, "filament", "t", CameraEffects(shutter_s=shutter_s)).view(raw, camera, shot, placed.geoms)
+        for shutter_s in (0.0, 0.05)
+    )
+    changed = (sharp.linear_rgb != smeared.linear_rgb).any(axis=-1)
+    assert changed[: size[0] // 3].mean() > 0.9 and not changed[size[0] // 2 :].any()

@@ -14,6 +14,7 @@ import cv2
 import mujoco
 import numpy as np
 
+from gear.camera.optics import lens_map
 from gear.camera.response import response_for
 from gear.config.collection import CollectionConfig, SplitConfig, WeatherConfig
 from gear.config.dump import to_plain
@@ -23,7 +24,8 @@ from gear.config.reader import read_node
 from gear.contracts.rendering import RendererInfo
 from gear.contracts.tasks import SplitInfo
 from gear.dataset.plan import Plan
-from gear.plugins.build import find
+from gear.plugins.build import blamed, build, find
+from gear.plugins.catalogue import Found
 from gear.render.probing import renderer_info
 from gear.values.errors import ConfigError, UnknownNameError
 from gear.values.resources import data_dir
@@ -82,13 +84,14 @@ def resolve(config: CollectionConfig) -> Job:
 
     Raises:
         UnknownNameError: a task, town, scene, split or weather is not known; says what may have been meant.
-        ConfigError: a scene library or the task's options cannot be read.
+        ConfigError: a scene library or the task's options cannot be read, or the lens folds its pictures over.
         PatchError: the patch cannot be used.
         BackendError: the renderer cannot start here.
     """
     config = with_scene_file(config)
     found = find("task", config.task)
     options = read_node(found.spec.config, config.options, "options")
+    _check_lens(config, found)
     library = AssetLibrary.for_town(config.town)
     simulation = load_simulation(config.simulation)
     scene = find_scene(config, library.town_name)
@@ -143,6 +146,21 @@ def resolve(config: CollectionConfig) -> Job:
         plan=plan,
         renderer=renderer,
     )
+
+
+def _check_lens(config: CollectionConfig, task: Found) -> None:
+    lens = config.camera.lens
+    if not lens.bends:
+        return
+    product = build(task, config.options)
+    with blamed(task, "rig"):
+        rig = product.rig()
+    for camera in rig.cameras:
+        try:
+            lens_map(lens, camera.width_px, camera.height_px, camera.intrinsics.focal_px)
+        except ValueError as error:
+            problem = f"{error}; take k1 and k2 nearer to 0, or a narrower field of view"
+            raise ConfigError("camera", 0, 0, "lens", problem) from error
 
 
 def with_scene_file(config: CollectionConfig) -> CollectionConfig:
