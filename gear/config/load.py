@@ -10,7 +10,7 @@ from gear.config.nodes import Mapping as MappingNode
 from gear.config.nodes import Node, Place, Scalar, parse_file, parse_text
 from gear.config.original import from_original, is_original, simulation_from_python
 from gear.config.overrides import merged, with_overrides
-from gear.config.reader import read_node
+from gear.config.reader import read_node, spelled_out
 from gear.values.errors import UnknownNameError
 from gear.values.resources import data_dir
 
@@ -57,7 +57,7 @@ def load_collection(
         if text is not None
     }
     node = merged(node, MappingNode(given, node.place))
-    node = with_overrides(node, settings)
+    node = with_overrides(spelled_out(CollectionConfig, node), settings)
     if isinstance(node, MappingNode) and "task" not in node.entries:
         hint = "missing; say what to collect, such as --task stereo3d (see: gear plugins --kind task)"
         raise node.place.error("task", hint)

@@ -31,6 +31,23 @@ def read_node(kind: type[T], node: Node, key: str = "") -> T:
     return cast(T, _read(kind, node, key))
 
 
+def spelled_out(kind: Any, node: Node) -> Node:
+    """The node of a dataclass with the bare words of its fields written in full, so that more can be set beside them."""
+    if not isinstance(node, Mapping):
+        return node
+    hints = type_hints(kind)
+    return Mapping(
+        {name: (place, _in_full(hints.get(name), item)) for name, (place, item) in node.entries.items()}, node.place
+    )
+
+
+def _in_full(kind: Any, node: Node) -> Node:
+    shorthand = getattr(kind, "SHORTHAND", None)
+    if shorthand and isinstance(node, Scalar) and not node.is_null:
+        return Mapping({shorthand: (node.place, node)}, node.place)
+    return node
+
+
 def _read(kind: Any, node: Node, key: str) -> Any:
     if kind == Node:
         return node
@@ -67,10 +84,7 @@ def _expect_mapping(node: Node, key: str) -> Mapping:
 
 
 def _read_dataclass(kind: Any, node: Node, key: str) -> Any:
-    shorthand = getattr(kind, "SHORTHAND", None)
-    if shorthand and isinstance(node, Scalar) and not node.is_null:
-        node = Mapping({shorthand: (node.place, node)}, node.place)
-    mapping = _expect_mapping(node, key)
+    mapping = _expect_mapping(_in_full(kind, node), key)
     hints = type_hints(kind)
     fields = {field.name: field for field in dataclasses.fields(kind) if field.init}
     given: dict[str, Any] = {}

@@ -28,6 +28,15 @@ def test_flags_go_before_the_file_and_settings_before_flags(tmp_path: Path) -> N
     )
 
 
+def test_a_setting_below_a_bare_word_keeps_the_word(tmp_path: Path) -> None:
+    config = load_collection(None, {"task": "semseg", "weather": "HardRainNoon"}, ["weather.sun_altitude_deg=-20"])
+    assert (config.weather.preset, config.weather.sun_altitude_deg) == ("HardRainNoon", -20.0)
+    file = tmp_path / "c.yml"
+    file.write_text("task: semseg\nweather: WetNoon\n")
+    assert load_collection(str(file), {}, ["weather.cloudiness=40"]).weather.preset == "WetNoon"
+    assert load_collection(str(file), {}, ["weather.preset=CloudyNoon"]).weather.preset == "CloudyNoon"
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
