@@ -7,19 +7,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gear.camera.air import Air
+from gear.camera.night import Night, NightLight
 from gear.camera.optics import lens_map, motion_blurred, noisy, through_lens, vignetted
 from gear.camera.puddles import Puddles
 from gear.camera.rain import Rain
 from gear.camera.response import Response
 from gear.contracts.rendering import RawView
 from gear.values.frames import GeomTable, UInt16Image, View
-from gear.values.labels import LABEL_BY_NAME
+from gear.values.labels import OPEN_GROUND_CODES
 from gear.values.optics import CameraEffects, LensRecord
 from gear.values.rng import derive_rng
 from gear.values.scene import CameraRecord, SceneRecord
-
-PUDDLE_CODES = [LABEL_BY_NAME[name].code for name in ("road", "road_marking", "parking", "ground")]
-"""Level ground on which water stands."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -28,6 +26,7 @@ class Darkroom:
 
     Attributes:
         response: exposure and tone curve.
+        night: the town's lamps; None by day.
         air: fog and haze.
         puddles: standing water.
         rain: falling water.
@@ -35,6 +34,7 @@ class Darkroom:
     """
 
     response: Response
+    night: Night | None = None
     air: Air
     puddles: Puddles
     rain: Rain
@@ -51,7 +51,20 @@ class Darkroom:
             cameras.append(replace(camera, lens=LensRecord(k1=lens.k1, k2=lens.k2, focal_px=found.focal_px)))
         return replace(record, cameras=tuple(cameras))
 
-    def view(self, raw: RawView, camera: CameraRecord, record: SceneRecord, geoms: GeomTable) -> View:
+    def night_light(
+        self, truth: RawView, camera: CameraRecord, record: SceneRecord, geoms: GeomTable
+    ) -> NightLight | None:
+        """What a view gets of lamps, for `view`; None by day."""
+        return self.night.light(truth, camera, record, geoms) if self.night is not None else None
+
+    def view(
+        self,
+        raw: RawView,
+        camera: CameraRecord,
+        record: SceneRecord,
+        geoms: GeomTable,
+        night_light: NightLight | None = None,
+    ) -> View:
         """One view: colour with everything that the weather and the camera add, and truth aligned with it.
 
         Args:
@@ -59,9 +72,11 @@ class Darkroom:
             camera: who looks.
             record: the scene, for its seed and the ego car's motion.
             geoms: what each geom is.
+            night_light: what the same view, whatever its surfaces show, gets of lamps; found anew unless given.
         """
         assert raw.linear_rgb is not None and raw.depth_m is not None and raw.geom_id is not None
-        seen = replace(raw, linear_rgb=self._weathered(raw, camera, record, geoms))
+        lamps = night_light or self.night_light(raw, camera, record, geoms)
+        seen = replace(raw, linear_rgb=self._weathered(raw, camera, record, geoms, lamps))
         assert seen.linear_rgb is not None and seen.depth_m is not None and seen.geom_id is not None
         if self.effects.shutter_s > 0:
             speed = record.ego.velocity_world_mps
@@ -87,13 +102,19 @@ class Darkroom:
             geom_id=seen.geom_id,
         )
 
-    def _weathered(self, raw: RawView, camera: CameraRecord, record: SceneRecord, geoms: GeomTable) -> UInt16Image:
+    def _weathered(
+        self, raw: RawView, camera: CameraRecord, record: SceneRecord, geoms: GeomTable, lamps: NightLight | None
+    ) -> UInt16Image:
         assert raw.linear_rgb is not None and raw.depth_m is not None and raw.geom_id is not None
         linear_rgb = raw.linear_rgb
+        if lamps is not None:
+            linear_rgb = lamps.lay(linear_rgb)
         if self.puddles.share > 0:
             # The last entry is what id -1, nothing, finds.
-            holds_water = np.append(np.isin(geoms.label_code, PUDDLE_CODES), False)
+            holds_water = np.append(np.isin(geoms.label_code, OPEN_GROUND_CODES), False)
             linear_rgb = self.puddles.lay(linear_rgb, raw.depth_m, holds_water[raw.geom_id], camera)
+        if lamps is not None:
+            linear_rgb = lamps.mirror(linear_rgb)
         linear_rgb = self.air.veil(linear_rgb, raw.depth_m, camera)
         if self.rain.intensity > 0:
             rng = derive_rng(record.seed, "rain", record.index, camera.name)

@@ -13,7 +13,7 @@ Nothing in it depends on the picture: a patch cannot change how the rest of a sc
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -80,24 +80,18 @@ class Response:
 IDENTITY = Response(encoding="none")
 """For frames that hold display values: the picture is the frame."""
 
-NIGHT_EXPOSURE, CLASSIC_NIGHT_EXPOSURE = 0.35, 0.1
-"""Of linear frames and of display values: a grey wall is just to be seen."""
-
 
 def response_for(renderer_name: str, weather: Weather) -> Response:
     """The camera setting for a renderer's frames in a weather: fixed, as if set once by hand for that light.
 
     A low sun leaves streets in shadow and needs more lift; under clouds contrast is low by itself and gets a little
-    more. Frames of a night are as bright as those of a day, so that they have as many levels; here it becomes dark.
+    more.
     """
-    night = weather.night
     if renderer_name == "classic":
-        return replace(IDENTITY, exposure=CLASSIC_NIGHT_EXPOSURE**night) if night else IDENTITY
+        return IDENTITY
     low_sun = float(np.clip((40 - weather.sun_altitude_deg) / 30, 0, 1))
     clouds = max(weather.cloudiness, 80.0 if weather.precipitation > 0 else 0.0) / 100
     exposure = 4.5 + 1.2 * low_sun - 2.0 * clouds
-    if night:
-        exposure = exposure ** (1 - night) * NIGHT_EXPOSURE**night
     return Response(exposure=round(exposure, 3), contrast=round(1.43 + 0.05 * clouds, 3))
 
 

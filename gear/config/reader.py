@@ -32,7 +32,7 @@ def read_node(kind: type[T], node: Node, key: str = "") -> T:
 
 
 def spelled_out(kind: Any, node: Node) -> Node:
-    """The node of a dataclass with the bare words of its fields written in full, so that more can be set beside them."""
+    """The node of a dataclass with its bare words written in full, so that more can be set beside them."""
     if not isinstance(node, Mapping):
         return node
     hints = type_hints(kind)

@@ -72,3 +72,6 @@ LABELS: tuple[Label, ...] = (
 
 LABEL_BY_NAME: dict[str, Label] = {label.name: label for label in LABELS}
 """Labels by the name that MJCF default classes start with."""
+
+OPEN_GROUND_CODES = tuple(LABEL_BY_NAME[name].code for name in ("road", "road_marking", "parking", "ground"))
+"""Level ground under the sky: it gets wet, and water stands on it."""

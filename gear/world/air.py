@@ -9,6 +9,7 @@ import numpy as np
 
 from gear.camera.air import Air, Fog
 from gear.camera.develop import Darkroom
+from gear.camera.night import Night
 from gear.camera.puddles import Puddles
 from gear.camera.rain import Rain
 from gear.camera.response import encode_srgb, response_for
@@ -44,7 +45,13 @@ DROP_LIGHT = 1.25
 _MIRROR_ROWS, _MIRROR_COLUMNS = 128, 512
 
 
-def darkroom_of(weather: Weather, renderer_name: str, town: str, effects: CameraEffects | None = None) -> Darkroom:
+def darkroom_of(
+    weather: Weather,
+    renderer_name: str,
+    town: str,
+    effects: CameraEffects | None = None,
+    night: Night | None = None,
+) -> Darkroom:
     """What develops a renderer's frames of a weather in a town.
 
     Args:
@@ -52,12 +59,14 @@ def darkroom_of(weather: Weather, renderer_name: str, town: str, effects: Camera
         renderer_name: who renders.
         town: its puddles lie where they always lie.
         effects: of the camera; none unless given.
+        night: the town's lamps; none by day.
     """
-    air = air_of(weather, renderer_name)
-    mirrored = _shown(mirrored_light(weather, _MIRROR_ROWS, _MIRROR_COLUMNS), renderer_name)
+    left = night.sky_level if night else 1.0
+    mirrored = _shown(left * mirrored_light(weather, _MIRROR_ROWS, _MIRROR_COLUMNS), renderer_name)
     return Darkroom(
         response=response_for(renderer_name, weather),
-        air=air,
+        night=night,
+        air=air_of(weather, renderer_name, left),
         puddles=Puddles(
             town=town,
             share=FULL_PUDDLES * weather.precipitation_deposits / 100,
@@ -67,7 +76,7 @@ def darkroom_of(weather: Weather, renderer_name: str, town: str, effects: Camera
         rain=Rain.of(
             weather.precipitation,
             weather.wind_intensity,
-            np.minimum(_shown(DROP_LIGHT * horizon_light(weather).mean(axis=0), renderer_name), 1.0),
+            np.minimum(_shown(left * DROP_LIGHT * horizon_light(weather).mean(axis=0), renderer_name), 1.0),
         ),
         effects=effects or CameraEffects(),
     )
@@ -78,14 +87,14 @@ def _shown(light: Floats, renderer_name: str) -> Floats:
     return encode_srgb(light) if renderer_name == "classic" else light
 
 
-def air_of(weather: Weather, renderer_name: str) -> Air:
-    """The air of a weather, in the units of a renderer's frames."""
+def air_of(weather: Weather, renderer_name: str, left: float = 1.0) -> Air:
+    """The air of a weather, in the units of a renderer's frames; `left` is the share of its own light at night."""
     aerosol = AEROSOL_PER_M * weather.mie_scattering_scale / 0.03
     molecules = np.array(MOLECULES_PER_M) * weather.rayleigh_scattering_scale / 0.0331
     return Air(
         fogs=fogs_of(weather),
         clear_per_m=weather.scattering_intensity * (aerosol + molecules),
-        ring=_shown(horizon_light(weather), renderer_name),
+        ring=_shown(left * horizon_light(weather), renderer_name),
     )
 
 

@@ -111,6 +111,17 @@ def _in_street(sky: Sky, directions: Floats) -> Floats:
     return np.asarray(radiance + share * (houses - radiance))
 
 
+def even_light(weather: Weather) -> Floats:
+    """(3, 3) what a white surface shows that faces up, sideways on average, and down, by channel, without the sun."""
+    sky = Sky.of(weather)
+    coarse, solid_angle = face_directions(_INTEGRATION_PX), _solid_angles(_INTEGRATION_PX)
+    light = np.minimum(BOUNCE_GAIN * _exposure(sky)[0] * _in_street(sky, coarse), 1.0)
+    sides = [np.array([math.cos(angle), math.sin(angle), 0.0]) for angle in np.arange(8) * math.pi / 4]
+    up, down = (_irradiance(light, coarse, solid_angle, np.array([0.0, 0.0, z])) for z in (1.0, -1.0))
+    aside = np.mean([_irradiance(light, coarse, solid_angle, side) for side in sides], axis=0)
+    return np.stack([up, aside, down]) / math.pi
+
+
 def horizon_light(weather: Weather) -> Floats:
     """(`HORIZON_AZIMUTHS`, 3) light of distant air by azimuth, counter-clockwise from east, in units of the frame.
 

@@ -23,6 +23,7 @@ _MIN_ALTITUDE_RAD = math.radians(1.5)
 """The formulas hold for a sun above the horizon; a lower one lights the sky as if it stood here, only more weakly."""
 
 _NIGHT_TINT = np.array([0.72, 0.84, 1.0])
+_NIGHT_CLOUDS = np.array([1.25, 1.12, 1.0])
 _GROUND_ALBEDO = np.array([0.16, 0.15, 0.13])
 _SUN_KLX = 128.0 * np.array([1.03, 1.0, 0.96])
 _WAVELENGTHS_UM = np.array([0.610, 0.550, 0.465])
@@ -177,7 +178,12 @@ class Sky:
         global_klx = beam * self.towards_sun[2] + 0.18 * beam.mean()
         tint = 0.4 - 0.3 * self.cloud_cover
         grey = (1 - tint) * global_klx.mean() + tint * global_klx
-        return np.asarray((0.72 - 0.36 * self.cloud_cover) * grey / math.pi)
+        day = (0.72 - 0.36 * self.cloud_cover) * grey / math.pi
+        if not self.night:
+            return np.asarray(day)
+        # A town's lamps reach clouds, but not the sky behind them.
+        zenith = _zenith(self.turbidity, math.acos(float(self.towards_sun[2])))["Y"]
+        return np.asarray(day + self.night * (_NIGHT_CLOUDS * zenith - day))
 
     def _clouds(self, noise: Floats, height: Floats, towards_sun: Floats) -> Floats:
         """(N, 3): bright where thin and near the sun; where overcast, brighter overhead, as the CIE's overcast sky."""

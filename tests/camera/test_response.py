@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 import pytest
 import torch
@@ -12,7 +10,6 @@ from hypothesis import strategies as st
 
 from gear.camera import IDENTITY, Response, face_light, response_for, torch_response
 from gear.values.frames import LINEAR_FULL_SCALE
-from gear.values.scene import Weather
 from gear.world.weather import PRESETS
 
 RESPONSES = st.builds(
@@ -83,21 +80,6 @@ def test_every_weather_has_a_fixed_setting() -> None:
         assert 75 < 255 * setting.curve(0.1) < 140
         assert 225 < 255 * setting.curve(0.85) < 252
     assert all(response_for("classic", weather) == IDENTITY for weather in PRESETS.values())
-
-
-@pytest.mark.parametrize("name", ["filament", "classic"])
-def test_pictures_darken_as_the_sun_goes_down(name: str) -> None:
-    light = np.linspace(0.05, 0.9, 20)
-    shown = [
-        response_for(name, Weather(name="x", sun_altitude_deg=float(a))).curve(light) for a in (0, -2, -5, -8, -10)
-    ]
-    assert all((later < earlier).all() for earlier, later in itertools.pairwise(shown))
-    night = response_for(name, Weather(name="x", sun_altitude_deg=-10))
-    assert response_for(name, Weather(name="x", sun_altitude_deg=-90)) == night
-    assert response_for(name, Weather(name="x", sun_altitude_deg=0)) == response_for(
-        name, Weather(name="x", sun_altitude_deg=0.5)
-    )
-    assert 10 < 255 * night.curve(0.3) < 70
 
 
 def test_settings_out_of_range_are_refused() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from itertools import pairwise
 
@@ -66,10 +67,14 @@ def stage_of(model: mujoco.MjModel) -> Stage:
 
 
 def test_presets_are_carlas() -> None:
-    assert set(PRESETS) == {
+    assert {name for name, weather in PRESETS.items() if not weather.night} == {
         "ClearNoon", "CloudyNoon", "ClearSunset", "CloudySunset", "SoftRainNoon", "WetNoon", "MidRainyNoon",
         "HardRainNoon",
     }  # fmt: skip
+    for name, weather in PRESETS.items():
+        if weather.night:
+            noon = PRESETS[name.replace("Night", "Noon")]
+            assert dataclasses.replace(noon, name=name, sun_altitude_deg=-90) == weather
     assert all(weather.name == name for name, weather in PRESETS.items())
     clear, soft, hard = PRESETS["ClearNoon"], PRESETS["SoftRainNoon"], PRESETS["HardRainNoon"]
     assert (clear.cloudiness, clear.sun_altitude_deg, clear.fog_density, clear.sun_azimuth_deg) == (5, 45, 2, 225)
@@ -186,7 +191,9 @@ def test_the_glow_of_the_sun_leaves_the_sky_at_night() -> None:
     dark = lighting_of(Weather(name="x", sun_altitude_deg=-30), sky_face_px=16)
     assert dark.sky_faces.mean() < 0.7 * evening.sky_faces.mean()
     assert dark.sun.mean() < 0.1 * dark.ambient.mean(), "nothing casts a shadow"
-    assert dark.ambient.mean() > 0.5 * evening.ambient.mean(), "the frame keeps its levels; the camera darkens it"
+    assert dark.ambient.mean() > 0.5 * evening.ambient.mean(), (
+        "the frame keeps its levels; the night's light darkens it"
+    )
 
 
 @pytest.mark.parametrize("name", sorted(PRESETS))

@@ -53,9 +53,10 @@ def develop_probes(
 
         if not shot.white:
             break
-        black = quiet.view(developed(shot.black), camera, record, geoms).linear_rgb
+        lamps = quiet.night_light(truth[number], camera, record, geoms)
+        black = quiet.view(developed(shot.black), camera, record, geoms, lamps).linear_rgb
         for surface, raws in shot.white.items():
-            white = quiet.view(developed(raws), camera, record, geoms).linear_rgb
+            white = quiet.view(developed(raws), camera, record, geoms, lamps).linear_rgb
             probe = crop_probe(surface, camera.name, black, white, darkroom.response)
             if probe is not None:
                 probes.append(probe)

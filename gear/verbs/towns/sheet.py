@@ -18,6 +18,7 @@ from gear.verbs.collect.run import Progress
 from gear.verbs.towns.canvas import Canvas
 from gear.verbs.towns.facts import Town
 from gear.world.air import darkroom_of
+from gear.world.night import night_of
 from gear.world.planner import ScenePlanner
 from gear.world.scene_spec import SceneSpec
 from gear.world.world import World
@@ -91,7 +92,8 @@ def thumbnail(town: Town, name: str, scene: SceneSpec, options: SheetOptions) ->
         where = f"{np.nanmean(view.depth_m[pixels]):.0f} m ahead, " if pixels.any() else ""
         seen.append(f"{face.asset} {where}{pixels.mean():.1%} of the picture")
     others = len(record.actors) - 1
-    shown = darkroom_of(options.weather, options.renderer, world.town_name).view(
+    night = night_of(world, options.weather, options.renderer)
+    shown = darkroom_of(options.weather, options.renderer, world.town_name, night=night).view(
         view, record.cameras[0], record, placed.geoms
     )
     return shown.rgb, "; ".join([*seen, f"{others} other road users"])

@@ -1,0 +1,175 @@
+"""Lamps at night, laid over linear frames: what they light, by depth, and what glows itself.
+
+    L' = L (k + E / A) + G
+
+L is the frame under the night's even light, in which every surface shows its albedo times A, the even light that a
+surface of its slant gets; k is what is left of that light, E what lamps add to it, G the light of what glows. None of
+these depends on any albedo: frames stay linear, and a patch changes no pixel that it does not reach.
+
+Slants follow from depth. Lamps throw no shadows; walls that face away from them stay dark.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.camera.beams import Headlamps, Lamps, Spots, headlamps
+from gear.camera.glow import Shine, Windows
+from gear.camera.own_light import board_light, lens_light
+from gear.camera.slant import Strip, strips_of
+from gear.contracts.rendering import RawView
+from gear.values.frames import LINEAR_FULL_SCALE, FloatImage, GeomTable, IdImage, UInt16Image
+from gear.values.geometry import Array
+from gear.values.labels import OPEN_GROUND_CODES
+from gear.values.rng import derive_rng
+from gear.values.scene import CameraRecord, SceneRecord
+
+GLARE = {"street": 0.12, "globe": 0.6, "head": 0.03}
+"""Light of the spot that a lamp is seen as, per light that it throws."""
+
+SIGNAL_GAIN = 0.9
+STREAK_SHARE = 0.12
+"""Of a lamp's light that wet ground mirrors."""
+
+DISPLAY_POWER = 1 / 2.2
+"""Display values grow with this power of light."""
+
+_GRAIN_PX = 128
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class NightLight:
+    """What one view of one scene gets of lamps; the same whatever its surfaces show.
+
+    Attributes:
+        share: (H, W, 3) k + E / A.
+        glow: (H, W, 3) G in frame units.
+        streaks: (H, W, 3) what wet ground mirrors of lamps, in frame units; None for dry ground.
+    """
+
+    share: FloatImage
+    glow: FloatImage
+    streaks: FloatImage | None
+
+    def lay(self, linear_rgb: UInt16Image) -> UInt16Image:
+        """(H, W, 3) uint16 frame at night, a new array. Steps between levels are hidden in a fixed grain."""
+        light = linear_rgb * self.share
+        light += self.glow
+        return _rounded(light)
+
+    def mirror(self, linear_rgb: UInt16Image) -> UInt16Image:
+        """The frame with lamps mirrored in wet ground."""
+        return linear_rgb if self.streaks is None else _rounded(linear_rgb + self.streaks)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Night:
+    """A town's lamps in one weather.
+
+    Attributes:
+        level, sky_level: share of the even light that is left on the ground and in the sky, 0..1.
+        lit: how far lamps outshine it, 0..1: at dusk they are on, and yet pale.
+        even: (3, 3) what a white surface shows in the even light that faces up, sideways and down, by channel; 1.0 is
+            the frame's full scale.
+        lamps: of the town, by kind: `street` and `globe`.
+        windows: panes with light behind them.
+        vehicles: where vehicles bear their headlamps, by asset.
+        wetness: of open ground, 0..1.
+        is_signal: (ngeom,) what glows by itself in the frame, the lenses of traffic lights.
+        is_lens: (ngeom,) the glass of vehicles' lamps.
+        is_display: whether frames hold display values instead of light.
+    """
+
+    level: float
+    sky_level: float
+    lit: float
+    even: Array
+    lamps: Mapping[str, Lamps]
+    windows: Windows
+    vehicles: Mapping[str, Headlamps]
+    wetness: float
+    is_signal: npt.NDArray[np.bool_]
+    is_lens: npt.NDArray[np.bool_]
+    is_display: bool
+
+    def light(self, truth: RawView, camera: CameraRecord, record: SceneRecord, geoms: GeomTable) -> NightLight:
+        """What a view gets of lamps.
+
+        Args:
+            truth: depth and ids of a renderer's view.
+            camera: who looks.
+            record: the scene, for who drives with lights.
+            geoms: what each geom is.
+        """
+        assert truth.depth_m is not None and truth.geom_id is not None
+        kinds = {**self.lamps, "head": headlamps(record, self.vehicles)}
+        share, glow = self._own(truth.geom_id, truth.depth_m, camera, record, geoms)
+        streaks = np.zeros_like(glow) if self.wetness > 0 else None
+        is_open = np.append(np.isin(geoms.label_code, OPEN_GROUND_CODES), False)[truth.geom_id]
+        for kind, lamps in kinds.items():
+            shine = Shine.of(lamps, camera, GLARE[kind], truth.depth_m)
+            colour = np.array(lamps.colour, np.float32)
+            glow += shine.spots(is_open.shape)[..., None] * colour
+            if streaks is not None:
+                image = shine.streaks(camera, record.ego.world_from_actor.position_m[2]) * is_open
+                streaks += image[..., None] * (np.float32(STREAK_SHARE * self.wetness) * colour)
+        share *= np.float32(self.lit)
+        spots = [Spots.of(lamps, camera) for lamps in kinds.values()]
+        for strip in strips_of(truth.depth_m, camera):
+            self._add_lamps(strip, spots, share[strip.rows])
+        return NightLight(
+            share=self._shown(share), glow=self._lit(glow), streaks=None if streaks is None else self._lit(streaks)
+        )
+
+    def _lit(self, light: FloatImage) -> FloatImage:
+        return np.asarray(self._shown(light * np.float32(self.lit)) * np.float32(LINEAR_FULL_SCALE))
+
+    def _shown(self, light: FloatImage) -> FloatImage:
+        return light ** np.float32(DISPLAY_POWER) if self.is_display else light
+
+    def _add_lamps(self, strip: Strip, spots: Sequence[Spots], share: FloatImage) -> None:
+        """Adds k + E / A to some rows of shares."""
+        share += np.where(strip.is_seen, np.float32(self.level), np.float32(self.sky_level))[..., None]
+        lit = [(spot.lamps.colour, spot.light(strip)) for spot in spots]
+        above, aside, below = self.even.astype(np.float32)
+        rise, sink = np.maximum(strip.normal[2], 0), np.maximum(-strip.normal[2], 0)
+        for channel in range(3):
+            even = aside[channel] + (above - aside)[channel] * rise + (below - aside)[channel] * sink
+            for colour, light in lit:
+                if light is not None:
+                    share[..., channel] += np.float32(self.lit * colour[channel]) * light / even
+
+    def _own(
+        self, geom_id: IdImage, depth_m: FloatImage, camera: CameraRecord, record: SceneRecord, geoms: GeomTable
+    ) -> tuple[FloatImage, FloatImage]:
+        """(H, W, 3) shares of what has light of its own, and the light that it shows besides."""
+        share = np.zeros((*geom_id.shape, 3), np.float32)
+        glow = np.zeros_like(share)
+        panes = self.windows.seen(geom_id, camera)
+        where = np.nonzero(panes >= 0)
+        share[where], glow[where] = self.windows.gain[panes[where]], self.windows.light[panes[where]]
+        share[np.append(self.is_signal, False)[geom_id]] = SIGNAL_GAIN
+        lenses = np.append(self.is_lens, False)
+        for where, gain, light in lens_light(lenses, geom_id, depth_m, camera, record, geoms, self.vehicles):
+            share[where], glow[where] = gain, light
+        for where, lit in board_light(geom_id, depth_m, camera, record, geoms):
+            share[where] = lit[:, None] / self.even[1].astype(np.float32)
+        return share, glow
+
+
+def _rounded(light: FloatImage) -> UInt16Image:
+    """(H, W, 3) light as levels, right on average: rounded down after a grain of 0..1 is added, the same every time."""
+    height, width = light.shape[:2]
+    light += _grain(height, width)[..., None]
+    return np.minimum(light, LINEAR_FULL_SCALE, out=light).astype(np.uint16)
+
+
+@cache
+def _grain(height_px: int, width_px: int) -> FloatImage:
+    tile = derive_rng(0, "night", "grain").random((_GRAIN_PX, _GRAIN_PX)).astype(np.float32)
+    return np.tile(tile, (-(-height_px // _GRAIN_PX), -(-width_px // _GRAIN_PX)))[:height_px, :width_px]

@@ -1,0 +1,77 @@
+"""What has light of its own at night: the lenses of signals, the lamps of vehicles, boards under their lamps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.camera.beams import Headlamps, drivers
+from gear.values.frames import FloatImage, GeomTable, IdImage
+from gear.values.geometry import Array
+from gear.values.scene import CameraRecord, SceneRecord
+
+Where = tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]
+
+BOARD_LIGHT, BOARD_FALL = 0.33, 0.3
+"""What a white board shows at its upper edge in the light of its own lamps, and by what share less at its lower one."""
+
+FRONT_LIGHT, BACK_LIGHT = (0.9, 0.85, 0.75), (0.30, 0.008, 0.004)
+BACK_GAIN = 0.35
+
+
+def lens_light(
+    lenses: npt.NDArray[np.bool_],
+    geom_id: IdImage,
+    depth_m: FloatImage,
+    camera: CameraRecord,
+    record: SceneRecord,
+    geoms: GeomTable,
+    vehicles: Mapping[str, Headlamps],
+) -> Iterator[tuple[Where, float, tuple[float, float, float]]]:
+    """The glass of the lamps of all that drives: rows and columns, gain of what is seen there, and light besides.
+
+    Args:
+        lenses: (ngeom + 1,) whether a geom is such glass; the last entry is what id -1 finds.
+        geom_id, depth_m: (H, W) of a view.
+        camera: who looks.
+        record, geoms: the scene, and what each geom is.
+        vehicles: assets that have lamps.
+    """
+    rows, columns = np.nonzero(lenses[geom_id])
+    if not len(rows):
+        return
+    at_m = places(rows, columns, depth_m, camera)
+    owner = geoms.object_id[geom_id[rows, columns]]
+    for actor in drivers(record, vehicles):
+        pose = actor.world_from_actor.transform("world", "actor")
+        is_front = (at_m - pose.translation_m) @ pose.rotation[:, 0] > 0
+        for chosen, gain, light in ((is_front, 0.0, FRONT_LIGHT), (~is_front, BACK_GAIN, BACK_LIGHT)):
+            mine = chosen & (owner == actor.id)
+            yield (rows[mine], columns[mine]), gain, light
+
+
+def board_light(
+    geom_id: IdImage, depth_m: FloatImage, camera: CameraRecord, record: SceneRecord, geoms: GeomTable
+) -> Iterator[tuple[Where, FloatImage]]:
+    """Faces of standing boards: rows and columns, and (N,) what a white one shows there in the light from above."""
+    index = np.append(geoms.surface_index, -1)[geom_id]
+    for number, surface in enumerate(record.surfaces):
+        rows, columns = np.nonzero(index == number)
+        if surface.actor_id is None and len(rows):
+            world_from_surface = record.world_from_surface(surface)
+            away_m = places(rows, columns, depth_m, camera) - world_from_surface.translation_m
+            down = np.clip(away_m @ world_from_surface.rotation[:, 1] / surface.height_m + 0.5, 0, 1)
+            yield (rows, columns), (BOARD_LIGHT * (1 - BOARD_FALL * down)).astype(np.float32)
+
+
+def places(
+    rows: npt.NDArray[np.intp], columns: npt.NDArray[np.intp], depth_m: FloatImage, camera: CameraRecord
+) -> Array:
+    """(N, 3) where pixels lie in the world."""
+    pose = camera.world_from_camera_transform
+    z = depth_m[rows, columns].astype(np.float64)
+    x = (columns + 0.5 - camera.width_px / 2) / camera.focal_px * z
+    y = (rows + 0.5 - camera.height_px / 2) / camera.focal_px * z
+    return np.asarray(np.stack([x, y, z], axis=1) @ pose.rotation.T + pose.translation_m)

@@ -1,0 +1,80 @@
+"""Where pixels lie and which way their surfaces face, from depth alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.values.frames import FloatImage
+from gear.values.scene import CameraRecord
+
+STRIP_ROWS = 32
+"""Strips stay in the processor's cache."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Strip:
+    """Some rows of a picture.
+
+    Attributes:
+        rows: which.
+        is_seen: (h, W) whether there is anything.
+        position_m: (3, h, W) float32 east, north and up from the camera to what is seen; zero where nothing is.
+        normal: (3, h, W) float32 unit vectors out of what is seen, towards the camera; zero where nothing is.
+    """
+
+    rows: slice
+    is_seen: npt.NDArray[np.bool_]
+    position_m: FloatImage
+    normal: FloatImage
+
+
+def strips_of(depth_m: FloatImage, camera: CameraRecord) -> Iterator[Strip]:
+    """A picture from its top to its bottom.
+
+    A surface's slant is that between a pixel and its nearer neighbours in depth, so that silhouettes do not bend it.
+
+    Args:
+        depth_m: (H, W) float32 planar z, NaN where nothing is.
+        camera: who looks.
+    """
+    height, width = depth_m.shape
+    x = ((np.arange(width) + 0.5 - width / 2) / camera.focal_px).astype(np.float32)
+    y = ((np.arange(height) + 0.5 - height / 2) / camera.focal_px).astype(np.float32)[:, None]
+    rotation = camera.world_from_camera_transform.rotation.astype(np.float32)
+    for top in range(0, height, STRIP_ROWS):
+        bottom = min(top + STRIP_ROWS, height)
+        first, last = max(top - 1, 0), min(bottom + 1, height)
+        z = depth_m[first:last]
+        position = np.stack([axis[0] * (x * z) + axis[1] * (y[first:last] * z) + axis[2] * z for axis in rotation])
+        inside = slice(top - first, bottom - first)
+        across = _along(position, z, 1)[:, inside]
+        down = _along(position, z, 0)[:, inside]
+        is_seen = z[inside] == z[inside]
+        yield Strip(
+            rows=slice(top, bottom),
+            is_seen=is_seen,
+            position_m=np.where(is_seen, position[:, inside], np.float32(0)),
+            normal=_unit_cross(down, across),
+        )
+
+
+def _along(position: FloatImage, z: FloatImage, axis: int) -> FloatImage:
+    """(3, h, W) step to a neighbour along an axis of the picture, the one whose depth differs less."""
+    step, fall = np.diff(position, axis=axis + 1), np.abs(np.diff(z, axis=axis))
+    fall[np.isnan(fall)] = np.inf
+    pad = [(0, 0), (0, 0)]
+    before, after = list(pad), list(pad)
+    before[axis], after[axis] = (1, 0), (0, 1)
+    is_after = np.pad(fall, after, constant_values=np.inf) < np.pad(fall, before, constant_values=np.inf)
+    return np.where(is_after, np.pad(step, [(0, 0), *after]), np.pad(step, [(0, 0), *before]))
+
+
+def _unit_cross(a: FloatImage, b: FloatImage) -> FloatImage:
+    normal = np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    length = np.sqrt(np.einsum("ihw,ihw->hw", normal, normal))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(np.nan_to_num(normal / length, nan=0.0, posinf=0.0, neginf=0.0), np.float32)

@@ -1,0 +1,59 @@
+"""A town at night, for the camera: its lamps and windows, and how much of the even light is left."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from gear.camera.beams import Headlamps
+from gear.camera.night import Night
+from gear.values.rng import derive_rng
+from gear.values.scene import Weather
+from gear.world.lamps import find_lamps, find_windows
+from gear.world.light import even_light
+from gear.world.weather import wetness
+from gear.world.world import World
+
+LEVEL, SKY_LEVEL = 0.03, 0.14
+"""Of even light, on the ground and in the sky, when the sun's is gone."""
+
+HEADLAMP_KINDS = ("car", "van", "bus", "truck", "motorcycle")
+GAUGE_SHARE = 0.72
+"""Of a vehicle's width that lies between its headlamps."""
+
+
+def night_of(world: World, weather: Weather, renderer_name: str) -> Night | None:
+    """What the night adds to a world's frames; nothing while the sun is up.
+
+    Args:
+        world: compiled; its meshes must still be there.
+        weather: light and air.
+        renderer_name: who renders.
+    """
+    if not weather.night:
+        return None
+    model = world.model
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    material = [model.mat(index).name.rsplit("/", 1)[-1] if index >= 0 else "" for index in model.geom_matid]
+    level = LEVEL**weather.night
+    return Night(
+        level=level,
+        sky_level=SKY_LEVEL**weather.night,
+        lit=1 - level,
+        even=even_light(weather),
+        lamps=find_lamps(model, data),
+        windows=find_windows(model, data, derive_rng(0, "windows", world.town_name)),
+        vehicles={
+            name: Headlamps(
+                front_m=kind.front_m,
+                half_gauge_m=0.0 if kind.facts.kind == "motorcycle" else GAUGE_SHARE * kind.half_width_m,
+            )
+            for name, kind in world.types.items()
+            if kind.facts.kind in HEADLAMP_KINDS
+        },
+        wetness=wetness(weather),
+        is_signal=np.array([index >= 0 and model.mat_emission[index] > 0 for index in model.geom_matid]),
+        is_lens=np.array([name == "lights" for name in material]),
+        is_display=renderer_name == "classic",
+    )

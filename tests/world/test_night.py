@@ -1,0 +1,117 @@
+"""The lamps and windows of towns are found where they stand."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+
+import mujoco
+import numpy as np
+import pytest
+
+from gear.testing.tiny_town import CLEAR, tiny_world
+from gear.values.resources import data_dir
+from gear.values.rng import derive_rng
+from gear.values.scene import Weather
+from gear.world.lamps import GLAZINGS, find_lamps, find_windows
+from gear.world.light import even_light, lighting_of
+from gear.world.night import night_of
+
+NIGHT = Weather(name="night", sun_altitude_deg=-90)
+
+
+@cache
+def compiled(town: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    model = mujoco.MjModel.from_xml_path(str(data_dir("mjcf") / "towns" / f"{town}.xml"))
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    return model, data
+
+
+def posts_m(model: mujoco.MjModel, data: mujoco.MjData, name: str) -> np.ndarray:
+    """(N, 2) where the felt posts of lamps stand."""
+    found = [i for i in range(model.ngeom) if re.fullmatch(rf"{name}(_\d+)?", model.geom(i).name)]
+    return np.asarray(data.geom_xpos[found, :2])
+
+
+@pytest.mark.parametrize(
+    "town", ["suburb", pytest.param("town10", marks=pytest.mark.slow), pytest.param("harbour", marks=pytest.mark.slow)]
+)
+def test_every_street_lamp_is_found_over_its_street(town: str) -> None:
+    model, data = compiled(town)
+    street = find_lamps(model, data)["street"]
+    posts = posts_m(model, data, "lamp_modern")
+    assert len(posts) >= 50
+    away_m = np.linalg.norm(street.position_m[None, :, :2] - posts[:, None], axis=2)
+    assert (away_m.min(axis=1) < 3.0).all(), "each post bears a lamp"
+    modern = away_m.min(axis=0) < 3.0
+    assert modern.sum() == len(posts)
+    assert (street.axis[modern, 2] < -0.99).all()
+    assert ((street.position_m[modern, 2] > 5) & (street.position_m[modern, 2] < 12)).all()
+
+
+@pytest.mark.slow
+def test_heritage_lamps_shine_to_all_sides() -> None:
+    model, data = compiled("town10")
+    globes = find_lamps(model, data)["globe"]
+    posts = np.concatenate([posts_m(model, data, name) for name in ("lamp_heritage", "lamp")])
+    assert len(globes.intensity) == len(posts) == 56
+    assert np.linalg.norm(globes.position_m[None, :, :2] - posts[:, None], axis=2).min(axis=1).max() < 0.5
+
+
+def test_some_windows_are_lit_the_same_every_night_and_face_away_from_their_houses() -> None:
+    model, data = compiled("suburb")
+    first, again = (find_windows(model, data, derive_rng(0, "windows", "suburb")) for _ in range(2))
+    np.testing.assert_array_equal(first.corners_m, again.corners_m)
+    glazed = [
+        i for i in range(model.ngeom) if model.geom_matid[i] >= 0 and model.mat(model.geom_matid[i]).name == "windows"
+    ]
+    panes = sum(model.mesh_facenum[model.geom_dataid[i]] for i in glazed) / 2
+    lit = np.isin(first.geom_id, glazed).sum()
+    assert lit == pytest.approx(GLAZINGS["windows"].lit * panes, rel=0.1)
+    # A ray from before a pane against its normal meets the pane's own geom.
+    hits = 0
+    for index in range(0, len(first.geom_id), 40):
+        start = first.corners_m[index].mean(axis=0) + 0.05 * first.normal[index]
+        geom = np.zeros(1, np.int32)
+        group = np.array([1, 1, 1, 0, 0, 0], np.uint8)
+        distance = mujoco.mj_ray(model, data, start, -first.normal[index], group, 1, -1, geom)
+        hits += int(geom[0] == first.geom_id[index] and distance < 0.1)
+    assert hits >= 0.95 * len(range(0, len(first.geom_id), 40))
+
+
+def test_lamp_glass_of_other_towns_is_a_material_of_that_name() -> None:
+    model = mujoco.MjModel.from_xml_string("""
+        <mujoco>
+          <asset>
+            <material name="lamp_glass"/>
+            <mesh name="pane" vertex="0 0 0  0.3 0 0  0.3 0.3 0  0 0.3 0  0.1 0.1 0.02" face="0 2 1  0 3 2"
+                  inertia="shell"/>
+          </asset>
+          <worldbody>
+            <geom type="mesh" mesh="pane" material="lamp_glass" pos="4 5 6" contype="0" conaffinity="0"/>
+            <geom type="sphere" size="0.2" material="lamp_glass" pos="-4 5 3" contype="0" conaffinity="0"/>
+          </worldbody>
+        </mujoco>""")
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    found = find_lamps(model, data)
+    np.testing.assert_allclose(found["street"].position_m, [[4.15, 5.15, 6.0]], atol=0.05)
+    np.testing.assert_allclose(found["street"].axis, [[0, 0, -1]], atol=1e-6)
+    np.testing.assert_allclose(found["globe"].position_m, [[-4, 5, 3]], atol=0.01)
+
+
+def test_there_is_a_night_only_without_the_sun() -> None:
+    world = tiny_world()
+    assert night_of(world, CLEAR, "filament") is None
+    dusk, dark = (night_of(world, Weather(name="x", sun_altitude_deg=a), "classic") for a in (-2, -90))
+    assert dusk is not None and dark is not None
+    assert dark.level < 0.1 < dusk.level < 1 and 0 < dusk.lit < dark.lit < 1 and dark.is_display
+    assert not len(dark.windows.geom_id) and not len(dark.lamps["street"].intensity)
+    assert dark.vehicles and all(lamps.front_m > 0 for lamps in dark.vehicles.values())
+
+
+def test_even_light_is_what_the_sky_and_the_houses_give() -> None:
+    above, aside, below = even_light(NIGHT)
+    assert (above > aside).all() and (aside > below).all() and (below > 0).all()
+    assert above.mean() == pytest.approx(lighting_of(NIGHT, sky_face_px=16).ambient.mean(), rel=0.4)
