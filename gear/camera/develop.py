@@ -75,8 +75,7 @@ class Darkroom:
             night_light: what the same view, whatever its surfaces show, gets of lamps; found anew unless given.
         """
         assert raw.linear_rgb is not None and raw.depth_m is not None and raw.geom_id is not None
-        lamps = night_light or self.night_light(raw, camera, record, geoms)
-        seen = replace(raw, linear_rgb=self._weathered(raw, camera, record, geoms, lamps))
+        seen = replace(raw, linear_rgb=self._weathered(raw, camera, record, geoms, night_light))
         assert seen.linear_rgb is not None and seen.depth_m is not None and seen.geom_id is not None
         if self.effects.shutter_s > 0:
             speed = record.ego.velocity_world_mps
@@ -103,10 +102,11 @@ class Darkroom:
         )
 
     def _weathered(
-        self, raw: RawView, camera: CameraRecord, record: SceneRecord, geoms: GeomTable, lamps: NightLight | None
+        self, raw: RawView, camera: CameraRecord, record: SceneRecord, geoms: GeomTable, given: NightLight | None
     ) -> UInt16Image:
         assert raw.linear_rgb is not None and raw.depth_m is not None and raw.geom_id is not None
         linear_rgb = raw.linear_rgb
+        lamps = given or self.night_light(raw, camera, record, geoms)
         if lamps is not None:
             linear_rgb = lamps.lay(linear_rgb)
         if self.puddles.share > 0:
@@ -115,6 +115,7 @@ class Darkroom:
             linear_rgb = self.puddles.lay(linear_rgb, raw.depth_m, holds_water[raw.geom_id], camera)
         if lamps is not None:
             linear_rgb = lamps.mirror(linear_rgb)
+            del lamps  # much memory
         linear_rgb = self.air.veil(linear_rgb, raw.depth_m, camera)
         if self.rain.intensity > 0:
             rng = derive_rng(record.seed, "rain", record.index, camera.name)

@@ -11,7 +11,7 @@ Slants follow from depth. Lamps throw no shadows; walls that face away from them
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -21,13 +21,15 @@ import numpy.typing as npt
 from gear.camera.beams import Headlamps, Lamps, Spots, headlamps
 from gear.camera.glow import Shine, Windows
 from gear.camera.own_light import board_light, lens_light
-from gear.camera.slant import Strip, strips_of
+from gear.camera.slant import STRIP_ROWS, Strip, strips_of
 from gear.contracts.rendering import RawView
 from gear.values.frames import LINEAR_FULL_SCALE, FloatImage, GeomTable, IdImage, UInt16Image
 from gear.values.geometry import Array
 from gear.values.labels import OPEN_GROUND_CODES
 from gear.values.rng import derive_rng
 from gear.values.scene import CameraRecord, SceneRecord
+
+HalfImage = npt.NDArray[np.float16]
 
 GLARE = {"street": 0.12, "globe": 0.6, "head": 0.03}
 """Light of the spot that a lamp is seen as, per light that it throws."""
@@ -47,24 +49,31 @@ class NightLight:
     """What one view of one scene gets of lamps; the same whatever its surfaces show.
 
     Attributes:
-        share: (H, W, 3) k + E / A.
-        glow: (H, W, 3) G in frame units.
-        streaks: (H, W, 3) what wet ground mirrors of lamps, in frame units; None for dry ground.
+        share: (H, W, 3) float16, k + E / A.
+        glow: (H, W, 3) float16, G in frame units.
+        streaks: (H, W, 3) float16, what wet ground mirrors of lamps, in frame units; None for dry ground.
     """
 
-    share: FloatImage
-    glow: FloatImage
-    streaks: FloatImage | None
+    share: HalfImage
+    glow: HalfImage
+    streaks: HalfImage | None
 
     def lay(self, linear_rgb: UInt16Image) -> UInt16Image:
         """(H, W, 3) uint16 frame at night, a new array. Steps between levels are hidden in a fixed grain."""
-        light = linear_rgb * self.share
-        light += self.glow
-        return _rounded(light)
+        result = np.empty_like(linear_rgb)
+        for rows in _bands(len(linear_rgb)):
+            light = self.share[rows].astype(np.float32) * linear_rgb[rows] + self.glow[rows]
+            result[rows] = _rounded(light.astype(np.float32, copy=False), rows)
+        return result
 
     def mirror(self, linear_rgb: UInt16Image) -> UInt16Image:
         """The frame with lamps mirrored in wet ground."""
-        return linear_rgb if self.streaks is None else _rounded(linear_rgb + self.streaks)
+        if self.streaks is None:
+            return linear_rgb
+        result = np.empty_like(linear_rgb)
+        for rows in _bands(len(linear_rgb)):
+            result[rows] = _rounded(self.streaks[rows].astype(np.float32) + linear_rgb[rows], rows)
+        return result
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -113,21 +122,22 @@ class Night:
         is_open = np.append(np.isin(geoms.label_code, OPEN_GROUND_CODES), False)[truth.geom_id]
         for kind, lamps in kinds.items():
             shine = Shine.of(lamps, camera, GLARE[kind], truth.depth_m)
-            colour = np.array(lamps.colour, np.float32)
-            glow += shine.spots(is_open.shape)[..., None] * colour
+            _add_colour(glow, shine.spots(is_open.shape), lamps.colour)
             if streaks is not None:
-                image = shine.streaks(camera, record.ego.world_from_actor.position_m[2]) * is_open
-                streaks += image[..., None] * (np.float32(STREAK_SHARE * self.wetness) * colour)
-        share *= np.float32(self.lit)
+                image = shine.streaks(camera, record.ego.world_from_actor.position_m[2])
+                image *= is_open * np.float32(STREAK_SHARE * self.wetness)
+                _add_colour(streaks, image, lamps.colour)
         spots = [Spots.of(lamps, camera) for lamps in kinds.values()]
         for strip in strips_of(truth.depth_m, camera):
-            self._add_lamps(strip, spots, share[strip.rows])
-        return NightLight(
-            share=self._shown(share), glow=self._lit(glow), streaks=None if streaks is None else self._lit(streaks)
-        )
-
-    def _lit(self, light: FloatImage) -> FloatImage:
-        return np.asarray(self._shown(light * np.float32(self.lit)) * np.float32(LINEAR_FULL_SCALE))
+            rows = strip.rows
+            part = np.float32(self.lit) * share[rows].astype(np.float32)
+            self._add_lamps(strip, spots, part)
+            share[rows] = self._shown(part)
+            for light in (glow, streaks):
+                if light is not None:
+                    lit = self._shown(np.float32(self.lit) * light[rows].astype(np.float32))
+                    light[rows] = lit * np.float32(LINEAR_FULL_SCALE)
+        return NightLight(share=share, glow=glow, streaks=streaks)
 
     def _shown(self, light: FloatImage) -> FloatImage:
         return light ** np.float32(DISPLAY_POWER) if self.is_display else light
@@ -146,9 +156,9 @@ class Night:
 
     def _own(
         self, geom_id: IdImage, depth_m: FloatImage, camera: CameraRecord, record: SceneRecord, geoms: GeomTable
-    ) -> tuple[FloatImage, FloatImage]:
+    ) -> tuple[HalfImage, HalfImage]:
         """(H, W, 3) shares of what has light of its own, and the light that it shows besides."""
-        share = np.zeros((*geom_id.shape, 3), np.float32)
+        share = np.zeros((*geom_id.shape, 3), np.float16)
         glow = np.zeros_like(share)
         panes = self.windows.seen(geom_id, camera)
         where = np.nonzero(panes >= 0)
@@ -162,14 +172,24 @@ class Night:
         return share, glow
 
 
-def _rounded(light: FloatImage) -> UInt16Image:
-    """(H, W, 3) light as levels, right on average: rounded down after a grain of 0..1 is added, the same every time."""
-    height, width = light.shape[:2]
-    light += _grain(height, width)[..., None]
+def _add_colour(total: HalfImage, light: FloatImage, colour: tuple[float, float, float]) -> None:
+    """Adds (H, W) light of a colour."""
+    for rows in _bands(len(light)):
+        total[rows] += light[rows, :, None] * np.array(colour, np.float32)
+
+
+def _bands(height: int) -> Iterator[slice]:
+    """Rows a few at a time: whole pictures of floats take more memory than all that a sample keeps."""
+    return (slice(top, min(top + STRIP_ROWS, height)) for top in range(0, height, STRIP_ROWS))
+
+
+def _rounded(light: FloatImage, rows: slice) -> UInt16Image:
+    """Some rows of light as levels, right on average: rounded down after a grain of 0..1, the same every time."""
+    grain = _grain()[np.arange(rows.start, rows.stop) % _GRAIN_PX]
+    light += np.tile(grain, (1, -(-light.shape[1] // _GRAIN_PX)))[:, : light.shape[1], None]
     return np.minimum(light, LINEAR_FULL_SCALE, out=light).astype(np.uint16)
 
 
 @cache
-def _grain(height_px: int, width_px: int) -> FloatImage:
-    tile = derive_rng(0, "night", "grain").random((_GRAIN_PX, _GRAIN_PX)).astype(np.float32)
-    return np.tile(tile, (-(-height_px // _GRAIN_PX), -(-width_px // _GRAIN_PX)))[:height_px, :width_px]
+def _grain() -> FloatImage:
+    return derive_rng(0, "night", "grain").random((_GRAIN_PX, _GRAIN_PX)).astype(np.float32)

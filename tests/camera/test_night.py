@@ -135,18 +135,18 @@ def test_the_road_gets_what_the_inverse_square_says() -> None:
     beam = min(3.5 * cosine, 1) * (1 + 1.6 * (1 - cosine**2))
     expected = 20.0 * beam * cosine / square * (1 - (square / 30**2) ** 2) ** 2
     np.testing.assert_allclose(
-        shared[row, column], 0.05 + 0.95 * expected * np.array([1, 0.8, 0.5]) / [0.9, 0.9, 1.0], rtol=3e-3
+        shared[row, column], 0.05 + 0.95 * expected * np.array([1, 0.8, 0.5]) / [0.9, 0.9, 1.0], rtol=4e-3
     )
 
 
 def test_darkness_and_the_sky_keep_their_levels_and_walls_that_face_away_stay_dark() -> None:
     dark = light_of(night())
     _, geom_id = street()
-    np.testing.assert_allclose(dark.share[geom_id >= 0], 0.05)
-    np.testing.assert_allclose(dark.share[geom_id < 0], 0.2)
+    np.testing.assert_allclose(dark.share[geom_id >= 0], 0.05, rtol=1e-3)
+    np.testing.assert_allclose(dark.share[geom_id < 0], 0.2, rtol=1e-3)
     assert not dark.glow.any() and dark.streaks is None
     behind = light_of(night((WALL_M + 2, 0.0, 5.0)))
-    np.testing.assert_allclose(behind.share[geom_id == WALL], 0.05)
+    np.testing.assert_allclose(behind.share[geom_id == WALL], 0.05, rtol=1e-3)
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -196,8 +196,8 @@ def test_lit_panes_are_seen_where_they_are_and_only_from_outside() -> None:
     assert (replace(windows, normal=-windows.normal).seen(geom_id, camera()) < 0).all()
     assert (windows.seen(np.full_like(geom_id, ROAD), camera()) < 0).all(), "something else stands before it"
     lit = light_of(night(windows=windows))
-    assert lit.share[rows[0], columns[0]] == pytest.approx(0.05 + 0.95 * 2)
-    assert lit.glow[rows[0], columns[0]] == pytest.approx(0.95 * 0.1 * LINEAR_FULL_SCALE)
+    assert lit.share[rows[0], columns[0]] == pytest.approx(0.05 + 0.95 * 2, rel=1e-3)
+    assert lit.glow[rows[0], columns[0]] == pytest.approx(0.95 * 0.1 * LINEAR_FULL_SCALE, rel=1e-3)
 
 
 def test_a_lamp_shines_at_the_camera_unless_something_hides_it() -> None:
@@ -274,11 +274,11 @@ def test_standing_boards_are_lit_from_above_and_those_on_trucks_are_not() -> Non
         id=2, asset="truck", role="carrier", world_from_actor=Pose(position_m=(0, 0, 0), quat_wxyz=(1.0, 0, 0, 0))
     )
     carried = light_of(night(), record(truck, surfaces=(replace(board, actor_id=2),)), table).share
-    np.testing.assert_allclose(carried[geom_id == WALL], 0.05)
+    np.testing.assert_allclose(carried[geom_id == WALL], 0.05, rtol=1e-3)
 
 
 def test_signals_keep_their_light_and_display_values_are_bent() -> None:
     _, geom_id = street()
     signal = light_of(night(is_signal=np.array([False, True]))).share
-    np.testing.assert_allclose(signal[geom_id == WALL], 0.05 + 0.95 * 0.9, rtol=1e-5)
-    np.testing.assert_allclose(light_of(night(is_display=True)).share[geom_id == ROAD], 0.05 ** (1 / 2.2), rtol=1e-5)
+    np.testing.assert_allclose(signal[geom_id == WALL], 0.05 + 0.95 * 0.9, rtol=1e-3)
+    np.testing.assert_allclose(light_of(night(is_display=True)).share[geom_id == ROAD], 0.05 ** (1 / 2.2), rtol=1e-3)
