@@ -15,7 +15,7 @@ from gear.camera.rain import Rain
 from gear.camera.response import encode_srgb, response_for
 from gear.values.optics import CameraEffects
 from gear.values.scene import Weather
-from gear.world.light import Floats, horizon_light, mirrored_light
+from gear.world.light import Floats, horizon_light, lamplit_houses, mirrored_light
 
 DENSEST_FOG_PER_M = 0.05
 """Extinction of CARLA's 100 percent: what is 60 m away can no longer be told."""
@@ -62,7 +62,9 @@ def darkroom_of(
         night: the town's lamps; none by day.
     """
     left = night.sky_level if night else 1.0
-    mirrored = _shown(left * mirrored_light(weather, _MIRROR_ROWS, _MIRROR_COLUMNS), renderer_name)
+    mirrored = left * mirrored_light(weather, _MIRROR_ROWS, _MIRROR_COLUMNS)
+    if night is not None:
+        mirrored += night.lit * lamplit_houses(_MIRROR_ROWS)
     return Darkroom(
         response=response_for(renderer_name, weather),
         night=night,
@@ -71,7 +73,7 @@ def darkroom_of(
             town=town,
             share=FULL_PUDDLES * weather.precipitation_deposits / 100,
             ripples=min(1.0, 1.5 * weather.precipitation / 100),
-            mirrored=mirrored.astype(np.float32),
+            mirrored=_shown(mirrored, renderer_name).astype(np.float32),
         ),
         rain=Rain.of(
             weather.precipitation,

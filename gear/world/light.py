@@ -42,6 +42,9 @@ BOUNCE_GAIN = 1.25
 NIGHT_SKY_SHARE = 0.2
 """How bright the night's sky looks beside the light that streets have then: that is mostly a town's own."""
 
+LAMPLIT_HOUSES = np.array([0.10, 0.075, 0.05])
+"""What the fronts of a street show in the light of its lamps, in shares of the frame's full scale."""
+
 FACE_ORDER = "RLUDFB"
 _INTEGRATION_PX = 16
 
@@ -99,16 +102,24 @@ def mirrored_light(weather: Weather, rows: int, columns: int) -> Floats:
     return np.minimum(_exposure(sky)[0] * _looks(sky) * _in_street(sky, directions), 1.0)
 
 
+def lamplit_houses(rows: int) -> Floats:
+    """(rows, 1, 3) what still water mirrors at night of houses in lamplight; rows as `mirrored_light`'s."""
+    return np.asarray(_house_share(np.linspace(0, 1, rows))[:, None, None] * LAMPLIT_HOUSES)
+
+
 def _in_street(sky: Sky, directions: Floats) -> Floats:
     """(..., 3) kcd/m² between houses: they hide the lower sky and throw back their share of sun and sky."""
     radiance = sky.radiance(directions)
     _, from_above = _exposure(sky)
     sunlit = STREET_SUNLIT * sky.sun_klx * max(float(np.hypot(*sky.towards_sun[:2])), 0.3)
     houses = STREET_ALBEDO / math.pi * (sunlit + 0.5 * from_above)
-    height = directions[..., 2]
+    return np.asarray(radiance + _house_share(directions[..., 2])[..., None] * (houses - radiance))
+
+
+def _house_share(height: Floats) -> Floats:
+    """Share of a direction, by the sine of its height, that houses hide."""
     t = np.clip((height / STREET_TOP - 0.35) / 0.65, 0.0, 1.0)
-    share = np.where(height > -0.02, STREET_SHARE * (1 - t * t * (3 - 2 * t)), 0.0)[..., None]
-    return np.asarray(radiance + share * (houses - radiance))
+    return np.where(height > -0.02, STREET_SHARE * (1 - t * t * (3 - 2 * t)), 0.0)
 
 
 def even_light(weather: Weather) -> Floats:

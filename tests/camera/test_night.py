@@ -121,6 +121,19 @@ def test_slants_are_those_of_the_road_and_the_wall() -> None:
     assert np.isfinite(np.concatenate([strip.position_m for strip in strips], axis=1)).all()
 
 
+def test_paint_some_millimetres_thick_lies_as_flat_as_its_road() -> None:
+    rows = ((np.arange(SIZE[0]) + 0.5 - SIZE[0] / 2) / FOCAL_PX)[:, None].repeat(SIZE[1], axis=1)
+    columns = (np.arange(SIZE[1]) + 0.5 - SIZE[1] / 2) / FOCAL_PX
+    seen = rows > 0.08
+    road_m = EYE_M / np.where(seen, rows, 1)
+    # A stripe that runs aslant over the road, 5 mm above it.
+    is_paint = np.abs(0.4 * road_m - columns * road_m - 2.0) < 0.15
+    depth_m = np.where(seen, np.where(is_paint, (EYE_M - 0.005) / np.where(seen, rows, 1), road_m), np.nan)
+    up = np.concatenate([strip.normal[2] for strip in strips_of(depth_m.astype(np.float32), camera())])
+    assert is_paint[seen].sum() > 100
+    assert (up[seen] > 0.9999).mean() > 0.997
+
+
 def test_the_road_gets_what_the_inverse_square_says() -> None:
     place = (12.0, 1.0, 8.0)
     shared = light_of(night(place)).share
