@@ -59,6 +59,20 @@ def test_a_gap_is_reported_and_written(pair: tuple[Path, Path], tmp_path: Path) 
     assert report.effect == {}
 
 
+def test_a_patch_in_lamplight_is_composed_as_exactly(tmp_path: Path, collect_small: Collect) -> None:
+    night = {"weather": "WetNight"}
+    collect_small("semseg", tmp_path / "clean", probes=True, **night)
+    collect_small("semseg", tmp_path / "twin", patch="random", **night)
+    report = gear.gap(tmp_path / "clean", twin=tmp_path / "twin")
+    assert report.median_db("transport") > 40
+    collect_small("semseg", tmp_path / "day", patch="random")
+    day, dark = (
+        np.mean([sample.images["left"].mean() for sample in gear.open_dataset(tmp_path / name, split="debug")])
+        for name in ("day", "twin")
+    )
+    assert dark < 0.6 * day
+
+
 def test_a_models_figures_are_taken_digitally_and_rendered(
     pair: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
