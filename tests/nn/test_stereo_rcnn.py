@@ -5,16 +5,18 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
-from torch import nn
+from torch import Tensor, nn
 
 from gear.formats.kitti_object import Calibration
 from gear.losses.stereo_rcnn import car_targets, sample_pairs
 from gear.nn.network import as_batch
-from gear.nn.stereo_options import StereoRcnnOptions
+from gear.nn.runtime import seeded
+from gear.nn.stereo_options import LEFT, RIGHT, StereoRcnnOptions
 from gear.nn.stereo_rcnn_decode import decode_cars, place_car
 from gear.nn.stereo_rcnn_graph import VARIANCES, StereoRcnn, StereoRcnnShape, anchors, from_official, is_norm, pooled
 from gear.nn.stereo_rcnn_network import StereoRcnnNetwork
@@ -185,6 +187,31 @@ def test_variances_weigh_the_losses() -> None:
         plain = network(pictures, [sample])
     for name, loss in plain.items():
         assert float(first[name]) == pytest.approx(float(loss) * math.e - 1, rel=1e-4, abs=1e-5), name
+
+
+def test_what_the_losses_look_at_is_drawn_anew_in_training_and_stays_otherwise(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    network, sample, seen = tiny(), street(), list[list[float]]()
+    pictures = as_batch([sample.images] * 2, (LEFT, RIGHT))
+
+    def remembered(left: Tensor, right: Tensor, cars: Any, draws: torch.Generator) -> Any:
+        seen.append(torch.rand(4, generator=draws).tolist())
+        return sample_pairs(left, right, cars, draws)
+
+    monkeypatch.setattr("gear.nn.stereo_rcnn_network.sample_pairs", remembered)
+
+    def draws(seed: int) -> list[list[float]]:
+        seen.clear()
+        with seeded(seed), torch.no_grad():
+            network(pictures, [sample, sample])
+        return list(seen)
+
+    assert draws(1) == draws(2) and seen[0] == seen[1]
+    network.train()
+    first, second = draws(1), draws(2)
+    assert first == draws(1)
+    assert len({tuple(each) for each in first + second}) == 4
 
 
 def test_losses_are_not_made_of_outputs() -> None:
