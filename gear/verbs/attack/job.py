@@ -121,7 +121,7 @@ def resolve(
     task = datasets[0].plan.task["name"]
     validation = open_all(_list(val), task, names=VALIDATION, allow_tests=allow_tests)
     check_joined([*datasets, *validation])
-    models = choose_models([model] if isinstance(model, str) else list(model), model_settings, datasets[0])
+    models = choose_models([model] if isinstance(model, str) else list(model), model_settings, [*datasets, *validation])
     guard = choose_defense(defense, defense_settings, models, task)
     found, options = find("attack", attack), with_overrides(NO_OPTIONS, settings)
     config = read_node(found.spec.config, options, "")

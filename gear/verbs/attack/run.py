@@ -23,12 +23,13 @@ from gear.values.rng import derive_rng
 from gear.values.serial import Json
 from gear.verbs.attack.folder import begin, read_patches, tidy
 from gear.verbs.attack.job import Job, Paths, resolve
-from gear.verbs.attack.models import build_model
+from gear.verbs.attack.models import FLAG, build_model
 from gear.verbs.attack.outputs import as_picture, write_curves, write_patches, write_samples
 from gear.verbs.attack.report import AttackReport
 from gear.verbs.attack.scenes import Scenes
 from gear.verbs.attack.watch import Recorder
 from gear.verbs.evaluate.player import weights_digest
+from gear.verbs.evaluate.shown_size import size_note
 
 Progress = Callable[[int, int], None]
 """Called with (steps done, steps in all)."""
@@ -75,6 +76,7 @@ def attack(
     allow_tests: bool = False,
     force: bool = False,
     progress: Progress | None = None,
+    noted: Callable[[str], None] | None = None,
 ) -> AttackReport:
     """Makes patches for the surfaces of a scene; takes up again what was begun.
 
@@ -100,6 +102,7 @@ def attack(
         allow_tests: whether `test` splits may be optimised on.
         force: start afresh where something else is.
         progress: told after every step.
+        noted: told, before anything is made, of a model that sees these pictures at another size than it learnt from.
 
     Raises:
         GearError: anything that the user can put right; its text is one line.
@@ -121,6 +124,7 @@ def attack(
         seed=seed,
         allow_tests=allow_tests,
     )
+    _note_sizes(job, noted)
     product, network, root = build(job.found, job.options), build_model(job.models, job.defense), Path(out)
     plan = job.plan(weights_digest(network))
     there = begin(root, plan, force=force)
@@ -134,6 +138,14 @@ def attack(
     write_patches(root, made.patches, facts)
     tidy(root)
     return AttackReport(out=root, patches=made.patches, facts=facts, made=True)
+
+
+def _note_sizes(job: Job, noted: Callable[[str], None] | None) -> None:
+    """Tells of every model that sees the pictures, which are all of one size, larger or smaller than it knows them."""
+    if noted is not None:
+        for note in (size_note(model, job.datasets[0], FLAG) for model in job.models):
+            if note is not None:
+                noted(note)
 
 
 def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, progress: Progress | None) -> _Made:

@@ -21,13 +21,14 @@ from gear.values.errors import ConfigError
 from gear.verbs.evaluate.choice import Chosen
 
 
-def size_note(model: Chosen, dataset: Dataset[Any]) -> str | None:
+def size_note(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> str | None:
     """One line where the dataset's pictures are not of the size that the weights' share belongs to; None where all is
     well, nothing is known, or the user said the share.
 
     Args:
         model: with its options.
-        dataset: to be evaluated on.
+        dataset: whose pictures it is shown.
+        flag: how the user sets one of the model's options.
     """
     spec = model.found.spec
     config = read_node(spec.config, model.options, "")
@@ -42,7 +43,7 @@ def size_note(model: Chosen, dataset: Dataset[Any]) -> str | None:
     wanted = round(share * usual_px / width_px, 4)
     try:
         read_node(spec.config, with_value(model.options, (OPTION,), Scalar(f"{wanted:g}", False, Place("size"))), "")
-        remedy = f"--set {OPTION}={wanted:g} shows it these so"
+        remedy = f"{flag}{OPTION}={wanted:g} shows it these so"
     except ConfigError:
         remedy = "collect larger ones"
     look = "smaller" if width_px < usual_px else "larger"
