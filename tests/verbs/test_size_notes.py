@@ -12,7 +12,10 @@ import pytest
 import torch
 
 from gear.cli.main import main
+from gear.config.overrides import with_overrides
+from gear.contracts.specs import ModelSpec
 from gear.nn.weights import write as write_weights
+from gear.plugins.build import NO_OPTIONS, build, find
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_segmenter
 from gear.verbs.collect.run import CollectReport
 
@@ -51,3 +54,14 @@ def test_attack_and_gap_tell_of_it(
     # What the user can put right in the models is not an option of the attack.
     assert main([*attack, "--model-set=hfov_deg=60", f"--out={tmp_path / 'lens'}"]) == 2
     assert re.search(r"reckons with 60; say --model-set hfov_deg=\d+", capsys.readouterr().err)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["ddrnet23_slim", "bisenet_x39", "ddrnet23_slim_depth", "glpn_b0", "stereo_centre", "retinanet_lite0_fpn"],
+)
+def test_networks_run_at_the_share_that_their_spec_names(name: str) -> None:
+    found = find("model", name)
+    network = build(found, with_overrides(NO_OPTIONS, ["weights=none", "device=cpu"]))
+    scale = network.sizing.inner_px((1000, 1000))[0] / 1000 if name.startswith("retinanet") else network.input_scale
+    assert isinstance(found.spec, ModelSpec) and found.spec.input_scale == scale
