@@ -142,6 +142,19 @@ def test_suppression_counts_the_last_pixel() -> None:
     assert legacy_nms(boxes, torch.tensor([0.9, 0.8]), 0.51).tolist() == [0, 1]
 
 
+@pytest.mark.parametrize(("apart_px", "cars"), [(5.4, 1), (5.7, 2)])
+def test_cars_are_suppressed_in_pixels_of_the_original_pictures(apart_px: float, cars: int) -> None:
+    """Boxes of 10.3 pixels share 0.3 at 5.6 pixels apart; three times as large, with one last pixel, at 5.2."""
+    scale = 3.0
+    boxes = torch.tensor([[20.0, 20.0, 29.0, 29.0], [20.0 + apart_px, 20.0, 29.0 + apart_px, 29.0]]) * scale
+    said = {
+        "class_logits": torch.tensor([[0.0, 5.0], [0.0, 4.0]]), "rois_left": boxes, "rois_right": boxes,
+        "box_codes": torch.zeros(2, 2, 6), "size_and_direction": torch.zeros(2, 2, 5),
+        "keypoint_logits": torch.zeros(2, 4, 28), "border_logits": torch.zeros(2, 2, 28),
+    }  # fmt: skip
+    assert len(decode_cars(said, scale, (300, 600), 0.05)) == cars
+
+
 def test_what_a_perfect_network_says_is_placed() -> None:
     """Outputs written from the truth come back as the car, within what 28 columns can say; unaligned."""
     scale = 600 / 370
