@@ -221,6 +221,7 @@ def _parts(found: Found, spec: TaskSpec[Any], origin: Origin, root: Path) -> Par
     return Parts(
         spec=spec,
         task=origin.training.datasets[0].task,
+        found=found,
         model=model,
         twin=twin,
         views=views,
