@@ -17,7 +17,8 @@ from gear.contracts.attacks import Budget, Patch
 from gear.contracts.models import Model
 from gear.dataset.files import sha256
 from gear.dataset.sidecar import dump_json
-from gear.plugins.build import blamed, build
+from gear.plugins.build import blamed, build, traced
+from gear.plugins.catalogue import Found
 from gear.values.errors import GearError, PluginError
 from gear.values.rng import derive_rng
 from gear.values.serial import Json
@@ -130,8 +131,9 @@ def attack(
     there = begin(root, plan, force=force)
     if there is not None:
         return AttackReport(out=root, patches=read_patches(root), facts=there, made=False)
-    made = _optimised(job, product, network, root, plan, progress)
-    facts = _facts(job, network, plan, made)
+    with traced(_asked(job), "forward"):
+        made = _optimised(job, product, network, root, plan, progress)
+        facts = _facts(job, network, plan, made)
     names = ", ".join(one.found.spec.name for one in job.models)
     write_curves(root, f"{attack} on {names}", made.recorder.curves, made.recorder.judged)
     write_samples(root, made.seen.pairs(made.patches))
@@ -146,6 +148,11 @@ def _note_sizes(job: Job, noted: Callable[[str], None] | None) -> None:
         for note in (size_note(model, job.datasets[0], FLAG) for model in job.models):
             if note is not None:
                 noted(note)
+
+
+def _asked(job: Job) -> list[Found]:
+    """Whose code the attack asks."""
+    return [one.found for one in (*job.models, job.defense) if one is not None]
 
 
 def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, progress: Progress | None) -> _Made:
@@ -172,7 +179,7 @@ def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, p
         told=progress,
     )
     recorder.tell(0)
-    with blamed(job.found, "optimise"):
+    with blamed(job.found, "optimise"), traced(_asked(job), "forward"):
         last = product.optimise(
             network,
             seen.samples,
