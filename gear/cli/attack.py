@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 
 EXAMPLE = """examples:
   gear collect --task semseg --scene billboard01 --split train --probes --out data/b01
@@ -92,6 +93,7 @@ def run(args: argparse.Namespace) -> int:
             allow_tests=args.allow_test_data,
             force=args.force,
             progress=progress,
+            noted=lambda text: print(f"gear: note: {text}", file=sys.stderr),
         )
     if args.verify is None or not args.json:
         print(json.dumps(report.facts, indent=2) if args.json else report.summary())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 
 EXAMPLE = """examples:
   gear gap data/train --twin data/train-patched
@@ -65,6 +66,7 @@ def run(args: argparse.Namespace) -> int:
             scenes=args.scenes,
             out=args.out,
             progress=progress,
+            noted=lambda text: print(f"gear: note: {text}", file=sys.stderr),
             **given,
         )
     print(dump_json(report.as_json()).decode().rstrip() if args.json else report.table())

@@ -73,6 +73,8 @@ class ModelSpec(Spec[ConfigT, Model]):
         published: weights that others publish for it.
         normalisation: one line on what its graph wants of a picture in 0..1.
         parameters: how many its graph has with default options; 0 where nobody counted.
+        input_scale: of networks with an option of this name: share of the picture's size that they run at where neither
+            the option nor the weights say.
         needs: modules that `build` imports beside what gear itself depends on, such as `torchvision`.
         convert: makes of a published file's tensors, by key, those of `module().state_dict()`; `gear weights convert`
             calls it after it has taken the state out of the checkpoint and `module.` off its keys, and checks the
@@ -90,6 +92,7 @@ class ModelSpec(Spec[ConfigT, Model]):
     published: tuple[PublishedWeights, ...] = ()
     normalisation: str = ""
     parameters: int = 0
+    input_scale: float = 1.0
     needs: tuple[str, ...] = ()
     convert: Callable[[Mapping[str, Any]], Mapping[str, Any]] | None = None
     starts: Mapping[str, Callable[[Any], None]] = field(default_factory=dict)

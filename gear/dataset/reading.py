@@ -81,6 +81,12 @@ def read_manifest(root: Path, split: str) -> Json:
     return load_json(path)
 
 
+def scenes_of(dataset: Dataset[Any]) -> tuple[str, int]:
+    """What decides which scenes a dataset shows, however they are rendered: `town/scene`, and the seed."""
+    info = dataset.plan.info
+    return f"{info.town}/{info.scene}", info.seed
+
+
 @dataclass(frozen=True, slots=True)
 class Twins(Sequence[tuple[SampleT, SampleT]], Generic[SampleT]):
     """Two splits that differ in nothing but their patch, sample by sample."""

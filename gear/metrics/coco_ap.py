@@ -37,7 +37,7 @@ class CocoEvaluator(Generic[SampleT]):
         See `gear.metrics.single_picture`; average precision has no meaning for a single picture.
 
         Raises:
-            ValueError: a detection has an unknown category or a box turned inside out.
+            ValueError: a detection has an unknown category, a box turned inside out, or a number that is not finite.
         """
         for found in prediction:
             left, top, right, bottom = found.box_px
@@ -45,6 +45,8 @@ class CocoEvaluator(Generic[SampleT]):
                 raise ValueError(f"category_id must be one of COCO's, got {found.category_id}")
             if not (right >= left and bottom >= top):
                 raise ValueError(f"box_px must be left, top, right, bottom, got {found.box_px}")
+            if not np.isfinite((*found.box_px, found.score)).all():
+                raise ValueError(f"box_px and score must be finite, got {found.box_px} and {found.score}")
         picture = self._as_picture(sample)
         self.pictures.append(picture)
         self.detections.append(tuple(prediction))

@@ -52,10 +52,10 @@ class KittiEvaluator(Generic[SampleT]):
         See `gear.metrics.single_picture`; average precision has no meaning for a single picture.
 
         Raises:
-            ValueError: a detection has no score.
+            ValueError: a detection has no score, a box turned inside out, or a number that is not finite.
         """
-        if any(found.score is None for found in prediction):
-            raise ValueError("every detection needs a score")
+        for found in prediction:
+            _check(found)
         labels = self._labels_of(sample)
         self.pictures.append(picture_boxes(labels, prediction))
         wanted = [label for label in labels if label.type in NEIGHBOURS]
@@ -118,6 +118,18 @@ class KittiEvaluator(Generic[SampleT]):
         curve_by_name = {overlap: precision} | ({"aos": orientation} if overlap == "2d" else {})
         for name, curve in curve_by_name.items():
             figures |= _at_recalls(f"{kind.lower()}_{name}_{difficulty.name}", curve)
+
+
+def _check(found: KittiLabel) -> None:
+    """Raises `ValueError` for a detection that cannot be measured, which would count as one that found nothing."""
+    if found.score is None:
+        raise ValueError("every detection needs a score")
+    left, top, right, bottom = found.box_px
+    body = (found.alpha_rad, found.height_m, found.width_m, found.length_m, *found.location_m, found.rotation_y_rad)
+    if not np.isfinite((*found.box_px, *body, found.score)).all():
+        raise ValueError(f"every number of a detection must be finite, got {found}")
+    if right < left or bottom < top:
+        raise ValueError(f"box_px must be left, top, right, bottom, got {found.box_px}")
 
 
 def resampled_r40(chosen: Sequence[Chosen], draws: Draws) -> Array:

@@ -13,13 +13,10 @@ from gear.nn.input_scale import input_scale_of
 from gear.nn.network import Network, Normalise
 from gear.nn.stereo_centre import KINDS, STRIDE, StereoCentre, StereoCentreShape, fit_to_network, in_picture_px
 from gear.nn.stereo_decode import Peaks, decode
-from gear.nn.stereo_options import LEFT, RIGHT, StereoCentreOptions
+from gear.nn.stereo_options import INPUT_SCALE, LEFT, RIGHT, StereoCentreOptions
 from gear.nn.weights import build_graph
 
 NAME = "stereo_centre"
-
-INPUT_SCALE = 0.5
-"""Where neither the user nor the weights say."""
 
 
 class StereoCentreNetwork(Network):

@@ -12,6 +12,9 @@ from gear.values.geometry import Intrinsics
 
 LEFT, RIGHT = "left", "right"
 
+INPUT_SCALE = 0.5
+"""Of the network of centres, where neither the user nor the weights say."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StereoOptions(NetworkOptions):

@@ -45,12 +45,17 @@ class StereoRcnnNetwork(Network):
     def forward(
         self, views: Mapping[str, Tensor], targets: Sequence[LabelledPair] | None = None
     ) -> Mapping[str, Tensor]:
-        """Outputs, or the six losses, each weighed by its learned variance: L exp(-s) + s."""
+        """Outputs, or the six losses, each weighed by its learned variance: L exp(-s) + s.
+
+        Which anchors and pairs of boxes the losses look at is drawn: from `options.seed`, the same ones every time,
+        unless the network is in training mode, where torch's own generator decides, and for every picture anew.
+        """
         if targets is None:
             return super().forward(views)
         pictures = {name: views[name].to(self.device) for name in self._views}
+        draws = self._draws(len(targets))
         with autocast(self.device, self.options.precision):
-            each = [self._losses_of(*self._pyramids(pictures, i), targets[i]) for i in range(len(targets))]
+            each = [self._losses_of(*self._pyramids(pictures, i), targets[i], draws[i]) for i in range(len(targets))]
         means = {name: torch.stack([losses[name].float() for losses in each]).mean() for name in LOSSES}
         variances = self.graph.loss_log_variances
         return {name: means[name] * (-variances[i]).exp() + variances[i] for i, name in enumerate(LOSSES)}
@@ -138,13 +143,26 @@ class StereoRcnnNetwork(Network):
         considered = self.options.considered * (2 if self.training else 1)
         return propose(chances[0].float(), codes[0].float(), places, size, considered=considered, most=most)
 
+    def _draws(self, count: int) -> list[torch.Generator]:
+        """A generator for each picture of a batch."""
+        if self.training:  # `gear train` seeds torch's own generator by the step, so a training taken up again agrees
+            step = int(torch.randint(2**62, ()))
+            seeds = [derive_rng(step, NAME, "samples", number) for number in range(count)]
+        else:
+            seeds = [derive_rng(self.options.seed, NAME, "samples") for _ in range(count)]
+        return [torch.Generator().manual_seed(int(rng.integers(2**62))) for rng in seeds]
+
     def _losses_of(
-        self, left: list[Tensor], right: list[Tensor], size: tuple[int, int], sample: LabelledPair
+        self,
+        left: list[Tensor],
+        right: list[Tensor],
+        size: tuple[int, int],
+        sample: LabelledPair,
+        draws: torch.Generator,
     ) -> dict[str, Tensor]:
         intrinsics = sample.calibration.intrinsics
         cars = car_targets(sample, self._scale((intrinsics.height_px, intrinsics.width_px))).to(self.device)
         places = anchors(left)
-        draws = torch.Generator().manual_seed(int(derive_rng(self.options.seed, NAME, "samples").integers(2**62)))
         logits, chances, codes = self.graph.RCNN_rpn(left, right)
         first = rpn_losses(logits[0].float(), codes[0].float(), places, cars, size, draws)
         most = PROPOSED_IN_TRAINING if self.training else self.options.proposals

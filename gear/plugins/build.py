@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Iterator
+import traceback
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from gear.config.nodes import Mapping, Node, Place
@@ -54,6 +55,29 @@ def blamed(found: Found, stage: str) -> Iterator[None]:
             raise
         name = f"{found.spec.name} ({owner.package} {owner.version})"
         raise PluginError(name, stage, one_line(error)) from error
+
+
+@contextlib.contextmanager
+def traced(founds: Iterable[Found], stage: str) -> Iterator[None]:
+    """Around another's code that calls plugins, such as an attack's that asks a network: what passes through a third
+    party's package on its way says whose it is.
+
+    Raises:
+        PluginError: code of one of the packages raised something other than a `GearError`, or what it called did.
+    """
+    try:
+        yield
+    except GearError:
+        raise
+    except Exception as error:
+        passed = {str(frame.f_globals.get("__name__")) for frame, _ in traceback.walk_tb(error.__traceback__)}
+        packages = {name.partition(".")[0] for name in passed}
+        for found in founds:
+            is_ours = found.owner.package == DISTRIBUTION
+            if not is_ours and str(getattr(found.spec.build, "__module__", "")).partition(".")[0] in packages:
+                name = f"{found.spec.name} ({found.owner.package} {found.owner.version})"
+                raise PluginError(name, stage, one_line(error)) from error
+        raise
 
 
 def build_task(name: str, options: Node = NO_OPTIONS) -> tuple[TaskSpec[Any], Task[Any, Any]]:

@@ -1,3 +1,5 @@
+import math
+
 import pytest
 
 from gear.formats import rle
@@ -71,3 +73,6 @@ def test_bad_detections_are_refused() -> None:
         evaluator().update(picture(0, CAR), [found(0.9, category_id=12)])
     with pytest.raises(ValueError, match="box_px"):
         evaluator().update(picture(0, CAR), [found(0.9, (50, 20, 20, 80))])
+    for bad in (found(math.nan), found(math.inf), found(0.9, (20, 20, math.inf, 80))):
+        with pytest.raises(ValueError, match="finite"):
+            evaluator().update(picture(0, CAR), [bad])

@@ -240,3 +240,19 @@ def test_dont_care_excuses_in_the_picture_alone() -> None:
 def test_a_detection_needs_a_score() -> None:
     with pytest.raises(ValueError, match="score"):
         evaluate([([CAR], [CAR])])
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"score": math.nan},
+        {"location_m": (0.0, 1.6, math.inf)},
+        {"rotation_y_rad": math.nan},
+        {"height_m": math.nan},
+        {"box_px": (0.0, math.nan, 40.0, 60.0)},
+        {"box_px": (40.0, 20.0, 0.0, 60.0)},
+    ],
+)
+def test_what_cannot_be_measured_is_refused_rather_than_taken_for_a_miss(change: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match=r"finite|left, top, right, bottom"):
+        evaluate([([CAR], [replace(CAR, **{"score": 0.9, **change})])])

@@ -5,16 +5,18 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
-from torch import nn
+from torch import Tensor, nn
 
 from gear.formats.kitti_object import Calibration
 from gear.losses.stereo_rcnn import car_targets, sample_pairs
 from gear.nn.network import as_batch
-from gear.nn.stereo_options import StereoRcnnOptions
+from gear.nn.runtime import seeded
+from gear.nn.stereo_options import LEFT, RIGHT, StereoRcnnOptions
 from gear.nn.stereo_rcnn_decode import decode_cars, place_car
 from gear.nn.stereo_rcnn_graph import VARIANCES, StereoRcnn, StereoRcnnShape, anchors, from_official, is_norm, pooled
 from gear.nn.stereo_rcnn_network import StereoRcnnNetwork
@@ -140,6 +142,19 @@ def test_suppression_counts_the_last_pixel() -> None:
     assert legacy_nms(boxes, torch.tensor([0.9, 0.8]), 0.51).tolist() == [0, 1]
 
 
+@pytest.mark.parametrize(("apart_px", "cars"), [(5.4, 1), (5.7, 2)])
+def test_cars_are_suppressed_in_pixels_of_the_original_pictures(apart_px: float, cars: int) -> None:
+    """Boxes of 10.3 pixels share 0.3 at 5.6 pixels apart; three times as large, with one last pixel, at 5.2."""
+    scale = 3.0
+    boxes = torch.tensor([[20.0, 20.0, 29.0, 29.0], [20.0 + apart_px, 20.0, 29.0 + apart_px, 29.0]]) * scale
+    said = {
+        "class_logits": torch.tensor([[0.0, 5.0], [0.0, 4.0]]), "rois_left": boxes, "rois_right": boxes,
+        "box_codes": torch.zeros(2, 2, 6), "size_and_direction": torch.zeros(2, 2, 5),
+        "keypoint_logits": torch.zeros(2, 4, 28), "border_logits": torch.zeros(2, 2, 28),
+    }  # fmt: skip
+    assert len(decode_cars(said, scale, (300, 600), 0.05)) == cars
+
+
 def test_what_a_perfect_network_says_is_placed() -> None:
     """Outputs written from the truth come back as the car, within what 28 columns can say; unaligned."""
     scale = 600 / 370
@@ -185,6 +200,31 @@ def test_variances_weigh_the_losses() -> None:
         plain = network(pictures, [sample])
     for name, loss in plain.items():
         assert float(first[name]) == pytest.approx(float(loss) * math.e - 1, rel=1e-4, abs=1e-5), name
+
+
+def test_what_the_losses_look_at_is_drawn_anew_in_training_and_stays_otherwise(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    network, sample, seen = tiny(), street(), list[list[float]]()
+    pictures = as_batch([sample.images] * 2, (LEFT, RIGHT))
+
+    def remembered(left: Tensor, right: Tensor, cars: Any, draws: torch.Generator) -> Any:
+        seen.append(torch.rand(4, generator=draws).tolist())
+        return sample_pairs(left, right, cars, draws)
+
+    monkeypatch.setattr("gear.nn.stereo_rcnn_network.sample_pairs", remembered)
+
+    def draws(seed: int) -> list[list[float]]:
+        seen.clear()
+        with seeded(seed), torch.no_grad():
+            network(pictures, [sample, sample])
+        return list(seen)
+
+    assert draws(1) == draws(2) and seen[0] == seen[1]
+    network.train()
+    first, second = draws(1), draws(2)
+    assert first == draws(1)
+    assert len({tuple(each) for each in first + second}) == 4
 
 
 def test_losses_are_not_made_of_outputs() -> None:

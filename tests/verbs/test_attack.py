@@ -417,3 +417,27 @@ def test_a_look_at_validation_samples_changes_no_check(small: Small, install: In
     judged = attack(train, model="tiny_depth", out=tmp_path / "b", steps=1, settings=SMALL, val=val, every=1)
     assert not difference(plain.patches, judged.patches, "patches")
     assert judged.facts["masking"] == plain.facts["masking"] is not None
+
+
+class Failing(TinySegmenter):
+    def forward(self, views: Any, targets: Any = None) -> Any:
+        raise RuntimeError("out of ideas")
+
+
+def test_a_third_partys_network_that_fails_is_named(small: Small, install: Install, tmp_path: Path) -> None:
+    install(dataclasses.replace(tiny_segmenter, build=Failing))
+    with pytest.raises(PluginError, match=r"tiny_segmenter \(.*failed at forward: RuntimeError: out of ideas"):
+        attack(small(), model="tiny_segmenter", out=tmp_path / "p", steps=1, settings=SMALL)
+
+
+class Misnaming(TinySegmenter):
+    def forward(self, views: Any, targets: Any = None) -> Any:
+        return {"classes": super().forward(views)["logits"]}
+
+
+def test_a_network_without_the_output_that_attacks_need_is_told_so(
+    small: Small, install: Install, tmp_path: Path
+) -> None:
+    install(dataclasses.replace(tiny_segmenter, build=Misnaming))
+    with pytest.raises(GearError, match=r"works on the output 'logits'; the network gives classes"):
+        attack(small(), model="tiny_segmenter", out=tmp_path / "p", steps=1, settings=SMALL)

@@ -479,6 +479,11 @@ def test_pictures_of_another_size_than_the_weights_are_for_are_noted(
 
     (note,) = notes("weights", f"weights={weights}")
     assert re.search(remedy, note) and str(data) in note
+    # Weights that say nothing learnt from the task's pictures at the share that their network has by itself.
+    write_weights(weights, {"bias": torch.zeros(1)}, {})
+    install(replace(model_spec(lambda _: Oracle([data]), "semseg", input_scale=said), config=ScaledConfig))
+    (note,) = notes("silent", f"weights={weights}")
+    assert re.search(remedy, note)
     assert notes("none") == notes("given", f"weights={weights}", "input_scale=1") == []
 
 

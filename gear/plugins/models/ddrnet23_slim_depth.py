@@ -38,6 +38,7 @@ spec = ModelSpec(
     recipe=Recipe(learning_rate=1e-3, batch=8, epochs=40, scales=(0.8, 1.25)),
     normalisation="ImageNet's mean and deviation, at half the picture's sides unless input_scale says otherwise",
     parameters=5_694_817,
+    input_scale=HABIT,
 )
 
 

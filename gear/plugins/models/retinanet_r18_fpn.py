@@ -89,6 +89,7 @@ retinanet_r18: ModelSpec[ReferenceDetectorOptions] = ModelSpec(
     recipe=RECIPE,
     normalisation="RGB in 0..1, less ImageNet's mean, over its standard deviation",
     parameters=13_366_855,
+    input_scale=INPUT_SCALE,
     needs=("torchvision",),
 )
 
@@ -103,6 +104,7 @@ retinanet_lite0: ModelSpec[ReferenceDetectorOptions] = ModelSpec(
     recipe=RECIPE,
     normalisation="RGB in 0..255, less 127, over 128",
     parameters=4_504_071,
+    input_scale=INPUT_SCALE,
     needs=("torchvision", "timm"),
     starts={"imagenet": start_from_imagenet},
 )

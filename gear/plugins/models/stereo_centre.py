@@ -5,7 +5,7 @@ from __future__ import annotations
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model, Recipe
 from gear.contracts.specs import ModelSpec
-from gear.nn.stereo_options import LEFT, RIGHT, StereoCentreOptions
+from gear.nn.stereo_options import INPUT_SCALE, LEFT, RIGHT, StereoCentreOptions
 
 
 def build(options: StereoCentreOptions) -> Model:
@@ -26,6 +26,7 @@ stereo_centre: ModelSpec[StereoCentreOptions] = ModelSpec(
     recipe=Recipe(learning_rate=1e-3, weight_decay=1e-2, batch=4, epochs=20, gradient_norm=10.0),
     normalisation="ImageNet mean and deviation",
     parameters=4_962_314,
+    input_scale=INPUT_SCALE,
 )
 
 

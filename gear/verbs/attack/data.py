@@ -92,12 +92,6 @@ def check_joined(datasets: Sequence[Dataset[Any]]) -> None:
                 raise DatasetError(dataset.root, f"has {name} {value}, but {first.root} has {facts[0][name]}")
 
 
-def scenes_of(dataset: Dataset[Any]) -> tuple[str, int]:
-    """What decides which scenes a dataset shows, however they are rendered: `town/scene`, and the seed."""
-    info = dataset.plan.info
-    return f"{info.town}/{info.scene}", info.seed
-
-
 def _facts(dataset: Dataset[Any]) -> dict[str, Any]:
     record = dataset.sidecar(0).record
     return {

@@ -13,14 +13,14 @@ from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
 from gear.contracts.specs import AttackSpec
 from gear.dataset.files import sha256
-from gear.dataset.reading import Dataset
+from gear.dataset.reading import Dataset, scenes_of
 from gear.dataset.sidecar import dump_json, load_json
 from gear.opening import root_and_split
 from gear.plugins.build import NO_OPTIONS, find
 from gear.plugins.catalogue import Found
 from gear.values.errors import DatasetError, GearError
 from gear.values.serial import Json
-from gear.verbs.attack.data import check_joined, scenes_of
+from gear.verbs.attack.data import check_joined
 from gear.verbs.attack.models import check_attack, choose_defense, choose_models
 from gear.verbs.evaluate.choice import Chosen
 from gear.verbs.train.data import open_all
@@ -121,7 +121,7 @@ def resolve(
     task = datasets[0].plan.task["name"]
     validation = open_all(_list(val), task, names=VALIDATION, allow_tests=allow_tests)
     check_joined([*datasets, *validation])
-    models = choose_models([model] if isinstance(model, str) else list(model), model_settings, datasets[0])
+    models = choose_models([model] if isinstance(model, str) else list(model), model_settings, [*datasets, *validation])
     guard = choose_defense(defense, defense_settings, models, task)
     found, options = find("attack", attack), with_overrides(NO_OPTIONS, settings)
     config = read_node(found.spec.config, options, "")

@@ -14,9 +14,12 @@ from gear.plugins.catalogue import Found
 from gear.values.errors import GearError
 from gear.verbs.evaluate.choice import Chosen, check_defense, check_model, chosen_defense, chosen_model
 
+FLAG = "--model-set "
+"""How the user sets one of the models' options; `--set` is for the attack's."""
 
-def choose_models(names: Sequence[str], settings: Iterable[str], dataset: Dataset[Any]) -> list[Chosen]:
-    """Every model with the same options, checked against the dataset.
+
+def choose_models(names: Sequence[str], settings: Iterable[str], datasets: Sequence[Dataset[Any]]) -> list[Chosen]:
+    """Every model with the same options, checked against the datasets.
 
     Raises:
         GearError: there is no such model, an option does not fit, it is named twice, or it does another task.
@@ -27,7 +30,8 @@ def choose_models(names: Sequence[str], settings: Iterable[str], dataset: Datase
         raise GearError(f"a model is named twice: {', '.join(names)}")
     chosen = [chosen_model(name, settings) for name in names]
     for model in chosen:
-        check_model(model, dataset)
+        for dataset in datasets:
+            check_model(model, dataset, FLAG)
     return chosen
 
 

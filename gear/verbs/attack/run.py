@@ -17,18 +17,20 @@ from gear.contracts.attacks import Budget, Patch
 from gear.contracts.models import Model
 from gear.dataset.files import sha256
 from gear.dataset.sidecar import dump_json
-from gear.plugins.build import blamed, build
+from gear.plugins.build import blamed, build, traced
+from gear.plugins.catalogue import Found
 from gear.values.errors import GearError, PluginError
 from gear.values.rng import derive_rng
 from gear.values.serial import Json
 from gear.verbs.attack.folder import begin, read_patches, tidy
 from gear.verbs.attack.job import Job, Paths, resolve
-from gear.verbs.attack.models import build_model
+from gear.verbs.attack.models import FLAG, build_model
 from gear.verbs.attack.outputs import as_picture, write_curves, write_patches, write_samples
 from gear.verbs.attack.report import AttackReport
 from gear.verbs.attack.scenes import Scenes
 from gear.verbs.attack.watch import Recorder
 from gear.verbs.evaluate.player import weights_digest
+from gear.verbs.evaluate.shown_size import size_note
 
 Progress = Callable[[int, int], None]
 """Called with (steps done, steps in all)."""
@@ -75,6 +77,7 @@ def attack(
     allow_tests: bool = False,
     force: bool = False,
     progress: Progress | None = None,
+    noted: Callable[[str], None] | None = None,
 ) -> AttackReport:
     """Makes patches for the surfaces of a scene; takes up again what was begun.
 
@@ -100,6 +103,7 @@ def attack(
         allow_tests: whether `test` splits may be optimised on.
         force: start afresh where something else is.
         progress: told after every step.
+        noted: told, before anything is made, of a model that sees these pictures at another size than it learnt from.
 
     Raises:
         GearError: anything that the user can put right; its text is one line.
@@ -121,19 +125,34 @@ def attack(
         seed=seed,
         allow_tests=allow_tests,
     )
+    _note_sizes(job, noted)
     product, network, root = build(job.found, job.options), build_model(job.models, job.defense), Path(out)
     plan = job.plan(weights_digest(network))
     there = begin(root, plan, force=force)
     if there is not None:
         return AttackReport(out=root, patches=read_patches(root), facts=there, made=False)
-    made = _optimised(job, product, network, root, plan, progress)
-    facts = _facts(job, network, plan, made)
+    with traced(_asked(job), "forward"):
+        made = _optimised(job, product, network, root, plan, progress)
+        facts = _facts(job, network, plan, made)
     names = ", ".join(one.found.spec.name for one in job.models)
     write_curves(root, f"{attack} on {names}", made.recorder.curves, made.recorder.judged)
     write_samples(root, made.seen.pairs(made.patches))
     write_patches(root, made.patches, facts)
     tidy(root)
     return AttackReport(out=root, patches=made.patches, facts=facts, made=True)
+
+
+def _note_sizes(job: Job, noted: Callable[[str], None] | None) -> None:
+    """Tells of every model that sees the pictures, which are all of one size, larger or smaller than it knows them."""
+    if noted is not None:
+        for note in (size_note(model, job.datasets[0], FLAG) for model in job.models):
+            if note is not None:
+                noted(note)
+
+
+def _asked(job: Job) -> list[Found]:
+    """Whose code the attack asks."""
+    return [one.found for one in (*job.models, job.defense) if one is not None]
 
 
 def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, progress: Progress | None) -> _Made:
@@ -160,7 +179,7 @@ def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, p
         told=progress,
     )
     recorder.tell(0)
-    with blamed(job.found, "optimise"):
+    with blamed(job.found, "optimise"), traced(_asked(job), "forward"):
         last = product.optimise(
             network,
             seen.samples,

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
+from gear.dataset.reading import scenes_of
 from gear.dataset.sidecar import load_json
 from gear.opening import open_dataset, root_and_split
 from gear.values.errors import DatasetError, GearError
-from gear.verbs.attack.data import check_joined, scenes_of
+from gear.verbs.attack.data import check_joined
 from gear.verbs.attack.folder import VERIFY
 from gear.verbs.gap.report import GapReport
 from gear.verbs.gap.run import gap

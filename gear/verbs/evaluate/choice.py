@@ -62,8 +62,13 @@ def chosen_defense(name: str, settings: Iterable[str]) -> Chosen:
     return Chosen(found=found, options=options)
 
 
-def check_model(model: Chosen, dataset: Dataset[Any]) -> None:
+def check_model(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> None:
     """Whether the model can do the dataset's task and sees its cameras.
+
+    Args:
+        model: with its options.
+        dataset: whose pictures it is shown.
+        flag: how the user sets one of the model's options.
 
     Raises:
         GearError: it cannot.
@@ -76,7 +81,7 @@ def check_model(model: Chosen, dataset: Dataset[Any]) -> None:
     missing = [name for name in spec.views if name not in cameras]
     if missing:
         raise GearError(f"model {spec.name!r} looks at {', '.join(missing)}, which {dataset.root} does not have")
-    check_camera(model, dataset)
+    check_camera(model, dataset, flag)
 
 
 def check_camera(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> None:

@@ -13,6 +13,7 @@ from gear.dataset.reading import Dataset
 from gear.plugins.build import find
 from gear.verbs.evaluate.choice import check_defense, check_model, chosen_defense, chosen_model
 from gear.verbs.evaluate.player import Player
+from gear.verbs.evaluate.shown_size import size_note
 
 CLEAN, RENDERED = "clean", "rendered"
 
@@ -43,12 +44,14 @@ class Effect:
         player: the model, behind its defense if there is one.
         evaluators: by `clean`, a compositor's name, or `rendered`.
         figure: of the task, the one that is to be looked at first.
+        note: that the model sees the pictures at another size than it learnt from, or None.
         samples: of those taken in so far.
     """
 
     player: Player
     evaluators: Mapping[str, Evaluator[Any, Any]]
     figure: str
+    note: str | None = None
     samples: list[SampleEffect] = field(default_factory=list)
 
     @staticmethod
@@ -81,6 +84,7 @@ class Effect:
             player=Player(chosen, guard),
             evaluators={name: dataset.task.evaluator() for name in names},
             figure=spec.figure.rpartition(".")[2],
+            note=size_note(chosen, dataset),
         )
 
     def update(self, index: int, clean: Any, shown: Mapping[str, Any]) -> None:

@@ -52,6 +52,7 @@ def gap(
     scenes: str | Path | None = None,
     out: str | Path | None = None,
     progress: Progress | None = None,
+    noted: Callable[[str], None] | None = None,
 ) -> GapReport:
     """Holds digital patches against rendered ones.
 
@@ -69,6 +70,8 @@ def gap(
         town, scenes: with `patch`, files of the town and of its scene library, where they are none of gear's own.
         out: folder for `gap.json` and `gap.txt`; needed with `patch`.
         progress: told after every sample.
+        noted: told, before anything is rendered, of a model that sees these pictures at another size than it learnt
+            from.
 
     Raises:
         GearError: anything that the user can put right; its text is one line.
@@ -96,6 +99,8 @@ def gap(
         if model is None
         else Effect.of(model, settings, clean, tuple(compositors), defense=defense, defense_settings=defense_settings)
     )
+    if noted is not None and effect is not None and effect.note is not None:
+        noted(effect.note)
     if patch is not None:
         collect_twin(clean, patch, root, town=town, scenes=scenes)
         pairs = checked_twin(clean, open_dataset(root, clean.plan.info.split))

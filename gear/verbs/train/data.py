@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, overload
 
 from gear.augment.apply import shrunk
-from gear.dataset.reading import Dataset
+from gear.dataset.reading import Dataset, scenes_of
 from gear.dataset.store import splits_of
 from gear.opening import open_dataset, root_and_split
 from gear.values.errors import DatasetError, GearError
@@ -132,8 +132,8 @@ def spread(samples: Samples, most: int) -> Samples:
 
 
 def keep_some(samples: Samples, share: float, seed: int) -> tuple[Samples, Samples]:
-    """Samples to train on and samples to validate on. Whole sequences go to either side, with their twins, so that what
-    a picture shows is never seen on the other.
+    """Samples to train on and samples to validate on. Whole sequences go to either side, in every weather and with
+    every patch that there is of them, so that what a picture shows is never seen on the other.
 
     Raises:
         GearError: there are too few.
@@ -152,9 +152,9 @@ def keep_some(samples: Samples, share: float, seed: int) -> tuple[Samples, Sampl
 
 
 def _streets(datasets: Sequence[Dataset[Any]]) -> list[int]:
-    """For each dataset the number of the first one that differs from it in nothing but the patch: twins show the same
-    streets."""
-    keys = [dataset.plan.twin_key for dataset in datasets]
+    """For each dataset the number of the first one that shows the same streets, in whatever weather, with whatever
+    patch."""
+    keys = [scenes_of(dataset) for dataset in datasets]
     return [keys.index(key) for key in keys]
 
 

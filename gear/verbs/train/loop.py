@@ -16,6 +16,8 @@ from torch import nn
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Task
 from gear.nn.runtime import autocast, device_of, seeded
+from gear.plugins.build import blamed
+from gear.plugins.catalogue import Found
 from gear.readers import Batch
 from gear.values.errors import GearError
 from gear.values.rng import derive_rng
@@ -50,6 +52,7 @@ class Parts:
 
     Attributes:
         spec, task: what is learnt, and its evaluator.
+        found: whose network it is.
         model: being trained.
         twin: another one of its kind, in float32, that is given the mean weights and validated.
         views: cameras that it looks at.
@@ -62,6 +65,7 @@ class Parts:
 
     spec: TaskSpec[Any]
     task: Task[Any, Any]
+    found: Found
     model: Any
     twin: Any
     views: Sequence[str]
@@ -183,15 +187,19 @@ class Training:
             progress.open_losses.clear()
 
     def _loss(self, views: Mapping[str, torch.Tensor], batch: Batch) -> torch.Tensor:
-        try:
-            return total(self._parts.model.forward(views, batch.samples))
-        except ValueError as error:
-            if len(batch.samples) == 1 and ONE_VALUE in str(error):
-                raise GearError(
-                    "this network normalises over the samples of a batch, and there is one; train on two samples or "
-                    "more, with --batch 2 or more"
-                ) from error
-            raise
+        with blamed(self._parts.found, "forward"):
+            try:
+                loss = total(self._parts.model.forward(views, batch.samples))
+            except ValueError as error:
+                if len(batch.samples) == 1 and ONE_VALUE in str(error):
+                    raise GearError(
+                        "this network normalises over the samples of a batch, and there is one; train on two samples "
+                        "or more, with --batch 2 or more"
+                    ) from error
+                raise
+            if not loss.requires_grad:
+                raise ValueError("its losses do not depend on anything that can be trained")
+            return loss
 
     def _count_broken(self, is_finite: bool, loss: torch.Tensor) -> None:
         """A step that overflows is left out; a training that only overflows is over."""
@@ -206,7 +214,7 @@ class Training:
         parts, progress = self._parts, self.progress
         with self._timed() as spent:
             parts.twin.module().load_state_dict(self._mean.state)
-            figures = validate(parts.twin, parts.task, parts.validation, parts.views)
+            figures = validate(parts.twin, parts.found, parts.task, parts.validation, parts.views)
         best = max((rank(old, parts.spec) for old in progress.validations), default=(-math.inf, -math.inf))
         is_better = rank(figures, parts.spec) > best or not progress.validations
         entry = {"step": progress.step, "elapsed_s": progress.elapsed_s, "took_s": spent[0], **figures}

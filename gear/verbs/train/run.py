@@ -12,6 +12,7 @@ from gear.config.dump import to_plain
 from gear.contracts.specs import ModelSpec, TaskSpec
 from gear.dataset.files import clear_scratch, explained
 from gear.dataset.layout import GEAR
+from gear.dataset.reading import scenes_of
 from gear.dataset.store import refuse_dataset
 from gear.nn.runtime import device_of, prepare
 from gear.plugins.build import blamed, find
@@ -220,6 +221,7 @@ def _parts(found: Found, spec: TaskSpec[Any], origin: Origin, root: Path) -> Par
     return Parts(
         spec=spec,
         task=origin.training.datasets[0].task,
+        found=found,
         model=model,
         twin=twin,
         views=views,
@@ -258,11 +260,11 @@ def _samples(
     training = all_of(open_all(data, task, names=TRAINING, allow_tests=allow_tests))
     if val:
         held_out = all_of(open_all(val, task, names=VALIDATION, allow_tests=allow_tests))
-        streets = {one.plan.twin_key: one.root for one in training.datasets}
+        streets = {scenes_of(one): one.root for one in training.datasets}
         for one in held_out.datasets:
-            if one.plan.twin_key in streets:
+            if scenes_of(one) in streets:
                 raise GearError(
-                    f"--val {one.root} shows the same streets as --data {streets[one.plan.twin_key]}; give --val "
+                    f"--val {one.root} shows the same streets as --data {streets[scenes_of(one)]}; give --val "
                     "another split, or leave it out"
                 )
     else:

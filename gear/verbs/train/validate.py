@@ -11,19 +11,24 @@ import torch
 from gear.contracts.evaluation import Reports
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Task
+from gear.plugins.build import blamed
+from gear.plugins.catalogue import Found
 from gear.readers import as_pictures, picture_tensor
 from gear.values.errors import GearError
 
 LOSS = "loss"
 
 
-def validate(model: Any, task: Task[Any, Any], samples: Sequence[Any], views: Sequence[str]) -> dict[str, float]:
+def validate(
+    model: Any, found: Found, task: Task[Any, Any], samples: Sequence[Any], views: Sequence[str]
+) -> dict[str, float]:
     """Figures over the samples, with the model in eval mode.
 
     Those of the task's evaluator, those of its reports as `<report>.<figure>`, and `loss`, the mean of summed losses.
 
     Raises:
         GearError: a prediction cannot be measured.
+        PluginError: a third party's network failed, or gives something else than losses and the task's predictions.
     """
     evaluators = {"": task.evaluator()}
     if isinstance(task, Reports):
@@ -33,17 +38,19 @@ def validate(model: Any, task: Task[Any, Any], samples: Sequence[Any], views: Se
         sample = samples[index]
         pictures = {name: sample.images[name] for name in views}
         batch = as_pictures({name: picture_tensor(picture)[None] for name, picture in pictures.items()})
-        with torch.no_grad():
+        with blamed(found, "forward"), torch.no_grad():
             losses.append(float(total(model.forward(batch, [sample]))))
-        prediction = model.predict(pictures)
-        for evaluator in evaluators.values():
-            try:
-                evaluator.update(sample, prediction)
-            except ValueError as error:
-                raise GearError(
-                    f"what the network says of a validation picture cannot be measured ({error}); if it came apart, "
-                    "train again with a lower --lr in another --out"
-                ) from error
+        with blamed(found, "predict"):
+            prediction = model.predict(pictures)
+        with blamed(found, "prediction"):
+            for evaluator in evaluators.values():
+                try:
+                    evaluator.update(sample, prediction)
+                except ValueError as error:
+                    raise GearError(
+                        f"what the network says of a validation picture cannot be measured ({error}); if it came "
+                        "apart, train again with a lower --lr in another --out"
+                    ) from error
     figures = {
         f"{prefix}{name}": value
         for prefix, evaluator in evaluators.items()
@@ -53,7 +60,14 @@ def validate(model: Any, task: Task[Any, Any], samples: Sequence[Any], views: Se
 
 
 def total(losses: Mapping[str, torch.Tensor]) -> torch.Tensor:
-    """The sum of named losses, which is what is minimised."""
+    """The sum of named losses, which is what is minimised.
+
+    Raises:
+        TypeError: they are no names with tensors.
+    """
+    if not isinstance(losses, Mapping) or not losses:
+        given = "none" if isinstance(losses, Mapping) else type(losses).__name__
+        raise TypeError(f"must give losses by name where it is given targets, got {given}")
     return torch.stack([loss.float() for loss in losses.values()]).sum()
 
 

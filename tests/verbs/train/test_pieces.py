@@ -188,6 +188,21 @@ def test_twins_are_kept_together(street: Callable[..., Path]) -> None:
         assert not shown[0] & shown[1] and len(train) == 8 and len(val) == 4
 
 
+def test_the_same_streets_in_another_weather_are_kept_together(street: Callable[..., Path]) -> None:
+    """The seed and the scene decide what stands where, so labels would be known from training."""
+    (dataset,) = open_all([street("semseg")], "semseg", names=("train",))
+    plan = dataclasses.replace(dataset.plan, content={**dataset.plan.content, "weather": "another"})
+    sunset = dataclasses.replace(dataset, plan=plan)
+    assert plan.twin_key != dataset.plan.twin_key
+    for seed in range(5):
+        train, val = keep_some(all_of((dataset, sunset)), 0.4, seed=seed)
+        shown = [{place[1] for place in side.places} for side in (train, val)]
+        assert not shown[0] & shown[1] and len(train) == 8 and len(val) == 4
+    info = dataclasses.replace(plan.info, seed=plan.info.seed + 1)
+    other = dataclasses.replace(dataset, plan=dataclasses.replace(plan, info=info))
+    assert len(keep_some(all_of((dataset, other)), 0.25, seed=0)[1]) == 3
+
+
 def test_sequences_are_kept_together(street: Callable[..., Path]) -> None:
     (dataset,) = open_all([street("semseg")], "semseg", names=("train",))
     dataset.plan.content["frames"] = 2

@@ -22,7 +22,7 @@ from gear.cli.main import main
 from gear.contracts.models import Recipe
 from gear.nn.weights import load_into
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_segmenter
-from gear.values.errors import DatasetError, GearError, UnknownNameError
+from gear.values.errors import DatasetError, GearError, PluginError, UnknownNameError
 from gear.verbs.train import loop
 from gear.verbs.train.checkpoint import Progress
 from gear.verbs.train.run import TrainReport, train
@@ -329,3 +329,36 @@ def test_the_command(street: Street, tmp_path: Path, install: Any, capsys: pytes
     assert "model.safetensors: miou" in captured.out and "miou" in captured.err
     assert main([*words, "--out", str(tmp_path / "x"), "--set", "augmentation.flop=1"]) == 2
     assert "unknown key (did you mean 'flip'?)" in capsys.readouterr().err
+
+
+class Faulty(TinySegmenter):
+    """Gives what it likes where it is given targets, and as a prediction."""
+
+    def __init__(self, config: TinyConfig, change: Callable[[Any], Any], answer: Any = None) -> None:
+        super().__init__(config)
+        self.change, self.said = change, answer
+
+    def forward(self, views: Any, targets: Any = None) -> Any:
+        outputs = super().forward(views, targets)
+        return outputs if targets is None else self.change(outputs)
+
+    def predict(self, views: Any) -> Any:
+        return super().predict(views) if self.said is None else self.said
+
+
+@pytest.mark.parametrize(
+    ("change", "answer", "message"),
+    [
+        (lambda losses: {}, None, "failed at forward: TypeError: must give losses by name .*, got none"),
+        (lambda losses: None, None, "failed at forward: TypeError: must give losses by name .*, got NoneType"),
+        (lambda losses: {"loss": losses["loss"].detach()}, None, "do not depend on anything that can be trained"),
+        (lambda losses: losses["los"], None, "failed at forward: KeyError"),
+        (lambda losses: losses, "road", "failed at prediction: AttributeError"),
+    ],
+)
+def test_a_third_partys_network_that_breaks_its_promise_is_named(
+    street: Street, tmp_path: Path, install: Any, change: Any, answer: Any, message: str
+) -> None:
+    install(replace(tiny_segmenter, build=lambda config: Faulty(config, change, answer)))
+    with pytest.raises(PluginError, match=f"tiny_segmenter .*{message}"):
+        quick(street, tmp_path / "out", epochs=1)
