@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import contextlib
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -54,6 +55,35 @@ class Store:
             target = inside(self.root, patch_path(self.plan.info.patch_label, name))
             if not target.exists():
                 write_whole(self.root, patch_path(self.plan.info.patch_label, name), data)
+
+    @contextlib.contextmanager
+    def begun(self, patch_files: Mapping[str, bytes]) -> Iterator[None]:
+        """`open`; where what follows fails before a new split has a sample, all of it is taken back: what made nothing
+        must not stand in the way of the next try, with another configuration.
+
+        Raises:
+            DatasetError: as `open`.
+        """
+        here = [self.root, *self.root.parents]
+        was_there = {folder for folder in here if folder.exists()}
+        is_new = not inside(self.root, plan_path(self.split)).exists()
+        copies = [inside(self.root, patch_path(self.plan.info.patch_label, name)) for name in patch_files]
+        new_copies = [copy for copy in copies if not copy.exists()]
+        try:
+            with explained(self.root):
+                self.root.mkdir(parents=True, exist_ok=True)
+            self.open(patch_files)
+            yield
+        except BaseException:
+            if is_new and len(self.missing()) == self.plan.samples:
+                with contextlib.suppress(OSError, DatasetError):
+                    remove_split(self.root, self.split)
+                    for copy in new_copies:
+                        copy.unlink(missing_ok=True)
+                    for folder in [*sorted((self.root / GEAR).rglob("*"), reverse=True), self.root / GEAR, *here]:
+                        if folder not in was_there and folder.is_dir() and not any(folder.iterdir()):
+                            folder.rmdir()
+            raise
 
     def missing(self) -> list[int]:
         """Indices of samples that have no sidecar yet; a sample with one is whole and is never made again."""

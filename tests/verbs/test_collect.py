@@ -27,6 +27,7 @@ from gear.values.errors import (
     PatchError,
     PlacementError,
     PluginError,
+    TownError,
     UnknownNameError,
 )
 from gear.verbs.collect.run import CollectReport
@@ -197,6 +198,25 @@ def test_another_configuration_needs_force(tmp_path: Path, collect_small: Collec
     assert tree(tmp_path) == before
     collect_small("depth", tmp_path, seed=11, force=True)
     assert gear.open_dataset(tmp_path)[0].record.seed == 11
+
+
+def test_a_first_try_that_makes_nothing_leaves_nothing(tmp_path: Path, collect_small: Collect) -> None:
+    town = tmp_path / "towns" / "tiny.xml"
+    town.parent.mkdir()
+    whole = TINY_TOWN.read_text()
+    town.write_text(whole.replace("building.plaster", "bilding.plaster"))
+    for folder in TINY_TOWN.parents[1].iterdir():
+        if folder.name != "towns":
+            (tmp_path / folder.name).symlink_to(folder)
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "notes.txt").write_text("x")
+    for out in (tmp_path / "new" / "below", tmp_path / "mine"):
+        with pytest.raises(TownError, match=r"bilding\.plaster"):
+            collect_small("depth", out, town=town, patch="random")
+    assert not (tmp_path / "new").exists()
+    assert tree(tmp_path / "mine").keys() == {"notes.txt"}
+    town.write_text(whole)
+    assert collect_small("depth", tmp_path / "mine", town=town, seed=4).made == 2
 
 
 def test_the_command_line_says_it_in_one_line_and_leaves_with_2(tmp_path: Path) -> None:

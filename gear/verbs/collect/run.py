@@ -10,7 +10,6 @@ from typing import Any
 from gear.config.collection import CollectionConfig
 from gear.config.dump import to_plain
 from gear.config.load import load_collection
-from gear.dataset.files import explained
 from gear.dataset.store import Store, remove_split
 from gear.plugins.build import blamed, build, find
 from gear.values.serial import Json, to_json
@@ -131,11 +130,19 @@ def collect_config(
 def run_job(job: Job, *, workers: int = 1, force: bool = False, progress: Progress | None = None) -> CollectReport:
     """Collects what is missing of a resolved job and closes the split."""
     store = Store(job.root, job.plan)
-    with explained(job.root):
-        job.root.mkdir(parents=True, exist_ok=True)
     if force:
         remove_split(job.root, job.plan.info.split)
-    store.open(job.patch.files)
+    with store.begun(job.patch.files):
+        made = _collect_missing(job, store, workers, progress)
+    plugin = find("task", job.config.task)
+    task = build(plugin, job.config.options)
+    with blamed(plugin, "finalise"):
+        store.close(task, manifest_facts(job))
+    return CollectReport(root=job.root, split=job.plan.info.split, samples=job.plan.samples, made=made)
+
+
+def _collect_missing(job: Job, store: Store, workers: int, progress: Progress | None) -> int:
+    """How many samples it made."""
     missing = store.missing()
     finished = job.plan.samples - len(missing)
 
@@ -152,11 +159,7 @@ def run_job(job: Job, *, workers: int = 1, force: bool = False, progress: Progre
             collect_samples(session, store, missing, done)
     elif missing:
         collect_in_processes(job, missing, workers, done)
-    plugin = find("task", job.config.task)
-    task = build(plugin, job.config.options)
-    with blamed(plugin, "finalise"):
-        store.close(task, manifest_facts(job))
-    return CollectReport(root=job.root, split=job.plan.info.split, samples=job.plan.samples, made=len(missing))
+    return len(missing)
 
 
 def manifest_facts(job: Job) -> dict[str, Json]:
