@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import sys
 
+from gear.cli.device import add_device
+
 EXAMPLE = """examples:
   gear collect --task semseg --scene billboard01 --split train --probes --out data/b01
   gear attack --model ddrnet23_slim --data data/b01 --out patches/b01
@@ -38,6 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings", help="an option of the attack"
     )
     parser.add_argument("--model-set", metavar="KEY=VALUE", action="append", default=[], help="an option of the models")
+    add_device(parser, "model_set")
     parser.add_argument("--defense", metavar="NAME", help="a defense that the attack knows of and looks through")
     parser.add_argument("--defense-set", metavar="KEY=VALUE", action="append", default=[], help="an option of it")
     parser.add_argument(

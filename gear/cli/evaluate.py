@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from gear.cli.collect import positive
+from gear.cli.device import add_device
 
 EXAMPLE = """examples:
   gear evaluate --model ddrnet23_slim --data data/clean
@@ -48,6 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--workers", type=positive, default=2, metavar="N", help="threads that read and measure (2)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the defense's draws and the bootstrap (0)")
     parser.add_argument("--resamples", type=int, default=1000, metavar="N", help="of the bootstrap; 0 for none (1000)")
+    add_device(parser, "settings")
     parser.add_argument("--json", action="store_true", help="print results.json instead of the table")
 
 

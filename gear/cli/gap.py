@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import sys
 
+from gear.cli.device import add_device
+
 EXAMPLE = """examples:
   gear gap data/train --twin data/train-patched
   gear gap data/train --patch patches/ --out gap/
@@ -35,6 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--compositor", action="append", dest="compositors", help="transport, homography (both)")
     parser.add_argument("--samples", type=positive, metavar="N", help="the first N samples only")
     parser.add_argument("--out", metavar="DIR", help="folder for gap.json and gap.txt")
+    add_device(parser, "settings")
     parser.add_argument("--json", action="store_true", help="print the report as JSON")
 
 

@@ -8,7 +8,8 @@ import os
 import sys
 from collections.abc import Sequence
 
-from gear.values.errors import GearError
+from gear.cli.parser import Parser
+from gear.values.errors import GearError, UnknownNameError
 
 COMMANDS: dict[str, str] = {
     "collect": "collect a dataset split: pictures with exact ground truth",
@@ -50,7 +51,7 @@ def main(argv: Sequence[str]) -> int:
     Returns:
         0, 2 for what the user can put right (one line on stderr), 130 when interrupted. Bugs keep their traceback.
     """
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="gear",
         description="Driving datasets with physical adversarial patches in them, rendered by MuJoCo.",
         epilog=EXAMPLES,
@@ -67,7 +68,12 @@ def main(argv: Sequence[str]) -> int:
             module = importlib.import_module(f"gear.cli.{name.replace('-', '_')}")
             module.add_arguments(command)
             command.set_defaults(run=module.run)
-    args = parser.parse_args(argv)
+    if wanted is not None and wanted not in COMMANDS:
+        print(f"gear: {UnknownNameError('command', wanted, COMMANDS)}", file=sys.stderr)
+        return 2
+    args, unknown = parser.parse_known_args(argv)
+    if unknown:
+        (commands.choices[args.command] if args.command else parser).refuse(unknown)
     if args.version:
         from importlib.metadata import version
 

@@ -1,0 +1,30 @@
+"""`--device`, for the commands that run networks."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from typing import Any
+
+
+def add_device(parser: argparse.ArgumentParser, settings: str) -> None:
+    """Adds the flag; what it says joins the settings of the model, under that name in the arguments."""
+    parser.add_argument(
+        "--device",
+        choices=("auto", "cpu", "cuda"),
+        action=_AsSetting,
+        dest=settings,
+        default=argparse.SUPPRESS,
+        help="where the model runs: auto takes a GPU where there is one (auto)",
+    )
+
+
+class _AsSetting(argparse.Action):
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: str | Sequence[Any] | None,
+        option_string: str | None = None,
+    ) -> None:
+        setattr(namespace, self.dest, [*getattr(namespace, self.dest, []), f"device={values}"])

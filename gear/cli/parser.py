@@ -1,0 +1,24 @@
+"""The parser of the command line: whoever mistypes gets one line, with what they may have meant."""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+from collections.abc import Sequence
+from typing import NoReturn
+
+
+class Parser(argparse.ArgumentParser):
+    """As argparse's, with errors in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Leaves with 2."""
+        self.exit(2, f"{self.prog}: {message}; {self.prog} --help says more\n")
+
+    def refuse(self, unknown: Sequence[str]) -> NoReturn:
+        """Leaves with 2, for words that no argument takes."""
+        flag = next((word.partition("=")[0] for word in unknown if word.startswith("-")), None)
+        if flag is None:
+            self.error(f"does not know what to do with {' '.join(unknown)!r}")
+        close = difflib.get_close_matches(flag, self._option_string_actions, n=1)
+        self.error(f"no flag {flag}" + (f"; did you mean {close[0]}?" if close else ""))

@@ -1,0 +1,46 @@
+"""Who mistypes a command or a flag gets one line, with what they may have meant."""
+
+from __future__ import annotations
+
+import argparse
+
+import pytest
+
+from gear.cli.device import add_device
+from gear.cli.main import main
+
+
+def said(capsys: pytest.CaptureFixture[str], argv: list[str]) -> str:
+    try:
+        code = main(argv)
+    except SystemExit as left:
+        code = int(left.code or 0)
+    out, err = capsys.readouterr()
+    assert code == 2 and not out and err.count("\n") == 1
+    return err
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("colect --task semseg", "gear: no command named 'colect'; did you mean collect?"),
+        ("sheet data --jsn", "gear sheet: no flag --jsn"),
+        ("evaluate --model m --data d --devcie=cpu", "gear evaluate: no flag --devcie; did you mean --device?"),
+        ("evaluate --data d", "gear evaluate: the following arguments are required: --model; gear evaluate --help"),
+        ("sheet a b c", "gear sheet: does not know what to do with 'b c'"),
+        ("plugins --kind modl", "gear plugins: argument --kind: invalid choice: 'modl'"),
+        ("weights shw x", "gear weights: argument ACTION: invalid choice: 'shw'"),
+        ("--foo", "gear: no flag --foo"),
+    ],
+)
+def test_one_line(line: str, expected: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert said(capsys, line.split()).startswith(expected)
+
+
+def test_the_device_is_a_setting_of_the_model() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--set", action="append", default=[], dest="settings")
+    add_device(parser, "settings")
+    assert parser.parse_args([]).settings == []
+    assert parser.parse_args(["--set", "seed=3", "--device", "cpu"]).settings == ["seed=3", "device=cpu"]
+    assert parser.parse_args([]).settings == [], "the default stays as it was"
