@@ -23,6 +23,7 @@ from gear.attacking.group import members_of
 from gear.contracts.models import Model
 from gear.formats import rle
 from gear.formats.cityscapes import IGNORED_TRAIN_ID, LABELS
+from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
 
 TRAIN_IDS = torch.tensor([label.train_id for label in LABELS if label.id >= 0])
@@ -108,7 +109,7 @@ class SemsegObjective:
     ) -> Mapping[str, Term]:
         """`correct` and `wrong`, or `target`."""
         view = next(iter(views))
-        logits = model.forward(views)["logits"]
+        logits = _said(model, views, "logits")
         labels = train_labels(samples, logits.shape[1]).to(logits.device)
         counts = outside(samples, view, logits.device) & (labels != IGNORED_TRAIN_ID)
         if self.target is not None:
@@ -157,7 +158,7 @@ class DepthObjective:
         clean = torch.stack(
             [self._answer(model, sample, index, view) for sample, index in zip(samples, indexes, strict=True)]
         )
-        depth_m = model.forward(views)["depth_m"]
+        depth_m = _said(model, views, "depth_m")
         clean = clean.to(depth_m.device, depth_m.dtype)
         free = outside(samples, view, depth_m.device)
         if self._direction != "any":
@@ -172,7 +173,7 @@ class DepthObjective:
         key = (id(model), index)
         if key not in self._clean:
             with torch.no_grad():
-                self._clean[key] = model.forward({view: _as_batch(sample.images[view])})["depth_m"][0].cpu()
+                self._clean[key] = _said(model, {view: _as_batch(sample.images[view])}, "depth_m")[0].cpu()
         return self._clean[key]
 
 
@@ -221,6 +222,21 @@ def train_labels(samples: Sequence[Any], classes: int) -> Tensor:
 def class_of(label_id: int, classes: int) -> int:
     """The channel of a label id."""
     return int(TRAIN_IDS[label_id]) if classes == TRAIN_CLASSES else label_id
+
+
+def _said(model: Model, views: Mapping[str, Tensor], name: str) -> Tensor:
+    """The output that every network of the task has.
+
+    Raises:
+        GearError: this one has not.
+    """
+    outputs = model.forward(views)
+    if name not in outputs:
+        given = ", ".join(outputs) or "nothing"
+        raise GearError(
+            f"an attack works on the output {name!r}, and the network gives {given} (docs/write-a-model.md)"
+        )
+    return outputs[name]
 
 
 def _as_batch(picture: UInt8Image) -> Tensor:

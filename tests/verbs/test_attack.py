@@ -428,3 +428,16 @@ def test_a_third_partys_network_that_fails_is_named(small: Small, install: Insta
     install(dataclasses.replace(tiny_segmenter, build=Failing))
     with pytest.raises(PluginError, match=r"tiny_segmenter \(.*failed at forward: RuntimeError: out of ideas"):
         attack(small(), model="tiny_segmenter", out=tmp_path / "p", steps=1, settings=SMALL)
+
+
+class Misnaming(TinySegmenter):
+    def forward(self, views: Any, targets: Any = None) -> Any:
+        return {"classes": super().forward(views)["logits"]}
+
+
+def test_a_network_without_the_output_that_attacks_need_is_told_so(
+    small: Small, install: Install, tmp_path: Path
+) -> None:
+    install(dataclasses.replace(tiny_segmenter, build=Misnaming))
+    with pytest.raises(GearError, match=r"works on the output 'logits', and the network gives classes"):
+        attack(small(), model="tiny_segmenter", out=tmp_path / "p", steps=1, settings=SMALL)
