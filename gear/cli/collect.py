@@ -9,6 +9,7 @@ EXAMPLE = """examples:
   gear collect --task stereo3d
   gear collect --task semseg --scene billboard04 --patch patches/ --out data/twin
   gear collect --task semseg --split train --probes --out data/train
+  gear collect --task depth --weather WetNight --set weather.fog_density=10
   gear collect --config my.yml --set weather.cloudiness=30 --set options.width_px=1024
 """
 

@@ -439,5 +439,5 @@ def test_a_network_without_the_output_that_attacks_need_is_told_so(
     small: Small, install: Install, tmp_path: Path
 ) -> None:
     install(dataclasses.replace(tiny_segmenter, build=Misnaming))
-    with pytest.raises(GearError, match=r"works on the output 'logits'; the network gives classes"):
+    with pytest.raises(GearError, match=r"works on the output 'logits', and the network gives classes"):
         attack(small(), model="tiny_segmenter", out=tmp_path / "p", steps=1, settings=SMALL)

@@ -190,6 +190,23 @@ def test_bad_input_gets_one_line_and_leaves_nothing(
     assert not (tmp_path / "out").exists()
 
 
+def test_a_file_that_is_gone_or_damaged_is_named_with_its_remedy(tmp_path: Path, collect_small: Collect) -> None:
+    collect_small("semseg", tmp_path)
+    dataset = gear.open_dataset(tmp_path)
+    picture = next(iter(tmp_path.glob("leftImg8bit/*/*/*.png")))
+    whole = picture.read_bytes()
+    for damage, what in ((whole[:90], "not a picture"), (None, "is gone")):
+        picture.unlink()
+        if damage is not None:
+            picture.write_bytes(damage)
+        with pytest.raises(DatasetError, match=rf"{picture.name}: {what}; delete its sample's sidecar") as caught:
+            list(dataset)
+        assert "\n" not in str(caught.value)
+    (tmp_path / "gear/debug/samples/000000.json").unlink()
+    collect_small("semseg", tmp_path)
+    assert picture.read_bytes() == whole
+
+
 def test_another_configuration_needs_force(tmp_path: Path, collect_small: Collect) -> None:
     collect_small("depth", tmp_path)
     before = tree(tmp_path)

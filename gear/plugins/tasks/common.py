@@ -21,6 +21,9 @@ from gear.values.rig import CameraMount
 from gear.values.scene import SceneRecord, Vec3
 from gear.values.truth import SurfaceTruth
 
+REPAIR = "delete its sample's sidecar (gear/<split>/samples/<number>.json) and run the same collection again"
+"""What to do about a file that is gone or damaged."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraOptions:
@@ -93,10 +96,12 @@ def read_plain(root: Path, relative: str) -> npt.NDArray[Any]:
 def _read(root: Path, relative: str, decode: Callable[[bytes], npt.NDArray[Any]]) -> npt.NDArray[Any]:
     try:
         return decode((root / relative).read_bytes())
+    except FileNotFoundError as error:
+        raise DatasetError(root / relative, f"is gone; {REPAIR}") from error
     except OSError as error:
         raise DatasetError(root / relative, error.strerror or str(error)) from error
     except ValueError as error:
-        raise DatasetError(root / relative, f"{error}; delete its sidecar and collect again to repair it") from error
+        raise DatasetError(root / relative, f"{error}; {REPAIR}") from error
 
 
 def draw_surfaces(picture: UInt8Image, sample: Sample, camera: str) -> None:
