@@ -49,7 +49,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--lr", type=float, metavar="X", help="highest learning rate (recipe)")
     parser.add_argument("--seed", type=int, metavar="N", help="of weights, order and augmentation (0)")
     parser.add_argument("--init", metavar="FILE|NAME", help="first weights: a file, shipped, imagenet … (random)")
-    parser.add_argument("--precision", choices=("float32", "bfloat16"), help="of the training steps (float32)")
+    parser.add_argument(
+        "--precision",
+        choices=("auto", "float32", "bfloat16"),
+        help="of the training steps: auto is bfloat16 with --time-budget where it is quicker, else float32 (auto)",
+    )
     parser.add_argument("--device", choices=("auto", "cpu", "cuda"), help="where it runs (auto)")
     parser.add_argument("--workers", type=positive, metavar="N", help="threads that read; change nothing but time (2)")
     parser.add_argument(

@@ -54,8 +54,16 @@ def device_of(wish: Literal["auto", "cpu", "cuda"]) -> torch.device:
     return torch.device(wish)
 
 
-def autocast(device: torch.device, precision: Literal["float32", "bfloat16"]) -> torch.autocast:
-    """A context in which the graph runs at the precision."""
+def is_quick_in_half(device: torch.device) -> bool:
+    """Whether a device has instructions for bfloat16; where it has none, it is slower than float32."""
+    if device.type == "cuda":
+        return bool(torch.cuda.is_bf16_supported(including_emulation=False))
+    known = ("_is_avx512_bf16_supported", "_is_amx_tile_supported")
+    return device.type == "cpu" and any(bool(getattr(torch.cpu, name, bool)()) for name in known)
+
+
+def autocast(device: torch.device, precision: Literal["auto", "float32", "bfloat16"]) -> torch.autocast:
+    """A context in which the graph runs at the precision; `auto` is torch's own."""
     return torch.autocast(device.type, torch.bfloat16, enabled=precision == "bfloat16")
 
 

@@ -60,7 +60,8 @@ class TrainConfig(Recipe):
     Attributes:
         seed: of first weights, order, augmentation and whatever the network draws.
         time_budget_s: instead of `epochs`: the learning rate falls with the time that is left; 0 counts epochs.
-        precision: of the training steps; validation is always in float32.
+        precision: of the training steps; `auto` is bfloat16 with a time budget on a device that is quicker so, else
+            float32. Validation is always in float32.
         device: `auto` takes a GPU where there is one.
         init: what to begin with: "" is random weights, `shipped` the reference weights, a path of a safetensors file,
             or a name that the network knows, such as `imagenet`.
@@ -81,7 +82,7 @@ class TrainConfig(Recipe):
 
     seed: int = 0
     time_budget_s: float = 0.0
-    precision: Literal["float32", "bfloat16"] = "float32"
+    precision: Literal["auto", "float32", "bfloat16"] = "auto"
     device: Literal["auto", "cpu", "cuda"] = "auto"
     init: str = ""
     picture_scale: float | None = None

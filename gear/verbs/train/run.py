@@ -29,7 +29,7 @@ from gear.verbs.train.feed import Cache, Feed
 from gear.verbs.train.loop import Parts, Training, Watch
 from gear.verbs.train.results import WEIGHTS, Origin, command_of, figures_of, keep_weights, known, write_history
 from gear.verbs.train.sizes import picture_scale, without_empty_margins
-from gear.verbs.train.starting import begin_with, build_network, check_options, picture_share, with_scale
+from gear.verbs.train.starting import begin_with, build_network, check_options, picture_share, precision_of, with_scale
 
 GIGABYTE = 1e9
 CHANGE_NOTHING = ("workers", "cache_gb", "device")
@@ -133,7 +133,9 @@ def train(
     for dataset in (*training.datasets, *validation.datasets):
         check_camera(Chosen(found=found, options=config.options), dataset, "--set options.")
     scale = picture_scale(found, config, training)
-    config = replace(config, picture_scale=scale)
+    if noted is not None and config.precision == "auto" and precision_of(found, config) == "bfloat16":
+        noted("steps run in bfloat16, in which this device is quicker; --precision float32 keeps them whole")
+    config = replace(config, picture_scale=scale, precision=precision_of(found, config))
     training, validation = replace(training, scale=scale), replace(validation, scale=scale)
     if scale < 1 and noted is not None:
         noted(

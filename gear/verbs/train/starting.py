@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from gear.config.nodes import Mapping, Place, Scalar
 from gear.config.overrides import with_value
 from gear.contracts.specs import ModelSpec, TaskSpec
 from gear.nn.options import NONE, SHIPPED
-from gear.nn.runtime import seeded
+from gear.nn.runtime import device_of, is_quick_in_half, seeded
 from gear.nn.shipped import resolve
 from gear.nn.weights import load_into
 from gear.plugins.build import blamed, build
@@ -59,6 +59,19 @@ def with_scale(found: Found, config: TrainConfig, share: float) -> TrainConfig:
         return config
     options = with_value(config.options, (SCALE,), Scalar("1", False, Place("gear train")))
     return dataclasses.replace(config, options=options)
+
+
+def precision_of(found: Found, config: TrainConfig) -> Literal["float32", "bfloat16"]:
+    """Of the training steps: what was asked for; half of it where time counts and the device is quicker so.
+
+    Without a time budget the same command gives the same weights, so there it does not depend on the device.
+    """
+    if config.precision != "auto":
+        return config.precision
+    spec = found.spec
+    assert isinstance(spec, ModelSpec)
+    knows = any(field.name == "precision" for field in dataclasses.fields(spec.config))
+    return "bfloat16" if config.time_budget_s and knows and is_quick_in_half(device_of(config.device)) else "float32"
 
 
 def build_network(found: Found, config: TrainConfig, *, precision: str) -> Any:

@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import pytest
@@ -14,7 +15,7 @@ from safetensors import safe_open
 from gear.plugins.build import find
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_segmenter
 from gear.values.errors import ConfigError, GearError
-from gear.verbs.train import sizes
+from gear.verbs.train import sizes, starting
 from gear.verbs.train.config import TrainConfig, read_config
 from gear.verbs.train.data import Samples, all_of, open_all
 from gear.verbs.train.run import train
@@ -86,6 +87,21 @@ def test_a_network_that_could_not_say_it_afterwards_sees_them_whole(
     monkeypatch.setattr(sizes, "LEAST_PIXELS", 16)
     install(tiny_segmenter)
     assert sizes.picture_scale(find("model", "tiny_segmenter"), config_of(time_budget_s=1), samples_of(street)) == 1
+
+
+@pytest.mark.parametrize("quick", [True, False])
+def test_half_precision_is_for_time_budgets_on_devices_that_are_quicker_so(
+    quick: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(starting, "is_quick_in_half", lambda device: quick)
+    found = find("model", "ddrnet23_slim")
+    half = "bfloat16" if quick else "float32"
+    assert starting.precision_of(found, config_of(time_budget_s=60)) == half
+    assert starting.precision_of(found, config_of()) == "float32"
+    for asked in ("float32", "bfloat16"):
+        assert starting.precision_of(found, config_of(f"precision={asked}", time_budget_s=60)) == asked
+    own = SimpleNamespace(spec=replace(found.spec, config=TinyConfig))
+    assert starting.precision_of(own, config_of(time_budget_s=60)) == "float32", "a network that does not know of it"
 
 
 def test_validation_and_weights_know_of_smaller_pictures(street: Street, scaled: None, tmp_path: Path) -> None:
