@@ -98,7 +98,7 @@ def begin(root: Path, plan: Plan) -> None:
     if there is not None and there.samples > plan.samples:
         raise DatasetError(
             root,
-            f"split {split!r} has {there.samples} samples already, {plan.samples} were asked for;"
+            f"split {split!r} was begun with {there.samples} samples, {plan.samples} were asked for;"
             " use --force to replace it",
         )
     if there is None or there.samples != plan.samples:

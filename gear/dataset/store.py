@@ -44,17 +44,29 @@ class Store:
         return self.plan.info.split
 
     def open(self, patch_files: Mapping[str, bytes]) -> None:
-        """Begins the split or takes it up again.
+        """Begins the split or takes it up again; one that was killed before its first sample was not begun.
 
         Raises:
             DatasetError: it cannot be written, or was made with another configuration.
         """
         clear_scratch(self.root)
+        _forget_empty(self.root, self.plan)
         begin(self.root, self.plan)
         for name, data in patch_files.items():
-            target = inside(self.root, patch_path(self.plan.info.patch_label, name))
-            if not target.exists():
-                write_whole(self.root, patch_path(self.plan.info.patch_label, name), data)
+            self._keep_patch(patch_path(self.plan.info.patch_label, name), data)
+
+    def _keep_patch(self, relative: str, data: bytes) -> None:
+        """Copies a patch into the dataset, unless another split shows another one of the same name."""
+        target = inside(self.root, relative)
+        if target.exists() and target.read_bytes() == data:
+            return
+        label, digest = self.plan.patch["label"], self.plan.patch["sha256"]
+        for split in splits_of(self.root):
+            other = plan_of(self.root, split).patch
+            if target.exists() and other["label"] == label and other["sha256"] != digest:
+                problem = f"split {split!r} shows other patches of the name {label!r}; use another --out"
+                raise DatasetError(self.root, problem)
+        write_whole(self.root, relative, data)
 
     @contextlib.contextmanager
     def begun(self, patch_files: Mapping[str, bytes]) -> Iterator[None]:
@@ -67,8 +79,6 @@ class Store:
         here = [self.root, *self.root.parents]
         was_there = {folder for folder in here if folder.exists()}
         is_new = not inside(self.root, plan_path(self.split)).exists()
-        copies = [inside(self.root, patch_path(self.plan.info.patch_label, name)) for name in patch_files]
-        new_copies = [copy for copy in copies if not copy.exists()]
         try:
             with explained(self.root):
                 self.root.mkdir(parents=True, exist_ok=True)
@@ -78,8 +88,6 @@ class Store:
             if is_new and len(self.missing()) == self.plan.samples:
                 with contextlib.suppress(OSError, DatasetError):
                     remove_split(self.root, self.split)
-                    for copy in new_copies:
-                        copy.unlink(missing_ok=True)
                     for folder in [*sorted((self.root / GEAR).rglob("*"), reverse=True), self.root / GEAR, *here]:
                         if folder not in was_there and folder.is_dir() and not any(folder.iterdir()):
                             folder.rmdir()
@@ -163,8 +171,24 @@ class Store:
         sync_folder(target.parent)
 
 
+def _forget_empty(root: Path, plan: Plan) -> None:
+    """Removes splits that were begun otherwise and hold no sample, where they stand in the way of a plan."""
+    for path in sorted((root / GEAR).glob("*/plan.json")):
+        split = path.parent.name
+        if (
+            any(inside(root, f"{split_folder(split)}/samples").glob("*.json"))
+            or (path.parent / "manifest.json").exists()
+        ):
+            continue
+        there = read_plan(root, split)
+        is_same_task = there is not None and there.task["name"] == plan.task["name"]
+        if not is_same_task or (split == plan.info.split and there != plan):
+            remove_split(root, split)
+
+
 def remove_split(root: Path, split: str) -> None:
-    """Deletes what gear wrote for a split, and nothing else: the files its sidecars and manifest name.
+    """Deletes what gear wrote for a split, and nothing else: the files its sidecars and manifest name, and the copy of
+    its patches, unless another split shows them.
 
     Raises:
         DatasetError: a file cannot be deleted, or names a path outside the root.
@@ -180,12 +204,28 @@ def remove_split(root: Path, split: str) -> None:
     for path in sidecars:
         doomed += load_json(path).get("files", {})
     own = [manifest, *sidecars, inside(root, plan_path(split))]
+    label = _patch_label(root, split)
     with explained(root):
         for path in [manifest, *(inside(root, relative) for relative in doomed), *own]:
             path.unlink(missing_ok=True)
         for path in sorted((p for p in folder.rglob("*") if p.is_dir()), reverse=True):
             path.rmdir()
         folder.rmdir()
+        others = {_patch_label(root, path.parent.name) for path in (root / GEAR).glob("*/plan.json")}
+        if label and label not in others and (copies := inside(root, patch_path(label, "patch_0.png")).parent).is_dir():
+            for path in copies.glob("patch_*.png"):
+                path.unlink()
+            if not any(copies.iterdir()):
+                copies.rmdir()
+
+
+def _patch_label(root: Path, split: str) -> str:
+    """What a split's patches are called; nothing where its plan is damaged."""
+    try:
+        plan = read_plan(root, split)
+    except DatasetError:
+        return ""
+    return "" if plan is None else plan.patch["label"]
 
 
 def splits_of(root: Path) -> Sequence[str]:

@@ -11,7 +11,7 @@ import pytest
 from gear.config.nodes import parse_text
 from gear.contracts.tasks import SplitInfo
 from gear.dataset.plan import Plan
-from gear.dataset.store import Store, remove_split
+from gear.dataset.store import Store, remove_split, splits_of
 from gear.opening import open_dataset, open_twins
 from gear.plugins.build import build_task
 from gear.testing.synthetic import synthetic_frame
@@ -90,7 +90,7 @@ def test_more_samples_are_added_and_fewer_are_refused(tmp_path: Path) -> None:
     assert store.missing() == [2]
     fill(tmp_path, plan(samples=3))
     assert len(open_dataset(tmp_path)) == 3
-    with pytest.raises(DatasetError, match="has 3 samples already, 2 were asked for; use --force"):
+    with pytest.raises(DatasetError, match="was begun with 3 samples, 2 were asked for; use --force"):
         Store(tmp_path, plan(samples=2)).open({})
 
 
@@ -165,3 +165,39 @@ def test_exports_go_into_new_folders_and_fit_their_task(tmp_path: Path) -> None:
         export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b")
     with pytest.raises(DatasetError, match="the layout 'kitti' is for stereo3d"):
         export(tmp_path / "a", layout="kitti", out=tmp_path / "c")
+
+
+def test_a_split_that_was_killed_before_its_first_sample_is_nothing(tmp_path: Path) -> None:
+    Store(tmp_path, plan(samples=9, content={"scene": "truck", "seed": 5})).open({})
+    Store(tmp_path, plan("val", task={"name": "semseg", "package": "x", "version": "1"})).open({})
+    fill(tmp_path, plan())
+    fill(tmp_path / "fresh", plan())
+    assert tree(tmp_path).keys() == {*tree(tmp_path / "fresh"), *(f"fresh/{name}" for name in tree(tmp_path / "fresh"))}
+    Store(tmp_path, plan("val")).open({})
+    Store(tmp_path, plan("train")).open({})
+    assert splits_of(tmp_path) == ["test", "train", "val"], "of the same task: another run may be at it"
+
+
+def test_the_copy_of_the_patches_is_that_of_the_pictures(tmp_path: Path) -> None:
+    copy = tmp_path / "gear/patches/random/patch_0.png"
+
+    def begin(split: str, digest: str) -> None:
+        given = plan(split, patch={"label": "random", "sha256": digest})
+        info = dataclasses.replace(given.info, patch_label="random")
+        Store(tmp_path, dataclasses.replace(given, info=info)).open({"patch_0.png": digest.encode()})
+
+    begin("test", "1")
+    begin("val", "1")
+    copy.write_bytes(b"half")
+    begin("test", "1")
+    assert copy.read_bytes() == b"1"
+    with pytest.raises(DatasetError, match="split 'test' shows other patches of the name 'random'; use another --out"):
+        begin("train", "2")
+    remove_split(tmp_path, "train")
+    remove_split(tmp_path, "test")
+    assert copy.exists(), "split val shows it"
+    remove_split(tmp_path, "val")
+    assert not copy.parent.exists()
+    begin("test", "1")
+    begin("test", "2")
+    assert copy.read_bytes() == b"2"
