@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import hashlib
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -126,6 +126,14 @@ def read_patch(path: Path) -> UInt8Image:
     return np.ascontiguousarray(picture[..., ::-1])
 
 
+def digest_of(images: Iterable[UInt8Image]) -> str:
+    """Hex sha256 of patches: sizes and pixels, in surface order."""
+    digest = hashlib.sha256()
+    for image in images:
+        digest.update(repr(image.shape).encode() + image.tobytes())
+    return digest.hexdigest()
+
+
 def _numbered(folder: Path) -> list[Path]:
     """`patch_0.png`, `patch_1.png`, … of a folder, or the original tool's `<anything>_0.png`, or its only picture."""
     pictures = sorted(p for p in folder.iterdir() if p.suffix.lower() == ".png" and p.is_file())
@@ -156,11 +164,8 @@ def _scenes(notes: Path) -> tuple[str, ...]:
 
 
 def _patch_set(name: str, images: tuple[UInt8Image, ...], source: str, *, is_hashed: bool = True) -> PatchSet:
-    digest = hashlib.sha256()
-    files: dict[str, bytes] = {}
-    for i, image in enumerate(images):
-        digest.update(repr(image.shape).encode() + image.tobytes())
-        files[f"patch_{i}.png"] = cv2.imencode(".png", image[..., ::-1])[1].tobytes()
+    digest = digest_of(images)
+    files = {f"patch_{i}.png": cv2.imencode(".png", image[..., ::-1])[1].tobytes() for i, image in enumerate(images)}
     safe = re.sub(r"[^A-Za-z0-9.]+", "-", name).strip("-.") or "patch"
-    label = f"{safe}-{digest.hexdigest()[:8]}" if is_hashed else name
-    return PatchSet(label=label, images=images, digest=digest.hexdigest(), files=files, source=source)
+    label = f"{safe}-{digest[:8]}" if is_hashed else name
+    return PatchSet(label=label, images=images, digest=digest, files=files, source=source)

@@ -13,14 +13,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gear.dataset.files import clear_scratch, inside, write_whole
+from gear.dataset.files import clear_scratch, explained, inside, write_whole
 from gear.dataset.layout import patch_path
 from gear.dataset.reading import Dataset, Twins
 from gear.dataset.sidecar import dump_json
+from gear.dataset.store import refuse_dataset
 from gear.opening import open_dataset
 from gear.values.errors import DatasetError
 from gear.values.frames import UInt8Image
-from gear.verbs.collect.patches import read_patch
+from gear.verbs.collect.patches import digest_of, read_patch
 from gear.verbs.gap.effect import RENDERED, Effect
 from gear.verbs.gap.figures import PictureGap, picture_gap, visible_mask
 from gear.verbs.gap.report import GapReport, SampleGap
@@ -87,8 +88,13 @@ def gap(
         raise DatasetError(clean.root, "--town and --scenes say what to render; with --twin nothing is rendered")
     if patch is not None and out is None:
         raise DatasetError(clean.root, "a twin has to be rendered: say where to with --out DIR")
-    if defense is not None and model is None:
+    settings, defense_settings = tuple(settings), tuple(defense_settings)
+    if model is None and (defense is not None or defense_settings):
         raise DatasetError(clean.root, "a defense guards a model: name one with --model")
+    if model is None and settings:
+        raise DatasetError(clean.root, "options are given for a model: name it with --model")
+    if out is not None:
+        refuse_dataset(Path(out), "write the gap into a folder of its own")
     root = Path(twin) if twin is not None else Path(out or "") / "twin"
     if patch is None:
         pairs = checked_twin(clean, open_dataset(root, clean.plan.info.split))
@@ -104,6 +110,9 @@ def gap(
     if patch is not None:
         collect_twin(clean, patch, root, town=town, scenes=scenes)
         pairs = checked_twin(clean, open_dataset(root, clean.plan.info.split))
+    if out is not None:
+        with explained(Path(out)):
+            Path(out).mkdir(parents=True, exist_ok=True)
     count = min(len(pairs), samples or len(pairs))
     images = shown_patches(pairs.second, len(clean.sidecar(0).record.surfaces))
     found: list[SampleGap] = []
@@ -129,7 +138,6 @@ def gap(
     )
     if out is not None:
         folder = Path(out)
-        folder.mkdir(parents=True, exist_ok=True)
         write_whole(folder, REPORT, dump_json(report.as_json()))
         write_whole(folder, TABLE, (report.table() + "\n").encode())
         clear_scratch(folder)
@@ -186,7 +194,7 @@ def shown_patches(twin: Dataset[Any], surfaces: int) -> list[UInt8Image]:
     """The patches that a twin shows, from the copy that it keeps.
 
     Raises:
-        DatasetError: it shows none, or fewer than there are surfaces.
+        DatasetError: it shows none, or fewer than there are surfaces, or the copy is not what was shown.
     """
     label = twin.plan.patch["label"]
     paths = [inside(twin.root, patch_path(label, f"patch_{i}.png")) for i in range(surfaces)]
@@ -195,4 +203,7 @@ def shown_patches(twin: Dataset[Any], surfaces: int) -> list[UInt8Image]:
         raise DatasetError(
             twin.root, f"shows {len(there)} patches on {surfaces} surfaces; collect the twin with one for each"
         )
-    return [read_patch(path) for path in there]
+    images = [read_patch(path) for path in there]
+    if images and digest_of(images) != twin.plan.patch["sha256"]:
+        raise DatasetError(paths[0].parent, "is not what the pictures show; collect the twin again, with --force")
+    return images

@@ -10,7 +10,9 @@ import yaml
 from gear.config.collection import CollectionConfig
 from gear.config.nodes import parse_text
 from gear.config.reader import read_node
+from gear.dataset.plan import read_plan
 from gear.dataset.reading import Dataset, Twins, pair_twins
+from gear.dataset.store import Store
 from gear.values.errors import ConfigError, DatasetError, UnknownNameError
 from gear.verbs.collect.job import resolve
 from gear.verbs.collect.run import run_job
@@ -72,4 +74,9 @@ def collect_twin(
     surfaces, patches = len(clean.sidecar(0).record.surfaces), len(job.patch.images)
     if patches < surfaces:
         raise DatasetError(clean.root, f"has {surfaces} surfaces for patches, {patch} has {patches}; give one for each")
+    there = read_plan(root, job.plan.info.split)
+    if there is not None and there.patch != job.plan.patch and Store(root, there).missing() != [*range(there.samples)]:
+        raise DatasetError(
+            root, f"is another gap's twin, with the patch {there.patch['label']}; use another --out, or remove it"
+        )
     run_job(job)
