@@ -144,7 +144,7 @@ def suitable(found: Found, task: str) -> DefenseSpec[Any]:
 
 
 def begin(root: Path, split: str, plan: Json) -> None:
-    """Writes what the run is made of, or checks that what is there was made of the same.
+    """Writes what the run is made of, or checks that what is there was made of the same, as far as a sample was.
 
     Raises:
         DatasetError: it was made otherwise, or the disk refuses.
@@ -153,7 +153,8 @@ def begin(root: Path, split: str, plan: Json) -> None:
     with explained(root):
         root.mkdir(parents=True, exist_ok=True)
     path = inside(root, relative)
-    if not path.exists():
+    is_begun = next((path.parent / "samples").glob("*.json"), None) is not None
+    if not (is_begun and path.exists()):
         write_whole(root, relative, dump_json(plan))
         return
     there = load_json(path)

@@ -91,7 +91,7 @@ def test_what_is_there_is_not_made_again(small: Small, install: Install, tmp_pat
     again = attack(data, model="tiny_segmenter", out=out, steps=2, settings=SMALL)
     assert not again.made and (out / "patch_0.png").stat().st_mtime_ns == stamp
     assert not difference(first.patches, again.patches, "patches")
-    with pytest.raises(DatasetError, match="made otherwise"):
+    with pytest.raises(DatasetError, match=r"made otherwise \(steps: 2 there, 3 now\)"):
         attack(data, model="tiny_segmenter", out=out, steps=3, settings=SMALL)
     assert attack(data, model="tiny_segmenter", out=out, steps=3, settings=SMALL, force=True).made
 
@@ -192,6 +192,8 @@ def test_an_attack_that_breaks_its_promise_is_named(small: Small, install: Insta
         ({"attack": "scene_spesific"}, "scene_specific"),
         ({"steps": 0}, "at least 1"),
         ({"defense": "bit_dept"}, "bit_depth"),
+        ({"defense_settings": ["bits=3"]}, "there is no defense"),
+        ({"patience": 3}, "name some with --val"),
         ({"compositor": "glue"}, "transport"),
         ({"settings": ["learning_rate=-1"]}, "learning_rate"),
     ],
@@ -211,6 +213,8 @@ def test_test_splits_and_empty_scenes_are_refused(small: Small, install: Install
         attack(small(scene="no_billboard", probes=False), model="tiny_segmenter", out=tmp_path, steps=1)
     with pytest.raises(DatasetError, match="no dataset"):
         attack(tmp_path, model="tiny_segmenter", out=tmp_path / "x", steps=1)
+    with pytest.raises(DatasetError, match="is a dataset; make patches in a folder of their own"):
+        attack(small(), model="tiny_segmenter", out=small(), steps=1)
 
 
 def test_on_the_command_line(

@@ -8,6 +8,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
@@ -16,6 +17,7 @@ from gear.cli.main import main
 from gear.testing.tiny_networks import tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import DatasetError, GearError
+from gear.verbs.collect.patches import read_patch
 from gear.verbs.collect.run import CollectReport
 from gear.verbs.evaluate import choice
 from gear.verbs.gap.figures import PERFECT_DB, picture_gap
@@ -136,6 +138,25 @@ def test_what_cannot_be_compared_is_refused(pair: tuple[Path, Path], tmp_path: P
         gear.gap(clean, twin=tmp_path / "other")
     with pytest.raises(GearError, match="is a semseg dataset"):
         gear.gap(clean, twin=twin, model="glpdepth")
+    with pytest.raises(DatasetError, match="name it with --model"):
+        gear.gap(clean, twin=twin, settings=["weights=none"])
+    with pytest.raises(DatasetError, match="is a dataset; write the gap into a folder of its own"):
+        gear.gap(clean, twin=twin, out=clean)
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(DatasetError, match="a file is where a folder should be"):
+        gear.gap(clean, twin=twin, out=tmp_path / "file")
+    copy = twin / "gear/patches/random/patch_0.png"
+    copy.write_bytes(cv2.imencode(".png", read_patch(copy)[:, ::-1])[1].tobytes())
+    with pytest.raises(DatasetError, match="is not what the pictures show"):
+        gear.gap(clean, twin=twin)
+
+
+def test_the_twin_of_another_gap_stays(pair: tuple[Path, Path], tmp_path: Path) -> None:
+    places: dict[str, Any] = {"town": TINY_TOWN, "scenes": TINY_SCENES, "out": tmp_path / "gap"}
+    gear.gap(pair[0], patch="random", **places)
+    cv2.imwrite(str(tmp_path / "grey.png"), np.full((20, 40, 3), 90, np.uint8))
+    with pytest.raises(DatasetError, match="is another gap's twin, with the patch random; use another --out"):
+        gear.gap(pair[0], patch=tmp_path / "grey.png", **places)
 
 
 def test_the_twin_of_somebodys_own_town_is_rendered_too(pair: tuple[Path, Path], tmp_path: Path) -> None:

@@ -13,6 +13,8 @@ from safetensors.numpy import load as from_bytes
 from gear.contracts.attacks import Patch
 from gear.dataset.files import clear_scratch, explained, read_bytes, sha256
 from gear.dataset.layout import GEAR
+from gear.dataset.plan import differences
+from gear.dataset.store import refuse_dataset
 from gear.values.errors import DatasetError
 from gear.values.serial import Json
 from gear.verbs.attack.watch import CHECKPOINT
@@ -32,6 +34,7 @@ def begin(root: Path, plan: Json, *, force: bool) -> Json | None:
     Raises:
         DatasetError: something else is there, or the disk refuses.
     """
+    refuse_dataset(root, "make patches in a folder of their own")
     finished = root / NOTES
     if force:
         with explained(root):
@@ -40,9 +43,11 @@ def begin(root: Path, plan: Json, *, force: bool) -> Json | None:
         shutil.rmtree(root / VERIFY, ignore_errors=True)  # what the patches that go did in the world
     if finished.exists():
         there = _read_notes(finished)
-        if any(there.get(key) != json.loads(json.dumps(value)) for key, value in plan.items()):
+        wanted = json.loads(json.dumps(plan))
+        what = ", ".join(differences({key: there.get(key) for key in wanted}, wanted)[:3])
+        if what:
             raise DatasetError(
-                root, "holds patches that were made otherwise; use another --out, or --force to replace them"
+                root, f"holds patches that were made otherwise ({what}); use another --out, or --force to replace them"
             )
         _check_whole(root, there)
         return there

@@ -117,6 +117,8 @@ def resolve(
     """
     if (steps is not None and steps < 1) or every < 1 or patience < 0 or (queries is not None and queries < 1):
         raise GearError("steps, queries and every must be at least 1, patience at least 0")
+    if patience and not _list(val):
+        raise GearError("patience counts looks at validation samples, and there are none: name some with --val")
     datasets = open_all(_list(data), _task_of(data), names=TRAINING, allow_tests=allow_tests)
     task = datasets[0].plan.task["name"]
     validation = open_all(_list(val), task, names=VALIDATION, allow_tests=allow_tests)

@@ -41,9 +41,9 @@ def choose_defense(name: str | None, settings: Iterable[str], models: Sequence[C
     Raises:
         GearError: it does not fit, must learn first, or lets no gradient pass.
     """
-    if name is None:
-        return None
     chosen = chosen_defense(name, settings)
+    if chosen is None:
+        return None
     for model in models:
         check_defense(chosen, model, task, is_calibrated=False)
     spec = chosen.found.spec

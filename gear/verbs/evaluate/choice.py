@@ -51,12 +51,17 @@ def chosen_model(name: str, settings: Iterable[str]) -> Chosen:
     return Chosen(found=found, options=options)
 
 
-def chosen_defense(name: str, settings: Iterable[str]) -> Chosen:
-    """A defense by name.
+def chosen_defense(name: str | None, settings: Iterable[str]) -> Chosen | None:
+    """A defense by name, or none.
 
     Raises:
-        GearError: there is no such defense, or an option does not fit.
+        GearError: there is no such defense, an option does not fit, or options are given for none.
     """
+    settings = tuple(settings)
+    if not name:
+        if settings:
+            raise GearError(f"{settings[0]} is a defense's option, but there is no defense: name one with --defense")
+        return None
     found, options = find("defense", name), with_overrides(NO_OPTIONS, settings)
     read_node(found.spec.config, options, "")
     return Chosen(found=found, options=options)

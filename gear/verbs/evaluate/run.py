@@ -88,13 +88,15 @@ def evaluate(
             f"batch and workers must be at least 1, resamples at least 0; got {batch}, {workers}, {resamples}"
         )
     chosen = chosen_model(model, settings)
-    guard = chosen_defense(defense, defense_settings) if defense else None
+    guard = chosen_defense(defense, defense_settings)
     datasets = opened([data] if isinstance(data, (str, Path)) else data, split, chosen, reports)
     task, names = datasets[0].plan.task["name"], row_names(datasets)
     learnt = [open_dataset(one) if one is not None else None for one in (calibration, calibration_patched)]
     for one in learnt:
         if one is not None:
             check_model(chosen, one)
+    if guard is None and (calibration is not None or calibration_patched is not None):
+        raise GearError("defenses learn from calibration data, but there is no defense: name one with --defense")
     if guard is not None:
         check_defense(guard, chosen, task, is_calibrated=learnt[0] is not None)
     usual = Path("evaluations", task, model.replace("/", "-") + f"+{defense}" * bool(defense))
@@ -132,17 +134,18 @@ def evaluate(
 
 
 def _begin(root: Path, facts: Json) -> None:
-    """Writes what the evaluation is of, or checks that what is there is of the same."""
+    """Writes what the evaluation is of, or checks that what is there is of the same, as far as a sample is."""
     with explained(root):
         root.mkdir(parents=True, exist_ok=True)
     clear_scratch(root)
     path = inside(root, "plan.json")
     plain = to_plain(facts)
-    if not path.exists():
+    there = load_json(path) if path.exists() else None
+    is_ours = isinstance(there, dict) and there.keys() == plain.keys()
+    is_empty = next(root.glob("*/samples/*.json"), None) is None
+    if there is None or (is_ours and is_empty):
         write_whole(root, "plan.json", dump_json(plain))
-        return
-    there = load_json(path)
-    if there != plain:
+    elif there != plain:
         what = ", ".join(differences(there, plain)[:3])
         raise DatasetError(root, f"holds an evaluation of something else ({what}); use another --out")
 

@@ -74,7 +74,7 @@ class Effect:
         chosen = chosen_model(model, settings)
         check_model(chosen, dataset)
         task = dataset.plan.task["name"]
-        guard = None if defense is None else chosen_defense(defense, defense_settings)
+        guard = chosen_defense(defense, defense_settings)
         if guard is not None:
             check_defense(guard, chosen, task, is_calibrated=False)
         spec = find("task", task).spec

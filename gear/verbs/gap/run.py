@@ -89,8 +89,10 @@ def gap(
     if patch is not None and out is None:
         raise DatasetError(clean.root, "a twin has to be rendered: say where to with --out DIR")
     settings, defense_settings = tuple(settings), tuple(defense_settings)
-    if model is None and (defense is not None or settings or defense_settings):
-        raise DatasetError(clean.root, "a defense guards a model, and options are a model's: name one with --model")
+    if model is None and (defense is not None or defense_settings):
+        raise DatasetError(clean.root, "a defense guards a model: name one with --model")
+    if model is None and settings:
+        raise DatasetError(clean.root, "options are given for a model: name it with --model")
     if out is not None:
         refuse_dataset(Path(out), "write the gap into a folder of its own")
     root = Path(twin) if twin is not None else Path(out or "") / "twin"
@@ -202,6 +204,6 @@ def shown_patches(twin: Dataset[Any], surfaces: int) -> list[UInt8Image]:
             twin.root, f"shows {len(there)} patches on {surfaces} surfaces; collect the twin with one for each"
         )
     images = [read_patch(path) for path in there]
-    if digest_of(images) != twin.plan.patch["sha256"]:
+    if images and digest_of(images) != twin.plan.patch["sha256"]:
         raise DatasetError(paths[0].parent, "is not what the pictures show; collect the twin again, with --force")
     return images
