@@ -7,10 +7,13 @@ import ctypes
 import mmap
 import os
 from pathlib import Path
+from typing import TypeAlias
 
 import mujoco
 import numpy as np
 from isal import isal_zlib
+
+Bytes: TypeAlias = np.ndarray[tuple[int], np.dtype[np.uint8]]
 
 
 def write_model(model: mujoco.MjModel, path: Path) -> int:
@@ -25,12 +28,9 @@ def write_model(model: mujoco.MjModel, path: Path) -> int:
             os.posix_fallocate(file.fileno(), 0, size)
         else:
             file.truncate(size)
-        with mmap.mmap(file.fileno(), size) as mapped:
-            content = np.frombuffer(mapped, np.uint8)
-            mujoco.mj_saveModel(model, None, content)
-            crc32 = isal_zlib.crc32(content)
-            del content  # a map is not closed while arrays look at it
-    return crc32
+        content = _view(mmap.mmap(file.fileno(), size))
+    mujoco.mj_saveModel(model, None, content)
+    return isal_zlib.crc32(content)
 
 
 def read_model(path: Path, crc32: int) -> mujoco.MjModel:
@@ -44,17 +44,20 @@ def read_model(path: Path, crc32: int) -> mujoco.MjModel:
         OSError: there is none.
         ValueError: it is not what was written.
     """
-    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as mapped:
-        content = np.frombuffer(mapped, np.uint8)
-        is_whole = isal_zlib.crc32(content) == crc32
-        model = _model_in(content) if is_whole else None
-        del content
-    if not is_whole:
+    with path.open("rb") as file:
+        content = _view(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ))
+    if isal_zlib.crc32(content) != crc32:
         raise ValueError(f"{path} is not what was written there")
-    return model or mujoco.MjModel.from_binary_path(str(path))
+    return _model_in(content) or mujoco.MjModel.from_binary_path(str(path))
 
 
-def _model_in(content: np.ndarray[tuple[int], np.dtype[np.uint8]]) -> mujoco.MjModel | None:
+def _view(mapped: mmap.mmap) -> Bytes:
+    """A map as an array, which alone holds it: a map that is closed by hand while an array looks at it, as after Ctrl-C
+    in the middle of a reading, raises an error of its own in place of what happened."""
+    return np.frombuffer(mapped, np.uint8)
+
+
+def _model_in(content: Bytes) -> mujoco.MjModel | None:
     """A model out of memory, which MuJoCo's bindings offer for files alone; None where its library hides the way."""
     load = getattr(ctypes.CDLL(mujoco._structs.__file__), "mj_loadModelBuffer", None)
     adopt = getattr(mujoco.MjModel, "_from_model_ptr", None)

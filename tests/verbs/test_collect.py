@@ -166,6 +166,22 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path: Path, collect_small: Collec
     assert tree(out) == tree(tmp_path / "straight")
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="there a terminal interrupts otherwise")
+def test_ctrl_c_while_workers_start_is_one_line(tmp_path: Path) -> None:
+    """A terminal interrupts the whole group, workers that still import included."""
+    (tmp_path / "sitecustomize.py").write_text(
+        "import os, signal, sys\nif '--multiprocessing-fork' in sys.orig_argv:\n    os.killpg(0, signal.SIGINT)\n"
+    )
+    done = subprocess.run(
+        command(tmp_path / "out", "--samples", "8", "--workers", "2"),
+        capture_output=True, text=True, check=False, start_new_session=True, timeout=120,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, (str(tmp_path), os.environ.get("PYTHONPATH"))))},
+    )  # fmt: skip
+    assert done.returncode == 130
+    assert done.stderr == "gear: stopped; run the same command again to go on\n"
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.parametrize(
     ("changes", "error", "message"),
     [

@@ -50,6 +50,24 @@ def test_a_damaged_file_is_refused(tmp_path: Path) -> None:
         read_model(tmp_path / "nowhere", crc32)
 
 
+def test_ctrl_c_while_a_file_is_read_or_written_is_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was an error about arrays that still looked at a closed map, with a traceback."""
+    model, path = mujoco.MjModel.from_xml_string(XML), tmp_path / "a.mjb"
+    crc32 = write_model(model, path)
+
+    def interrupted(content: np.ndarray) -> mujoco.MjModel:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(mjb, "_model_in", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        read_model(path, crc32)
+    monkeypatch.setattr(mjb.isal_zlib, "crc32", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write_model(model, tmp_path / "b.mjb")
+
+
 def test_the_quick_way_is_there_with_the_mujoco_that_is_pinned(tmp_path: Path) -> None:
     path = tmp_path / "a.mjb"
     write_model(mujoco.MjModel.from_xml_string(XML), path)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import pickle
 import queue
+import signal
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from multiprocessing.context import SpawnProcess
 from multiprocessing.queues import Queue
@@ -33,8 +36,9 @@ def collect_in_processes(job: Job, indices: Sequence[int], workers: int, done: C
         context.Process(target=_work, args=(job, list(indices), position, reports), daemon=True, name=f"gear-{i}")
         for i in range(min(workers, len(indices)))
     ]
-    for process in processes:
-        process.start()
+    with _no_interrupts():  # workers inherit that, and are not stopped in the middle of their imports
+        for process in processes:
+            process.start()
     try:
         _listen(job, processes, reports, len(indices), done)
     finally:
@@ -43,6 +47,22 @@ def collect_in_processes(job: Job, indices: Sequence[int], workers: int, done: C
                 process.terminate()
         for process in processes:
             process.join(timeout=10)
+
+
+@contextlib.contextmanager
+def _no_interrupts() -> Iterator[None]:
+    """Keeps Ctrl-C waiting, where the system can."""
+    if sys.platform != "win32":
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        _interrupts_again()
+
+
+def _interrupts_again() -> None:
+    if sys.platform != "win32":
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
 
 def _listen(
@@ -88,6 +108,7 @@ def _work(job: Job, indices: list[int], position: Any, reports: Queue[tuple[str,
             yield indices[taken]
 
     try:
+        _interrupts_again()
         with open_session(job) as session:
             collect_samples(session, Store(job.root, job.plan), remaining(), lambda i: reports.put(("done", i)))
     except KeyboardInterrupt:
