@@ -51,6 +51,22 @@ def main(argv: Sequence[str]) -> int:
     Returns:
         0, 2 for what the user can put right (one line on stderr), 130 when interrupted. Bugs keep their traceback.
     """
+    try:
+        return _run(argv)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except (KeyboardInterrupt, Exception) as error:
+        if _is_of_an_interrupt(error):
+            print("gear: stopped; run the same command again to go on", file=sys.stderr)
+            return 130
+        if not isinstance(error, GearError):
+            raise
+        print(f"gear: {error}", file=sys.stderr)
+        return 2
+
+
+def _run(argv: Sequence[str]) -> int:
     parser = Parser(
         prog="gear",
         description="Driving datasets with physical adversarial patches in them, rendered by MuJoCo.",
@@ -82,17 +98,14 @@ def main(argv: Sequence[str]) -> int:
     if args.command is None:
         parser.print_help()
         return 0
-    try:
-        return int(args.run(args))
-    except GearError as error:
-        print(f"gear: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("gear: stopped; run the same command again to go on", file=sys.stderr)
-        return 130
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+    return int(args.run(args))
+
+
+def _is_of_an_interrupt(error: BaseException | None) -> bool:
+    """Whether Ctrl-C is behind it: compiled modules that it stops in their import raise an ImportError from it."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 if __name__ == "__main__":

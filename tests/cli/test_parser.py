@@ -6,8 +6,10 @@ import argparse
 
 import pytest
 
+from gear.cli import doctor
 from gear.cli.device import add_device
 from gear.cli.main import main
+from gear.values.errors import GearError
 
 
 def said(capsys: pytest.CaptureFixture[str], argv: list[str]) -> str:
@@ -44,3 +46,35 @@ def test_the_device_is_a_setting_of_the_model() -> None:
     assert parser.parse_args([]).settings == []
     assert parser.parse_args(["--set", "seed=3", "--device", "cpu"]).settings == ["seed=3", "device=cpu"]
     assert parser.parse_args([]).settings == [], "the default stays as it was"
+
+
+def test_ctrl_c_is_one_line_whatever_was_made_of_it(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Compiled modules that are stopped in their import raise an ImportError, and others may make an error of that."""
+
+    def stopped(args: argparse.Namespace) -> int:
+        try:
+            try:
+                raise KeyboardInterrupt
+            except KeyboardInterrupt as interrupt:
+                raise ImportError("initialization failed") from interrupt
+        except ImportError as error:
+            if args.of_ours:
+                raise GearError("there is no torch: pip install torch") from None
+            raise error
+
+    monkeypatch.setattr(doctor, "add_arguments", lambda parser: parser.add_argument("--of-ours", action="store_true"))
+    monkeypatch.setattr(doctor, "run", stopped)
+    for more in ([], ["--of-ours"]):
+        assert main(["doctor", *more]) == 130
+        assert capsys.readouterr().err == "gear: stopped; run the same command again to go on\n"
+
+
+def test_a_bug_keeps_its_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(args: argparse.Namespace) -> int:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(doctor, "run", broken)
+    with pytest.raises(ZeroDivisionError):
+        main(["doctor"])
