@@ -48,7 +48,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--batch", type=positive, metavar="N", help="samples a step (recipe)")
     parser.add_argument("--lr", type=float, metavar="X", help="highest learning rate (recipe)")
     parser.add_argument("--seed", type=int, metavar="N", help="of weights, order and augmentation (0)")
-    parser.add_argument("--init", metavar="FILE|NAME", help="first weights: a file, shipped, imagenet … (random)")
+    parser.add_argument(
+        "--init",
+        metavar="FILE|NAME",
+        help="first weights: a file, shipped, imagenet …, trunk:FILE or trunk:MODEL for what fits of another network's "
+        "(random)",
+    )
     parser.add_argument(
         "--precision",
         choices=("auto", "float32", "bfloat16"),

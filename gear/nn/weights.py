@@ -26,6 +26,9 @@ SHOWN_KEYS = 3
 HEADER_AT = 8
 """A safetensors file is the length of its header in eight bytes, the header as JSON, the tensors."""
 
+LEAST_SHARED = 0.25
+"""Of a network's numbers, for a file to be its trunk: heads are small, and a few layers alone are an accident."""
+
 GraphT = TypeVar("GraphT", bound=nn.Module)
 
 
@@ -60,6 +63,31 @@ def load_into(network: nn.Module, path: str | Path) -> dict[str, str]:
         raise GearError(f"{path}: not this network's weights: {'; '.join(problems)}")
     network.load_state_dict(state, strict=False)
     return metadata
+
+
+def load_trunk(network: nn.Module, path: str | Path) -> tuple[int, int]:
+    """Loads what a safetensors file of another network has under the same keys in the same shapes; the rest of the
+    network stays as it is.
+
+    Returns:
+        How many of the network's numbers were loaded, and how many it has.
+
+    Raises:
+        GearError: there is no such file, it is no safetensors, or it shares less than `LEAST_SHARED` of the network.
+    """
+    given, _ = read(path)
+    wanted = network.state_dict()
+    shared = {
+        key: given[key] for key in wanted if key in given and not mismatches({key: wanted[key]}, {key: given[key]})
+    }
+    loaded, total = (sum(tensor.numel() for tensor in state.values()) for state in (shared, wanted))
+    if loaded < LEAST_SHARED * total:
+        raise GearError(
+            f"{path}: has {loaded / total:.0%} of this network's numbers under its keys and in its shapes: "
+            f"no trunk of it (that would be {LEAST_SHARED:.0%})"
+        )
+    network.load_state_dict(shared, strict=False)
+    return loaded, total
 
 
 def mismatches(wanted: Mapping[str, Tensor], given: Mapping[str, Tensor]) -> list[str]:

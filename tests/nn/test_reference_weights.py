@@ -9,8 +9,9 @@ import pytest
 
 from gear.contracts.models import Model
 from gear.dataset.files import sha256
+from gear.nn.ddrnet import DDRNet23Slim
 from gear.nn.shipped import CHECKOUT, inspect
-from gear.nn.weights import mismatches, read
+from gear.nn.weights import load_trunk, mismatches, read
 from gear.plugins.build import NO_OPTIONS, build, find
 from gear.verbs.collect.run import collect
 from gear.verbs.evaluate.run import evaluate
@@ -79,3 +80,9 @@ def test_on_a_street_that_nobody_has_seen_before(path: Path, tmp_path: Path) -> 
     name, bounds = UNSEEN[path.stem]
     figures = report.rows[0].figures[name]
     assert all(low < figures[key].value < high for key, (low, high) in bounds.items()), figures
+
+
+def test_depth_has_a_trunk_for_segmentation() -> None:
+    """What docs/train.md says: all but the heads of ddrnet23_slim can begin with what depth has taught."""
+    loaded, total = load_trunk(DDRNet23Slim(19), CHECKOUT / "models" / "ddrnet23_slim_depth.safetensors")
+    assert 0.95 * total < loaded < total

@@ -64,7 +64,8 @@ class TrainConfig(Recipe):
             float32. Validation is always in float32.
         device: `auto` takes a GPU where there is one.
         init: what to begin with: "" is random weights, `shipped` the reference weights, a path of a safetensors file,
-            or a name that the network knows, such as `imagenet`.
+            a name that the network knows, such as `imagenet`, or `trunk:` and a file or a network with reference
+            weights, of which is taken what has the same keys and shapes.
         picture_scale: share of their size at which pictures are shown, in training and in validation; null is 1, and
             with a time budget on a CPU what leaves time for enough steps (`gear.verbs.train.sizes`).
         warm_up: share of the training in which the learning rate rises.

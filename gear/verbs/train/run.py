@@ -161,7 +161,7 @@ def train(
         picture_share=share,
     )
     training_run = Training(
-        _parts(found, spec, origin, root),
+        _parts(found, spec, origin, root, noted),
         config,
         watch=watch,
         keep=lambda state, progress: keep_weights(root, state, origin, progress),
@@ -199,10 +199,12 @@ def trainable(found: Found, task: str) -> Any:
     return spec.recipe
 
 
-def _parts(found: Found, spec: TaskSpec[Any], origin: Origin, root: Path) -> Parts:
+def _parts(found: Found, spec: TaskSpec[Any], origin: Origin, root: Path, noted: Callable[[str], None] | None) -> Parts:
     config = origin.config
     model = build_network(found, config, precision=config.precision)
-    begin_with(found, model, config.init)
+    told = begin_with(found, model, config.init)
+    if told and noted is not None:
+        noted(told)
     twin = build_network(found, config, precision="float32")
     views = found.spec.views  # type: ignore[attr-defined]
     limit = config.cache_gb * GIGABYTE

@@ -11,8 +11,8 @@ from gear.config.overrides import with_value
 from gear.contracts.specs import ModelSpec, TaskSpec
 from gear.nn.options import NONE, SHIPPED
 from gear.nn.runtime import device_of, is_quick_in_half, seeded
-from gear.nn.shipped import resolve
-from gear.nn.weights import load_into
+from gear.nn.shipped import resolve, shipped, shipped_networks
+from gear.nn.weights import load_into, load_trunk
 from gear.plugins.build import blamed, build
 from gear.plugins.catalogue import Found
 from gear.values.errors import GearError, UnknownNameError
@@ -22,6 +22,8 @@ from gear.verbs.train.data import Samples
 SCALE = "input_scale"
 """Option of many networks: at which share of the picture's size they run; null leaves it to the weights."""
 
+TRUNK = "trunk:"
+"""Before the file, or the name of a network, of which `--init` takes what fits."""
 
 FLAGS = {"weights": "--init", "seed": "--seed", "device": "--device", "precision": "--precision"}
 """Options of a network that the training gives it, and what says them."""
@@ -94,8 +96,12 @@ def build_network(found: Found, config: TrainConfig, *, precision: str) -> Any:
         return build(found, options)
 
 
-def begin_with(found: Found, model: Any, init: str) -> None:
-    """Puts first weights into a network: `shipped`, a file's, or those that the network knows by name.
+def begin_with(found: Found, model: Any, init: str) -> str:
+    """Puts first weights into a network: `shipped`, a file's, those that the network knows by name, or `trunk:` and a
+    file or the name of another network with reference weights, for what the two have in common.
+
+    Returns:
+        What the user should know of it; mostly nothing.
 
     Raises:
         GearError: there are none, or they do not fit.
@@ -104,7 +110,7 @@ def begin_with(found: Found, model: Any, init: str) -> None:
     spec = found.spec
     assert isinstance(spec, ModelSpec)
     if not init or init == NONE:
-        return
+        return ""
     if init in spec.starts:
         with blamed(found, f"starts[{init!r}]"):
             spec.starts[init](model)
@@ -112,9 +118,22 @@ def begin_with(found: Found, model: Any, init: str) -> None:
         path = resolve(SHIPPED, spec.name)
         assert path is not None
         load_into(model.module(), path)
+    elif init.startswith(TRUNK):
+        path = _trunk(init.removeprefix(TRUNK))
+        loaded, total = load_trunk(model.module(), path)
+        return f"{loaded / total:.0%} of the network's numbers are those of {path.name}; the rest is random"
     elif Path(init).is_file():
         load_into(model.module(), init)
     elif Path(init).suffix:
         raise GearError(f"--init {init}: there is no such file")
     else:
         raise UnknownNameError("start", init, (SHIPPED, *spec.starts), f"for {spec.name}; or give a safetensors file")
+    return ""
+
+
+def _trunk(source: str) -> Path:
+    """The file that `trunk:` is followed by, as itself or as the name of a network."""
+    path = shipped(source) or Path(source)
+    if not path.exists() and not path.suffix:
+        raise UnknownNameError("reference weights", source, shipped_networks(), "or give a safetensors file")
+    return path

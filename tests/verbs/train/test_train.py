@@ -20,7 +20,7 @@ from safetensors import safe_open
 import gear
 from gear.cli.main import main
 from gear.contracts.models import Recipe
-from gear.nn.weights import load_into
+from gear.nn.weights import load_into, read, write
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_segmenter
 from gear.values.errors import DatasetError, GearError, PluginError, UnknownNameError
 from gear.verbs.train import loop
@@ -225,6 +225,30 @@ def test_it_begins_with_what_it_is_told(street: Street, tmp_path: Path, install:
     report = quick(street, tmp_path / "third", epochs=1, lr=1e-9, init="nothing")
     with safe_open(str(report.weights), framework="pt") as opened:
         assert float(opened.get_tensor("stem.weight").abs().max()) < 1e-6
+
+
+def test_it_begins_with_the_trunk_of_another_network(street: Street, tmp_path: Path, install: Any) -> None:
+    """What has the same keys and shapes is taken, the rest stays random, and stderr says how much that is."""
+    first = quick(street, tmp_path / "first", epochs=4, lr=0.02)
+    state, _ = read(first.weights)
+    other = tmp_path / "other.safetensors"
+    write(other, {**state, "head.weight": torch.zeros(1, 2, 3, 3), "more": torch.zeros(3)}, {})
+    said: list[str] = []
+    begun = quick(
+        street, tmp_path / "begun", epochs=1, lr=1e-9, settings=["ema=0"], init=f"trunk:{other}", noted=said.append
+    )
+    after, _ = read(begun.weights)
+    assert torch.allclose(after["stem.weight"], state["stem.weight"], atol=1e-3)
+    assert after["head.weight"].shape == state["head.weight"].shape
+    assert not torch.allclose(after["head.weight"], state["head.weight"], atol=1e-3)
+    assert any("of the network's numbers are those of other.safetensors" in line for line in said)
+    write(other, {"stem.weight": torch.zeros(1)}, {})
+    with pytest.raises(GearError, match="has 0% of this network's numbers"):
+        quick(street, tmp_path / "none", init=f"trunk:{other}")
+    with pytest.raises(UnknownNameError, match="no reference weights named 'ddrnet23_slm'; did you mean ddrnet23_slim"):
+        quick(street, tmp_path / "none", init="trunk:ddrnet23_slm")
+    with pytest.raises(GearError, match="there is no such weights file"):
+        quick(street, tmp_path / "none", init="trunk:gone.safetensors")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
