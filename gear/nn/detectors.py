@@ -129,11 +129,15 @@ class Detector(Network):
         return inner / torch.tensor([picture_px[1], picture_px[0]] * 2, dtype=torch.float32, device=self.device)
 
     def targets(self, sample: Any, picture_px: Size) -> Targets:
-        """What a sample of 2D detection asks for; objects that the network has no class for count as ignored."""
+        """What a sample of 2D detection asks for; objects that the network has no class for count as ignored, and so do
+        boxes without an area, whose sides have no logarithm to learn."""
         shrinkage = self.shrinkage(picture_px)
         number = {category: index for index, category in enumerate(self.categories) if category is not None}
-        wanted = [thing for thing in sample.objects if not thing.is_ignored and thing.category_id in number]
-        others = [thing for thing in sample.objects if thing.is_ignored or thing.category_id not in number]
+        wanted, others = [], []
+        for thing in sample.objects:
+            left, top, right, bottom = thing.box_px
+            is_wanted = not thing.is_ignored and thing.category_id in number and left < right and top < bottom
+            (wanted if is_wanted else others).append(thing)
         labels = [number[thing.category_id] for thing in wanted]
         return Targets(
             boxes=self._boxes(wanted) * shrinkage,

@@ -202,6 +202,23 @@ def test_ignored_objects_are_no_background(pair: tuple[Any, Any]) -> None:
         assert float(covered["bbox_regression"]) == float(plain["bbox_regression"])
 
 
+def test_boxes_without_an_area_are_ignored(pair: tuple[Any, Any]) -> None:
+    """Annotated by hand they occur; their losses were infinite."""
+    ours, _ = pair
+    sample = street_samples(WIDTH_PX, HEIGHT_PX, 1)[0]
+    labelled = [thing for thing in sample.objects if not thing.is_ignored]
+    left, top, right, bottom = labelled[0].box_px
+    flat = [replace(labelled[0], box_px=box) for box in ((left, top, left, bottom), (left, top, right, top))]
+    batch = as_batch([sample.images], ["left"])
+    with torch.no_grad():
+        plain = ours(batch, [replace(sample, objects=tuple(labelled))])
+        more = ours(batch, [replace(sample, objects=(*labelled, *flat))])
+    assert all(torch.isfinite(loss) for loss in more.values())
+    assert float(more["bbox_regression" if "bbox_regression" in more else "loss_rpn_box_reg"]) == float(
+        plain["bbox_regression" if "bbox_regression" in plain else "loss_rpn_box_reg"]
+    )
+
+
 def test_background_in_ignored_objects_is_never_sampled() -> None:
     nothing = torch.zeros(0, 4)
     boxes = torch.tensor([[0.0, 0, 10, 10], [0, 0, 10, 4], [50, 50, 60, 60]])
