@@ -133,7 +133,8 @@ class Detector(Network):
         boxes without an area, whose sides have no logarithm to learn."""
         shrinkage = self.shrinkage(picture_px)
         number = {category: index for index, category in enumerate(self.categories) if category is not None}
-        wanted, others = [], []
+        wanted: list[Any] = []
+        others: list[Any] = []
         for thing in sample.objects:
             left, top, right, bottom = thing.box_px
             is_wanted = not thing.is_ignored and thing.category_id in number and left < right and top < bottom

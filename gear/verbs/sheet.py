@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from gear.dataset.files import explained
+from gear.dataset.files import write_alone
 from gear.opening import open_dataset
 from gear.values.frames import UInt8Image
 
@@ -46,11 +46,7 @@ def write_sheet(path: str | Path, out: str | Path, *, split: str | None = None, 
     """
     target = Path(out)
     data = cv2.imencode(".png", contact_sheet(path, split=split, samples=samples)[..., ::-1])[1].tobytes()
-    with explained(target):
-        target.parent.mkdir(parents=True, exist_ok=True)
-        temporary = target.with_name(f".{target.name}.part")
-        temporary.write_bytes(data)
-        temporary.replace(target)
+    write_alone(target, data)
     return target
 
 

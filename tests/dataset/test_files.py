@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from gear.dataset.files import clear_scratch, inside, write_whole
+from gear.dataset.files import clear_scratch, inside, write_alone, write_whole
 from gear.values.errors import DatasetError
 
 
@@ -43,6 +43,20 @@ def test_a_refusing_disk_is_one_line_and_leaves_nothing(
 
     monkeypatch.setattr(os, "fsync", refuse)
     with pytest.raises(DatasetError, match=message):
+        write_whole(tmp_path, "a.bin", b"1")
+    assert not (tmp_path / "a.bin").exists()
+    assert list((tmp_path / "gear/scratch").iterdir()) == []
+
+
+def test_ctrl_c_leaves_nothing_half_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(_: int) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(os, "fsync", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write_alone(tmp_path / "sheet.png", b"1")
+    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(KeyboardInterrupt):
         write_whole(tmp_path, "a.bin", b"1")
     assert not (tmp_path / "a.bin").exists()
     assert list((tmp_path / "gear/scratch").iterdir()) == []

@@ -9,7 +9,7 @@ from pathlib import Path
 import cv2
 
 from gear.contracts.rendering import Quality
-from gear.dataset.files import explained
+from gear.dataset.files import explained, write_alone
 from gear.render.opening import describe
 from gear.values.errors import GearError, PlacementError, UnknownNameError
 from gear.values.frames import UInt8Image
@@ -111,8 +111,5 @@ def check_pictures(*, renderer: str, quality: str, weather: str, seed: int) -> N
 
 def _write(target: Path, picture: UInt8Image) -> Path:
     data = cv2.imencode(".png", picture[..., ::-1])[1].tobytes()
-    with explained(target):
-        temporary = target.with_name(f".{target.name}.part")
-        temporary.write_bytes(data)
-        temporary.replace(target)
+    write_alone(target, data)
     return target
