@@ -5,8 +5,10 @@ from __future__ import annotations
 import argparse
 import importlib
 import os
+import signal
 import sys
 from collections.abc import Sequence
+from types import FrameType
 
 from gear.cli.parser import Parser
 from gear.values.errors import GearError, UnknownNameError
@@ -40,8 +42,13 @@ EXAMPLES = """examples:
 """
 
 
+class Terminated(KeyboardInterrupt):
+    """Somebody, a batch system perhaps, asks the process to end: it does as after Ctrl-C."""
+
+
 def entry() -> None:
     """Console entry point."""
+    signal.signal(signal.SIGTERM, _terminate)
     sys.exit(main(sys.argv[1:]))
 
 
@@ -49,7 +56,8 @@ def main(argv: Sequence[str]) -> int:
     """Runs one command.
 
     Returns:
-        0, 2 for what the user can put right (one line on stderr), 130 when interrupted. Bugs keep their traceback.
+        0, 2 for what the user can put right (one line on stderr), 130 when interrupted, 143 when terminated. Bugs keep
+        their traceback.
     """
     try:
         return _run(argv)
@@ -57,9 +65,10 @@ def main(argv: Sequence[str]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except (KeyboardInterrupt, Exception) as error:
-        if _is_of_an_interrupt(error):
+        interrupt = _interrupt_behind(error)
+        if interrupt is not None:
             print("gear: stopped; run the same command again to go on", file=sys.stderr)
-            return 130
+            return 143 if isinstance(interrupt, Terminated) else 130
         if not isinstance(error, GearError):
             raise
         print(f"gear: {error}", file=sys.stderr)
@@ -101,11 +110,15 @@ def _run(argv: Sequence[str]) -> int:
     return int(args.run(args))
 
 
-def _is_of_an_interrupt(error: BaseException | None) -> bool:
-    """Whether Ctrl-C is behind it: compiled modules that it stops in their import raise an ImportError from it."""
+def _terminate(number: int, frame: FrameType | None) -> None:
+    raise Terminated
+
+
+def _interrupt_behind(error: BaseException | None) -> KeyboardInterrupt | None:
+    """The Ctrl-C that made an error: compiled modules that it stops in their import raise an ImportError from it."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
-    return error is not None
+    return error
 
 
 if __name__ == "__main__":

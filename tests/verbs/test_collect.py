@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import json
 import os
@@ -164,6 +165,32 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path: Path, collect_small: Collec
     assert all((samples / name).stat().st_mtime_ns == stamp for name, stamp in kept.items())
     collect_small("depth", tmp_path / "straight", samples=total)
     assert tree(out) == tree(tmp_path / "straight")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no process groups there")
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGKILL, -signal.SIGKILL)])
+def test_workers_do_not_outlive_the_command(tmp_path: Path, number: signal.Signals, code: int) -> None:
+    """Batch systems end the process that they started, and kill the one that took too much memory; its workers went on,
+    beside whoever gave the command again."""
+    running = subprocess.Popen(
+        command(tmp_path / "out", "--samples", "2000", "--workers", "2"),
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+    samples = tmp_path / "out/gear/debug/samples"
+    for _ in range(1200):
+        if samples.is_dir() and len(list(samples.iterdir())) >= 2:
+            break
+        time.sleep(0.05)
+    running.send_signal(number)
+    assert running.wait(timeout=60) == code
+    with contextlib.suppress(ProcessLookupError):  # its group is gone with the last worker
+        for _ in range(600):
+            os.killpg(running.pid, 0)
+            time.sleep(0.05)
+        pytest.fail("workers are still there")
+    said = running.communicate()[1]
+    assert said.endswith("gear: stopped; run the same command again to go on\n") == (number == signal.SIGTERM)
+    assert "Traceback" not in said and 2 <= len(list(samples.iterdir())) < 2000
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there a terminal interrupts otherwise")

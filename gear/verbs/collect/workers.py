@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
+import os
 import pickle
 import queue
 import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from multiprocessing.context import SpawnProcess
 from multiprocessing.queues import Queue
@@ -107,6 +109,7 @@ def _work(job: Job, indices: list[int], position: Any, reports: Queue[tuple[str,
                 return
             yield indices[taken]
 
+    threading.Thread(target=_follow_parent, daemon=True).start()
     try:
         _interrupts_again()
         with open_session(job) as session:
@@ -115,6 +118,14 @@ def _work(job: Job, indices: list[int], position: Any, reports: Queue[tuple[str,
         return
     except GearError as error:
         reports.put(("error", _portable(error)))
+
+
+def _follow_parent() -> None:
+    """Ends this process when its parent is gone, killed perhaps: who gives the command again should be alone."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
 
 
 def _portable(error: GearError) -> GearError:
