@@ -17,6 +17,7 @@ import os
 import statistics
 import time
 from collections.abc import Callable
+from functools import partial
 
 import torch
 
@@ -78,7 +79,7 @@ def main() -> None:
             attack_step(step)
         for step in range(first, first + args.steps + 1):
             batch = seen(step)
-            one, other = timed(lambda batch=batch: bare_step(batch)), timed(lambda step=step: attack_step(step))
+            one, other = timed(partial(bare_step, batch)), timed(partial(attack_step, step))
             if step > first:
                 bare.append(one)
                 whole.append(other)

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import gear
+from gear.contracts.tasks import Sidecar
 from gear.dataset.reading import Dataset
-from gear.dataset.sidecar import Sidecar
 from gear.verbs.evaluate.choice import chosen_defense, chosen_model
 from gear.verbs.evaluate.player import Player
 from gear.verbs.evaluate.row import evaluate_row
@@ -28,10 +28,10 @@ from gear.verbs.evaluate.spread import draw, gather
 class Part(Dataset[Any]):
     """The first samples of a split, and again from the start where more are wanted than there are."""
 
-    count = 0
+    wanted = 0
 
     def __len__(self) -> int:
-        return self.count
+        return self.wanted
 
     def sidecar(self, index: int) -> Sidecar:
         """Of one sample."""
@@ -51,7 +51,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=5)
     args = parser.parse_args()
     opened = gear.open_dataset(args.data)
-    Part.count = args.samples
+    Part.wanted = args.samples
     dataset = Part(root=opened.root, plan=opened.plan, task=opened.task, manifest=opened.manifest)
     model = chosen_model(args.model, args.settings)
     player = Player(model, chosen_defense(args.defense, ()) if args.defense else None)
@@ -70,7 +70,9 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             scorer = Scorer(dataset, Path(folder), "row", (), model.found)
             begun, worked = time.perf_counter(), time.process_time()
-            notes, _ = evaluate_row(dataset, scorer, player, batch=args.batch, workers=args.workers, told=lambda: None)
+            notes = evaluate_row(
+                dataset, scorer, player, batch=args.batch, workers=args.workers, told=lambda: None
+            ).notes
             scorer.finish(notes)
             whole.append((time.perf_counter() - begun) / len(pictures))
             used["whole"] += time.process_time() - worked

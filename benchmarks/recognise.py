@@ -107,7 +107,8 @@ def crops(sample: Any, least_px: int, visible: float) -> list[tuple[str, np.ndar
 def best_five(network: torch.nn.Module, crop: np.ndarray) -> list[int]:
     """ImageNet's indices of the five likeliest classes."""
     picture = torch.from_numpy(np.ascontiguousarray(crop)).permute(2, 0, 1)[None].float() / 255
-    return network((picture - MEAN) / STD)[0].topk(5).indices.tolist()
+    best: list[int] = network((picture - MEAN) / STD)[0].topk(5).indices.tolist()
+    return best
 
 
 def sheet(shown: dict[str, list[tuple[np.ndarray, list[int]]]]) -> np.ndarray:

@@ -172,7 +172,8 @@ def test_options_are_checked(options: dict[str, float]) -> None:
 
 @pytest.mark.slow
 def test_it_learns_a_street_by_heart() -> None:
-    """Each labelled object within 10 % of its depth after 150 steps on one pair; nothing stands where nothing does."""
+    """Each labelled object within 10 % of its depth after 150 steps on one pair, and surer than not; nothing else is.
+    (Objects come to 0.74 and more, what is none to 0.25 at most, with one thread or two and from 150 to 250 steps.)"""
     network, sample = tiny(), street()
     pictures = as_batch([sample.images], ("left", "right"))
     optimiser = torch.optim.AdamW(network.module().parameters(), lr=3e-3)
@@ -182,7 +183,7 @@ def test_it_learns_a_street_by_heart() -> None:
         torch.stack(list(network(pictures, [sample]).values())).sum().backward()
         optimiser.step()
     network.eval()
-    found = [label for label in network.predict(sample.images) if (label.score or 0) > 0.2]
+    found = [label for label in network.predict(sample.images) if (label.score or 0) > 0.5]
     wanted = [thing for thing in sample.objects if not thing.is_ignored]
     assert len(found) == len(wanted) > 1
     for thing in wanted:
