@@ -12,7 +12,10 @@ from gear.dataset.store import plan_of, splits_of
 from gear.plugins.build import build_task
 from gear.values.errors import DatasetError
 
-__all__ = ["Dataset", "Twins", "open_dataset", "open_twins", "root_and_split"]
+__all__ = ["Dataset", "Twins", "open_dataset", "open_twins", "root_and_split", "roots_of"]
+
+DEEPEST = 3
+"""Folders between one that is given and the roots in it."""
 
 
 def open_dataset(path: str | Path, split: str | None = None) -> Dataset[Any]:
@@ -48,6 +51,14 @@ def root_and_split(path: str | Path) -> tuple[Path, str | None]:
         text, _, split = str(path).rpartition(":")
         return Path(text), split
     return Path(path), None
+
+
+def roots_of(folder: Path) -> list[Path]:
+    """The folder itself where it is a dataset's root, else the roots in it, by name; none where there is none."""
+    if (folder / "gear").is_dir():
+        return [folder]
+    plans = (plan for depth in range(DEEPEST + 1) for plan in folder.glob("*/" * depth + "gear/*/plan.json"))
+    return sorted({plan.parents[2] for plan in plans})
 
 
 def open_twins(first: str | Path, second: str | Path, split: str | None = None) -> Twins[Sample]:

@@ -7,7 +7,7 @@
 Each collection is one `gear collect`, so the same command again goes on where it was stopped. Then:
 
     gear train --task semseg --model ddrnet23_slim --data data/training/semseg --out runs/semseg
-    gear evaluate … --data data/held-out/semseg/…
+    gear evaluate … --data data/held-out/semseg --report reference
     python -m authoring.weights ship runs/semseg --evaluation evaluations/semseg/ddrnet23_slim
     python -m authoring.weights patches --task semseg --model ddrnet23_slim --out runs/patches
 """

@@ -21,7 +21,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = EXAMPLE
     parser.add_argument("--model", required=True, metavar="NAME", help="model plugin; gear plugins --kind model")
     parser.add_argument(
-        "--data", required=True, nargs="+", metavar="DIR", help="datasets of its task, twins among them; DIR:SPLIT"
+        "--data",
+        required=True,
+        nargs="+",
+        metavar="DIR",
+        help="datasets of its task, twins among them; DIR:SPLIT, or a folder of datasets",
     )
     parser.add_argument("--split", help="of the datasets, where they have several")
     parser.add_argument("--defense", metavar="NAME", help="defense plugin; gear plugins --kind defense")

@@ -298,6 +298,13 @@ def test_datasets_of_one_label_have_a_row_together(tmp_path: Path, small: Small,
     assert "all with patch none" in (tmp_path / "out" / "table.txt").read_text()
     alone = evaluate(roots[:1], model="odd", out=tmp_path / "alone", resamples=50)
     assert alone.together == ()
+    for number, root in enumerate(roots):
+        (tmp_path / "all" / "depth").mkdir(parents=True, exist_ok=True)
+        (tmp_path / "all" / "depth" / str(number)).symlink_to(root)
+    again = evaluate(tmp_path / "all", model="odd", out=tmp_path / "folder", resamples=50)
+    assert [row.name for row in again.rows] == [row.name for row in report.rows], "a folder of datasets is all of them"
+    with pytest.raises(DatasetError, match="is not a dataset of gear's"):
+        evaluate(tmp_path / "out", model="odd", out=tmp_path / "none")
 
 
 def test_twins_are_tested_sample_by_sample(tmp_path: Path, small: Small, install: Install) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from gear.dataset.reading import Dataset
-from gear.opening import open_dataset, root_and_split
+from gear.opening import open_dataset, root_and_split, roots_of
 from gear.values.errors import DatasetError, GearError
 from gear.verbs.evaluate.choice import Chosen, check_model, check_reports
 
@@ -17,7 +17,7 @@ def opened(paths: Sequence[str | Path], split: str | None, model: Chosen, report
     """Opens them.
 
     Args:
-        paths: roots, or `DIR:SPLIT`.
+        paths: roots, folders of roots, or `DIR:SPLIT`.
         split: of those that do not say theirs; None where each has only one.
         model: that must suit them.
         reports: that must be there for them.
@@ -28,7 +28,7 @@ def opened(paths: Sequence[str | Path], split: str | None, model: Chosen, report
     if not paths:
         raise GearError("there is nothing to evaluate on; give at least one dataset")
     places = [root_and_split(path) for path in paths]
-    datasets = [open_dataset(root, own or split) for root, own in places]
+    datasets = [open_dataset(root, own or split) for folder, own in places for root in roots_of(folder) or [folder]]
     first = datasets[0].plan
     for one in datasets:
         if one.plan.task["name"] != first.task["name"]:

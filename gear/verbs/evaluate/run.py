@@ -63,7 +63,7 @@ def evaluate(
     sample. Intervals are of 95 %, by bootstrap over samples.
 
     Args:
-        data: roots of datasets, all of one task; `DIR:SPLIT` says which split of one.
+        data: roots of datasets, or folders of roots, all of one task; `DIR:SPLIT` says which split of one.
         model: name of a model plugin.
         settings: `KEY=VALUE` texts for the model's options.
         defense: name of a defense plugin.

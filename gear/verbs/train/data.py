@@ -10,7 +10,7 @@ from typing import Any, overload
 from gear.augment.apply import shrunk
 from gear.dataset.reading import Dataset, scenes_of
 from gear.dataset.store import splits_of
-from gear.opening import open_dataset, root_and_split
+from gear.opening import open_dataset, root_and_split, roots_of
 from gear.values.errors import DatasetError, GearError
 from gear.values.rng import derive_rng
 from gear.values.serial import Json
@@ -18,8 +18,6 @@ from gear.values.serial import Json
 TRAINING = ("finetuning", "train")
 VALIDATION = ("val",)
 KEPT_FOR_TESTS = "test"
-DEEPEST = 3
-"""Folders between one that is given and the roots in it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,8 +101,7 @@ def _open(path: str | Path, names: Sequence[str]) -> list[Dataset[Any]]:
     root, split = root_and_split(path)
     if not root.is_dir():
         raise DatasetError(root, "there is no such folder")
-    plans = (plan for depth in range(DEEPEST + 1) for plan in root.glob("*/" * depth + "gear/*/plan.json"))
-    roots = [root] if (root / "gear").is_dir() else sorted({plan.parents[2] for plan in plans})
+    roots = roots_of(root)
     if not roots:
         raise DatasetError(root, "holds no dataset of gear's (there is no gear/<split>/plan.json below it)")
     return [open_dataset(place, name) for place in roots for name in ([split] if split else _wanted(place, names))]
