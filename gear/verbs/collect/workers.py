@@ -38,16 +38,16 @@ def collect_in_processes(job: Job, indices: Sequence[int], workers: int, done: C
         context.Process(target=_work, args=(job, list(indices), position, reports), daemon=True, name=f"gear-{i}")
         for i in range(min(workers, len(indices)))
     ]
-    with _no_interrupts():  # workers inherit that, and are not stopped in the middle of their imports
-        for process in processes:
-            process.start()
     try:
+        with _no_interrupts():  # workers inherit that, and are not stopped in the middle of their imports
+            for process in processes:
+                process.start()
         _listen(job, processes, reports, len(indices), done)
     finally:
-        for process in processes:
-            if process.is_alive():
-                process.terminate()
-        for process in processes:
+        started = [process for process in processes if process.pid is not None]
+        for process in started:
+            process.terminate()
+        for process in started:
             process.join(timeout=10)
 
 
