@@ -199,15 +199,16 @@ def test_ctrl_c_while_workers_start_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "sitecustomize.py").write_text(
         "import os, signal, sys\nif '--multiprocessing-fork' in sys.orig_argv:\n    os.killpg(0, signal.SIGINT)\n"
     )
-    before = signal.signal(
-        signal.SIGINT, signal.default_int_handler
-    )  # a shell's background ignores it, and so do heirs
-    done = subprocess.run(
-        command(tmp_path / "out", "--samples", "8", "--workers", "2"),
-        capture_output=True, text=True, check=False, start_new_session=True, timeout=120,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, (str(tmp_path), os.environ.get("PYTHONPATH"))))},
-    )  # fmt: skip
-    signal.signal(signal.SIGINT, before)
+    # A shell's background ignores it, and so would all that is started there.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        done = subprocess.run(
+            command(tmp_path / "out", "--samples", "8", "--workers", "2"),
+            capture_output=True, text=True, check=False, start_new_session=True, timeout=120,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])},
+        )  # fmt: skip
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert done.returncode == 130
     assert done.stderr == "gear: stopped; run the same command again to go on\n"
     assert not (tmp_path / "out").exists()

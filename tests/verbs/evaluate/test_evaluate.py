@@ -1,19 +1,17 @@
-"""`gear evaluate` on tiny datasets: figures, files, resuming, twins, defenses, and who is blamed."""
+"""`gear evaluate` on tiny datasets: figures, files, resuming, defenses, and who is blamed."""
 
 from __future__ import annotations
 
 import contextlib
 import copy
-import hashlib
 import importlib
 import io
 import json
 import re
 import sys
 import types
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
@@ -25,93 +23,16 @@ import torch
 import gear
 from gear.cli.main import main
 from gear.contracts.defenses import DefenseResult
-from gear.contracts.hookspecs import hookimpl
-from gear.contracts.specs import DefenseSpec, ModelSpec
+from gear.contracts.specs import DefenseSpec
 from gear.formats.kitti_object import parse_labels
 from gear.nn.weights import write as write_weights
-from gear.plugins import build as building
-from gear.plugins.manager import discover
 from gear.testing.tiny_networks import tiny_depth, tiny_segmenter
-from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import ConfigError, DatasetError, FieldError, GearError, PluginError, UnknownNameError
-from gear.values.frames import UInt8Image
-from gear.verbs.collect.run import collect
 from gear.verbs.evaluate.patch_area import patch_masks
 from gear.verbs.evaluate.run import evaluate
-from tests.verbs.conftest import size_settings
+from tests.verbs.evaluate.conftest import Config, Install, Oracle, Small, Views, model_spec
 
-Small = Callable[..., Path]
-Install = Callable[..., None]
-Views = Mapping[str, UInt8Image]
 HEADLINES = {"semseg": ("miou", 1), "depth": ("rmse_m", 0), "detect2d": ("ap", 1), "stereo3d": ("car_2d_easy_r40", 1)}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Config:
-    strength: float = 1.0
-
-
-class Oracle:
-    """Knows the truth of every picture that it was shown beforehand; may change it."""
-
-    def __init__(self, roots: list[Path], change: Callable[[Any, Any], Any] | None = None) -> None:
-        self.known: dict[str, Any] = {}
-        self.shown = 0
-        for root in roots:
-            dataset = gear.open_dataset(root)
-            for sample in dataset:
-                prediction = dataset.task.as_prediction(sample)
-                self.known[self.key(sample.images)] = change(sample, prediction) if change else prediction
-
-    @staticmethod
-    def key(views: Views) -> str:
-        return hashlib.sha256(views["left"].tobytes()).hexdigest()
-
-    def predict(self, views: Views) -> Any:
-        self.shown += 1
-        return self.known[self.key(views)]
-
-    def taps(self) -> Mapping[str, Any]:
-        return {}
-
-
-def model_spec(build: Callable[[Any], Any], task: str, **facts: Any) -> ModelSpec[Any]:
-    spec: dict[str, Any] = {"tasks": (task,), "views": ("left",)} | facts
-    return ModelSpec(name="odd", summary="Odd.", config=Config, build=build, **spec)
-
-
-@pytest.fixture
-def install(monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
-    def put(*specs: Any) -> None:
-        module = types.ModuleType("odd_package")
-        for hook, kind in (("gear_models", ModelSpec), ("gear_defenses", DefenseSpec)):
-            chosen = [spec for spec in specs if isinstance(spec, kind)]
-            setattr(module, hook, hookimpl(lambda chosen=chosen: chosen, specname=hook))
-        sys.modules["odd_package"] = module
-        found = discover([EntryPoint(name="odd", value="odd_package", group="gear")])
-        monkeypatch.setattr(building, "catalogue", lambda: found)
-
-    yield put
-    sys.modules.pop("odd_package", None)
-
-
-@pytest.fixture(scope="module")
-def small(tmp_path_factory: pytest.TempPathFactory) -> Small:
-    """Datasets that tests share and only read; the folder's name is the patch."""
-    made: dict[tuple[str, str, int], Path] = {}
-
-    def root(task: str, patch: str = "random", samples: int = 2) -> Path:
-        key = (task, patch, samples)
-        if key not in made:
-            made[key] = tmp_path_factory.mktemp(task) / patch
-            settings = [f"scenes={TINY_SCENES}", *size_settings(task)]
-            collect(
-                task, town=TINY_TOWN, scene="board", split="debug", samples=samples, renderer="classic",
-                quality="fast", patch=patch, out=made[key], settings=settings,
-            )  # fmt: skip
-        return made[key]
-
-    return root
 
 
 def timeless(path: Path) -> Any:
@@ -245,102 +166,6 @@ def test_batches_and_threads_change_nothing(tmp_path: Path, small: Small, instal
     figure = one["rows"][0]["figures"]["task"]["pixel_accuracy"]
     assert 0 <= figure["low"] <= figure["value"] <= figure["high"] <= 1 and figure["low"] < figure["high"]
     assert [s["index"] for s in one["rows"][0]["per_sample"]] == [0, 1, 2, 3, 4]
-
-
-def test_twins_are_compared_and_the_patch_can_be_left_out(tmp_path: Path, small: Small, install: Install) -> None:
-    """A network that is wrong on the random patch alone."""
-    roots = [small("semseg", "none"), small("semseg", "random")]
-
-    def fooled(sample: Any, prediction: Any) -> Any:
-        is_patched = (
-            gear.open_dataset(roots[1])[sample.record.index].images["left"].tobytes() == sample.images["left"].tobytes()
-        )
-        return np.where(patch_masks(sample)["left"] & is_patched, np.uint8(26), prediction)
-
-    install(model_spec(lambda _: Oracle(roots, fooled), "semseg"))
-    report = evaluate(roots, model="odd", out=tmp_path / "out", reports=["outside_patch"], resamples=50)
-    none, random = report.row("none"), report.row("random")
-    assert none.figures["task"]["miou"].value == 1
-    # The board is "static" in Cityscapes, which is not evaluated: nothing is lost by being wrong there.
-    board = {p for s in gear.open_dataset(roots[0]) for p in np.unique(s.label_ids[patch_masks(s)["left"]]).tolist()}
-    assert board == {4} and random.figures["task"]["miou"].value == 1
-    (difference,) = report.differences
-    assert (difference.row, difference.against) == (random.name, none.name)
-    assert difference.figures["task"]["miou"].value == 0 and difference.auroc is None
-    assert {name: (test["miou"].mean, test["miou"].p) for name, test in difference.paired.items()} == {
-        "task": (0, 1), "outside_patch": (0, 1),
-    }  # fmt: skip
-
-
-def test_datasets_of_one_label_have_a_row_together(tmp_path: Path, small: Small, install: Install) -> None:
-    """Right on one dataset, a metre too far on the other: together they are as if they were one."""
-    other = tmp_path / "other"
-    collect(
-        "depth", town=TINY_TOWN, scene="board", split="debug", samples=1, seed=77, renderer="classic", quality="fast",
-        patch="none", out=other, settings=[f"scenes={TINY_SCENES}", *size_settings("depth")],
-    )  # fmt: skip
-    roots = [small("depth", "none"), other]
-    seeds = [gear.open_dataset(root).plan.info.seed for root in roots]
-    install(model_spec(lambda _: Oracle(roots, lambda s, p: p + (s.record.seed == seeds[1])), "depth"))
-
-    report = evaluate(roots, model="odd", out=tmp_path / "out", resamples=50)
-
-    whole = gear.open_dataset(other).task.evaluator()
-    for root, error_m in zip(roots, (0, 1), strict=True):
-        dataset = gear.open_dataset(root)
-        for sample in dataset:
-            whole.update(sample, dataset.task.as_prediction(sample) + error_m)
-    (pooled,) = report.together
-    assert (pooled.patch, pooled.samples, pooled.rows) == ("none", 3, tuple(row.name for row in report.rows))
-    figures = pooled.figures["task"]
-    assert {name: one.value for name, one in figures.items()} == pytest.approx(dict(whole.result()), nan_ok=True)
-    assert figures["mae_m"].interval is not None and figures["mae_m"].interval[0] < figures["mae_m"].value
-    assert "all with patch none" in (tmp_path / "out" / "table.txt").read_text()
-    alone = evaluate(roots[:1], model="odd", out=tmp_path / "alone", resamples=50)
-    assert alone.together == ()
-    for number, root in enumerate(roots):
-        (tmp_path / "all" / "depth").mkdir(parents=True, exist_ok=True)
-        (tmp_path / "all" / "depth" / str(number)).symlink_to(root)
-    again = evaluate(tmp_path / "all", model="odd", out=tmp_path / "folder", resamples=50)
-    assert [row.name for row in again.rows] == [row.name for row in report.rows], "a folder of datasets is all of them"
-    with pytest.raises(DatasetError, match="is not a dataset of gear's"):
-        evaluate(tmp_path / "out", model="odd", out=tmp_path / "none")
-
-
-def test_twins_are_tested_sample_by_sample(tmp_path: Path, small: Small, install: Install) -> None:
-    """A network that the random patch leads astray by a metre a sample, on the patch alone in one report."""
-    roots = [small("depth", "none", 3), small("depth", "random", 3)]
-    patched = {Oracle.key(sample.images) for sample in gear.open_dataset(roots[1])}
-
-    def astray(sample: Any, prediction: Any) -> Any:
-        far = np.float32(1 + sample.record.index if Oracle.key(sample.images) in patched else 0)
-        return np.where(patch_masks(sample)["left"], prediction, prediction + far)
-
-    install(model_spec(lambda _: Oracle(roots, astray), "depth"))
-    report = evaluate(roots, model="odd", out=tmp_path / "out", reports=["outside_patch"], resamples=0)
-    (difference,) = report.differences
-    test = difference.paired["outside_patch"]["mae_m"]
-    assert (test.mean, test.p, test.pairs) == (pytest.approx(2, abs=1e-4), 2 / 8, 3)
-    assert 0 < difference.paired["task"]["mae_m"].mean < test.mean
-    written = json.loads((tmp_path / "out/results.json").read_text())["differences"][0]["paired"]
-    assert written["outside_patch"]["mae_m"] == test.as_json()
-    assert len(json.loads((tmp_path / "out/results.json").read_text())["rows"][0]["per_sample"][0]["figures"]) == 2
-    line = (tmp_path / "out/table.txt").read_text().splitlines()[-1]
-    assert "minus none: mae_m +" in line and "outside_patch.mae_m +2.000 (p 0.25, 3 pairs)" in line
-
-
-def test_figures_outside_the_patch_do_not_see_it(tmp_path: Path, small: Small, install: Install) -> None:
-    data = small("depth")
-
-    def wrong_there(sample: Any, prediction: Any) -> Any:
-        return np.where(patch_masks(sample)["left"], np.float32(3.0), prediction)
-
-    install(model_spec(lambda _: Oracle([data], wrong_there), "depth"))
-    (row,) = evaluate(data, model="odd", out=tmp_path / "out", reports=["outside_patch"]).rows
-    assert row.figures["task"]["rmse_m"].value > 0.1
-    assert row.figures["outside_patch"]["rmse_m"].value == 0
-    low, high = row.figures["task"]["rmse_m"].interval or (0, 0)
-    assert low <= row.figures["task"]["rmse_m"].value <= high
 
 
 class Finder:
