@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import gc
 import json
+import multiprocessing
 import os
 import sys
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -15,8 +17,9 @@ from gear.values.serial import from_json
 from gear.world.assets import AssetLibrary
 from gear.world.compiled import compile_world
 from gear.world.digest import asset_files
+from gear.world.light import Lighting, lighting_of
 from gear.world.scene_spec import SceneSpec
-from gear.world.shelf import MAY_KEEP, order_of
+from gear.world.shelf import DONE, MAY_KEEP, order_of
 
 _SWITCH_S = 0.0005
 """How long one thread may keep others from Python: what runs beside is quick to go on."""
@@ -25,24 +28,51 @@ _CODE_SUFFIXES = (".py", ".pyc", ".so")
 
 
 def main(folder: str) -> None:
-    """Compiles the order on standard input into a folder, and says there whether the order covers all that was read.
+    """Compiles the order on standard input into a folder, and says there whether the order covers all that was read,
+    and on standard output when it is done.
 
-    It does not where a town refers to files far from it, or where somebody edited one meanwhile.
+    The order does not where a town refers to files far from it, or where somebody edited one meanwhile.
     """
     gc.disable()  # half a million objects of MJCF, all kept to the end: looking for garbage took a third of the time
     sys.setswitchinterval(_SWITCH_S)
     order = json.load(sys.stdin)
     library = AssetLibrary(Path(order["town"]))
     scene, weather = from_json(SceneSpec, order["scene"]), from_json(Weather, order["weather"])
+    lighting = _lighting_beside(weather)
     known = {os.path.realpath(path) for path in asset_files(library).values()}
     heard = _watched()
-    compiled = compile_world(library, scene, weather)
+    compiled = compile_world(library, scene, weather, lighting)
     is_covered = heard <= known
     with ThreadPoolExecutor(1) as aside:
         read = aside.submit(order_of, library, scene, weather)
         compiled.save(Path(folder))
     if is_covered and read.result() == order:
         (Path(folder) / MAY_KEEP).touch()
+    os.write(sys.stdout.fileno(), DONE)
+
+
+def _lighting_beside(weather: Weather) -> Callable[[], Lighting] | None:
+    """What waits for a weather's light, which another process works out: in this one Python would hold it up."""
+    if sys.platform != "linux":
+        return None
+    fork = multiprocessing.get_context("fork")
+    here, there = fork.Pipe(duplex=False)
+
+    def work() -> None:
+        here.close()  # so that it ends with the one that waits
+        there.send(lighting_of(weather))
+
+    fork.Process(target=work, daemon=True).start()
+    there.close()
+
+    def wait() -> Lighting:
+        try:
+            lighting: Lighting = here.recv()
+        except EOFError:
+            return lighting_of(weather)
+        return lighting
+
+    return wait
 
 
 def _watched() -> set[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,11 +18,13 @@ from gear.world.catalogue import actor_types
 from gear.world.classes import GeomClasses
 from gear.world.compose import Slot, compose, slots_of
 from gear.world.instances import FaceName
-from gear.world.memory import keep_no_assets, release_memory
+from gear.world.light import Lighting
+from gear.world.memory import keep_no_assets
 from gear.world.mjb import read_model, write_model
 from gear.world.models import placement_model, render_model
 from gear.world.pool import plan_pool
 from gear.world.scene_spec import SceneSpec
+from gear.world.trees import without_mesh_trees
 from gear.world.weather import wetness
 from gear.world.wet import wet_own_colours
 
@@ -47,8 +50,9 @@ class Compiled:
     faces: tuple[FaceName, ...]
 
     def save(self, folder: Path) -> None:
-        """Writes it into an empty folder."""
-        crc32 = {_SEEN: write_model(self.model, folder / _SEEN)}
+        """Writes it into an empty folder, without what rays find triangles by."""
+        with without_mesh_trees(self.model):
+            crc32 = {_SEEN: write_model(self.model, folder / _SEEN)}
         crc32[_FELT] = write_model(self.placement_model, folder / _FELT)
         facts = {
             "faces": to_json(self.faces),
@@ -85,8 +89,14 @@ class Compiled:
         )
 
 
-def compile_world(library: AssetLibrary, scene: SceneSpec, weather: Weather) -> Compiled:
+def compile_world(
+    library: AssetLibrary, scene: SceneSpec, weather: Weather, lighting: Callable[[], Lighting] | None = None
+) -> Compiled:
     """Composes and compiles.
+
+    Args:
+        library, scene, weather: of the world.
+        lighting: as for `compose`.
 
     Raises:
         UnknownNameError: there is no such board or truck.
@@ -95,9 +105,8 @@ def compile_world(library: AssetLibrary, scene: SceneSpec, weather: Weather) -> 
     keep_no_assets()
     with tempfile.TemporaryDirectory(prefix="gear-") as folder:
         composition = compose(
-            library, scene.boards, plan_pool(scene, library), carrier_of(scene, library), weather
+            library, scene.boards, plan_pool(scene, library), carrier_of(scene, library), weather, lighting
         ).laid_out(Path(folder))
-        release_memory()
         model, classes = render_model(composition)
     wet_own_colours(model, classes.label_code, wetness(weather))
     data = mujoco.MjData(model)

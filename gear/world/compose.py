@@ -9,23 +9,28 @@ from __future__ import annotations
 
 import math
 import os
-import shutil
+import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
+from xml.sax.saxutils import quoteattr, unescape
 
 from gear.values.errors import TownError
 from gear.values.scene import Weather
 from gear.world.assets import ActorFacts, AssetLibrary
 from gear.world.instances import AssetParts, FaceName, load_mjcf
-from gear.world.light import lighting_of
+from gear.world.light import Lighting, lighting_of
 from gear.world.quiet_mjcf import mjcf
 from gear.world.scene_spec import BoardSpec
 from gear.world.statics import Place, Statics, split_town
 from gear.world.weather import apply_weather
+
+_FILE = re.compile(r'file="([^"]*)"')
+_STRIPPED = ' strippath="true"'
 
 PARKED_DEPTH_M = 60.0
 """Actors of the pool that a sample does not use wait this far below the town, under its ground."""
@@ -67,20 +72,18 @@ class Composition:
     folder: Path | None = None
 
     def laid_out(self, folder: Path) -> Composition:
-        """The same with its files written into a folder: MuJoCo copies what is in memory, all of it at once."""
+        """The same with its files written into a folder, but for meshes, which it refers to where they lie: MuJoCo
+        copies what is in memory, all of it at once.
+        """
         for name, content in self.assets.items():
-            if isinstance(content, Place):
-                _put(Path(os.fsdecode(content)), folder / name)
-            else:
+            if not isinstance(content, Place):
                 (folder / name).write_bytes(content)
-        return replace(self, assets={}, folder=folder)
+        xml = _FILE.sub(self._placed_file, self.xml.replace(_STRIPPED, ""))
+        return replace(self, xml=xml, assets={}, folder=folder)
 
-
-def _put(place: Path, link: Path) -> None:
-    try:
-        link.symlink_to(place)
-    except OSError:  # not every system lets everybody make links
-        shutil.copyfile(place, link)
+    def _placed_file(self, file: re.Match[str]) -> str:
+        place = self.assets.get(unescape(file[1], {"&quot;": '"'}))
+        return f"file={quoteattr(os.fsdecode(place))}" if isinstance(place, Place) else file[0]
 
 
 def compose(
@@ -89,6 +92,7 @@ def compose(
     pool: Sequence[tuple[ActorFacts, int]],
     carrier: ActorFacts | None,
     weather: Weather,
+    lighting: Callable[[], Lighting] | None = None,
 ) -> Composition:
     """Puts a town, its boards and its actors into one tree.
 
@@ -98,19 +102,20 @@ def compose(
         pool: actors and how many instances of each; the first one is the ego car's.
         carrier: an actor that bears a surface, besides the pool.
         weather: light and air.
+        lighting: waits for the weather's light, where that is being worked out already.
 
     Raises:
         TownError: a file cannot be composed.
         UnknownNameError: a board's asset is not there.
     """
     with ThreadPoolExecutor(1) as aside:
-        lighting = aside.submit(lighting_of, weather)
+        light = aside.submit(lighting or partial(lighting_of, weather))
         text, statics = split_town(library.town)
         root = load_mjcf(library.town, text, statics.places)
         slots = slots_of(pool, carrier)
         parts = AssetParts(root)
         faces = _fill(root, parts, library, statics, boards, slots)
-    apply_weather(root, weather, lighting.result(), statics.worn)
+    apply_weather(root, weather, light.result(), statics.worn)
     return Composition(
         xml=statics.put_into(parts.put_defaults_into(root.to_xml_string())),
         assets=root.get_assets(),

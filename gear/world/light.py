@@ -7,6 +7,7 @@ scale.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,12 +77,13 @@ def lighting_of(weather: Weather, *, sky_face_px: int = SKY_FACE_PX) -> Lighting
     """Light of a weather."""
     sky = Sky.of(weather)
     exposure, from_above = _exposure(sky)
-    faces = encode_srgb(exposure * _looks(sky) * sky.radiance(face_directions(sky_face_px)))
+    shown = exposure * _looks(sky)
+    faces = [encode_srgb(shown * sky.radiance(face)) for face in _faces(sky_face_px)]
     return Lighting(
         towards_sun=sky.towards_sun,
         sun=exposure * sky.sun_klx,
         ambient=exposure * from_above / math.pi,
-        sky_faces=faces.reshape(6 * sky_face_px, sky_face_px, 3),
+        sky_faces=np.concatenate(faces),
         street_faces=encode_srgb(BOUNCE_GAIN * exposure * _in_street(sky, face_directions(STREET_FACE_PX))).reshape(
             6 * STREET_FACE_PX, STREET_FACE_PX, 3
         ),
@@ -173,6 +175,11 @@ def face_directions(size: int) -> Floats:
 
     The cube is OpenGL's, turned so that its y points up in the world: the picture `right` is east, `back` is north.
     """
+    return np.stack(list(_faces(size)))
+
+
+def _faces(size: int) -> Iterator[Floats]:
+    """`face_directions`, one by one: all of them and what is worked out from them would be memory anew at each step."""
     ticks = (np.arange(size) + 0.5) / size * 2 - 1
     column, row = np.meshgrid(ticks, ticks)
     one = np.ones_like(column)
@@ -184,8 +191,9 @@ def face_directions(size: int) -> Floats:
         (column, -one, -row),
         (-column, one, -row),
     ]
-    directions = np.stack([np.stack(axes, axis=-1) for axes in world])
-    return np.asarray(directions / np.linalg.norm(directions, axis=-1, keepdims=True))
+    for axes in world:
+        directions = np.stack(axes, axis=-1)
+        yield np.asarray(directions / np.linalg.norm(directions, axis=-1, keepdims=True))
 
 
 def _solid_angles(size: int) -> Floats:

@@ -17,7 +17,6 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-_SEARCH_TREES = ("bvh_aabb", "bvh_child", "bvh_depth", "bvh_nodeid", "mesh_polymapadr", "mesh_polymapnum")
 _SHOWN = (
     "tex_data",
     "mesh_face",
@@ -58,14 +57,6 @@ def release_memory() -> None:
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:
         trim(0)
-
-
-def forget_search_trees(model: mujoco.MjModel) -> None:
-    """Gives up what rays and contacts find triangles by; half of a town's model, and no renderer looks at it.
-
-    Afterwards rays no longer find meshes.
-    """
-    _give_back(getattr(model, name) for name in _SEARCH_TREES)
 
 
 def forget_shown(model: mujoco.MjModel) -> None:

@@ -31,13 +31,16 @@ from gear.world.scene_spec import SceneSpec
 from gear.world.world import World
 
 KEPT_BYTES = 3 << 30
-"""Worlds that were used last are kept up to this, about eight towns."""
+"""Worlds that were used last are kept up to this, about sixteen towns."""
 
 SMALL_BYTES = 4 << 20
 """A town with fewer bytes of assets compiles sooner than a process starts."""
 
 MAY_KEEP = "may-keep"
 """Name of the file by which the compiling process says that the hash covers all that it read."""
+
+DONE = b"done"
+"""What the compiling process says when all is written."""
 
 _ROOMS = ("values", "contracts", "camera", "world")
 _SCRATCH = ".making-"
@@ -95,10 +98,11 @@ def _take(shelf: Path, library: AssetLibrary, scene: SceneSpec, weather: Weather
         with tempfile.TemporaryDirectory(prefix=_SCRATCH, dir=shelf, ignore_cleanup_errors=True) as name:
             scratch = Path(name) / "world"
             scratch.mkdir()
-            if _compile_apart(order, scratch):
-                compiled = _load(scratch, library, scene)
-                if (scratch / MAY_KEEP).exists():
-                    _keep(scratch, place)
+            with _compiled_apart(order, scratch) as is_done:
+                if is_done:
+                    compiled = _load(scratch, library, scene)
+                    if (scratch / MAY_KEEP).exists():
+                        _keep(scratch, place)
     # Where it failed, it fails here too, and says why.
     return compiled or compile_world(library, scene, weather)
 
@@ -135,20 +139,30 @@ def _load(place: Path, library: AssetLibrary, scene: SceneSpec) -> Compiled | No
     return compiled
 
 
-def _compile_apart(order: dict[str, Json], folder: Path) -> bool:
-    """Compiles into a folder, in another process; whether that went well."""
+@contextlib.contextmanager
+def _compiled_apart(order: dict[str, Json], folder: Path) -> Iterator[bool]:
+    """Compiles into a folder, in another process; whether that went well.
+
+    That process says so before it ends: giving back its memory takes a tenth of a second, in which others can load.
+    """
     # Without Python's own end, which would free half a million objects one by one.
     code = "import os, sys; from gear.world.apart import main; main(sys.argv[1]); os._exit(0)"
     places = os.pathsep.join(path for path in sys.path if path)
-    done = subprocess.run(
+    with subprocess.Popen(
         [sys.executable, "-c", code, str(folder)],
-        input=json.dumps(order).encode(),
-        env={**os.environ, "PYTHONPATH": places, "PYTHONSAFEPATH": "1"},
-        stdout=subprocess.DEVNULL,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
-        check=False,
-    )
-    return done.returncode == 0
+        env={**os.environ, "PYTHONPATH": places, "PYTHONSAFEPATH": "1"},
+    ) as compiler:
+        assert compiler.stdin is not None and compiler.stdout is not None
+        try:
+            with contextlib.suppress(BrokenPipeError), compiler.stdin as orders:
+                orders.write(json.dumps(order).encode())
+            yield compiler.stdout.read(len(DONE)) == DONE
+        except BaseException:
+            compiler.kill()
+            raise
 
 
 @contextlib.contextmanager

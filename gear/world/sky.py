@@ -32,6 +32,7 @@ _D65 = (0.3127, 0.3290)
 _HORIZON_BLUR = 0.035
 _DISC_COSINE = math.cos(math.radians(0.5))
 _DISC_SR = 2 * math.pi * (1 - _DISC_COSINE)
+_AT_A_TIME = 1 << 14
 
 # Distribution coefficients (A to E, each slope and offset in turbidity) of luminance and chromaticities, from the
 # paper.
@@ -114,10 +115,13 @@ class Sky:
         flat = directions.reshape(-1, 3)
         ground = self._ground()
         result = np.broadcast_to(ground, flat.shape).copy()
-        seen = flat[:, 2] > -_HORIZON_BLUR
-        rays = flat[seen]
-        share = _smooth_step(-_HORIZON_BLUR, 0.0, rays[:, 2])[:, None]
-        result[seen] = share * self._above(rays, with_disc=with_disc) + (1 - share) * ground
+        seen = np.flatnonzero(flat[:, 2] > -_HORIZON_BLUR)
+        # What stays in a processor's cache is done in half the time, and needs no fresh memory at every step.
+        for begin in range(0, len(seen), _AT_A_TIME):
+            some = seen[begin : begin + _AT_A_TIME]
+            rays = flat[some]
+            share = _smooth_step(-_HORIZON_BLUR, 0.0, rays[:, 2])[:, None]
+            result[some] = share * self._above(rays, with_disc=with_disc) + (1 - share) * ground
         return result.reshape(directions.shape)
 
     def horizon_radiance(self, azimuths: int) -> Floats:

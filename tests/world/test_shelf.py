@@ -15,6 +15,7 @@ from gear.values.errors import TownError
 from gear.values.scene import Weather
 from gear.world import shelf
 from gear.world.shelf import ready_world
+from gear.world.trees import without_mesh_trees
 from gear.world.world import World
 
 SCENE = "truck"
@@ -50,9 +51,11 @@ def model_bytes(model: mujoco.MjModel) -> bytes:
 
 def test_a_world_of_the_shelf_is_the_one_that_is_built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     built, made = build_tiny_world(SCENE), take(tmp_path)
-    monkeypatch.setattr(shelf, "_compile_apart", never)
+    monkeypatch.setattr(shelf, "_compiled_apart", never)
+    with without_mesh_trees(built.model):
+        seen = model_bytes(built.model)
     for world in (made, take(tmp_path)):
-        assert model_bytes(world.model) == model_bytes(built.model)
+        assert model_bytes(world.model) == seen
         assert model_bytes(world.placement_model) == model_bytes(built.placement_model)
         assert world.slots == built.slots and world.surface_records(7) == built.surface_records(7)
         for name in ("label_code", "is_paint", "is_face"):
@@ -90,6 +93,16 @@ def test_a_world_with_a_mesh_from_afar_is_not_kept(tmp_path: Path, town: Path) -
     town.write_text(text.replace("<asset>", '<asset><mesh name="far" file="../../far.obj"/>', 1))
     assert take(tmp_path, town).model.mesh("far").id >= 0
     assert not worlds(tmp_path)
+
+
+def test_a_town_that_strips_paths_finds_its_meshes(tmp_path: Path, town: Path) -> None:
+    """They are referred to where they lie, by whole paths."""
+    (town.parent / "a & b.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    text = town.read_text()
+    assert text.count("<compiler ") == 1 and "<asset>" in text and "meshdir" not in text
+    text = text.replace("<compiler ", '<compiler strippath="true" ')
+    town.write_text(text.replace("<asset>", '<asset><mesh name="odd" file="a &amp; b.obj"/>', 1))
+    assert take(tmp_path, town).model.mesh("odd").id >= 0
 
 
 def test_half_a_world_is_made_anew(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from gear.values.scene import SceneRecord
 from gear.verbs.collect.job import Job
 from gear.verbs.collect.probes import ProbeShot, develop_probes, shoot_probes
 from gear.world.air import darkroom_of
-from gear.world.memory import forget_search_trees, forget_shown, map_large_buffers, release_memory
+from gear.world.memory import forget_shown, map_large_buffers, release_memory
 from gear.world.night import night_of
 from gear.world.planner import ScenePlanner
 from gear.world.shelf import ready_world
@@ -97,7 +97,6 @@ def open_session(job: Job) -> Iterator[Session]:
     with blamed(plugin, "rig"):
         rig = task.rig()
     world = ready_world(town=job.config.town, scene_name=job.config.scene, scene=job.scene, weather=job.weather)
-    forget_search_trees(world.model)
     night = night_of(world, job.weather, job.config.renderer)
     renderer = open_renderer(job.config.renderer, world.model, quality=job.config.quality)
     forget_shown(world.model)

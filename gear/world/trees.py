@@ -1,0 +1,58 @@
+"""Models without what rays find the triangles of meshes by: half of a town's, and no renderer looks at it."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+from collections.abc import Iterator
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+_TREES = ("bvh_aabb", "bvh_child", "bvh_depth", "bvh_nodeid")
+_NBVH, _NBVHSTATIC, _NBUFFER = 7, 8, 97
+"""Places of sizes in MuJoCo's `mjModel`, which begins with them; whether they are there is looked at each time."""
+
+_ALIGNMENT_BYTES = 64
+"""Arrays of a model begin at multiples of this."""
+
+
+@contextlib.contextmanager
+def without_mesh_trees(model: mujoco.MjModel) -> Iterator[None]:
+    """For a while a model has its bodies' trees alone; one that is saved then comes back so.
+
+    All its meshes share one box without a size in place of their trees, so that rays miss them. A model with
+    flexes stays as it is, and one that is laid out otherwise than in the version of MuJoCo that this was written for.
+    """
+    sizes, count = _sizes(model), int(np.max(model.body_bvhadr + model.body_bvhnum, initial=0))
+    if sizes is None or count >= model.nbvh or model.nflex or not model.nmesh:
+        yield
+        return
+    trees = [getattr(model, name) for name in _TREES]
+    kept = sizes.copy(), model.mesh_bvhadr.copy(), model.mesh_bvhnum.copy(), [tree[count].copy() for tree in trees]
+    for tree in trees:
+        tree[count] = -1 if tree.dtype == np.int32 else 0
+    model.mesh_bvhadr[:], model.mesh_bvhnum[:] = count, 1
+    sizes[_NBUFFER] -= sum(_padded(tree.nbytes) - _padded(tree[: count + 1].nbytes) for tree in trees)
+    sizes[[_NBVH, _NBVHSTATIC]] = count + 1
+    try:
+        yield
+    finally:
+        sizes[:], model.mesh_bvhadr[:], model.mesh_bvhnum[:] = kept[:3]
+        for tree, row in zip(trees, kept[3], strict=True):
+            tree[count] = row
+
+
+def _sizes(model: mujoco.MjModel) -> npt.NDArray[np.int64] | None:
+    """(98,) sizes of a model as they lie in memory, to be written to; None where they are not what they should be."""
+    address = getattr(model, "_address", None)
+    if address is None:
+        return None
+    sizes = np.ctypeslib.as_array((ctypes.c_int64 * (_NBUFFER + 1)).from_address(address))
+    known = {_NBVH: model.nbvh, _NBVHSTATIC: model.nbvhstatic, _NBUFFER: model.nbuffer}
+    return sizes if all(sizes[place] == value for place, value in known.items()) else None
+
+
+def _padded(size_bytes: int) -> int:
+    return -(-size_bytes // _ALIGNMENT_BYTES) * _ALIGNMENT_BYTES
