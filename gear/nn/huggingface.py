@@ -20,6 +20,7 @@ from gear.nn.huggingface_folder import in_one_line
 from gear.nn.huggingface_labels import match
 from gear.nn.huggingface_options import DepthFolderOptions, DetectorFolderOptions, FolderOptions
 from gear.nn.huggingface_processor_file import read_processor
+from gear.nn.label_maps import best_class
 from gear.nn.network import Network
 from gear.nn.semseg import CLASSES, LABEL_ID_OF_TRAIN_ID
 from gear.values.errors import GearError
@@ -48,6 +49,7 @@ class FolderNetwork(Network):
 
     options: FolderOptions
     unmatched: tuple[str, ...] = ()
+    has_quick_copy = False  # nobody knows what others' graphs do with a convolution's result besides
 
     def __init__(self, graph: nn.Module, options: FolderOptions) -> None:
         super().__init__(graph, options, views=(VIEW,))
@@ -135,7 +137,7 @@ class FolderSegmenter(FolderNetwork):
     def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
         """(H, W) uint8 label ids."""
         labels = np.array(LABEL_ID_OF_TRAIN_ID, dtype=np.uint8)
-        return [labels[logits.argmax(0).cpu().numpy()] for logits in outputs[LOGITS]]
+        return [labels[best_class(logits)] for logits in outputs[LOGITS]]
 
 
 class FolderDepth(FolderNetwork):

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import copy
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
 from gear.nn.options import NetworkOptions
+from gear.nn.quick import InStep, quick_copy
 from gear.nn.runtime import autocast, device_of, prepare
 from gear.values.frames import UInt8Image
+
+Run = Callable[[Mapping[str, Tensor]], Mapping[str, Tensor]]
 
 IMAGENET_MEAN = (0.485, 0.456, 0.406)
 IMAGENET_STD = (0.229, 0.224, 0.225)
@@ -25,7 +29,10 @@ class Network(nn.Module, ABC):
         graph: the network itself, under official key names.
         options: as given.
         device: where it runs.
+        has_quick_copy: whether `gear.nn.quick` may make a copy of the graph for predictions.
     """
+
+    has_quick_copy: ClassVar[bool] = True
 
     def __init__(self, graph: nn.Module, options: NetworkOptions, *, views: Sequence[str] = ("left",)) -> None:
         super().__init__()
@@ -34,6 +41,7 @@ class Network(nn.Module, ABC):
         self.options = options
         self.device = device_of(options.device)
         self._views = tuple(views)
+        self._quick: InStep[Network] = InStep()
         self.to(self.device)
         self.eval()
 
@@ -46,11 +54,15 @@ class Network(nn.Module, ABC):
 
         Inputs may lie on any device; what comes out lies on the network's, in float32.
         """
+        if targets is None:
+            return self._outputs(self.run, views)
+        return self.losses(self._outputs(self.run_for_losses, views), targets)
+
+    def _outputs(self, run: Run, views: Mapping[str, Tensor]) -> dict[str, Tensor]:
         pictures = {name: views[name].to(self.device) for name in self._views}
         with autocast(self.device, self.options.precision):
-            raw = self.run(pictures) if targets is None else self.run_for_losses(pictures)
-        outputs = {name: tensor.float() for name, tensor in raw.items()}
-        return outputs if targets is None else self.losses(outputs, targets)
+            raw = run(pictures)
+        return {name: tensor.float() for name, tensor in raw.items()}
 
     def taps(self) -> Mapping[str, nn.Module]:
         """Named feature maps; none unless a network says so."""
@@ -67,10 +79,32 @@ class Network(nn.Module, ABC):
         for size in dict.fromkeys(sizes):
             chosen = [index for index, other in enumerate(sizes) if other == size]
             with torch.inference_mode():
-                outputs = self(as_batch([samples[index] for index in chosen], self._views, self.device))
+                batch = as_batch([samples[index] for index in chosen], self._views, self.device)
+                quick = self.for_predictions(batch)
+                outputs = quick._outputs(quick.run_for_answers, batch)
                 for index, answer in zip(chosen, self.answers(outputs, size), strict=True):
                     answers[index] = answer
         return answers
+
+    def for_predictions(self, batch: Mapping[str, Tensor]) -> Network:
+        """What says the same to rounding, sooner: on a CPU this network with a quick copy of its graph.
+
+        Args:
+            batch: as for `forward`; a new copy sees the first of it.
+        """
+        if not self.has_quick_copy or self.device.type != "cpu":
+            return self
+        first = {name: pictures[:1] for name, pictures in batch.items()}
+        return (
+            self._quick.of(self.graph, lambda: self._with(quick_copy(self.graph, lambda g: self._with(g)(first))))
+            or self
+        )
+
+    def _with(self, graph: nn.Module) -> Network:
+        """This network on another graph; they share everything else."""
+        other = copy.copy(self)
+        other._modules = self._modules | {"graph": graph}
+        return other
 
     @abstractmethod
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
@@ -80,13 +114,18 @@ class Network(nn.Module, ABC):
         """What `losses` is given: the outputs, unless a network has heads that only training looks at."""
         return self.run(pictures)
 
+    def run_for_answers(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        """What `answers` is given for predictions: the outputs, unless a network answers sooner from something else."""
+        return self.run(pictures)
+
     @abstractmethod
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
         """Named numbers without dimensions, to be minimised in training."""
 
     @abstractmethod
     def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
-        """The task's predictions from the outputs of a batch of pictures of (height, width)."""
+        """The task's predictions from the outputs of a batch of pictures of (height, width), or from what
+        `run_for_answers` gives."""
 
 
 class Normalise(nn.Module):

@@ -6,17 +6,18 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
 from gear.formats.cityscapes import IGNORED_TRAIN_ID, LABELS
 from gear.losses.semantic import sampled_logits
+from gear.nn.label_maps import best_class, best_class_at
 from gear.nn.network import Network, Normalise
 from gear.nn.options import SegmentationOptions
 
 VIEW = "left"
 LOGITS = "logits"
+MAPS = "maps"
 AUXILIARY = "auxiliary"
 """Outputs of further heads, which only losses see, are `auxiliary_0`, `auxiliary_1`, ..."""
 
@@ -69,12 +70,24 @@ class SemsegNetwork(Network):
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """`logits`: (B, 19, H, W), by train id."""
-        return {LOGITS: self._maps(pictures[VIEW], auxiliary=False)[0]}
+        picture = pictures[VIEW]
+        return {LOGITS: self._resized(self._maps(picture, auxiliary=False)[0], picture.shape[2:])}
+
+    def run_for_answers(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        """On a CPU `maps`: the logits as the graph gives them, which are quicker to answer from."""
+        if self.device.type != "cpu":
+            return self.run(pictures)
+        return {MAPS: self._maps(pictures[VIEW], auxiliary=False)[0]}
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """The same, and `auxiliary_0` and so on of the same shape; while the graph is being trained, at the pixels of
         `gear.losses.semantic.sampled_logits` alone."""
-        main, *others = self._maps(pictures[VIEW], auxiliary=True, sampled=self.graph.training)
+        size_px, align = pictures[VIEW].shape[2:], bool(self.graph.align_corners)
+        maps = self._maps(pictures[VIEW], auxiliary=True)
+        if self.graph.training:
+            main, *others = (sampled_logits(m.float(), size_px, align_corners=align) for m in maps)
+        else:
+            main, *others = (self._resized(m, size_px) for m in maps)
         return {LOGITS: main} | {f"{AUXILIARY}_{index}": other for index, other in enumerate(others)}
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
@@ -83,34 +96,24 @@ class SemsegNetwork(Network):
 
     def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
         """(H, W) uint8 label ids of each picture."""
-        return [LABEL_IDS[best_class(logits).cpu().numpy()] for logits in outputs[LOGITS]]
+        if LOGITS in outputs:
+            return [LABEL_IDS[best_class(logits)] for logits in outputs[LOGITS]]
+        align = bool(self.graph.align_corners)
+        return [LABEL_IDS[best_class_at(maps, size_px, align_corners=align)] for maps in outputs[MAPS]]
 
-    def _maps(self, pictures: Tensor, *, auxiliary: bool, sampled: bool = False) -> list[Tensor]:
-        """The heads' logits at the picture's size, or at some of its pixels."""
+    def _maps(self, pictures: Tensor, *, auxiliary: bool) -> list[Tensor]:
+        """The heads' logits, smaller than the picture; class by class in memory, whichever way the graph has them."""
         size_px = pictures.shape[2:]
         inner_px = inner_size(size_px, self.input_scale)
         if inner_px != tuple(size_px):
             pictures = functional.interpolate(
                 pictures, size=inner_px, mode="bilinear", align_corners=False, antialias=True
             )
-        maps: list[Tensor] = self.graph(self.normalise(pictures), auxiliary=auxiliary)
+        return [maps.contiguous() for maps in self.graph(self.normalise(pictures), auxiliary=auxiliary)]
+
+    def _resized(self, maps: Tensor, size_px: Sequence[int]) -> Tensor:
         align = bool(self.graph.align_corners)
-        if sampled:
-            return [sampled_logits(m.float(), size_px, align_corners=align) for m in maps]
-        return [functional.interpolate(m.float(), size=size_px, mode="bilinear", align_corners=align) for m in maps]
-
-
-def best_class(logits: Tensor) -> Tensor:
-    """(H, W) uint8: where (C, H, W) logits are largest, the first of equals.
-
-    The same as `argmax(0)`, which reads memory across its order and takes five times as long on a CPU.
-    """
-    largest = logits[0].clone()
-    best = torch.zeros(logits.shape[1:], dtype=torch.uint8, device=logits.device)
-    for index in range(1, len(logits)):
-        best.masked_fill_(logits[index] > largest, index)
-        torch.maximum(largest, logits[index], out=largest)
-    return best
+        return functional.interpolate(maps.float(), size=tuple(size_px), mode="bilinear", align_corners=align)
 
 
 def inner_size(size_px: Sequence[int], scale: float) -> tuple[int, ...]:

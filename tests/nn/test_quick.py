@@ -1,0 +1,132 @@
+"""Copies for predictions: the same to rounding, in step with their network, and out of the way of whoever looks in."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor, nn
+
+from gear.nn.network import Network, as_batch
+from gear.nn.options import NetworkOptions
+from gear.nn.quick import quick_copy
+from gear.values.rng import derive_rng
+
+
+class Graph(nn.Module):
+    """A pair that can be folded, a convolution that two take from, and a normalisation of no convolution's."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.first, self.first_bn = nn.Conv2d(3, 4, 3, bias=False), nn.BatchNorm2d(4)
+        self.twice, self.twice_bn = nn.Conv2d(4, 4, 1), nn.BatchNorm2d(4)
+        self.alone = nn.BatchNorm2d(4)
+        for norm in (self.first_bn, self.twice_bn, self.alone):
+            nn.init.uniform_(norm.weight, 0.5, 2.0)
+            nn.init.uniform_(norm.running_mean, -1.0, 1.0)
+            nn.init.uniform_(norm.running_var, 0.5, 2.0)
+
+    def forward(self, pictures: Tensor) -> Tensor:
+        features = self.first_bn(self.first(pictures)).relu()
+        return self.alone(self.twice_bn(self.twice(self.twice(features))).relu())
+
+
+class Mean(Network):
+    def __init__(self) -> None:
+        with torch.random.fork_rng():
+            torch.manual_seed(3)
+            graph = Graph()
+        super().__init__(graph, NetworkOptions(device="cpu"))
+
+    def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        return {"features": self.graph(pictures["left"])}
+
+    def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
+        return {"mean": outputs["features"].mean()}
+
+    def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
+        return [features.mean(dim=(1, 2)).numpy() for features in outputs["features"]]
+
+
+VIEWS = {"left": derive_rng(1, "picture").integers(0, 256, (12, 16, 3), dtype=np.uint8)}
+
+
+def plainly(network: Network) -> Any:
+    with torch.no_grad():
+        return network(as_batch([VIEWS], ("left",)))["features"][0].mean(dim=(1, 2)).numpy()
+
+
+def folded(network: Network) -> int:
+    """Normalisations fewer than the graph has, in what predicts."""
+    quick = network.for_predictions(as_batch([VIEWS], ("left",)))
+    return sum(isinstance(m, nn.BatchNorm2d) for m in network.graph.modules()) - sum(
+        isinstance(m, nn.BatchNorm2d) for m in quick.graph.modules()
+    )
+
+
+def test_only_what_one_normalisation_takes_from_one_use_is_folded() -> None:
+    network = Mean()
+    before = copy.deepcopy(network.state_dict())
+    quick = quick_copy(network.graph, lambda graph: graph(torch.zeros(1, 3, 12, 16)))
+    kinds = {name: type(module) for name, module in quick.named_children()}
+    assert kinds["first_bn"] is nn.Identity and kinds["twice_bn"] is kinds["alone"] is nn.BatchNorm2d
+    assert quick.first.bias is not None and network.graph.first.bias is None
+    assert all(torch.equal(tensor, before[name]) for name, tensor in network.state_dict().items())
+    assert not any(module._forward_hooks for module in (*network.graph.modules(), *quick.modules()))
+
+
+def test_predictions_are_those_of_the_network() -> None:
+    network = Mean()
+    assert folded(network) == 1
+    assert network.predict(VIEWS) == pytest.approx(plainly(network), abs=1e-5)
+    assert network.state_dict().keys() == Mean().state_dict().keys(), "the copy is no part of the network"
+
+
+def test_a_copy_is_used_again_and_again() -> None:
+    network, batch = Mean(), as_batch([VIEWS], ("left",))
+    assert network.for_predictions(batch).graph is network.for_predictions(batch).graph
+    assert np.array_equal(network.predict(VIEWS), network.predict(VIEWS))
+
+
+@pytest.mark.parametrize("how", ["step", "load", "data", "buffer"])
+def test_other_weights_make_another_copy(how: str) -> None:
+    network = Mean()
+    first, weight = network.predict(VIEWS), network.graph.alone.weight
+    with torch.no_grad():
+        if how == "step":
+            weight.mul_(2)
+        elif how == "load":
+            network.load_state_dict({name: 2 * value for name, value in network.state_dict().items()})
+        elif how == "data":
+            weight.data = weight.data * 2
+        else:
+            network.graph.first_bn.running_mean.add_(1)
+    second = network.predict(VIEWS)
+    assert not np.allclose(first, second) and second == pytest.approx(plainly(network), abs=1e-4)
+
+
+def test_who_looks_into_the_graph_sees_it_at_work() -> None:
+    network = Mean()
+    network.predict(VIEWS)
+    seen: list[Tensor] = []
+    hook = network.graph.first_bn.register_forward_hook(lambda _module, _inputs, output: seen.append(output))
+    network.predict(VIEWS)
+    hook.remove()
+    assert len(seen) == 1 and folded(network) == 1
+
+
+def test_a_graph_in_training_has_no_copy() -> None:
+    network = Mean()
+    network.train()
+    assert folded(network) == 0
+
+
+def test_a_network_may_want_none() -> None:
+    class Wary(Mean):
+        has_quick_copy = False
+
+    assert folded(Wary()) == 0
