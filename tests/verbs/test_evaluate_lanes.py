@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -161,7 +160,3 @@ def test_lanes_share_the_threads_and_print_nothing_on_stdout(capsys: pytest.Capt
 
     with lanes(3) as submit:
         assert sorted(future.result() for future in [submit(share) for _ in range(3)]) == [1, 1, 2]
-    with lanes(1) as submit:
-        assert submit(threading.current_thread).result() is threading.main_thread()
-        with pytest.raises(SystemExit):
-            submit(sys.exit, 3)

@@ -7,9 +7,7 @@ import itertools
 import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any, TypeVar
-
-Result = TypeVar("Result")
+from typing import Any
 
 Submit = Callable[..., "Future[Any]"]
 """Takes a function and its arguments; gives what will come of it."""
@@ -31,13 +29,10 @@ def lanes_of(model: Any) -> int:
 
 @contextlib.contextmanager
 def lanes(count: int) -> Iterator[Submit]:
-    """Runs what is submitted: at once and here where there is one lane, else in threads that share torch's cores.
+    """Runs what is submitted in so many threads, which share torch's cores.
 
     What is printed meanwhile goes to stderr, as it does wherever a plugin works.
     """
-    if count == 1:
-        yield _at_once
-        return
     import torch
 
     threads = torch.get_num_threads()
@@ -57,9 +52,3 @@ def lanes(count: int) -> Iterator[Submit]:
                 raise
     finally:
         torch.set_num_threads(threads)
-
-
-def _at_once(job: Callable[..., Result], *arguments: Any) -> Future[Result]:
-    done: Future[Result] = Future()
-    done.set_result(job(*arguments))
-    return done

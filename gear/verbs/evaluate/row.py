@@ -12,7 +12,7 @@ from typing import Any
 from gear.dataset.reading import Dataset
 from gear.values.errors import DatasetError
 from gear.verbs.evaluate.lanes import lanes
-from gear.verbs.evaluate.player import Answer, Player
+from gear.verbs.evaluate.player import Player
 from gear.verbs.evaluate.scoring import Note, Scorer
 
 Told = Callable[[], None]
@@ -37,40 +37,63 @@ class Row:
 def evaluate_row(dataset: Dataset[Any], scorer: Scorer, player: Player, *, batch: int, workers: int, told: Told) -> Row:
     """Takes up what is kept and predicts the rest.
 
-    Pictures are decoded and predictions measured and written in threads, while the model works on a batch, or on one in
-    each of its lanes; what waits is bounded, so memory does not grow with the dataset.
+    Where a model may work in several lanes, each of them takes a batch from its files to its note: what changes hands
+    less is done sooner. Else pictures are decoded, and predictions measured and written, in threads beside the model.
+    What waits is bounded, so memory does not grow with the dataset.
     """
     desk = _Desk(2 * batch + workers, told)
     with ThreadPoolExecutor(workers) as readers, ThreadPoolExecutor(workers) as scorers:
         try:
             notes, damaged = _taken_up(scorer, scorers, desk)
             missing = [index for index in range(len(dataset)) if index not in notes]
-            count = min(player.lanes, -(-len(missing) // batch)) or 1
-
-            def play(indices: Sequence[int], samples: Sequence[Any]) -> dict[int, Future[Note]]:
-                answers: Sequence[Answer] = player.play([sample.images for sample in samples], indices)
-                return {
-                    index: desk.submit(scorers, scorer.first, index, sample, answer)
-                    for index, sample, answer in zip(indices, samples, answers, strict=True)
-                }
-
-            with lanes(count) as submit:
-                played: deque[Future[dict[int, Future[Note]]]] = deque()
-                scored: dict[int, Future[Note]] = {}
+            count = min(player.lanes, -(-len(missing) // batch))
+            scored: dict[int, Future[Note]] = {}
+            if count > 1:
+                notes |= _in_lanes(dataset, scorer, player, missing, batch, count, desk)
+            else:
                 for indices, samples in _batches(dataset, missing, readers, batch, workers):
-                    played.append(submit(play, indices, samples))
-                    if len(played) > count:
-                        scored |= played.popleft().result()
+                    answers = player.play([sample.images for sample in samples], indices)
+                    for index, sample, answer in zip(indices, samples, answers, strict=True):
+                        scored[index] = desk.submit(scorers, scorer.first, index, sample, answer)
                     desk.check()
-                for one in played:
-                    scored |= one.result()
-            notes |= {index: future.result() for index, future in scored.items()}
+                notes |= {index: future.result() for index, future in scored.items()}
         except BaseException:
             readers.shutdown(wait=False, cancel_futures=True)
             scorers.shutdown(wait=False, cancel_futures=True)
             raise
     desk.check()  # looked at again now that every callback has ended: that of the last sample may fail too
     return Row(notes=[notes[index] for index in range(len(dataset))], made=len(missing), damaged=tuple(damaged))
+
+
+def _in_lanes(
+    dataset: Dataset[Any],
+    scorer: Scorer,
+    player: Player,
+    missing: Sequence[int],
+    batch: int,
+    count: int,
+    desk: _Desk,
+) -> dict[int, Note]:
+    """Batches side by side, each whole in one thread."""
+
+    def whole(indices: Sequence[int]) -> dict[int, Note]:
+        samples = [dataset[index] for index in indices]
+        answers = player.play([sample.images for sample in samples], indices)
+        notes = {}
+        for index, sample, answer in zip(indices, samples, answers, strict=True):
+            notes[index] = scorer.first(index, sample, answer)
+            desk.tell()
+        return notes
+
+    notes: dict[int, Note] = {}
+    with lanes(count) as submit:
+        coming = deque(missing[begin : begin + batch] for begin in range(0, len(missing), batch))
+        played: deque[Future[dict[int, Note]]] = deque()
+        while coming or played:
+            while coming and len(played) <= count:
+                played.append(submit(whole, coming.popleft()))
+            notes |= played.popleft().result()
+    return notes
 
 
 class _Desk:
@@ -92,13 +115,17 @@ class _Desk:
         if self._failed:
             raise self._failed[0]
 
+    def tell(self) -> None:
+        """Another sample is whole."""
+        with self._one_tells:
+            self._told()
+
     def _tell(self, done: Future[Any]) -> None:
         self._waiting.release()
         error = None if done.cancelled() else done.exception()
         try:
             if not done.cancelled() and error is None and isinstance(done.result(), Note):
-                with self._one_tells:
-                    self._told()
+                self.tell()
         except BaseException as problem:  # futures keep what is raised here to themselves
             error = problem
         if error is not None:
