@@ -29,6 +29,7 @@ class DepthNetwork(Network):
 
     options: DepthOptions
     multiple_px: ClassVar[int] = 1
+    has_quick_copy = True
 
     def __init__(self, graph: nn.Module, options: DepthOptions, *, input_scale: float = 1.0) -> None:
         """Wraps a graph.

@@ -72,6 +72,7 @@ class Detector(Network):
     """A torchvision graph that gives COCO detections."""
 
     options: DetectorOptions
+    has_quick_copy = True
     generator: ClassVar[str] = "anchor_generator"
     """Where the graph keeps what makes its anchors."""
 

@@ -49,7 +49,6 @@ class FolderNetwork(Network):
 
     options: FolderOptions
     unmatched: tuple[str, ...] = ()
-    has_quick_copy = False  # nobody knows what others' graphs do with a convolution's result besides
 
     def __init__(self, graph: nn.Module, options: FolderOptions) -> None:
         super().__init__(graph, options, views=(VIEW,))

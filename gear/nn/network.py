@@ -29,10 +29,11 @@ class Network(nn.Module, ABC):
         graph: the network itself, under official key names.
         options: as given.
         device: where it runs.
-        has_quick_copy: whether `gear.nn.quick` may make a copy of the graph for predictions.
+        has_quick_copy: whether predictions on a CPU come from a copy of the graph that `gear.nn.quick` makes. Only for
+            graphs in which nothing but its normalisation takes what a convolution gives.
     """
 
-    has_quick_copy: ClassVar[bool] = True
+    has_quick_copy: ClassVar[bool] = False
 
     def __init__(self, graph: nn.Module, options: NetworkOptions, *, views: Sequence[str] = ("left",)) -> None:
         super().__init__()

@@ -47,6 +47,8 @@ class SemsegNetwork(Network):
         input_scale: share of the picture's size.
     """
 
+    has_quick_copy = True
+
     def __init__(
         self, graph: nn.Module, options: SegmentationOptions, losses: Losses, *, input_scale: float = 1.0
     ) -> None:

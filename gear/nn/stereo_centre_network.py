@@ -24,6 +24,7 @@ class StereoCentreNetwork(Network):
 
     graph: StereoCentre
     options: StereoCentreOptions
+    has_quick_copy = True
 
     def __init__(self, options: StereoCentreOptions) -> None:
         graph = build_graph(lambda: StereoCentre(StereoCentreShape(width=options.width)), options, NAME)

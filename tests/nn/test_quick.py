@@ -14,7 +14,9 @@ from torch import Tensor, nn
 from gear.nn.network import Network, as_batch
 from gear.nn.options import NetworkOptions
 from gear.nn.quick import quick_copy
+from gear.plugins.build import build
 from gear.values.rng import derive_rng
+from gear.verbs.evaluate.choice import chosen_model
 
 
 class Graph(nn.Module):
@@ -36,6 +38,8 @@ class Graph(nn.Module):
 
 
 class Mean(Network):
+    has_quick_copy = True
+
     def __init__(self) -> None:
         with torch.random.fork_rng():
             torch.manual_seed(3)
@@ -130,3 +134,42 @@ def test_a_network_may_want_none() -> None:
         has_quick_copy = False
 
     assert folded(Wary()) == 0
+
+
+OURS = (
+    "adabins",
+    "bisenet_x39",
+    "ddrnet23_slim",
+    "ddrnet23_slim_depth",
+    "fasterrcnn_r50_fpn",
+    "glpdepth",
+    "glpn_b0",
+    "retinanet_r18_fpn",
+    "retinanet_r50_fpn",
+    "stereo_centre",
+)
+
+
+@pytest.mark.parametrize("name", OURS)
+def test_networks_of_gears_say_the_same_with_and_without(name: str) -> None:
+    """Of their graphs it holds that nothing but its normalisation takes what a convolution gives."""
+    chosen = chosen_model(name, ["weights=none", "seed=2", "device=cpu"])
+    network = build(chosen.found, chosen.options)
+    assert isinstance(network, Network)
+    generator = torch.Generator().manual_seed(5)
+    for module in network.graph.modules():
+        if isinstance(module, nn.BatchNorm2d) and module.running_mean is not None:
+            shape = module.running_mean.shape
+            module.running_mean.copy_(0.1 * torch.randn(shape, generator=generator))
+            module.weight.data.copy_(0.8 + 0.4 * torch.rand(shape, generator=generator))
+    pictures = {view: derive_rng(4, view).integers(0, 256, (96, 160, 3), dtype=np.uint8) for view in ("left", "right")}
+    batch = as_batch([pictures], network._views)
+    with torch.inference_mode():
+        quick = network.for_predictions(batch)
+        assert quick.graph is not network.graph
+        theirs, ours = quick(batch), network(batch)
+    dense = {key for key in ours if not key.startswith(("proposals", "class_logits", "box_regression"))}
+    assert dense, "regions of a second stage are chosen, and come in another order where two are as good"
+    for key in dense:
+        scale = float(ours[key].abs().max()) + 1e-6
+        assert float((theirs[key] - ours[key]).abs().max()) < 1e-4 * scale, key
