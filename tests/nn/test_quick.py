@@ -137,15 +137,15 @@ def test_a_network_may_want_none() -> None:
 
 
 OURS = (
-    "adabins",
+    pytest.param("adabins", marks=pytest.mark.slow),
     "bisenet_x39",
     "ddrnet23_slim",
     "ddrnet23_slim_depth",
-    "fasterrcnn_r50_fpn",
+    pytest.param("fasterrcnn_r50_fpn", marks=pytest.mark.slow),
     "glpdepth",
     "glpn_b0",
     "retinanet_r18_fpn",
-    "retinanet_r50_fpn",
+    pytest.param("retinanet_r50_fpn", marks=pytest.mark.slow),
     "stereo_centre",
 )
 
