@@ -31,6 +31,10 @@ class InStep(Generic[Made]):
         self._held: list[Tensor] = []
         self._made: Made | None = None
 
+    def __reduce__(self) -> tuple[type[InStep[Made]], tuple[()]]:
+        """A deep copy of a network, or one that is saved, makes its own."""
+        return type(self), ()
+
     def of(self, graph: nn.Module, make: Callable[[], Made]) -> Made | None:
         """What was made last, or made anew where the graph has changed since.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import pickle
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -111,6 +112,18 @@ def test_other_weights_make_another_copy(how: str) -> None:
             network.graph.first_bn.running_mean.add_(1)
     second = network.predict(VIEWS)
     assert not np.allclose(first, second) and second == pytest.approx(plainly(network), abs=1e-4)
+
+
+def test_a_copied_network_makes_its_own_copy() -> None:
+    network = Mean()
+    first = network.predict(VIEWS)
+    other = copy.deepcopy(network)
+    assert np.array_equal(other.predict(VIEWS), first)
+    with torch.no_grad():
+        other.graph.alone.weight.mul_(2)
+    assert not np.allclose(other.predict(VIEWS), first) and np.array_equal(network.predict(VIEWS), first)
+    saved = len(pickle.dumps(Mean().graph))
+    assert len(pickle.dumps(network.graph)) == saved and len(pickle.dumps(network._quick)) < 200
 
 
 def test_who_looks_into_the_graph_sees_it_at_work() -> None:
