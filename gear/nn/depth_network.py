@@ -75,4 +75,5 @@ def resized(maps: Tensor, height: int, width: int) -> Tensor:
     """(B, C, H, W) at another size: bilinear, averaging where it becomes smaller. The same tensor at the same size."""
     if tuple(maps.shape[2:]) == (height, width):
         return maps
-    return functional.interpolate(maps, (height, width), mode="bilinear", align_corners=False, antialias=True)
+    is_less = height < maps.shape[2] or width < maps.shape[3]  # elsewhere there is nothing to average, only more to do
+    return functional.interpolate(maps, (height, width), mode="bilinear", align_corners=False, antialias=is_less)
