@@ -1,4 +1,4 @@
-"""Networks for predictions alone: the same numbers to rounding, a fifth to a third sooner on a CPU.
+"""Networks for predictions alone: the same numbers to rounding, a tenth to a quarter sooner on a CPU.
 
 Batch normalisations that have come to rest are folded into the convolutions before them, and memory lies channels
 last, as oneDNN's convolutions want it. Neither is for gradients: training needs the normalisations, and torch's CPU
