@@ -52,7 +52,7 @@ def main() -> None:
     parser.add_argument("--set", action="append", default=[], dest="settings")
     parser.add_argument("--defense")
     parser.add_argument("--samples", type=int, default=16)
-    parser.add_argument("--batch", type=int, default=1)
+    parser.add_argument("--batch", type=int, help="of all; else 1, and what is usual for evaluate")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--rounds", type=int, default=5)
     args = parser.parse_args()
@@ -62,9 +62,10 @@ def main() -> None:
     model = chosen_model(args.model, args.settings)
     player = Player(model, chosen_defense(args.defense, ()) if args.defense else None)
     pictures = [sample.images for sample in dataset[:]]
-    groups = [range(i, min(i + args.batch, len(pictures))) for i in range(0, len(pictures), args.batch)]
+    step, batch = args.batch or 1, args.batch or player.usual_batch(dataset)
+    groups = [range(i, min(i + step, len(pictures))) for i in range(0, len(pictures), step)]
     player.play([pictures[i] for i in groups[0]], groups[0])
-    print(f"{os.cpu_count()} cores, {len(pictures)} samples of {pictures[0]['left'].shape}")
+    print(f"{os.cpu_count()} cores, {len(pictures)} samples of {pictures[0]['left'].shape}, {batch} at a time")
     spent: dict[str, list[float]] = {"bare": [], "predict": [], "evaluate": []}
     batches = [as_batch([pictures[i] for i in group], tuple(pictures[0])) for group in groups]
     for _ in range(args.rounds):
@@ -80,9 +81,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             scorer = Scorer(dataset, Path(folder), "row", (), model.found)
             begun = time.perf_counter()
-            notes = evaluate_row(
-                dataset, scorer, player, batch=args.batch, workers=args.workers, told=lambda: None
-            ).notes
+            notes = evaluate_row(dataset, scorer, player, batch=batch, workers=args.workers, told=lambda: None).notes
             scorer.finish(notes)
             spent["evaluate"].append((time.perf_counter() - begun) / len(pictures))
         print(", ".join(f"{name} {seconds[-1]:.3f} s" for name, seconds in spent.items()), flush=True)

@@ -49,7 +49,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="further figures: reference (what a shipped network is held to), outside_patch; repeatable",
     )
     parser.add_argument("--out", metavar="DIR", help="folder for the results (evaluations/<task>/<model>[+<defense>])")
-    parser.add_argument("--batch", type=positive, default=1, metavar="N", help="samples through the model together (1)")
+    parser.add_argument(
+        "--batch", type=positive, metavar="N", help="samples through the model together (1 to 4, by size)"
+    )
     parser.add_argument("--workers", type=positive, default=2, metavar="N", help="threads that read and measure (2)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the defense's draws and the bootstrap (0)")
     parser.add_argument("--resamples", type=int, default=1000, metavar="N", help="of the bootstrap; 0 for none (1000)")

@@ -87,11 +87,63 @@ def test_a_network_that_fails_stops_the_run_and_it_is_taken_up_again(
     with monkeypatch.context() as patched:
         patched.setattr(Network, "predict_many", failing)
         with pytest.raises(RuntimeError, match="out of luck"):  # our own networks keep their traceback
-            evaluate(pictures, model=NAME, settings=SETTINGS, out=tmp_path, resamples=0)
+            evaluate(pictures, model=NAME, settings=SETTINGS, out=tmp_path, resamples=0, batch=1)
     assert torch.get_num_threads() == 2
-    (row,) = evaluate(pictures, model=NAME, settings=SETTINGS, out=tmp_path, resamples=0).rows
+    (row,) = evaluate(pictures, model=NAME, settings=SETTINGS, out=tmp_path, resamples=0, batch=1).rows
     assert row.samples == 5 and 1 <= row.made < 5
     assert len(files(tmp_path)) == 5
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_batches_are_the_same_samples_after_an_interruption(
+    tmp_path: Path, pictures: Path, monkeypatch: pytest.MonkeyPatch, threads: int
+) -> None:
+    """Networks round a batch otherwise than one sample: what is finished goes through again beside what is not."""
+    torch.set_num_threads(threads)
+    predict, sizes = Network.predict_many, list[int]()
+
+    def watched(network: Any, samples: Any) -> Any:
+        sizes.append(len(samples))
+        return predict(network, samples)
+
+    monkeypatch.setattr(Network, "predict_many", watched)
+    evaluate(pictures, model=NAME, settings=SETTINGS, out=tmp_path / "whole", resamples=0, batch=2)
+    assert sorted(sizes) == [1, 2, 2]
+    sizes.clear()
+    out = tmp_path / "again"
+    evaluate(pictures, model=NAME, settings=SETTINGS, out=out, resamples=0, batch=2)
+    before = files(out)
+    for note in out.rglob("samples/00000[03].json"):
+        note.unlink()
+    for name in before:
+        if name.endswith(("0.png", "3.png")):
+            (out / name).unlink()
+    sizes.clear()
+    (row,) = evaluate(pictures, model=NAME, settings=SETTINGS, out=out, resamples=0, batch=2).rows
+    assert row.made == 2 and sizes == [2, 2]
+    assert files(out) == before == files(tmp_path / "whole")
+
+
+def test_small_pictures_go_together_unless_somebody_says(
+    tmp_path: Path, pictures: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    torch.set_num_threads(1)
+    predict, sizes = Network.predict_many, list[int]()
+
+    def watched(network: Any, samples: Any) -> Any:
+        sizes.append(len(samples))
+        return predict(network, samples)
+
+    monkeypatch.setattr(Network, "predict_many", watched)
+    evaluate(pictures, model=NAME, settings=SETTINGS, out=tmp_path / "usual", resamples=0)
+    assert sizes == [player.MOST_TOGETHER, 1]
+    monkeypatch.setattr(player, "SMALL_PX", 1)
+    sizes.clear()
+    evaluate(pictures, model=NAME, settings=SETTINGS, out=tmp_path / "large", resamples=0)
+    assert sizes == [1] * 5
+    sizes.clear()
+    evaluate(pictures, model=NAME, settings=SETTINGS, out=tmp_path / "defended", defense="jpeg", resamples=0)
+    assert sizes == [1] * 5
 
 
 class Still(Network):

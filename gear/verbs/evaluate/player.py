@@ -30,6 +30,9 @@ from gear.verbs.evaluate.lanes import lanes_of
 
 Views = Mapping[str, UInt8Image]
 
+SMALL_PX, MOST_TOGETHER = 1_400_000, 4
+"""More pixels at a time make no network of ours quicker on a CPU, and several slower."""
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Answer:
@@ -85,8 +88,8 @@ class Player:
             self._guard, self.model = self._guarded(defense, bare, clean, patched)
         many = getattr(self.model, "predict_many", None)
         self._many = many if callable(many) else None
-        is_ours = model.found.owner.package == DISTRIBUTION
-        self.lanes = lanes_of(bare) if is_ours and defense is None else 1
+        self._is_ours = model.found.owner.package == DISTRIBUTION and defense is None
+        self.lanes = lanes_of(bare) if self._is_ours else 1
         self._at_work, self._counting = 0, threading.Lock()
 
     def _guarded(
@@ -104,6 +107,16 @@ class Player:
         with blamed(found, "wrap"):
             wrapped: Model = product.wrap(bare)
         return Guard(found, product, bare if spec.needs_model or spec.taps else None, state), wrapped
+
+    def usual_batch(self, dataset: Dataset[Any]) -> int:
+        """How many of a dataset's samples go through one of gear's own models together unless somebody says: as many
+        small ones as make `SMALL_PX`, at most `MOST_TOGETHER`. Third parties' models and defended ones take one.
+        """
+        if not self._is_ours or self._many is None or not len(dataset):
+            return 1
+        cameras = [camera for camera in dataset.sidecar(0).record.cameras if camera.name in self._views]
+        pixels = sum(camera.width_px * camera.height_px for camera in cameras)
+        return max(1, min(MOST_TOGETHER, SMALL_PX // max(pixels, 1)))
 
     def play(self, pictures: Sequence[Views], indices: Sequence[int]) -> list[Answer]:
         """Cleans and predicts a batch of samples, of which each has its number in the split.

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence, Set
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -37,24 +38,28 @@ class Row:
 def evaluate_row(dataset: Dataset[Any], scorer: Scorer, player: Player, *, batch: int, workers: int, told: Told) -> Row:
     """Takes up what is kept and predicts the rest.
 
-    Where a model may work in several lanes, each of them takes a batch from its files to its note: what changes hands
-    less is done sooner. Else pictures are decoded, and predictions measured and written, in threads beside the model.
-    What waits is bounded, so memory does not grow with the dataset.
+    Batches are always the same samples, those that are finished already among them: networks round a batch otherwise
+    than one sample, and a run that was interrupted is to end with the same bytes. Where a model may work in several
+    lanes, each of them takes a batch from its files to its note: what changes hands less is done sooner. Else pictures
+    are decoded, and predictions measured and written, in threads beside the model. What waits is bounded, so memory
+    does not grow with the dataset.
     """
     desk = _Desk(2 * batch + workers, told)
     with ThreadPoolExecutor(workers) as readers, ThreadPoolExecutor(workers) as scorers:
         try:
             notes, damaged = _taken_up(scorer, scorers, desk)
             missing = [index for index in range(len(dataset)) if index not in notes]
-            count = min(player.lanes, -(-len(missing) // batch))
+            blocks = _blocks(len(dataset), batch, missing)
+            count = min(player.lanes, len(blocks))
             scored: dict[int, Future[Note]] = {}
             if count > 1:
-                notes |= _in_lanes(dataset, scorer, player, missing, batch, count, desk)
+                notes |= _in_lanes(dataset, scorer, player, blocks, set(missing), count, desk)
             else:
-                for indices, samples in _batches(dataset, missing, readers, batch, workers):
+                for indices, samples in _batches(dataset, blocks, readers, workers):
                     answers = player.play([sample.images for sample in samples], indices)
                     for index, sample, answer in zip(indices, samples, answers, strict=True):
-                        scored[index] = desk.submit(scorers, scorer.first, index, sample, answer)
+                        if index not in notes:
+                            scored[index] = desk.submit(scorers, scorer.first, index, sample, answer)
                     desk.check()
                 notes |= {index: future.result() for index, future in scored.items()}
         except BaseException:
@@ -65,12 +70,18 @@ def evaluate_row(dataset: Dataset[Any], scorer: Scorer, player: Player, *, batch
     return Row(notes=[notes[index] for index in range(len(dataset))], made=len(missing), damaged=tuple(damaged))
 
 
+def _blocks(samples: int, batch: int, missing: Sequence[int]) -> list[range]:
+    """The batches of a split in which something is missing."""
+    numbers = sorted({index // batch for index in missing})
+    return [range(number * batch, min((number + 1) * batch, samples)) for number in numbers]
+
+
 def _in_lanes(
     dataset: Dataset[Any],
     scorer: Scorer,
     player: Player,
-    missing: Sequence[int],
-    batch: int,
+    blocks: Sequence[range],
+    missing: Set[int],
     count: int,
     desk: _Desk,
 ) -> dict[int, Note]:
@@ -81,13 +92,14 @@ def _in_lanes(
         answers = player.play([sample.images for sample in samples], indices)
         notes = {}
         for index, sample, answer in zip(indices, samples, answers, strict=True):
-            notes[index] = scorer.first(index, sample, answer)
-            desk.tell()
+            if index in missing:
+                notes[index] = scorer.first(index, sample, answer)
+                desk.tell()
         return notes
 
     notes: dict[int, Note] = {}
     with lanes(count) as submit:
-        coming = deque(missing[begin : begin + batch] for begin in range(0, len(missing), batch))
+        coming = deque(blocks)
         played: deque[Future[dict[int, Note]]] = deque()
         while coming or played:
             while coming and len(played) <= count:
@@ -150,19 +162,19 @@ def _taken_up(scorer: Scorer, scorers: ThreadPoolExecutor, desk: _Desk) -> tuple
 
 
 def _batches(
-    dataset: Dataset[Any], indices: Sequence[int], readers: ThreadPoolExecutor, batch: int, ahead: int
-) -> Iterator[tuple[list[int], list[Any]]]:
+    dataset: Dataset[Any], blocks: Sequence[range], readers: ThreadPoolExecutor, ahead: int
+) -> Iterator[tuple[range, list[Any]]]:
     """Batches of samples in order, the next one being read while this one is worked on."""
-    coming = iter(indices)
-    queue: deque[tuple[int, Future[Any]]] = deque()
+    coming = (index for block in blocks for index in block)
+    queue: deque[Future[Any]] = deque()
 
     def read_on(count: int) -> None:
-        for _, index in zip(range(count), coming, strict=False):
-            queue.append((index, readers.submit(dataset.__getitem__, index)))
+        for index in itertools.islice(coming, count):
+            queue.append(readers.submit(dataset.__getitem__, index))
 
-    read_on(batch + max(batch, ahead))
-    while queue:
-        chosen = [queue.popleft() for _ in range(min(batch, len(queue)))]
-        samples = [future.result() for _, future in chosen]
-        read_on(len(chosen))
-        yield [index for index, _ in chosen], samples
+    most = max(map(len, blocks), default=0)
+    read_on(most + max(most, ahead))
+    for block in blocks:
+        samples = [queue.popleft().result() for _ in block]
+        read_on(len(block))
+        yield block, samples

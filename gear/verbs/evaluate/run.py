@@ -49,7 +49,7 @@ def evaluate(
     calibration_patched: str | Path | None = None,
     reports: Sequence[str] = (),
     out: str | Path | None = None,
-    batch: int = 1,
+    batch: int | None = None,
     workers: int = 2,
     seed: int = 0,
     resamples: int = 1000,
@@ -74,7 +74,7 @@ def evaluate(
         reports: further metrics: the task's own (`reference`), or `outside_patch`, the ground truth on the patch and 5
             px around it left out.
         out: folder for everything; `evaluations/<task>/<model>[+<defense>]` by default.
-        batch: samples that go through the model together.
+        batch: samples that go through the model together; one, or up to four small ones for gear's own, unless given.
         workers: threads that read, and threads that measure and write, beside the model.
         seed: of the defense's draws and of the bootstrap.
         resamples: of the bootstrap; 0 for no intervals.
@@ -83,7 +83,7 @@ def evaluate(
     Raises:
         GearError: anything that the user can put right; its text is one line.
     """
-    if min(batch, workers) < 1 or resamples < 0:
+    if min(1 if batch is None else batch, workers) < 1 or resamples < 0:
         raise GearError(
             f"batch and workers must be at least 1, resamples at least 0; got {batch}, {workers}, {resamples}"
         )
@@ -115,7 +115,8 @@ def evaluate(
     rows = []
     for dataset, name in zip(datasets, names, strict=True):
         scorer = Scorer(dataset, root, name, tuple(reports), chosen.found)
-        row = evaluate_row(dataset, scorer, player, batch=batch, workers=workers, told=told)
+        size = batch or player.usual_batch(dataset)
+        row = evaluate_row(dataset, scorer, player, batch=size, workers=workers, told=told)
         scorer.finish(row.notes)
         rows.append(
             Measured(name=name, dataset=dataset, scorer=scorer, notes=row.notes, made=row.made, damaged=row.damaged)
