@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import sys
 import types
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from gear.contracts.hookspecs import hookimpl
-from gear.contracts.specs import AttackSpec, ModelSpec
+from gear.contracts.specs import AttackSpec, DefenseSpec, ModelSpec
 from gear.plugins import build as building
 from gear.plugins.manager import discover
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_depth, tiny_segmenter
@@ -36,7 +36,7 @@ other_segmenter = ModelSpec(
 )
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def collect_small() -> Callable[..., CollectReport]:
     """`gear.collect` of small pictures of the tiny town, with the classic renderer unless asked otherwise."""
 
@@ -51,24 +51,28 @@ def collect_small() -> Callable[..., CollectReport]:
     return run
 
 
+def put_package(monkeypatch: pytest.MonkeyPatch, specs: Sequence[Any]) -> None:
+    """Installs plugins as a third party's package, in place of one that was put before."""
+    module = types.ModuleType("odd_package")
+    for hook, kind in (("gear_models", ModelSpec), ("gear_attacks", AttackSpec), ("gear_defenses", DefenseSpec)):
+        chosen = [spec for spec in specs if isinstance(spec, kind)]
+        setattr(module, hook, hookimpl(lambda chosen=chosen: chosen, specname=hook))
+    monkeypatch.setitem(sys.modules, "odd_package", module)
+    found = discover([EntryPoint(name="odd", value="odd_package", group="gear")])
+    monkeypatch.setattr(building, "catalogue", lambda: found)
+
+
 @pytest.fixture
-def install(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
+def install(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     def put(*specs: Any) -> None:
-        module = types.ModuleType("odd_attacks")
-        for hook, kind in (("gear_models", ModelSpec), ("gear_attacks", AttackSpec)):
-            chosen = [spec for spec in specs if isinstance(spec, kind)]
-            setattr(module, hook, hookimpl(lambda chosen=chosen: chosen, specname=hook))
-        sys.modules["odd_attacks"] = module
-        found = discover([EntryPoint(name="odd", value="odd_attacks", group="gear")])
-        monkeypatch.setattr(building, "catalogue", lambda: found)
+        put_package(monkeypatch, specs)
 
     put(tiny_segmenter, tiny_depth, other_segmenter)
-    yield put
-    sys.modules.pop("odd_attacks", None)
+    return put
 
 
 @pytest.fixture(scope="module")
-def small(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+def small(tmp_path_factory: pytest.TempPathFactory, collect_small: Callable[..., CollectReport]) -> Callable[..., Path]:
     """Datasets with probes, which tests share and only read."""
     made: dict[tuple[Any, ...], Path] = {}
 
@@ -78,10 +82,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
         key = (task, scene, split, probes, seed)
         if key not in made:
             made[key] = tmp_path_factory.mktemp("data") / f"{task}-{scene}-{split}-{seed}"
-            collect(
-                task, town=TINY_TOWN, scene=scene, split=split, samples=2, renderer="classic", quality="fast",
-                probes=probes, seed=seed, out=made[key], settings=[f"scenes={TINY_SCENES}", *size_settings(task)],
-            )  # fmt: skip
+            collect_small(task, made[key], scene=scene, split=split, probes=probes, seed=seed)
         return made[key]
 
     return root

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-import types
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +16,12 @@ import pytest
 import gear
 from gear.cli.main import main
 from gear.contracts.defenses import DefenseResult
-from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import DefenseSpec
-from gear.plugins import build as building
 from gear.plugins.defenses.jpeg import Jpeg, JpegConfig
-from gear.plugins.manager import discover
 from gear.values.errors import ConfigError, DatasetError, GearError, PluginError, UnknownNameError
 from gear.verbs.collect.run import CollectReport
 from gear.verbs.defend import defend
+from tests.verbs.conftest import put_package
 
 Collect = Callable[..., CollectReport]
 
@@ -56,17 +52,12 @@ class Odd:
 
 
 @pytest.fixture
-def stranger(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
+def stranger(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     def install(answer: Callable[..., Any], **facts: Any) -> None:
-        module = types.ModuleType("odd_package")
         spec = DefenseSpec(name="odd", summary="Odd.", config=Config, build=lambda _: Odd(answer), **facts)  # type: ignore[arg-type]
-        module.gear_defenses = hookimpl(lambda: [spec], specname="gear_defenses")  # type: ignore[attr-defined]
-        sys.modules["odd_package"] = module
-        found = discover([EntryPoint(name="odd", value="odd_package", group="gear")])
-        monkeypatch.setattr(building, "catalogue", lambda: found)
+        put_package(monkeypatch, [spec])
 
-    yield install
-    sys.modules.pop("odd_package", None)
+    return install
 
 
 def test_pictures_keep_their_paths_and_are_what_the_defense_makes(stereo: Path, tmp_path: Path) -> None:

@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 import hashlib
-import sys
-import types
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import gear
-from gear.contracts.hookspecs import hookimpl
-from gear.contracts.specs import DefenseSpec, ModelSpec
-from gear.plugins import build as building
-from gear.plugins.manager import discover
-from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
+from gear.contracts.specs import ModelSpec
 from gear.values.frames import UInt8Image
-from gear.verbs.collect.run import collect
-from tests.verbs.conftest import size_settings
+from gear.verbs.collect.run import CollectReport
+from tests.verbs.conftest import put_package
 
 Small = Callable[..., Path]
 Install = Callable[..., None]
@@ -63,22 +56,12 @@ def model_spec(build: Callable[[Any], Any], task: str, **facts: Any) -> ModelSpe
 
 
 @pytest.fixture
-def install(monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
-    def put(*specs: Any) -> None:
-        module = types.ModuleType("odd_package")
-        for hook, kind in (("gear_models", ModelSpec), ("gear_defenses", DefenseSpec)):
-            chosen = [spec for spec in specs if isinstance(spec, kind)]
-            setattr(module, hook, hookimpl(lambda chosen=chosen: chosen, specname=hook))
-        sys.modules["odd_package"] = module
-        found = discover([EntryPoint(name="odd", value="odd_package", group="gear")])
-        monkeypatch.setattr(building, "catalogue", lambda: found)
-
-    yield put
-    sys.modules.pop("odd_package", None)
+def install(monkeypatch: pytest.MonkeyPatch) -> Install:
+    return lambda *specs: put_package(monkeypatch, specs)
 
 
 @pytest.fixture(scope="module")
-def small(tmp_path_factory: pytest.TempPathFactory) -> Small:
+def small(tmp_path_factory: pytest.TempPathFactory, collect_small: Callable[..., CollectReport]) -> Small:
     """Datasets that tests share and only read; the folder's name is the patch."""
     made: dict[tuple[str, str, int], Path] = {}
 
@@ -86,11 +69,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Small:
         key = (task, patch, samples)
         if key not in made:
             made[key] = tmp_path_factory.mktemp(task) / patch
-            settings = [f"scenes={TINY_SCENES}", *size_settings(task)]
-            collect(
-                task, town=TINY_TOWN, scene="board", split="debug", samples=samples, renderer="classic",
-                quality="fast", patch=patch, out=made[key], settings=settings,
-            )  # fmt: skip
+            collect_small(task, made[key], samples=samples, patch=patch)
         return made[key]
 
     return root
