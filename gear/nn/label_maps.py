@@ -1,6 +1,6 @@
 """The best class of every pixel of a picture, from a network's smaller maps, without logits of the picture's size.
 
-Those have 160 MB at 2048x1024: writing and reading them took longer than a fifth of a light network. Band by band they
+Those have 160 MB at 2048x1024: writing and reading them was two fifths of a light network's work. Band by band they
 stay in a processor's cache, and come out as `torch.nn.functional.interpolate` has them.
 """
 

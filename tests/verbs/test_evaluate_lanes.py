@@ -38,6 +38,19 @@ def pictures(data: Path, collect_small: Callable[..., CollectReport]) -> Path:
     return data
 
 
+@pytest.fixture
+def sizes(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """How many samples went through a network together, each time."""
+    predict, seen = Network.predict_many, list[int]()
+
+    def watched(network: Any, samples: Any) -> Any:
+        seen.append(len(samples))
+        return predict(network, samples)
+
+    monkeypatch.setattr(Network, "predict_many", watched)
+    return seen
+
+
 def files(out: Path) -> dict[str, bytes]:
     return {str(path.relative_to(out)): path.read_bytes() for path in sorted(out.rglob("predictions/**/*.png"))}
 
@@ -96,17 +109,10 @@ def test_a_network_that_fails_stops_the_run_and_it_is_taken_up_again(
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_batches_are_the_same_samples_after_an_interruption(
-    tmp_path: Path, pictures: Path, monkeypatch: pytest.MonkeyPatch, threads: int
+    tmp_path: Path, pictures: Path, sizes: list[int], threads: int
 ) -> None:
     """Networks round a batch otherwise than one sample: what is finished goes through again beside what is not."""
     torch.set_num_threads(threads)
-    predict, sizes = Network.predict_many, list[int]()
-
-    def watched(network: Any, samples: Any) -> Any:
-        sizes.append(len(samples))
-        return predict(network, samples)
-
-    monkeypatch.setattr(Network, "predict_many", watched)
     evaluate(pictures, model=NAME, settings=SETTINGS, out=tmp_path / "whole", resamples=0, batch=2)
     assert sorted(sizes) == [1, 2, 2]
     sizes.clear()
@@ -124,17 +130,28 @@ def test_batches_are_the_same_samples_after_an_interruption(
     assert files(out) == before == files(tmp_path / "whole")
 
 
-def test_small_pictures_go_together_unless_somebody_says(
+def test_what_is_left_runs_on_as_many_threads_as_the_whole(
     tmp_path: Path, pictures: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    torch.set_num_threads(1)
-    predict, sizes = Network.predict_many, list[int]()
+    """Networks round otherwise on several threads than on one."""
+    torch.set_num_threads(2)
+    evaluate(pictures, model=NAME, settings=SETTINGS, out=tmp_path, resamples=0, batch=1)
+    next(tmp_path.rglob("samples/000003.json")).unlink()
+    predict, seen = Network.predict_many, list[int]()
 
     def watched(network: Any, samples: Any) -> Any:
-        sizes.append(len(samples))
+        seen.append(torch.get_num_threads())
         return predict(network, samples)
 
     monkeypatch.setattr(Network, "predict_many", watched)
+    evaluate(pictures, model=NAME, settings=SETTINGS, out=tmp_path, resamples=0, batch=1)
+    assert seen == [1]
+
+
+def test_small_pictures_go_together_unless_somebody_says(
+    tmp_path: Path, pictures: Path, monkeypatch: pytest.MonkeyPatch, sizes: list[int]
+) -> None:
+    torch.set_num_threads(1)
     evaluate(pictures, model=NAME, settings=SETTINGS, out=tmp_path / "usual", resamples=0)
     assert sizes == [player.MOST_TOGETHER, 1]
     monkeypatch.setattr(player, "SMALL_PX", 1)

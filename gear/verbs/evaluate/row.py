@@ -38,23 +38,24 @@ class Row:
 def evaluate_row(dataset: Dataset[Any], scorer: Scorer, player: Player, *, batch: int, workers: int, told: Told) -> Row:
     """Takes up what is kept and predicts the rest.
 
-    Batches are always the same samples, those that are finished already among them: networks round a batch otherwise
-    than one sample, and a run that was interrupted is to end with the same bytes. Where a model may work in several
-    lanes, each of them takes a batch from its files to its note: what changes hands less is done sooner. Else pictures
-    are decoded, and predictions measured and written, in threads beside the model. What waits is bounded, so memory
-    does not grow with the dataset.
+    Batches are always the same samples, those that are finished already among them, and there are as many lanes as the
+    whole dataset has work for: networks round a batch otherwise than one sample, and on several threads otherwise than
+    on one, and a run that was interrupted is to end with the same bytes. Each of several lanes takes a batch from its
+    files to its note: what changes hands less is done sooner. Else pictures are decoded, and predictions measured and
+    written, in threads beside the model. What waits is bounded, so memory does not grow with the dataset.
     """
     desk = _Desk(2 * batch + workers, told)
     with ThreadPoolExecutor(workers) as readers, ThreadPoolExecutor(workers) as scorers:
         try:
             notes, damaged = _taken_up(scorer, scorers, desk)
-            missing = [index for index in range(len(dataset)) if index not in notes]
-            blocks = _blocks(len(dataset), batch, missing)
-            count = min(player.lanes, len(blocks))
-            scored: dict[int, Future[Note]] = {}
+            every = [range(begin, min(begin + batch, len(dataset))) for begin in range(0, len(dataset), batch)]
+            blocks = [block for block in every if not notes.keys() >= set(block)]
+            made = len(dataset) - len(notes)
+            count = min(player.lanes, len(every))
             if count > 1:
-                notes |= _in_lanes(dataset, scorer, player, blocks, set(missing), count, desk)
+                notes |= _in_lanes(dataset, scorer, player, blocks, notes.keys(), count, desk)
             else:
+                scored: dict[int, Future[Note]] = {}
                 for indices, samples in _batches(dataset, blocks, readers, workers):
                     answers = player.play([sample.images for sample in samples], indices)
                     for index, sample, answer in zip(indices, samples, answers, strict=True):
@@ -67,13 +68,7 @@ def evaluate_row(dataset: Dataset[Any], scorer: Scorer, player: Player, *, batch
             scorers.shutdown(wait=False, cancel_futures=True)
             raise
     desk.check()  # looked at again now that every callback has ended: that of the last sample may fail too
-    return Row(notes=[notes[index] for index in range(len(dataset))], made=len(missing), damaged=tuple(damaged))
-
-
-def _blocks(samples: int, batch: int, missing: Sequence[int]) -> list[range]:
-    """The batches of a split in which something is missing."""
-    numbers = sorted({index // batch for index in missing})
-    return [range(number * batch, min((number + 1) * batch, samples)) for number in numbers]
+    return Row(notes=[notes[index] for index in range(len(dataset))], made=made, damaged=tuple(damaged))
 
 
 def _in_lanes(
@@ -81,7 +76,7 @@ def _in_lanes(
     scorer: Scorer,
     player: Player,
     blocks: Sequence[range],
-    missing: Set[int],
+    finished: Set[int],
     count: int,
     desk: _Desk,
 ) -> dict[int, Note]:
@@ -92,7 +87,7 @@ def _in_lanes(
         answers = player.play([sample.images for sample in samples], indices)
         notes = {}
         for index, sample, answer in zip(indices, samples, answers, strict=True):
-            if index in missing:
+            if index not in finished:
                 notes[index] = scorer.first(index, sample, answer)
                 desk.tell()
         return notes
