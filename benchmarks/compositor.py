@@ -113,7 +113,9 @@ def collect_both(world: World, clean: Job, twin: Job) -> None:
     """As `gear.collect` does, with one world and one renderer for both."""
     plugin = find("task", clean.config.task)
     task: Any = build(plugin, clean.config.options)
-    darkroom: Darkroom = darkroom_of(clean.weather, clean.config.renderer, world.town_name, clean.config.camera)
+    darkroom: Darkroom = darkroom_of(
+        clean.weather, clean.config.renderer, world.town_name, clean.config.camera, shapes=world.shapes
+    )
     renderer = open_renderer(clean.config.renderer, world.model, quality=clean.config.quality)
     try:
         planner = ScenePlanner(world, task.rig(), clean.split, split_name=clean.config.split)

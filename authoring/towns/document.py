@@ -16,6 +16,13 @@ from authoring.towns.walks import Walk
 
 # The one material without a texture: a dark, smooth, rippleless canal.
 WATER_XML = '<material name="water" rgba="0.035 0.06 0.055 1" metallic="0" roughness="0.08" specular="0.6"/>'
+# Below all that is seen: meshes that meet in a T leave cracks of a pixel, which would show the sky.
+UNDERGROUND_TOP_M = -2.2
+UNDERGROUND_MATERIAL_XML = '<material name="underground" rgba="0.03 0.03 0.03 1" metallic="0" roughness="1"/>'
+UNDERGROUND_XML = (
+    '<geom name="underground" class="ground" type="box" size="1000 1000 0.1" '
+    f'pos="0 0 {UNDERGROUND_TOP_M - 0.1:g}" material="underground"/>'
+)
 HEAD = """\
 <!-- Written by `python -m authoring.towns {name}`. Conventions: docs/mjcf-conventions.md. -->
 <mujoco model="{name}">
@@ -79,7 +86,7 @@ class Document:
         """The file's text."""
         geoms = [*self.geoms, *[geom for body in self.bodies for geom in body.geoms]]
         used = sorted({geom.material for geom in geoms})
-        labels = sorted({geom.label for geom in geoms})
+        labels = sorted({"ground", *(geom.label for geom in geoms)})
         lines = [HEAD.format(name=self.name), "  <default>", '    <mesh inertia="shell"/>']
         lines.append('    <default class="collision"><geom group="3" rgba="0.8 0.3 0.3 0.4"/></default>')
         lines.append('    <default class="visible">')
@@ -88,8 +95,9 @@ class Document:
         lines += ["    </default>", "  </default>", "  <asset>", f"    {SKY}"]
         lines += ["    " + line for line in material_xml([m for m in used if m in MATERIALS]).splitlines()]
         lines += [f"    {WATER_XML}"] if "water" in used else []
+        lines.append(f"    {UNDERGROUND_MATERIAL_XML}")
         lines += [f'    <mesh name="{mesh}" file="{mesh}.obj"/>' for mesh in self.meshes]
-        lines += ["  </asset>", "  <worldbody>", LIGHTS.rstrip("\n")]
+        lines += ["  </asset>", "  <worldbody>", LIGHTS.rstrip("\n"), f"    {UNDERGROUND_XML}"]
         lines += ["    " + _geom(geom) for geom in self.geoms]
         for body in self.bodies:
             lines.append(f'    <body name="{body.name}" pos="{_row(body.position)}" euler="0 0 {body.yaw_deg:g}">')

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gear.camera.air import Air
+from gear.camera.ground_shade import GroundShade
 from gear.camera.night import Night, NightLight
 from gear.camera.optics import lens_map, motion_blurred, noisy, through_lens, vignetted
 from gear.camera.puddles import Puddles
@@ -14,7 +15,7 @@ from gear.camera.rain import Rain
 from gear.camera.response import Response
 from gear.contracts.rendering import RawView
 from gear.values.frames import GeomTable, UInt16Image, View
-from gear.values.labels import OPEN_GROUND_CODES
+from gear.values.labels import GROUND_CODES, OPEN_GROUND_CODES
 from gear.values.optics import CameraEffects, LensRecord
 from gear.values.rng import derive_rng
 from gear.values.scene import CameraRecord, SceneRecord
@@ -26,6 +27,7 @@ class Darkroom:
 
     Attributes:
         response: exposure and tone curve.
+        shade: what road users keep from the ground; None for nothing.
         night: the town's lamps; None by day.
         air: fog and haze.
         puddles: standing water.
@@ -34,6 +36,7 @@ class Darkroom:
     """
 
     response: Response
+    shade: GroundShade | None = None
     night: Night | None = None
     air: Air
     puddles: Puddles
@@ -113,6 +116,9 @@ class Darkroom:
             # The last entry is what id -1, nothing, finds.
             holds_water = np.append(np.isin(geoms.label_code, OPEN_GROUND_CODES), False)
             linear_rgb = self.puddles.lay(linear_rgb, raw.depth_m, holds_water[raw.geom_id], camera)
+        if self.shade is not None:
+            is_ground = np.append(np.isin(geoms.label_code, GROUND_CODES), False)
+            linear_rgb = self.shade.lay(linear_rgb, raw.depth_m, is_ground[raw.geom_id], camera, record)
         if lamps is not None:
             linear_rgb = lamps.mirror(linear_rgb)
             del lamps  # much memory

@@ -202,6 +202,10 @@ class TownContract:
         names = tuple(town.scenes.scenes) if self.planned_scenes is None else tuple(self.planned_scenes)
         tell("scenes cannot be used", town_scenes.unusable(town, names, self.samples, self.min_visible))
 
+    def test_the_ground_is_closed(self) -> None:
+        """Meshes that meet in a T leave cracks of a pixel: a slab below the town keeps the sky out of them."""
+        tell("there are cracks in the ground", town_scenes.cracks(self.under_test(), self.samples))
+
     def test_ids_and_depth_are_those_of_rays(self) -> None:
         """The classic renderer and MuJoCo's own rays agree on the first scene."""
         tell("pixels and rays differ", town_scenes.disagreement(self.under_test(), self.min_agreement))

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from gear.config.collection import SplitConfig
 from gear.render.opening import open_renderer
 from gear.testing.town_facts import SEEN_GROUPS, Rays, TownUnderTest
 from gear.values.errors import GearError
+from gear.values.frames import FloatImage, IdImage
+from gear.values.labels import GROUND_CODES
 from gear.values.rig import CameraMount, Rig
 from gear.values.rng import derive_rng
 from gear.values.scene import SceneRecord
@@ -66,17 +70,35 @@ def unusable(town: TownUnderTest, names: Sequence[str], samples: int, min_visibl
     return problems
 
 
+def cracks(town: TownUnderTest, samples: int) -> list[str]:
+    """Pixels below the horizon that show nothing though all around them is ground."""
+    world, _ = town.first_world
+    planner = _planner(world, samples)
+    problems = []
+    for index in range(samples):
+        record = planner.plan(index)
+        placed = world.place(record)
+        view, camera = _truth(world, placed, record), record.cameras[0]
+        is_ground = np.isin(np.append(placed.geoms.label_code, 0)[view.geom_id], GROUND_CODES)
+        is_open = (view.geom_id < 0) & (np.arange(camera.height_px)[:, None] > camera.height_px / 2 + 1)
+        count, number = cv2.connectedComponents(is_open.astype(np.uint8), connectivity=8)
+        for crack in range(1, count):
+            around = cv2.dilate((number == crack).astype(np.uint8), np.ones((3, 3), np.uint8)).astype(bool)
+            rim = around & (number != crack)
+            if is_ground[rim].all():
+                row, column = (int(places[0]) for places in np.nonzero(rim))
+                point_m = camera.intrinsics.unproject([column, row], float(view.depth_m[row, column]))
+                x_m, y_m, _ = camera.world_from_camera_transform.apply(point_m)
+                problems.append(f"scene {record.scene}, sample {index}: the sky shows near ({x_m:.1f}, {y_m:.1f})")
+    return problems
+
+
 def disagreement(town: TownUnderTest, min_agreement: float) -> list[str]:
     """Too many pixels, away from edges, whose id or depth is not that of a ray through their centre."""
     world, _ = town.first_world
     record = _planner(world, 1).plan(0)
     placed = world.place(record)
-    renderer = open_renderer("classic", world.model, quality="fast")
-    try:
-        (view,) = renderer.render(placed.stage, record.cameras, colour=False)
-    finally:
-        renderer.close()
-    assert view.geom_id is not None and view.depth_m is not None
+    view = _truth(world, placed, record)
     camera, rays = record.cameras[0], _rays(placed)
     pose = camera.world_from_camera_transform
     inner = np.ones(view.geom_id.shape, bool)
@@ -102,6 +124,25 @@ def disagreement(town: TownUnderTest, min_agreement: float) -> list[str]:
     common = sorted(wrong, key=lambda told: -wrong[told])[:3]
     examples = "; ".join(f"rendered {pixel}, hit {ray}" for pixel, ray in common)
     return [f"scene {record.scene}: only {share:.1%} of {len(chosen)} pixels agree with rays ({examples})"]
+
+
+@dataclass(frozen=True, slots=True)
+class _Truth:
+    """Ids and depth of one view."""
+
+    geom_id: IdImage
+    depth_m: FloatImage
+
+
+def _truth(world: World, placed: PlacedStage, record: SceneRecord) -> _Truth:
+    """As classic renders them."""
+    renderer = open_renderer("classic", world.model, quality="fast")
+    try:
+        (view,) = renderer.render(placed.stage, record.cameras, colour=False)
+    finally:
+        renderer.close()
+    assert view.geom_id is not None and view.depth_m is not None
+    return _Truth(view.geom_id, view.depth_m)
 
 
 def _planner(world: World, samples: int) -> ScenePlanner:

@@ -75,3 +75,6 @@ LABEL_BY_NAME: dict[str, Label] = {label.name: label for label in LABELS}
 
 OPEN_GROUND_CODES = tuple(LABEL_BY_NAME[name].code for name in ("road", "road_marking", "parking", "ground"))
 """Level ground under the sky: it gets wet, and water stands on it."""
+
+GROUND_CODES = (*OPEN_GROUND_CODES, *(LABEL_BY_NAME[name].code for name in ("sidewalk", "terrain")))
+"""What road users stand on."""

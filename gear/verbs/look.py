@@ -16,10 +16,12 @@ from typing import Any
 
 import mujoco
 
+from gear.camera.ground_shade import MOST_HIDDEN
 from gear.camera.response import response_for
 from gear.dataset.plan import Plan
 from gear.values.errors import FieldError, GearError
 from gear.values.serial import Json, from_json, to_json
+from gear.world.air import even_share
 from gear.world.assets import AssetLibrary
 from gear.world.digest import assets_digest
 from gear.world.light import lighting_of
@@ -108,7 +110,8 @@ def read_look(value: Json) -> Look | None:
 
 @cache
 def light_digest() -> str:
-    """sha256 of every preset by day with the light that follows from it, and of the camera's response to a ramp.
+    """sha256 of every preset by day with the light that follows from it, what road users keep of it from the ground,
+    and the camera's response to a ramp.
 
     No shipped weights know nights.
     """
@@ -120,7 +123,8 @@ def light_digest() -> str:
         numbers = [*light.towards_sun, *light.sun, *light.ambient]
         levels = [int(level) for level in light.sky_faces.mean(axis=(0, 1)).round()]
         ramp = [round(float(value), 2) for value in response_for("filament", weather).curve(RAMP)]
-        presets[name] = [to_json(weather), [f"{number:.3g}" for number in numbers], levels, ramp]
+        hidden = round(MOST_HIDDEN * (1 + even_share(weather, light)) / 2, 2)
+        presets[name] = [to_json(weather), [f"{number:.3g}" for number in numbers], levels, ramp, hidden]
     return _digest(presets)
 
 

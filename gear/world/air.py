@@ -4,18 +4,29 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
 from gear.camera.air import Air, Fog
 from gear.camera.develop import Darkroom
+from gear.camera.ground_shade import GroundShade
 from gear.camera.night import Night
 from gear.camera.puddles import Puddles
 from gear.camera.rain import Rain
 from gear.camera.response import encode_srgb, response_for
+from gear.values.frames import Shape
 from gear.values.optics import CameraEffects
 from gear.values.scene import Weather
-from gear.world.light import Floats, horizon_light, lamplit_houses, mirrored_light
+from gear.world.light import (
+    Floats,
+    Lighting,
+    even_light,
+    horizon_light,
+    lamplit_houses,
+    lighting_of,
+    mirrored_light,
+)
 
 DENSEST_FOG_PER_M = 0.05
 """Extinction of CARLA's 100 percent: what is 60 m away can no longer be told."""
@@ -42,6 +53,9 @@ FULL_PUDDLES = 0.32
 DROP_LIGHT = 1.25
 """A drop shows a wide piece of the sky, brighter than the horizon."""
 
+SHADE_SKY_FACE_PX = 8
+"""A small sky says as much about its light as a large one."""
+
 _MIRROR_ROWS, _MIRROR_COLUMNS = 128, 512
 
 
@@ -51,6 +65,7 @@ def darkroom_of(
     town: str,
     effects: CameraEffects | None = None,
     night: Night | None = None,
+    shapes: Mapping[str, Shape] | None = None,
 ) -> Darkroom:
     """What develops a renderer's frames of a weather in a town.
 
@@ -60,6 +75,7 @@ def darkroom_of(
         town: its puddles lie where they always lie.
         effects: of the camera; none unless given.
         night: the town's lamps; none by day.
+        shapes: of the assets that may take part, which shade the ground about them; without them nothing does.
     """
     left = night.sky_level if night else 1.0
     mirrored = left * mirrored_light(weather, _MIRROR_ROWS, _MIRROR_COLUMNS)
@@ -67,6 +83,7 @@ def darkroom_of(
         mirrored += night.lit * lamplit_houses(_MIRROR_ROWS)
     return Darkroom(
         response=response_for(renderer_name, weather),
+        shade=None if shapes is None else shade_of(weather, renderer_name, shapes),
         night=night,
         air=air_of(weather, renderer_name, left),
         puddles=Puddles(
@@ -82,6 +99,19 @@ def darkroom_of(
         ),
         effects=effects or CameraEffects(),
     )
+
+
+def shade_of(weather: Weather, renderer_name: str, shapes: Mapping[str, Shape]) -> GroundShade:
+    """What assets keep from the ground of a weather's light."""
+    light = lighting_of(weather, sky_face_px=SHADE_SKY_FACE_PX)
+    return GroundShade(shapes=shapes, even_share=even_share(weather, light), is_display=renderer_name == "classic")
+
+
+def even_share(weather: Weather, light: Lighting) -> float:
+    """How much of the light on open level ground is not the sun's, 0..1."""
+    even = even_light(weather)[0].mean()
+    sun = light.sun.mean() * max(light.towards_sun[2], 0) / math.pi
+    return float(even / (even + sun))
 
 
 def _shown(light: Floats, renderer_name: str) -> Floats:

@@ -13,7 +13,7 @@ import numpy as np
 
 from gear.contracts.rendering import Stage
 from gear.values.errors import PlacementError
-from gear.values.frames import GeomTable, SceneObject, UInt8Image
+from gear.values.frames import GeomTable, SceneObject, Shape, UInt8Image
 from gear.values.scene import ActorRecord, SceneRecord, SurfaceRecord, Vec3, Weather
 from gear.world.assets import AssetLibrary
 from gear.world.catalogue import ActorType, StaticObjects, actor_types, static_objects, visible_geoms
@@ -132,6 +132,11 @@ class World:
         )
         release_memory()
         return world
+
+    @property
+    def shapes(self) -> dict[str, Shape]:
+        """Visible triangles of the pool's assets by name."""
+        return {name: kind.shape for name, kind in self.types.items()}
 
     @property
     def town_name(self) -> str:

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from gear.contracts.rendering import RawView
+from gear.render.opening import open_renderer
 from gear.testing.tiny_town import CLEAR, SMALL_RIG, TINY_TOWN, build_tiny_world, tiny_scenes, tiny_world
 from gear.values.errors import PlacementError, TownError, UnknownNameError
 from gear.values.frames import STATIC_OBJECT_BASE
-from gear.values.labels import LABEL_BY_NAME
+from gear.values.labels import GROUND_CODES, LABEL_BY_NAME
 from gear.values.optics import CameraEffects
 from gear.values.scene import ActorRecord, Pose, SceneRecord, Weather
 from gear.world.air import darkroom_of
@@ -298,3 +299,28 @@ def test_an_open_shutter_smears_what_the_ego_car_passes_and_not_its_bonnet() -> 
     )
     changed = (sharp.linear_rgb != smeared.linear_rgb).any(axis=-1)
     assert changed[: size[0] // 3].mean() > 0.9 and not changed[size[0] // 2 :].any()
+
+
+def test_the_ground_under_a_car_gets_less_of_the_sky_and_nothing_else_changes() -> None:
+    world = tiny_world("no_billboard")
+    shot = record(world, actor(2, "van_small", 20.0))
+    placed, camera = world.place(shot), shot.cameras[0]
+    renderer = open_renderer("classic", world.model)
+    try:
+        (raw,) = renderer.render(placed.stage, [camera])
+    finally:
+        renderer.close()
+    assert raw.geom_id is not None
+    cloudy = PRESETS["CloudyNoon"]
+    plain, shaded = (
+        darkroom_of(cloudy, "classic", "t", shapes=shapes).view(raw, camera, shot, placed.geoms).linear_rgb.astype(int)
+        for shapes in (None, world.shapes)
+    )
+    darker, changed = (shaded < plain).any(axis=-1), (shaded != plain).any(axis=-1)
+    is_ground = np.isin(np.append(placed.geoms.label_code, 0)[raw.geom_id], GROUND_CODES)
+    outline = cv2.dilate(is_ground.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    assert darker.any() and (changed == darker).all()
+    assert not changed[~outline].any()
+    below_van = np.flatnonzero((raw.geom_id == world.model.geom("main_road").id) & changed)
+    least = (shaded.sum(axis=-1).flat[below_van] / plain.sum(axis=-1).flat[below_van]).min()
+    assert least < 0.6, "classic's values are a root of light"

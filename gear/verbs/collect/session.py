@@ -103,7 +103,9 @@ def open_session(job: Job) -> Iterator[Session]:
     release_memory()
     try:
         planner = ScenePlanner(world, rig, job.split, split_name=job.config.split)
-        darkroom = darkroom_of(job.weather, job.config.renderer, world.town_name, job.config.camera, night)
+        darkroom = darkroom_of(
+            job.weather, job.config.renderer, world.town_name, job.config.camera, night, world.shapes
+        )
         yield Session(
             job=job,
             plugin=plugin,

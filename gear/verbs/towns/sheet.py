@@ -93,9 +93,8 @@ def thumbnail(town: Town, name: str, scene: SceneSpec, options: SheetOptions) ->
         seen.append(f"{face.asset} {where}{pixels.mean():.1%} of the picture")
     others = len(record.actors) - 1
     night = night_of(world, options.weather, options.renderer)
-    shown = darkroom_of(options.weather, options.renderer, world.town_name, night=night).view(
-        view, record.cameras[0], record, placed.geoms
-    )
+    darkroom = darkroom_of(options.weather, options.renderer, world.town_name, night=night, shapes=world.shapes)
+    shown = darkroom.view(view, record.cameras[0], record, placed.geoms)
     return shown.rgb, "; ".join([*seen, f"{others} other road users"])
 
 

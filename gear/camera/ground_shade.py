@@ -1,0 +1,276 @@
+"""The sky's light that road users keep from the ground under and beside them, laid over linear frames.
+
+    L' = L (1 - s o)
+
+o, the share of the sky that an actor hides from a place on the ground, weighted as level ground receives it, is the
+mean of the shadows that the actor's triangles throw from directions all over the sky. s is what the sky's light is
+worth there: all of it under a vehicle, where no sun comes; beside it, half way between shade, where it is all, and sun,
+since the frame does not say which. Neither depends on any albedo, so frames stay linear.
+
+Renderers know no such light: their sky is at an infinite distance, and what `gear.render.occlusion` finds in depth
+reaches some decimetres. Under an overcast sky, and in the shade of houses, cars would seem to float.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from gear.values.frames import FloatImage, Shape, UInt16Image
+from gear.values.geometry import Array
+from gear.values.scene import ActorRecord, CameraRecord, SceneRecord
+
+Mask = npt.NDArray[np.bool_]
+
+DIRECTIONS = 128
+MOST_HIDDEN = 0.94
+"""The rest comes by way of the ground around."""
+
+OUTLINE = np.float32(0.5)
+"""Of a pixel on an outline that shows what lies behind."""
+
+DISPLAY_POWER = 1 / 2.2
+"""Display values grow with this power of light."""
+
+_FULL_FROM, _BESIDE_TO = 0.75, 0.4
+"""Shares of the sky: where more is hidden there is no sun, where less, there may be."""
+
+_CELLS_PER_M = {"large": 12.5, "small": 16.0}
+_LARGE_M = 2.5
+_REACH_HEIGHTS, _LEAST_REACH_M, _MOST_REACH_M = 1.6, 0.6, 3.0
+_RIM = 0.4
+_STEP_M, _FADE_M = 0.2, 0.15
+"""Ground may lie this much higher or lower than an actor's wheels, as kerbs do, and a little more."""
+
+_NEAREST_M, _FARTHEST_M = 0.3, 200.0
+_MOST_POINTS = 400_000
+_BAND_ROWS = 64
+_CUBE = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+_EDGES = np.array([(i, i | bit) for bit in (1, 2, 4) for i in range(8) if not i & bit])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HiddenSky:
+    """How much of the sky one asset hides from the ground around it.
+
+    Attributes:
+        share: (rows, columns) float32 in 0..1; rows go to the actor's left, columns ahead. 0 at the border.
+        cells_per_m: of both.
+    """
+
+    share: FloatImage
+    cells_per_m: float
+
+    @staticmethod
+    def of(shape: Shape) -> HiddenSky:
+        """Shadows of an asset from directions spread as level ground weighs them. It is solid from its underside up.
+
+        Args:
+            shape: in the actor frame, standing on z = 0.
+        """
+        length_m, width_m, _ = shape.box_size_m
+        top_m = float(shape.box_centre_m[2] + shape.box_size_m[2] / 2)
+        cells_per_m = _CELLS_PER_M["large" if max(length_m, width_m) > _LARGE_M else "small"]
+        reach_m = min(max(_REACH_HEIGHTS * top_m, _LEAST_REACH_M), _MOST_REACH_M)
+        half_m = np.abs(shape.box_centre_m[:2]) + shape.box_size_m[:2] / 2 + reach_m
+        columns, rows = (2 * math.ceil(side * cells_per_m) + 1 for side in half_m)
+        layers = _layers(_points(shape, 1.5 * cells_per_m) * cells_per_m, rows, columns)
+        hidden = np.zeros((rows, columns), np.float32)
+        for to_east, to_north in _slopes():
+            hidden += _shadow(layers, to_east, to_north)
+        hidden = cv2.blur(hidden / np.float32(DIRECTIONS), (3, 3), borderType=cv2.BORDER_CONSTANT)
+        for axis, size in ((0, rows), (1, columns)):
+            from_border = (np.minimum(np.arange(size), np.arange(size)[::-1]) / cells_per_m).astype(np.float32)
+            rim = _smooth(from_border / np.float32(_RIM * reach_m))
+            hidden *= rim[:, None] if axis == 0 else rim
+        return HiddenSky(hidden, cells_per_m)
+
+
+def _layers(points: Array, rows: int, columns: int) -> list[Mask]:
+    """(rows, columns) of what an asset fills at each height: cells as high as wide, the lowest on the ground."""
+    cells = np.rint(points[:, 1]).astype(np.int64) + rows // 2, np.rint(points[:, 0]).astype(np.int64) + columns // 2
+    low, high = np.full((rows, columns), np.inf), np.full((rows, columns), -np.inf)
+    np.minimum.at(low, cells, points[:, 2])
+    np.maximum.at(high, cells, points[:, 2])
+    heights = np.arange(max(math.ceil(points[:, 2].max()), 1)) + 0.5
+    return [(low <= height + 0.5) & (high >= height - 0.5) for height in heights]
+
+
+def _shadow(layers: list[Mask], to_east: float, to_north: float) -> Mask:
+    """What layers hide from the ground in a direction: each moves by so many cells for each cell of its height."""
+    shadow = np.zeros_like(layers[0])
+    rows, columns = shadow.shape
+    for level, layer in enumerate(layers):
+        down, left = round((level + 0.5) * to_north), round((level + 0.5) * to_east)
+        if abs(down) >= rows or abs(left) >= columns:
+            break
+        onto = slice(max(-down, 0), rows - max(down, 0)), slice(max(-left, 0), columns - max(left, 0))
+        shadow[onto] |= layer[max(down, 0) : rows + min(down, 0), max(left, 0) : columns + min(left, 0)]
+    return shadow
+
+
+def _slopes() -> Iterator[tuple[float, float]]:
+    """Metres that shadows move for each metre of height: a spiral of directions, by the cosine to the zenith."""
+    for number in range(DIRECTIONS):
+        square = (number + 0.5) / DIRECTIONS
+        length, turn = math.sqrt(square / (1 - square)), number * math.pi * (3 - math.sqrt(5))
+        yield length * math.cos(turn), length * math.sin(turn)
+
+
+def _points(shape: Shape, per_m: float) -> Array:
+    """(N, 3) points on all triangles, about so many to a metre along and across; the same every time."""
+    corners = shape.vertices_m[shape.faces]
+    along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    longest_m = np.maximum(np.linalg.norm(along, axis=1), np.linalg.norm(across, axis=1))
+    longest_m = np.maximum(longest_m, np.linalg.norm(across - along, axis=1))
+    steps = np.maximum(np.ceil(longest_m * per_m).astype(np.int64), 1)
+    found = [np.unique(corners.reshape(-1, 3), axis=0)]
+    for step in np.unique(steps).tolist():
+        u, v = (grid.reshape(-1) / step for grid in np.mgrid[0 : step + 1, 0 : step + 1])
+        inside = u + v <= 1
+        chosen = steps == step
+        of_each = u[inside, None] * along[chosen, None] + v[inside, None] * across[chosen, None]
+        found.append((corners[chosen, None, 0] + of_each).reshape(-1, 3))
+    points = np.concatenate(found)
+    return points[:: 1 + len(points) // _MOST_POINTS]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class GroundShade:
+    """What the actors of a world hide of one weather's sky.
+
+    Attributes:
+        shapes: of every asset that may take part, by name.
+        even_share: how much of the light on open level ground is not the sun's, 0..1.
+        is_display: whether frames hold display values instead of light.
+    """
+
+    shapes: Mapping[str, Shape]
+    even_share: float
+    is_display: bool
+    _known: dict[str, HiddenSky] = field(default_factory=dict, init=False, repr=False)
+
+    def lay(
+        self, linear_rgb: UInt16Image, depth_m: FloatImage, is_ground: Mask, camera: CameraRecord, record: SceneRecord
+    ) -> UInt16Image:
+        """The frame with shaded ground.
+
+        Args:
+            linear_rgb: (H, W, 3) uint16, gear's linear frame.
+            depth_m: (H, W) float32 planar z, NaN where nothing is.
+            is_ground: (H, W) what is shaded.
+            camera: who looks.
+            record: the scene.
+
+        Returns:
+            (H, W, 3) uint16; the frame itself where nothing is shaded.
+        """
+        left = self.left(depth_m, is_ground, camera, record)
+        if left is None:
+            return linear_rgb
+        shaded = linear_rgb.copy()
+        for top in range(0, len(left), _BAND_ROWS):
+            band = slice(top, top + _BAND_ROWS)
+            if (left[band] < 1).any():
+                cv2.multiply(linear_rgb[band], cv2.merge([left[band]] * 3), dst=shaded[band], dtype=cv2.CV_16U)
+        return shaded
+
+    def left(
+        self, depth_m: FloatImage, is_ground: Mask, camera: CameraRecord, record: SceneRecord
+    ) -> FloatImage | None:
+        """(H, W) float32 shares of the frame's values that are left; None where nothing is shaded."""
+        left: FloatImage | None = None
+        for actor in record.actors:
+            shape = self.shapes.get(actor.asset)
+            if shape is None:
+                continue
+            sky = self._sky(actor.asset, shape)
+            box = _box_in_picture(actor, sky, camera)
+            if box is None or not is_ground[box].any():
+                continue
+            if left is None:
+                left = np.ones(depth_m.shape, np.float32)
+            for top in range(box[0].start, box[0].stop, _BAND_ROWS):
+                band = (slice(top, min(top + _BAND_ROWS, box[0].stop)), box[1])
+                where = is_ground[band]
+                if where.any():
+                    left[band] *= np.where(where, self._beside(actor, sky, depth_m, band, camera), np.float32(1))
+        if left is None:
+            return None
+        # Pixels on the outline of what stands before the ground show some of it.
+        darkest = cv2.erode(left, cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3)))
+        left = np.where(is_ground, left, 1 - OUTLINE * (1 - darkest))
+        return left ** np.float32(DISPLAY_POWER) if self.is_display else left
+
+    def _sky(self, asset: str, shape: Shape) -> HiddenSky:
+        if asset not in self._known:
+            self._known[asset] = HiddenSky.of(shape)
+        return self._known[asset]
+
+    def _beside(
+        self, actor: ActorRecord, sky: HiddenSky, depth_m: FloatImage, box: tuple[slice, slice], camera: CameraRecord
+    ) -> FloatImage:
+        """(h, W) shares of light that one actor leaves to ground in a box of the picture."""
+        actor_from_camera = (
+            actor.world_from_actor.transform("world", "actor").inverse() @ camera.world_from_camera_transform
+        )
+        turn = actor_from_camera.rotation.astype(np.float32)
+        place = actor_from_camera.translation_m.astype(np.float32)
+        z = depth_m[box]
+        x = _rays(camera.width_px, box[1], camera) * z
+        y = _rays(camera.height_px, box[0], camera)[:, None] * z
+        ahead, left, up = (turn[i, 0] * x + turn[i, 1] * y + turn[i, 2] * z + place[i] for i in range(3))
+        scale, (rows, columns) = np.float32(sky.cells_per_m), sky.share.shape
+        hidden = cv2.remap(
+            sky.share, ahead * scale + columns // 2, left * scale + rows // 2, cv2.INTER_LINEAR, borderValue=0
+        )
+        level = 1 - _smooth((np.abs(up) - _STEP_M) / np.float32(_FADE_M))
+        beside = np.float32((1 + self.even_share) / 2)
+        worth = beside + (1 - beside) * _smooth((hidden - _BESIDE_TO) / np.float32(_FULL_FROM - _BESIDE_TO))
+        return np.asarray(1 - np.float32(MOST_HIDDEN) * hidden * worth * level, dtype=np.float32)
+
+
+def _rays(size_px: int, part: slice, camera: CameraRecord) -> FloatImage:
+    """Slopes of the rays through columns or rows."""
+    return ((np.arange(part.start, part.stop) + 0.5 - size_px / 2) / camera.focal_px).astype(np.float32)
+
+
+def _box_in_picture(actor: ActorRecord, sky: HiddenSky, camera: CameraRecord) -> tuple[slice, slice] | None:
+    """Rows and columns that hold all ground near an actor; None where the camera sees none of it."""
+    half_m = (np.array(sky.share.shape[::-1]) // 2) / sky.cells_per_m
+    corners = _CUBE * (*half_m, _STEP_M + _FADE_M)
+    camera_from_actor = camera.world_from_camera_transform.inverse() @ actor.world_from_actor.transform(
+        "world", "actor"
+    )
+    corners = corners @ camera_from_actor.rotation.T + camera_from_actor.translation_m
+    seen = _before_camera(corners)
+    if not len(seen) or seen[:, 2].min() > _FARTHEST_M:
+        return None
+    box = []
+    for axis, size in ((1, camera.height_px), (0, camera.width_px)):
+        places = seen[:, axis] / seen[:, 2] * camera.focal_px + size / 2
+        low, high = (min(max(end, 0), size) for end in (math.floor(places.min()), math.ceil(places.max())))
+        if low >= high:
+            return None
+        box.append(slice(low, high))
+    return box[0], box[1]
+
+
+def _before_camera(corners: Array) -> Array:
+    """(N, 3) corners of what is left of a box when all that is too near or behind is cut off, camera frame."""
+    ends = corners[_EDGES]
+    first, last = ends[:, 0, 2] - _NEAREST_M, ends[:, 1, 2] - _NEAREST_M
+    cut = first * last < 0
+    share = (first[cut] / (first[cut] - last[cut]))[:, None]
+    return np.concatenate([corners[corners[:, 2] >= _NEAREST_M], ends[cut, 0] + share * (ends[cut, 1] - ends[cut, 0])])
+
+
+def _smooth(value: FloatImage) -> FloatImage:
+    """0 up to 0, 1 from 1 on, smooth in between."""
+    t = np.clip(value, 0, 1)
+    return np.asarray(t * t * (3 - 2 * t), dtype=np.float32)
