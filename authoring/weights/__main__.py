@@ -9,6 +9,7 @@ Each collection is one `gear collect`, so the same command again goes on where i
     gear train --task semseg --model ddrnet23_slim --data data/training/semseg --out runs/semseg
     gear evaluate … --data data/held-out/semseg --report reference
     python -m authoring.weights ship runs/semseg --evaluation evaluations/semseg/ddrnet23_slim
+    python -m authoring.weights renew ddrnet23_slim --evaluation evaluations/semseg/ddrnet23_slim --note "…"
     python -m authoring.weights patches --task semseg --model ddrnet23_slim --out runs/patches
 """
 
@@ -22,7 +23,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from authoring.weights import ship
+from authoring.weights import renew, ship
 from authoring.weights.patches import command as patches
 from authoring.weights.plan import HELD_OUT_SAMPLES, TRAINING_OPTIONS, Collection, held_out, training
 from gear.values.errors import GearError
@@ -54,6 +55,9 @@ def main() -> int:
     shipped = parts.add_parser("ship", help="puts trained and measured weights into the weights package")
     ship.add_arguments(shipped)
     shipped.set_defaults(run=ship.run)
+    renewed = parts.add_parser("renew", help="writes today's look and figures into weights that are shipped")
+    renew.add_arguments(renewed)
+    renewed.set_defaults(run=renew.run)
     args = parser.parse_args()
     try:
         return int(args.run(args))

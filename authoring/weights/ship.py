@@ -7,6 +7,7 @@ import json
 import math
 import textwrap
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from gear.verbs.train.results import HISTORY, WEIGHTS
 
 MODELS = CHECKOUT / "models"
 REPORT = "reference"
+MADE_BY, TRAINING = "## Made by", "## Training data"
 FACTS = ("scene", "weather", "split", "seed", "patch", "samples")
 
 
@@ -67,19 +69,11 @@ def ship(
     Raises:
         GearError: the evaluation is of another network or other weights, or lacks the report.
     """
-    results = _json(evaluation / "results.json")
     weights = runs[-1] / WEIGHTS
     state, metadata = read(weights)
     name = metadata["model"]
-    if results["model"]["weights_sha256"] != _digest(name, weights):
-        raise GearError(f"{evaluation}: not an evaluation of {weights}")
-    measured = results["together"][0] if results["together"] else results["rows"][0]
-    figures: dict[str, Any] = measured["figures"].get(REPORT, {})
-    if not figures:
-        raise GearError(f"{evaluation}: holds no report {REPORT!r}; evaluate again with --report {REPORT}")
-    known = {key: one for key, one in figures.items() if one["value"] is not None}
-    metadata["metrics"] = json.dumps({key: one["value"] for key, one in known.items()})
-    metadata["intervals"] = json.dumps({key: [one["low"], one["high"]] for key, one in known.items()})
+    measured = Measured.read(evaluation, name, weights)
+    metadata |= measured.texts()
     histories = [_json(one / HISTORY) for one in runs]
     commands = [_without(base, history["command"]).replace("--out DIR", f"--out {_without(base, str(one))}")
                 for history, one in zip(histories, runs, strict=True)]  # fmt: skip
@@ -89,24 +83,55 @@ def ship(
     target = models / f"{name}.safetensors"
     models.mkdir(parents=True, exist_ok=True)
     write(target, state, metadata, halves=True)
-    card = _card(target, metadata, histories, commands, results, measured, figures, note)
+    card = _card(target, metadata, histories, commands, measured, note)
     write_alone(target.with_suffix(".md"), card.encode())
     return target
 
 
-def _card(
-    target: Path,
-    metadata: Mapping[str, str],
-    histories: Sequence[Any],
-    commands: Sequence[str],
-    results: Any,
-    measured: Any,
-    figures: Mapping[str, Any],
-    note: str,
-) -> str:
-    data = target.read_bytes()
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """An evaluation with its report.
+
+    Attributes:
+        results: all of `results.json`.
+        samples: how many pictures.
+        figures: of the report over all of them: `value`, `low` and `high` by name.
+    """
+
+    results: Any
+    samples: int
+    figures: Mapping[str, Any]
+
+    @staticmethod
+    def read(evaluation: Path, name: str, weights: Path) -> Measured:
+        """Of a network's weights.
+
+        Raises:
+            GearError: the evaluation is of another network or other weights, or lacks the report.
+        """
+        results = _json(evaluation / "results.json")
+        if results["model"]["weights_sha256"] != _digest(name, weights):
+            raise GearError(f"{evaluation}: not an evaluation of {weights}")
+        together = results["together"][0] if results["together"] else results["rows"][0]
+        figures: dict[str, Any] = together["figures"].get(REPORT, {})
+        if not figures:
+            raise GearError(f"{evaluation}: holds no report {REPORT!r}; evaluate again with --report {REPORT}")
+        return Measured(results, together["samples"], figures)
+
+    def texts(self) -> dict[str, str]:
+        """As a weights file has them."""
+        known = {key: one for key, one in self.figures.items() if one["value"] is not None}
+        return {
+            "metrics": json.dumps({key: one["value"] for key, one in known.items()}),
+            "intervals": json.dumps({key: [one["low"], one["high"]] for key, one in known.items()}),
+        }
+
+
+def head(target: Path, metadata: Mapping[str, str], measured: Measured) -> list[str]:
+    """Lines of a card: what the file is, and what was measured with it."""
+    data, figures = target.read_bytes(), measured.figures
     absent = [key for key, one in figures.items() if one["value"] is None]
-    lines = [
+    return [
         f"# {metadata['model']} for {metadata['task']}",
         "",
         f"`{target.name}`, {len(data) / 1e6:.1f} MB, matrices in float16, sha256 `{sha256(data)}`. MIT licence.",
@@ -114,7 +139,7 @@ def _card(
         "",
         "## Measured",
         "",
-        f"On {measured['samples']} pictures at the task's own size, of two scenes and one weather that nothing was",
+        f"On {measured.samples} pictures at the task's own size, of two scenes and one weather that nothing was",
         "trained on (`python -m authoring.weights held-out`), 95 % intervals by bootstrap over pictures:",
         "",
         "| figure | value | from | to |",
@@ -123,8 +148,21 @@ def _card(
           for key, one in figures.items() if one["value"] is not None),
         "",
         *([f"Nothing to measure for: {', '.join(absent)}.", ""] if absent else []),
-        *_rows(results),
-        "## Made by",
+        *_rows(measured.results),
+    ]  # fmt: skip
+
+
+def _card(
+    target: Path,
+    metadata: Mapping[str, str],
+    histories: Sequence[Any],
+    commands: Sequence[str],
+    measured: Measured,
+    note: str,
+) -> str:
+    lines = [
+        *head(target, metadata, measured),
+        MADE_BY,
         "",
         "```",
         *commands,
@@ -133,8 +171,8 @@ def _card(
         *(f"- {one['finished_steps']} steps in {one['elapsed_s'] / 60:.0f} minutes; the weights are those after step "
           f"{one['best_step']}" for one in histories),
         "",
-        *([*textwrap.wrap(note, 110), ""] if note else []),
-        "## Training data",
+        *wrapped(note),
+        TRAINING,
         "",
         "| scene | weather | split | seed | patch | samples |",
         "|---|---|---|---|---|---|",
@@ -147,6 +185,11 @@ def _card(
         "",
     ]  # fmt: skip
     return "\n".join(lines)
+
+
+def wrapped(note: str) -> list[str]:
+    """Lines of a note, and an empty one; nothing for no note."""
+    return [*textwrap.wrap(note, 110), ""] if note else []
 
 
 def _rows(results: Any) -> list[str]:

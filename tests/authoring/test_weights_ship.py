@@ -8,13 +8,16 @@ from typing import Any
 
 import pytest
 
+from authoring.weights.renew import renew
 from authoring.weights.ship import ship
 from gear.nn.options import SegmentationOptions
 from gear.nn.shipped import inspect
 from gear.nn.weights import read, write
 from gear.plugins.models.ddrnet23_slim import build
 from gear.values.errors import GearError
+from gear.values.serial import to_json
 from gear.verbs.evaluate.player import weights_digest
+from gear.verbs.look import Look, light_digest
 
 MODEL = "ddrnet23_slim"
 
@@ -88,3 +91,34 @@ def test_other_weights_and_other_reports_are_refused(run: Path, evaluation: Path
     with pytest.raises(GearError, match="no report 'reference'"):
         ship([run], evaluation, run.parents[1], tmp_path / "models")
     assert not (tmp_path / "models").exists()
+
+
+def test_what_is_measured_again_keeps_its_numbers_and_its_history(run: Path, evaluation: Path, tmp_path: Path) -> None:
+    models = tmp_path / "models"
+    path = ship([run], evaluation, run.parents[1], models, note="First.")
+    state, texts = read(path)
+    trained = Look(assets={"nowhere": "1"}, renderers=("filament",), light="before", mujoco="4.0")
+    write(path, state, texts | {"look": json.dumps(to_json(trained))}, halves=True)
+    results = json.loads((evaluation / "results.json").read_text())
+    results["together"][0]["figures"]["reference"]["miou"] = estimate(0.7)
+    (evaluation / "results.json").write_text(json.dumps(results))
+    first = path.with_suffix(".md").read_text()
+    assert renew(MODEL, evaluation, "Then the light changed.", models) == path
+    facts, again = inspect(path).facts(), read(path)[0]
+    assert facts["metrics"] == {"miou": 0.7} and facts["look"]["light"] == light_digest()
+    assert facts["look_hash"] not in ("ab12", "") and facts["command"] == texts["command"]
+    assert all(bool((state[key] == again[key]).all()) for key in state)
+    card = path.with_suffix(".md").read_text()
+    assert "| miou | 0.700 | 0.600 | 0.800 |" in card and f"`{facts['look_hash']}`" in card
+    assert "First.\n\nThen the light changed.\n\n## Training data\n" in card
+    assert (
+        card[card.index("## Made by") :].replace("Then the light changed.\n\n", "")
+        == first[first.index("## Made by") :]
+    )
+
+
+def test_what_says_no_look_cannot_be_renewed(run: Path, evaluation: Path, tmp_path: Path) -> None:
+    models = tmp_path / "models"
+    ship([run], evaluation, run.parents[1], models)
+    with pytest.raises(GearError, match="does not say what look"):
+        renew(MODEL, evaluation, "Note.", models)
