@@ -21,6 +21,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from gear.camera.noise import smooth_step
+from gear.camera.response import DISPLAY_POWER
 from gear.values.frames import FloatImage, Shape, UInt16Image
 from gear.values.geometry import Array
 from gear.values.scene import ActorRecord, CameraRecord, SceneRecord
@@ -33,9 +35,6 @@ MOST_HIDDEN = 0.94
 
 OUTLINE = np.float32(0.5)
 """Of a pixel on an outline that shows what lies behind."""
-
-DISPLAY_POWER = 1 / 2.2
-"""Display values grow with this power of light."""
 
 _FULL_FROM, _BESIDE_TO = 0.75, 0.4
 """Shares of the sky: where more is hidden there is no sun, where less, there may be."""
@@ -86,7 +85,7 @@ class HiddenSky:
         hidden = cv2.blur(hidden / np.float32(DIRECTIONS), (3, 3), borderType=cv2.BORDER_CONSTANT)
         for axis, size in ((0, rows), (1, columns)):
             from_border = (np.minimum(np.arange(size), np.arange(size)[::-1]) / cells_per_m).astype(np.float32)
-            rim = _smooth(from_border / np.float32(_RIM * reach_m))
+            rim = smooth_step(from_border, 0, _RIM * reach_m)
             hidden *= rim[:, None] if axis == 0 else rim
         return HiddenSky(hidden, cells_per_m)
 
@@ -229,10 +228,15 @@ class GroundShade:
         hidden = cv2.remap(
             sky.share, ahead * scale + columns // 2, left * scale + rows // 2, cv2.INTER_LINEAR, borderValue=0
         )
-        level = 1 - _smooth((np.abs(up) - _STEP_M) / np.float32(_FADE_M))
-        beside = np.float32((1 + self.even_share) / 2)
-        worth = beside + (1 - beside) * _smooth((hidden - _BESIDE_TO) / np.float32(_FULL_FROM - _BESIDE_TO))
+        level = 1 - smooth_step(np.abs(up), _STEP_M, _FADE_M)
+        beside = np.float32(worth_beside(self.even_share))
+        worth = beside + (1 - beside) * smooth_step(hidden, _BESIDE_TO, _FULL_FROM - _BESIDE_TO)
         return np.asarray(1 - np.float32(MOST_HIDDEN) * hidden * worth * level, dtype=np.float32)
+
+
+def worth_beside(even_share: float) -> float:
+    """What the sky's light is worth beside an actor: half way between sun and shade."""
+    return (1 + even_share) / 2
 
 
 def _rays(size_px: int, part: slice, camera: CameraRecord) -> FloatImage:
@@ -268,9 +272,3 @@ def _before_camera(corners: Array) -> Array:
     cut = first * last < 0
     share = (first[cut] / (first[cut] - last[cut]))[:, None]
     return np.concatenate([corners[corners[:, 2] >= _NEAREST_M], ends[cut, 0] + share * (ends[cut, 1] - ends[cut, 0])])
-
-
-def _smooth(value: FloatImage) -> FloatImage:
-    """0 up to 0, 1 from 1 on, smooth in between."""
-    t = np.clip(value, 0, 1)
-    return np.asarray(t * t * (3 - 2 * t), dtype=np.float32)

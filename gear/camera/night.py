@@ -21,6 +21,7 @@ import numpy.typing as npt
 from gear.camera.beams import Headlamps, Lamps, Spots, headlamps
 from gear.camera.glow import Shine, Windows
 from gear.camera.own_light import board_light, lens_light
+from gear.camera.response import DISPLAY_POWER
 from gear.camera.slant import STRIP_ROWS, Strip, strips_of
 from gear.contracts.rendering import RawView
 from gear.values.frames import LINEAR_FULL_SCALE, FloatImage, GeomTable, IdImage, UInt16Image
@@ -37,9 +38,6 @@ GLARE = {"street": 0.12, "globe": 0.6, "head": 0.03}
 SIGNAL_GAIN = 0.9
 STREAK_SHARE = 0.12
 """Of a lamp's light that wet ground mirrors."""
-
-DISPLAY_POWER = 1 / 2.2
-"""Display values grow with this power of light."""
 
 _GRAIN_PX = 128
 

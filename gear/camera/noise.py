@@ -42,3 +42,9 @@ def sampled(picture: npt.NDArray[np.float32], x: npt.NDArray[Any], y: npt.NDArra
     folded = [np.resize((v % side).astype(np.float32), (rows, _FOLD)) for v, side in ((x, width), (y, height))]
     found = cv2.remap(picture, folded[0], folded[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
     return np.asarray(found.reshape(-1, *picture.shape[2:])[: len(x)], dtype=np.float32)
+
+
+def smooth_step(value: npt.NDArray[np.float32], edge: float, width: float) -> npt.NDArray[np.float32]:
+    """0 up to an edge, 1 from a width beyond it on, smooth in between."""
+    t = np.clip((value - edge) / width, 0, 1)
+    return np.asarray(t * t * (3 - 2 * t), dtype=np.float32)

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from gear.camera.noise import TILE_PX, periodic_noise, sampled
+from gear.camera.noise import TILE_PX, periodic_noise, sampled, smooth_step
 from gear.values.frames import LINEAR_FULL_SCALE, FloatImage, UInt16Image
 from gear.values.rng import derive_rng
 from gear.values.scene import CameraRecord
@@ -73,7 +73,7 @@ class Puddles:
         position_m = camera.world_from_camera_transform.translation_m
         towards = _towards(rows, columns, depth_m[rows, columns], camera)
         at_px = [(towards[axis] + np.float32(position_m[axis] % TILE_M)) * (TILE_PX / TILE_M) for axis in (0, 1)]
-        water = _smooth(sampled(_pattern(self.town), *at_px), 1 - self.share, _EDGE)
+        water = smooth_step(sampled(_pattern(self.town), *at_px), 1 - self.share, _EDGE)
         wet = np.flatnonzero(water > 0)
         if not len(wet):
             return result
@@ -121,8 +121,3 @@ def _towards(
 def _pattern(town: str) -> npt.NDArray[np.float32]:
     """(`TILE_PX`, `TILE_PX`) noise that belongs to a town."""
     return periodic_noise(derive_rng(0, "puddles", town), _OCTAVES, _SLOPE)
-
-
-def _smooth(value: npt.NDArray[np.float32], edge: float, width: float) -> npt.NDArray[np.float32]:
-    t = np.clip((value - edge) / width, 0, 1)
-    return np.asarray(t * t * (3 - 2 * t), dtype=np.float32)

@@ -25,6 +25,9 @@ from gear.values.scene import Weather
 Encoding = Literal["srgb", "none"]
 Floats = npt.NDArray[np.float64]
 
+DISPLAY_POWER = 1 / 2.2
+"""Display values grow with this power of light."""
+
 
 @dataclass(frozen=True, slots=True)
 class Response:

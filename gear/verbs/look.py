@@ -16,7 +16,7 @@ from typing import Any
 
 import mujoco
 
-from gear.camera.ground_shade import MOST_HIDDEN
+from gear.camera.ground_shade import MOST_HIDDEN, worth_beside
 from gear.camera.response import response_for
 from gear.dataset.plan import Plan
 from gear.values.errors import FieldError, GearError
@@ -123,7 +123,7 @@ def light_digest() -> str:
         numbers = [*light.towards_sun, *light.sun, *light.ambient]
         levels = [int(level) for level in light.sky_faces.mean(axis=(0, 1)).round()]
         ramp = [round(float(value), 2) for value in response_for("filament", weather).curve(RAMP)]
-        hidden = round(MOST_HIDDEN * (1 + even_share(weather, light)) / 2, 2)
+        hidden = round(MOST_HIDDEN * worth_beside(even_share(weather, light)), 2)
         presets[name] = [to_json(weather), [f"{number:.3g}" for number in numbers], levels, ramp, hidden]
     return _digest(presets)
 
