@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 import trimesh
@@ -10,6 +12,10 @@ from authoring.kit.parts import Sink
 from authoring.materials.registry import MATERIALS
 
 Array = npt.NDArray[np.float64]
+
+TRIALS = 4
+HIDDEN = 0.85
+"""What lies deeper than this share of another mass's radius is in it."""
 
 
 def lump(
@@ -21,8 +27,8 @@ def lump(
     around: Array,
     detail: int,
     rng: np.random.Generator,
-) -> None:
-    """One mass of foliage: a dented ball that is shaded as a part of the crown around `around`.
+) -> Array:
+    """One mass of foliage: a dented ball that is shaded as a part of the crown around `around`; returns its faces.
 
     Args:
         sink: takes the faces.
@@ -32,6 +38,9 @@ def lump(
         around: (3,) the crown's middle: normals lean away from it, so that the crown is lit as one.
         detail: subdivisions of an icosahedron: 0 is 20 faces, 1 is 80.
         rng: dents it.
+
+    Returns:
+        (F, 3, 3) the corners of the faces.
     """
     ball = trimesh.creation.icosphere(subdivisions=detail)
     unit = np.asarray(ball.vertices, np.float64)
@@ -54,46 +63,72 @@ def lump(
         uvs=uvs.reshape(-1, 2),
         normals=normals.reshape(-1, 3),
     )
+    return corners
+
+
+def on_masses(
+    masses: Sequence[Array], centres: Array, radii_m: Array, *, count: int, around: Array, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """Where sprays grow on foliage masses that overlap: spread evenly over what is seen of them from outside.
+
+    Args:
+        masses: (F, 3, 3) the faces of each, as `lump` returns them.
+        centres: (K, 3) of the masses.
+        radii_m: (K, 3) half extents of the masses.
+        count: points in all.
+        around: (3,) the middle of the crown.
+        rng: chooses them.
+
+    Returns:
+        (count, 3) points on the faces, and (count, 3) unit vectors away from mass and crown.
+    """
+    faces = np.concatenate(masses)
+    owner = np.repeat(np.arange(len(masses)), [len(mass) for mass in masses])
+    area = np.linalg.norm(np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0]), axis=1)
+    # Of these many times more points than are wanted, enough lie in no other mass.
+    face = rng.choice(len(faces), size=count * TRIALS, p=area / area.sum())
+    share = rng.dirichlet((1.0, 1.0, 1.0), count * TRIALS)
+    points = np.einsum("nc,ncx->nx", share, faces[face])
+    depth = np.linalg.norm((points[:, None] - centres) / radii_m, axis=-1)
+    depth[np.arange(len(points)), owner[face]] = np.inf
+    seen = np.flatnonzero(depth.min(1) > HIDDEN)
+    kept = np.concatenate([seen, np.setdiff1d(np.arange(len(points)), seen)])[:count]
+    points, mass = points[kept], owner[face][kept]
+    outward = _unit(_unit(points - centres[mass]) + 0.6 * _unit(points - around))
+    return points, outward
 
 
 def scatter_leaves(
     sink: Sink,
     material: str,
-    centres: Array,
-    radii_m: Array,
+    feet: Array,
+    outward: Array,
     *,
-    count: int,
     length_m: float,
-    around: Array,
     rng: np.random.Generator,
-    reach: tuple[float, float] = (0.7, 1.05),
+    lift: float = 1.0,
+    breadth: float = 1.0,
 ) -> None:
     """Sprays of leaves on foliage masses: one pointed triangle each, seen from both sides, with leaves drawn on it.
 
     Args:
         sink: takes the faces.
         material: a foliage material.
-        centres: (K, 3) of the masses.
-        radii_m: (K, 3) half extents of the masses.
-        count: sprays in all; larger masses get more.
+        feet: (N, 3) where they grow.
+        outward: (N, 3) unit vectors out of the foliage.
         length_m: of a spray; the texture keeps its own scale, so that a long spray shows several leaves.
-        around: (3,) or (K, 3), the middle that leaves point away from.
-        rng: places and turns them.
-        reach: where a spray's foot is between a mass's centre (0) and its surface (1).
+        rng: turns them.
+        lift: how much of the way out sprays keep: at 0 they lie on their mass like shingles, at 1 they stand off it.
+        breadth: of a spray, 1 for a slender one.
     """
-    share = radii_m[:, 0] ** 2
-    mass = rng.choice(len(centres), size=count, p=share / share.sum())
-    middle = np.broadcast_to(around, centres.shape)[mass]
-    outside = _unit(centres[mass] - middle)
-    direction = _unit(rng.normal(size=(count, 3)) + 1.1 * outside + (0, 0, 0.15))
-    foot = centres[mass] + direction * radii_m[mass] * rng.uniform(*reach, (count, 1))
-    outward = _unit(direction + 0.6 * outside)
+    count = len(feet)
     along = _unit(_unit(rng.normal(size=(count, 3))) + 0.75 * outward - (0, 0, 0.25))
+    along = _unit(along - (1 - lift) * (along * outward).sum(-1, keepdims=True) * outward)
     across = _unit(np.cross(along, _unit(outward + 0.7 * rng.normal(size=(count, 3)))))
     length = length_m * rng.uniform(0.6, 1.35, (count, 1))
-    width = length * rng.uniform(0.26, 0.40, (count, 1))
+    width = length * rng.uniform(0.26, 0.40, (count, 1)) * breadth
     skew = along * length * rng.uniform(-0.1, 0.25, (count, 1))
-    back = foot - along * length * 0.25
+    back = feet - along * length * 0.25
     corners = np.stack([back - across * width, back + across * width + skew, back + along * length], 1).reshape(-1, 3)
     faces = np.arange(len(corners)).reshape(-1, 3)
     face_normal = np.cross(across, along)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from authoring.kit.leaves import lump, scatter_leaves
+from authoring.kit.leaves import lump, on_masses, scatter_leaves
 from authoring.kit.parts import Part, Sink
 from authoring.kit.shapes import cylinder
 from authoring.materials.registry import MATERIALS
@@ -129,18 +129,11 @@ def _hedge_leaves(sink: Sink, length_m: float, height_m: float, depth_m: float, 
     # Each leaf is pushed to the front, the back or the top, by the areas of the three.
     face = rng.choice(3, size=count, p=np.array([height_m, height_m, depth_m * 1.5]) / (2 * height_m + depth_m * 1.5))
     at[face == 0, 1], at[face == 1, 1], at[face == 2, 2] = -half[1], half[1], half[2]
-    inward = np.array([(0.0, -1.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)])[face]
+    outward = np.array([(0.0, -1.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)])[face]
+    outward += 0.5 * rng.normal(size=(count, 3))
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
     at += (0, 0, half[2])
-    scatter_leaves(
-        sink,
-        "foliage_dark",
-        at,
-        np.full((count, 3), 0.02),
-        count=count,
-        length_m=0.13,
-        around=at - inward,
-        rng=rng,
-    )
+    scatter_leaves(sink, "foliage_dark", at, outward, length_m=0.13, rng=rng)
 
 
 def _bush(
@@ -152,10 +145,12 @@ def _bush(
     centres = foot + shape * height_m
     radii = rng.uniform(0.28, 0.38, (6, 1)) * height_m * np.ones(3)
     around = foot + np.array([0.0, 0.0, height_m * 0.2])
-    for centre, radius in zip(centres, radii, strict=True):
+    masses = [
         lump(sink, foliage, centre, radius, around=around, detail=0, rng=rng)
-    length_m = 0.10 + 0.08 * height_m
-    scatter_leaves(sink, foliage, centres, radii, count=leaves, length_m=length_m, around=around, rng=rng)
+        for centre, radius in zip(centres, radii, strict=True)
+    ]
+    feet, outward = on_masses(masses, centres, radii, count=leaves, around=around, rng=rng)
+    scatter_leaves(sink, foliage, feet, outward, length_m=0.10 + 0.08 * height_m, rng=rng)
 
 
 def _sheet(sink: Sink, material: str, points: Array) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from authoring.kit.leaves import lump, scatter_leaves
+from authoring.kit.leaves import lump, on_masses, scatter_leaves
 from authoring.kit.parts import Part, Sink
 from authoring.kit.shapes import ring_faces, sweep
 
@@ -97,6 +97,30 @@ SPECIES: dict[str, Species] = {
 }
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Layer:
+    """A part of a crown's sprays.
+
+    Attributes:
+        share: of the habit's number of leaves.
+        size: of the habit's spray.
+        lift, breadth: as `scatter_leaves` takes them.
+    """
+
+    share: float
+    size: float
+    lift: float = 1.0
+    breadth: float = 1.0
+
+
+NEAR = (
+    Layer(share=0.3, size=1.3, lift=0.2, breadth=1.5),
+    Layer(share=0.75, size=0.8, lift=1.0, breadth=0.9),
+)
+FAR = (Layer(share=0.06, size=2.6, lift=0.35, breadth=1.4),)
+"""Shingles that cover the masses, and small sprays that make the outline; from afar a few large ones do."""
+
+
 def tree(species: str, height_m: float, rng: np.random.Generator, *, lod: str = "near") -> list[Part]:
     """One tree on the ground at the origin, all of it labelled vegetation.
 
@@ -104,7 +128,7 @@ def tree(species: str, height_m: float, rng: np.random.Generator, *, lod: str = 
         species: of `SPECIES`.
         height_m: to the top of the crown, at least 2.
         rng: decides branches and leaves.
-        lod: `near` for about 3 to 4 thousand triangles, `far` for about 300.
+        lod: `near` for about 3 to 4 thousand triangles, `far` for about 400.
     """
     if species not in SPECIES:
         raise ValueError(f"no tree species named {species!r}; there are {', '.join(SPECIES)}")
@@ -120,20 +144,22 @@ def tree(species: str, height_m: float, rng: np.random.Generator, *, lod: str = 
         radii = radii * 1.5
     _wood(sink, habit, height_m, centres, near=near, rng=rng)
     middle = np.array([0.0, 0.0, habit.centre * height_m])
-    for centre, radius in zip(centres, radii, strict=True):
+    masses = [
         lump(sink, habit.foliage, centre, radius, around=middle, detail=0, rng=rng)
+        for centre, radius in zip(centres, radii, strict=True)
+    ]
     length_m = habit.leaf_m * (height_m / 8) ** 0.5
-    layers = ((0.42, 1.9, (0.75, 1.0)), (0.58, 0.8, (0.85, 1.15))) if near else ((0.035, 4.0, (0.7, 0.95)),)
-    for share, size, reach in layers:
+    for layer in NEAR if near else FAR:
+        count = round(habit.leaves * layer.share)
+        feet, outward = on_masses(masses, centres, radii, count=count, around=middle, rng=rng)
         scatter_leaves(
             sink,
             habit.foliage,
-            centres,
-            radii,
-            count=round(habit.leaves * share),
-            length_m=length_m * size,
-            around=middle,
-            reach=reach,
+            feet,
+            outward,
+            length_m=length_m * layer.size,
+            lift=layer.lift,
+            breadth=layer.breadth,
             rng=rng,
         )
     return sink.parts()

@@ -19,6 +19,9 @@ BOARD_LIGHT, BOARD_FALL = 0.33, 0.3
 
 FRONT_LIGHT, BACK_LIGHT = (0.9, 0.85, 0.75), (0.30, 0.008, 0.004)
 BACK_GAIN = 0.35
+ENDS = 0.6
+"""Glass farther out than this share of the way to a vehicle's front or back is of lamps that are on; what is between,
+on the roof, is of blue lights that are off."""
 
 
 def lens_light(
@@ -46,8 +49,9 @@ def lens_light(
     owner = geoms.object_id[geom_id[rows, columns]]
     for actor in drivers(record, vehicles):
         pose = actor.world_from_actor.transform("world", "actor")
-        is_front = (at_m - pose.translation_m) @ pose.rotation[:, 0] > 0
-        for chosen, gain, light in ((is_front, 0.0, FRONT_LIGHT), (~is_front, BACK_GAIN, BACK_LIGHT)):
+        ahead_m = (at_m - pose.translation_m) @ pose.rotation[:, 0]
+        end_m = ENDS * vehicles[actor.asset].front_m
+        for chosen, gain, light in ((ahead_m > end_m, 0.0, FRONT_LIGHT), (ahead_m < -end_m, BACK_GAIN, BACK_LIGHT)):
             mine = chosen & (owner == actor.id)
             yield (rows[mine], columns[mine]), gain, light
 

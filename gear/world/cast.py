@@ -138,7 +138,8 @@ class Crowd:
                     draft = self.spawner.in_bay(kind, body, bays[int(rng.integers(len(bays)))], rng)
                 elif len(pieces) and not parks:
                     lane, s_m = self.spawner.lane_table.draw(pieces, rng)
-                    draft = self.spawner.on_lane(kind, body, "npc", lane, s_m, rng)
+                    if self.spawner.belongs(kind, lane):
+                        draft = self.spawner.on_lane(kind, body, "npc", lane, s_m, rng)
                 if draft is not None and self._add(cast, draft, VEHICLE_GAP_M):
                     added.append(body)
                     break

@@ -22,6 +22,9 @@ CROSSING_WEIGHT = 2.5
 STANDING_SHARE = 0.2
 """Share of the vehicles on lanes that stand still, as in a queue."""
 
+MOTORWAY_MPS = 20.0
+"""Nobody cycles where traffic is this fast."""
+
 SIDE_CLEARANCE_M = 0.35
 """People keep this far from the edge of a sidewalk."""
 
@@ -147,6 +150,10 @@ class Spawner:
         return (
             [self.lanes.bays[i] for i in np.flatnonzero(region.holds(self._bays_m[:, :2]))] if len(self._bays_m) else []
         )
+
+    def belongs(self, kind: ActorType, lane: str) -> bool:
+        """Whether such a vehicle is met on a lane: bicycles keep off motorways."""
+        return kind.facts.kind != "bicycle" or self.lanes.lanes[lane].speed_mps < MOTORWAY_MPS
 
     def on_lane(
         self,

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 from authoring import kit
+from authoring.kit.leaves import lump, on_masses
+from authoring.kit.parts import Sink
 from authoring.kit.props import MAKERS, PROPS, write_prop
 from authoring.materials import MATERIALS, material_xml
 from authoring.materials.atlas import TRAFFIC_SIGNS
@@ -139,7 +141,7 @@ def test_same_rng_same_bytes_other_rng_other_building(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("species", list(kit.SPECIES))
 def test_trees_are_sound_within_budget_and_as_high_as_asked(species: str) -> None:
-    for lod, low, high in (("near", 2000, 4500), ("far", 150, 400)):
+    for lod, low, high in (("near", 2000, 4500), ("far", 150, 450)):
         parts = kit.tree(species, 9.0, derive_rng(3, species), lod=lod)
         check_sound(parts)
         assert low <= kit.triangle_count(parts) <= high
@@ -153,6 +155,24 @@ def test_leaves_are_seen_from_both_sides() -> None:
     agreement = facing(crown)
     assert (agreement < 0).sum() > 1000
     assert (agreement > 0).sum() > 1000
+
+
+def test_leaves_grow_on_the_outside_of_overlapping_masses() -> None:
+    rng = derive_rng(0, "masses")
+    centres, radii_m = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)]), np.full((2, 3), 0.8)
+    middle = centres.mean(0)
+    sink = Sink("vegetation")
+    masses = [lump(sink, "foliage_green", *one, around=middle, detail=1, rng=rng)
+              for one in zip(centres, radii_m, strict=True)]  # fmt: skip
+    feet, outward = on_masses(masses, centres, radii_m, count=500, around=middle, rng=rng)
+    assert feet.shape == outward.shape == (500, 3)
+    np.testing.assert_allclose(np.linalg.norm(outward, axis=1), 1, atol=1e-9)
+    near = np.abs(np.linalg.norm(feet[:, None] - centres, axis=2) / 0.8 - 0.95)
+    assert near.min(1).max() < 0.2, "on a surface"
+    assert np.linalg.norm(feet[:, None] - centres, axis=2).min(1).min() > 0.8 * 0.7, "in neither mass"
+    assert (np.einsum("nx,nx->n", outward, feet - middle) > 0).mean() > 0.95
+    halves = (feet[:, 0] < 0.5).mean()
+    assert 0.4 < halves < 0.6, "evenly over both"
 
 
 @pytest.mark.parametrize("name", sorted(SMALL_THINGS))

@@ -257,12 +257,18 @@ def test_only_those_that_drive_have_their_lamps_on() -> None:
     assert ahead > 0.9 and below > 0.8 and above < 0.05, "the beam is cut off at the height of the lamp"
 
 
-def test_vehicles_show_white_ahead_and_red_behind_and_parked_ones_nothing() -> None:
+def test_vehicles_show_white_ahead_and_red_behind_and_nothing_on_the_roof_or_where_they_are_parked() -> None:
     vehicles = {"van": Headlamps(front_m=2.0, half_gauge_m=0.6)}
     _, geom_id = street()
     table = geoms(object_id=np.array([-1, 2], np.int32))
-    for role, yaw, expected in (("npc", 0.0, "red"), ("npc", math.pi, "white"), ("parked", math.pi, "dark")):
-        pose = RigidTransform.from_yaw("world", "actor", (WALL_M + 1.0, 0.0, 0.0), yaw)
+    for role, yaw, away_m, expected in (
+        ("npc", 0.0, 1.8, "red"),
+        ("npc", math.pi, 1.8, "white"),
+        ("npc", 0.0, 0.4, "dark"),
+        ("npc", math.pi, 0.4, "dark"),
+        ("parked", math.pi, 1.8, "dark"),
+    ):
+        pose = RigidTransform.from_yaw("world", "actor", (WALL_M + away_m, 0.0, 0.0), yaw)
         van = ActorRecord(id=2, asset="van", role=role, world_from_actor=Pose.from_transform(pose))  # type: ignore[arg-type]
         one = night(vehicles=vehicles, is_lens=np.array([False, True]))
         red, _, blue = light_of(one, record(van), table).glow[geom_id == WALL][0] / LINEAR_FULL_SCALE

@@ -16,6 +16,7 @@ from gear.values.errors import PlacementError
 from gear.values.geometry import wrap_angle_rad
 from gear.values.scene import ActorRecord, SceneRecord
 from gear.values.serial import from_json, to_json
+from gear.world import spawn
 from gear.world.planner import ScenePlanner
 from gear.world.scene_spec import EgoLimits, NpcLimits, SceneSpec, VehicleLimits
 from gear.world.world import World
@@ -203,6 +204,17 @@ def test_counts_and_regions_are_kept() -> None:
         assert 2 <= len(vehicles) <= 5
         assert 2 <= len(people) <= 6
         assert all(np.linalg.norm(ego - actor.world_from_actor.position_m) < 61.5 for actor in vehicles + people)
+
+
+def test_nobody_cycles_on_a_motorway(monkeypatch: pytest.MonkeyPatch) -> None:
+    def kinds() -> set[str]:
+        types = tiny_world("no_billboard").types
+        return {types[a.asset].facts.kind for r in records("no_billboard", 20) for a in r.actors if a.role == "npc"}
+
+    assert "bicycle" in kinds()
+    monkeypatch.setattr(spawn, "MOTORWAY_MPS", 0.0)
+    assert "car" in kinds()
+    assert "bicycle" not in kinds()
 
 
 def test_colours_come_from_the_palette() -> None:
