@@ -18,7 +18,7 @@ import pytest
 from authoring.weights.patches import command
 from authoring.weights.patches.install import install
 from authoring.weights.patches.plan import FIRST_SEEDS, PatchPlan, model_settings, plans
-from authoring.weights.patches.run import EFFECT, make_patch
+from authoring.weights.patches.run import EFFECT, make_patch, measure_again
 from authoring.weights.patches.summary import is_clearly_worse, table
 from authoring.weights.plan import TRAINING_OPTIONS, held_out, training
 from gear.cli.main import main
@@ -91,12 +91,14 @@ def test_collections_can_be_made_and_twins_are_twins(task: str) -> None:
 
 @pytest.mark.parametrize("task", MODELS)
 def test_every_command_is_one_that_gear_understands(task: str) -> None:
-    for step in replace(of(task)[0], attack_settings=("batch=1",)).commands(Path("out")):
+    plan = replace(of(task)[0], attack_settings=("batch=1",))
+    for step in (*plan.commands(Path("out")), *plan.commands_again(Path("again"))):
         parser = argparse.ArgumentParser(exit_on_error=False)
         importlib.import_module(f"gear.cli.{step.arguments[0]}").add_arguments(parser)
         args = parser.parse_args(step.arguments[1:])
         if step.name == "evaluate":
-            assert args.data == ["out/none", "out/random", "out/patched"] and args.settings == ["weights=none"]
+            folders = [f"{Path(args.out).parent}/{kind}" for kind in ("none", "random", "patched")]
+            assert args.data == folders[-len(args.data) :] and args.settings == ["weights=none"]
         if step.name == "attack":
             assert (args.settings, args.model_set, args.every) == (["batch=1"], ["weights=none"], 25)
         if step.name == "gap":
@@ -128,6 +130,10 @@ def test_what_cannot_be_made_is_refused() -> None:
         args = parser.parse_args(["--task", "semseg", "--model", "ddrnet23_slim", "--out", "x", "--install", *flags])
         with pytest.raises(GearError, match="--install is for patches"):
             command.run(args)
+    with pytest.raises(GearError, match="--again measures installed patches"):
+        command.run(
+            argparse.Namespace(**vars(args) | {"install": False, "settings": [], "again": True, "weights": "none"})
+        )
 
 
 def effect(**changes: Any) -> dict[str, Any]:
@@ -282,3 +288,10 @@ def test_a_patch_is_made_measured_taken_up_again_and_installed(
     monkeypatch.setattr("gear.nn.shipped.shipped_folders", lambda: (tmp_path / "package",))
     installed = resolve_patch(plan.name, surfaces=1, seed=0)
     assert installed.label == patched["dataset"]["patch"], "gear collect --patch NAME shows what was measured"
+
+    again = measure_again(plan, tmp_path / "again", in_this_process(ran), told.append, tmp_path / "package/patches")
+    assert ran == ["collect", "collect", "evaluate"] and {name: again[name] for name in found} == found
+    assert again["again"] == {
+        "weights_sha256": results["model"]["weights_sha256"], "samples": 4, "seed": 42_003, "outside": found["outside"],
+    }, "by the same weights the same"  # fmt: skip
+    assert json.loads((target / "effect.json").read_text()) == again

@@ -6,12 +6,13 @@ import argparse
 import shlex
 import sys
 import time
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from authoring.weights.patches.install import install
 from authoring.weights.patches.plan import SAMPLES, STEPS, STEPS_OF, PatchPlan, plans
-from authoring.weights.patches.run import gear_process, make_patch
+from authoring.weights.patches.run import Gear, Told, gear_process, make_patch, measure_again
 from authoring.weights.patches.summary import table
 from authoring.weights.plan import TOWNS, TRAINING_OPTIONS
 from gear.dataset.files import write_alone
@@ -43,6 +44,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--jobs", type=int, default=1, metavar="J", help="scenes at a time (1)")
     parser.add_argument("--install", action="store_true", help="put what is whole into weights/gear_weights/patches")
+    parser.add_argument(
+        "--again", action="store_true", help="make none: measure what is installed against the weights of today"
+    )
     parser.add_argument("--list", action="store_true", help="print the commands and do nothing")
 
 
@@ -57,6 +61,10 @@ def run(args: argparse.Namespace) -> int:
     if args.install and (args.settings or args.attack_set):
         raise GearError(
             "--install is for patches made as they are made for everybody; leave --set and --attack-set out"
+        )
+    if args.again and (args.install or args.weights != SHIPPED):
+        raise GearError(
+            "--again measures installed patches against the shipped weights; leave --install and --weights out"
         )
     if args.jobs < 1:
         raise GearError(f"--jobs must be at least 1, got {args.jobs}")
@@ -74,10 +82,12 @@ def run(args: argparse.Namespace) -> int:
     root: Path = args.out / args.model.replace("/", "-")
     if args.list:
         for plan in chosen:
-            for step in plan.commands(root / plan.place):
+            for step in (plan.commands_again if args.again else plan.commands)(root / plan.place):
                 print(shlex.join(["gear", *step.arguments]))
         return 0
-    effects, failed = _made(chosen, root, args.jobs)
+    effects, failed = _made(chosen, root, args.jobs, measure_again if args.again else make_patch)
+    if args.again:
+        return 1 if failed else 0
     if effects:
         write_alone(root / "summary.json", dump_json(effects))
         write_alone(root / "summary.txt", table(effects).encode())
@@ -88,7 +98,9 @@ def run(args: argparse.Namespace) -> int:
     return 1 if failed else 0
 
 
-def _made(chosen: list[PatchPlan], root: Path, jobs: int) -> tuple[list[Json], int]:
+def _made(
+    chosen: list[PatchPlan], root: Path, jobs: int, work: Callable[[PatchPlan, Path, Gear, Told], Json]
+) -> tuple[list[Json], int]:
     begin = time.monotonic()
 
     def say(text: str) -> None:
@@ -96,7 +108,7 @@ def _made(chosen: list[PatchPlan], root: Path, jobs: int) -> tuple[list[Json], i
 
     def make(plan: PatchPlan) -> Json | None:
         try:
-            return make_patch(plan, root / plan.place, gear, lambda step: say(f"{plan.name}: {step}"))
+            return work(plan, root / plan.place, gear, lambda step: say(f"{plan.name}: {step}"))
         except GearError as error:
             say(f"{plan.name}: failed: {error}")
             return None

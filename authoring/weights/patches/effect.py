@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from authoring.weights.patches.plan import EFFECT, OUTSIDE, PatchPlan
+from authoring.weights.patches.plan import EFFECT, OUTSIDE, TASK, PatchPlan
 from gear.contracts.specs import TaskSpec
 from gear.dataset.sidecar import load_json
 from gear.plugins.build import find
 from gear.values.serial import Json
-
-TASK = "task"
 
 
 def read_effect(plan: PatchPlan, root: Path, minutes: float) -> Json:
@@ -32,16 +30,10 @@ def read_effect(plan: PatchPlan, root: Path, minutes: float) -> Json:
     """
     evaluation, gap = load_json(root / "evaluation/results.json"), load_json(root / "gap/gap.json")
     attack = load_json(root / plan.name / "attack.json")
-    rows = {_kind(row["dataset"]["patch"]): row for row in evaluation["rows"]}
+    rows = _rows(evaluation)
     spec = find("task", plan.task).spec
     assert isinstance(spec, TaskSpec)
     report, _, figure = spec.figure.rpartition(".")
-    change = next(
-        one
-        for one in evaluation["differences"]
-        if (one["row"], one["against"]) == (rows["patched"]["name"], rows["random"]["name"])
-    )
-    where, tested = OUTSIDE[plan.task]
     return {
         "patch": plan.name,
         "task": plan.task,
@@ -58,13 +50,43 @@ def read_effect(plan: PatchPlan, root: Path, minutes: float) -> Json:
                 kind: rows[kind]["figures"][report or TASK].get(figure, {}).get("value")
                 for kind in ("none", "random", "patched")
             },
-            "patched_minus_random": change["figures"][report or TASK].get(figure),
+            "patched_minus_random": _change(evaluation)["figures"][report or TASK].get(figure),
         },
-        "outside": {"figure": f"{where}.{tested}", **change["paired"][where][tested]},
+        "outside": _outside(plan, evaluation),
         "effect": _effect(gap, EFFECT.get(plan.task, figure)),
         "psnr_db": gap["median_psnr_db"].get("transport"),
         "minutes": {"attack": round(attack["seconds"] / 60, 2), "all": round(minutes, 2)},
     }
+
+
+def read_again(plan: PatchPlan, root: Path) -> Json:
+    """What the patch does to the network of today, by `PatchPlan.commands_again`: its weights, and as `outside` above.
+
+    Raises:
+        DatasetError: the results cannot be read.
+    """
+    evaluation = load_json(root / "evaluation/results.json")
+    return {
+        "weights_sha256": evaluation["model"]["weights_sha256"],
+        "samples": plan.samples["test"],
+        "seed": plan.seed("test"),
+        "outside": _outside(plan, evaluation),
+    }
+
+
+def _rows(evaluation: Json) -> dict[str, Json]:
+    return {_kind(row["dataset"]["patch"]): row for row in evaluation["rows"]}
+
+
+def _change(evaluation: Json) -> Json:
+    """From the random patch to this one."""
+    names = tuple(_rows(evaluation)[kind]["name"] for kind in ("patched", "random"))
+    return next(one for one in evaluation["differences"] if (one["row"], one["against"]) == names)
+
+
+def _outside(plan: PatchPlan, evaluation: Json) -> Json:
+    where, tested = OUTSIDE[plan.task]
+    return {"figure": f"{where}.{tested}", **_change(evaluation)["paired"][where][tested]}
 
 
 def _effect(gap: Json, figure: str) -> Json:

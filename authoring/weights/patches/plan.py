@@ -53,11 +53,14 @@ ATTACK: dict[str, tuple[str, ...]] = {
 }
 """Options of the attack on a network: every loss is a backward pass of its own, and three of nine say what matters."""
 
+TASK = "task"
+"""Report of the task's own evaluator."""
+
 OUTSIDE = {
     "semseg": ("outside_patch", "miou"),
     "depth": ("outside_patch", "eigen_d1"),
-    "detect2d": ("task", "found_share"),
-    "stereo3d": ("task", "found_share"),
+    "detect2d": (TASK, "found_share"),
+    "stereo3d": (TASK, "found_share"),
 }
 """Report and figure of single samples by which a patch's harm outside itself is tested. A board has no labelled objects
 on it, so the share of objects that are found is such a figure as it is."""
@@ -144,6 +147,19 @@ class PatchPlan:
             _step(
                 "gap", root / "none", "--twin", root / "patched", "--model", self.model, *model, "--compositor",
                 "transport", "--out", root / "gap",
+            ),
+        ]  # fmt: skip
+
+    def commands_again(self, root: Path) -> list[Step]:
+        """What measures the installed patch on pictures that it was not made on, against a random one."""
+        where, _ = OUTSIDE[self.task]
+        return [
+            self._collect("test", root / "random", patch="random"),
+            self._collect("test", root / "patched", patch=self.name),
+            _step(
+                "evaluate", "--model", self.model, *_repeated("--set", self.model_settings),
+                *_repeated("--report", () if where == TASK else (where,)), "--out", root / "evaluation",
+                "--data", root / "random", root / "patched",
             ),
         ]  # fmt: skip
 

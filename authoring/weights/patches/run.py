@@ -9,7 +9,8 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from authoring.weights.patches.effect import read_effect
+from authoring.weights.patches.effect import read_again, read_effect
+from authoring.weights.patches.install import PATCHES
 from authoring.weights.patches.plan import PatchPlan
 from gear.dataset.files import sha256, write_alone
 from gear.dataset.sidecar import dump_json, load_json
@@ -66,6 +67,22 @@ def make_patch(plan: PatchPlan, root: Path, gear: Gear, told: Told) -> Json:
         told(step.name)
     effect = read_effect(plan, root, sum(_minutes(root).values()))
     write_alone(root / EFFECT, dump_json({"recipe": recipe, "effect": effect}))
+    return effect
+
+
+def measure_again(plan: PatchPlan, root: Path, gear: Gear, told: Told, patches: Path = PATCHES) -> Json:
+    """Measures an installed patch against the weights that are shipped now; its `effect.json` says so as `again`.
+
+    Raises:
+        GearError: a command failed, or the patch is not installed.
+    """
+    path = patches / plan.name / EFFECT
+    effect = load_json(path)
+    for step in plan.commands_again(root):
+        gear(step.arguments)
+        told(step.name)
+    effect |= {"again": read_again(plan, root)}
+    write_alone(path, dump_json(effect))
     return effect
 
 
