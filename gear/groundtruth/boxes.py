@@ -9,11 +9,14 @@ import numpy as np
 
 from gear.groundtruth.raster import NEAR_M
 from gear.values.frames import SceneObject
-from gear.values.geometry import Array, Intrinsics, wrap_angle_rad
+from gear.values.geometry import Array, Intrinsics, frozen, wrap_angle_rad
 from gear.values.scene import CameraRecord, Vec3
 
 EDGES = ((0, 1), (1, 3), (3, 2), (2, 0), (4, 5), (5, 7), (7, 6), (6, 4), (0, 4), (1, 5), (2, 6), (3, 7))
 """Edges of a box whose corner i has the signs of i's bits: 4 is x, 2 is y, 1 is z."""
+
+_CORNERS = frozen([[(i >> 2 & 1) - 0.5, (i >> 1 & 1) - 0.5, i & 1] for i in range(8)])
+"""(8, 3): how many lengths, widths and heights each corner lies from the middle of the bottom face."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,11 +52,13 @@ class Box3d:
         """(8, 3) corners in the camera's frame, ordered as `EDGES` wants them."""
         c, s = math.cos(self.rotation_y_rad), math.sin(self.rotation_y_rad)
         front, left = np.array([c, 0.0, -s]), np.array([s, 0.0, c])
-        signs = np.array([[(i >> 2 & 1) - 0.5, (i >> 1 & 1) - 0.5, i & 1] for i in range(8)])
         up = np.array([0.0, -self.height_m, 0.0])
         middle = np.array(self.bottom_m)
         return np.asarray(
-            middle + signs[:, 0:1] * self.length_m * front + signs[:, 1:2] * self.width_m * left + signs[:, 2:3] * up
+            middle
+            + _CORNERS[:, 0:1] * self.length_m * front
+            + _CORNERS[:, 1:2] * self.width_m * left
+            + _CORNERS[:, 2:3] * up
         )
 
 
@@ -86,6 +91,16 @@ def project_box(corners_m: Array, intrinsics: Intrinsics) -> tuple[float, float,
     Returns:
         None if the whole box lies behind the near plane; edges that cross it are cut there.
     """
+    points = corners_m if (corners_m[:, 2] >= NEAR_M).all() else _in_front(corners_m)
+    if not len(points):
+        return None
+    pixels = intrinsics.project(points)
+    (left, top), (right, bottom) = pixels.min(axis=0), pixels.max(axis=0)
+    return (float(left), float(top), float(right), float(bottom))
+
+
+def _in_front(corners_m: Array) -> Array:
+    """(N, 3): the corners in front of the near plane, and where edges cross it."""
     points = [corner for corner in corners_m if corner[2] >= NEAR_M]
     for i, j in EDGES:
         a, b = corners_m[i], corners_m[j]
@@ -93,8 +108,4 @@ def project_box(corners_m: Array, intrinsics: Intrinsics) -> tuple[float, float,
             cut = a + (NEAR_M - a[2]) / (b[2] - a[2]) * (b - a)
             cut[2] = NEAR_M
             points.append(cut)
-    if not points:
-        return None
-    pixels = intrinsics.project(np.array(points))
-    (left, top), (right, bottom) = pixels.min(axis=0), pixels.max(axis=0)
-    return (float(left), float(top), float(right), float(bottom))
+    return np.array(points)

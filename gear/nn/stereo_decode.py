@@ -14,7 +14,7 @@ from torch.nn import functional
 from gear.formats.kitti_object import Calibration, KittiLabel, clip_box, occlusion_level, truncation
 from gear.groundtruth.boxes import Box3d, project_box
 from gear.metrics.boxes import iou_2d
-from gear.values.geometry import Array, wrap_angle_rad
+from gear.values.geometry import Array, Intrinsics, wrap_angle_rad
 
 TRUSTED_M = 1.0
 """A detection's score is the geometric mean of the chances that it is one, that its depth is this right, and that its
@@ -57,6 +57,7 @@ def decode(
         cell_px: width and height of a cell.
         peaks: which of them are kept.
     """
+    intrinsics = calibration.intrinsics
     heat = outputs["heat"].sigmoid()
     any_kind, kind = heat.max(dim=1)
     is_peak = functional.max_pool2d(any_kind[:, None], 3, 1, 1)[:, 0] == any_kind
@@ -70,10 +71,12 @@ def decode(
         maps = {name: _plain(tensor[batch, :, rows, columns].T) for name, tensor in outputs.items()}
         chosen = [kinds[index] for index in kind[batch, rows, columns].tolist()]
         scores = _plain(chance[batch, rows, columns])
-        u = (_plain(columns) + 0.5) * cell_px[0] - 0.5
-        v = (_plain(rows) + 0.5) * cell_px[1] - 0.5
+        middles_px = np.stack([_plain(columns) + 0.5, _plain(rows) + 0.5], axis=-1) * cell_px - 0.5
+        depths_m = intrinsics.focal_px * calibration.baseline_m / maps["disparity_px"][:, 0]
+        maps["middle_m"] = intrinsics.unproject(middles_px + maps["centre_px"], depths_m)
+        maps["alpha_rad"], maps["line_chance"] = heading_rad(maps["heading_logits"])
         labels = [
-            _label({name: values[i] for name, values in maps.items()}, chosen[i], scores[i], (u[i], v[i]), calibration)
+            _label({name: values[i] for name, values in maps.items()}, chosen[i], scores[i], middles_px[i], intrinsics)
             for i in range(len(chosen))
         ]
         found.append(_apart([label for label in labels if label is not None], peaks))
@@ -85,17 +88,15 @@ def _plain(tensor: Tensor) -> Array:
 
 
 def _label(
-    said: Mapping[str, Array], kind: str, chance: float, cell_middle_px: tuple[float, float], calibration: Calibration
+    said: Mapping[str, Array], kind: str, chance: float, cell_middle_px: Array, intrinsics: Intrinsics
 ) -> KittiLabel | None:
     """One detection; None where its box lies outside the picture."""
-    intrinsics = calibration.intrinsics
-    depth_m = intrinsics.focal_px * calibration.baseline_m / float(said["disparity_px"][0])
-    middle_m = intrinsics.unproject(np.array(cell_middle_px) + said["centre_px"], np.array(depth_m))
-    height_m, width_m, length_m = (float(value) for value in said["size_m"])
-    alpha_rad, line_chance = heading_rad(said["heading_logits"])
+    middle_m, alpha_rad = said["middle_m"].tolist(), float(said["alpha_rad"])
+    depth_m = middle_m[2]
+    height_m, width_m, length_m = said["size_m"].tolist()
     rotation_y_rad = wrap_angle_rad(alpha_rad + math.atan2(middle_m[0], middle_m[2]))
-    location_m = (float(middle_m[0]), float(middle_m[1] + height_m / 2), depth_m)
-    (u, v), (left, top, right, bottom) = cell_middle_px, said["sides_px"]
+    location_m = (middle_m[0], middle_m[1] + height_m / 2, depth_m)
+    (u, v), (left, top, right, bottom) = cell_middle_px.tolist(), said["sides_px"].tolist()
     box_px = clip_box((u - left, v - top, u + right, v + bottom), intrinsics)
     if box_px is None:
         return None
@@ -105,7 +106,7 @@ def _label(
     projected = project_box(box.corners_m, intrinsics)
     clipped = clip_box(projected, intrinsics) if projected else None
     error_m = depth_m * math.exp(float(said["disparity_spread"][0]))
-    chances = (chance, 1 - math.exp(-TRUSTED_M / error_m), *((line_chance,) if kind in LONG else ()))
+    chances = (chance, 1 - math.exp(-TRUSTED_M / error_m), *((float(said["line_chance"]),) if kind in LONG else ()))
     return KittiLabel(
         type=kind,
         truncated=truncation(projected, clipped) if projected and clipped else 1.0,
@@ -121,37 +122,39 @@ def _label(
     )
 
 
-def heading_rad(logits: Array) -> tuple[float, float]:
-    """The angle of a distribution over directions, evenly round the circle from 0 on, and how sure its line is, 0..1.
+def heading_rad(logits: Array) -> tuple[Array, Array]:
+    """The angles of distributions over directions, evenly round the circle from 0 on, and how sure their lines are.
 
-    Its line is where the chances of both ends are highest together, so that not knowing front from back does not turn
+    A line is where the chances of both ends are highest together, so that not knowing front from back does not turn
     it; between directions it is the mean of the best one and its neighbours. Then the likelier end is the front.
+
+    Args:
+        logits: (..., directions).
+
+    Returns:
+        (...) in [-pi, pi), and (...) 0..1.
     """
-    chances = np.exp(logits - logits.max())
-    chances /= chances.sum()
-    half = len(chances) // 2
-    lines = chances[:half] + chances[half:]
-    best = int(lines.argmax())
-    near = np.arange(best - 1, best + 2)
-    sure = lines[near % half]
-    place = best + float(sure @ (-1, 0, 1)) / float(sure.sum())
-    is_front = chances[near % len(chances)].sum() >= chances[(near + half) % len(chances)].sum()
-    angle_rad = math.pi * (place / half + (0 if is_front else 1))
-    return wrap_angle_rad(angle_rad), float(sure.sum())
+    chances = np.exp(logits - logits.max(axis=-1, keepdims=True))
+    chances /= chances.sum(axis=-1, keepdims=True)
+    half = chances.shape[-1] // 2
+    lines = chances[..., :half] + chances[..., half:]
+    best = lines.argmax(axis=-1)
+    near = best[..., None] + (-1, 0, 1)
+    sure = np.take_along_axis(lines, near % half, axis=-1)
+    place = best + (sure[..., 2] - sure[..., 0]) / sure.sum(axis=-1)
+    front, back = (np.take_along_axis(chances, (near + turn) % (2 * half), axis=-1).sum(axis=-1) for turn in (0, half))
+    angle_rad = math.pi * (place / half + (front < back))
+    return (angle_rad + math.pi) % (2 * math.pi) - math.pi, np.asarray(sure.sum(axis=-1))
 
 
 def _apart(labels: Sequence[KittiLabel], peaks: Peaks) -> tuple[KittiLabel, ...]:
     """The surest of those that are one object."""
     ordered = sorted(labels, key=lambda label: -(label.score or 0.0))
     boxes_px = np.array([label.box_px for label in ordered]).reshape(-1, 4)
-    overlaps = iou_2d(boxes_px, boxes_px)
-    depths_m = np.array([label.location_m[2] for label in ordered])
+    logs = np.log([label.location_m[2] for label in ordered])
+    is_same = (iou_2d(boxes_px, boxes_px) > peaks.same_overlap) & (abs(logs[:, None] - logs) < peaks.same_depth)
     kept: list[int] = []
     for i in range(len(ordered)):
-        is_same = [
-            overlaps[i, j] > peaks.same_overlap and abs(math.log(depths_m[i] / depths_m[j])) < peaks.same_depth
-            for j in kept
-        ]
-        if not any(is_same):
+        if not is_same[i, kept].any():
             kept.append(i)
     return tuple(ordered[i] for i in kept)
