@@ -8,7 +8,7 @@ from typing import Any
 
 from gear.values.errors import BackendError
 
-_REMEDY = "apt-get install libegl1 libgl1-mesa-dri (or libosmesa6)"
+_REMEDY = "apt-get install libegl1 libopengl0 libgl1-mesa-dri (or libosmesa6)"
 _PLATFORM_DEVICE = 0x313F
 _MAX_DEVICES = 32
 

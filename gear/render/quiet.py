@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import re
 import sys
@@ -27,8 +28,7 @@ def native_output(descriptors: tuple[int, ...] = (1, 2)) -> Iterator[list[str]]:
         for.
     """
     chatter: list[str] = []
-    sys.stdout.flush()
-    sys.stderr.flush()
+    _flush()
     with ExitStack() as files:
         kept = [(fd, os.dup(fd), files.enter_context(tempfile.TemporaryFile())) for fd in descriptors]
         try:
@@ -36,6 +36,7 @@ def native_output(descriptors: tuple[int, ...] = (1, 2)) -> Iterator[list[str]]:
                 os.dup2(file.fileno(), fd)
             yield chatter
         finally:
+            _flush()
             for fd, original, file in kept:
                 os.dup2(original, fd)
                 os.close(original)
@@ -46,3 +47,10 @@ def native_output(descriptors: tuple[int, ...] = (1, 2)) -> Iterator[list[str]]:
                         chatter.append(text.strip())
                     elif text.strip():
                         os.write(fd, line)
+
+
+def _flush() -> None:
+    """Empties Python's buffers and C's, which holds what is printed back wherever stdout is no terminal."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    ctypes.CDLL(None).fflush(None)

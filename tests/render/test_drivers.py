@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -29,7 +30,7 @@ def test_a_machine_without_opengl_is_told_what_to_install(monkeypatch: pytest.Mo
     monkeypatch.setattr(glcontext, "_egl_works", lambda: False)
     assert glcontext.choose_backend() == "osmesa"
     monkeypatch.setattr(glcontext, "_loads", lambda library: False)
-    with pytest.raises(BackendError, match="apt-get install libegl1 libgl1-mesa-dri"):
+    with pytest.raises(BackendError, match="apt-get install libegl1 libopengl0 libgl1-mesa-dri"):
         glcontext.choose_backend()
 
 
@@ -96,3 +97,26 @@ def test_output_comes_back_after_an_exception(capfd: pytest.CaptureFixture[str])
         raise RuntimeError
     os.write(1, b"alive\n")
     assert capfd.readouterr() == ("alive\n", "last words\n")
+
+
+@pytest.mark.parametrize("quiet", [True, False], ids=["caught", "not caught"])
+def test_what_c_keeps_in_its_buffers_is_caught_too(quiet: bool) -> None:
+    """Into a pipe C prints late: after the block, past the one who reads a command's JSON, unless it is made to."""
+    code = (
+        "import contextlib, ctypes\n"
+        "from gear.render.quiet import native_output\n"
+        f"with native_output() if {quiet} else contextlib.nullcontext([]) as chatter:\n"
+        "    ctypes.CDLL(None).puts(b'Backend feature level: 3')\n"
+        "print(chatter)\n"
+    )
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    expected = ["['Backend feature level: 3']"] if quiet else ["[]", "Backend feature level: 3"]
+    assert done.stdout.splitlines() == expected
+
+
+def test_the_doctor_prints_json_alone_into_a_pipe() -> None:
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    code = "from gear.cli.main import main; main(['doctor', '--renderer', 'filament', '--json'])"
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert json.loads(done.stdout)["renderers"]["filament"]["driver"] != "unknown", "Filament's words came too late"
