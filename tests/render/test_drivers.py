@@ -29,6 +29,7 @@ def test_a_machine_without_opengl_is_told_what_to_install(monkeypatch: pytest.Mo
     monkeypatch.delenv("MUJOCO_GL", raising=False)
     monkeypatch.delenv("PYOPENGL_PLATFORM", raising=False)
     monkeypatch.setattr(glcontext, "_egl_works", lambda: False)
+    monkeypatch.setattr(glcontext, "_loads", lambda library: True)
     assert glcontext.choose_backend() == "osmesa"
     monkeypatch.setattr(glcontext, "_loads", lambda library: False)
     with pytest.raises(BackendError, match="apt-get install libegl1 libopengl0 libgl1-mesa-dri"):
