@@ -7,6 +7,7 @@ from pathlib import Path
 from authoring.mesh import write_obj
 from authoring.people.texture import write_atlas, write_skin
 from authoring.two_wheelers.machine import COLOURS, TwoWheeler, all_meshes
+from authoring.two_wheelers.plate import add_picture
 
 _XML = """<mujoco model="{name}">
   <!-- Made by `python -m authoring.two_wheelers`; the rider is part of the file. -->
@@ -67,6 +68,8 @@ def write_two_wheeler(out: Path, machine: TwoWheeler) -> None:
     for group, mesh in meshes.items():
         write_obj(folder / f"{group}.obj", mesh)
     write_atlas(folder / "machine.png", COLOURS)
+    if machine.hard.plate is not None:
+        add_picture(folder / "machine.png", machine.hard.plate)
     write_atlas(folder / "cloth.png", machine.rider.atlas)
     write_skin(folder / "skin.png", machine.rider.face)
     first = machine.palette[0][:3]

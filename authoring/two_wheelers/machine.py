@@ -12,6 +12,7 @@ from authoring.people.figure import Person
 from authoring.people.piece import Piece, combine, mesh_pieces
 from authoring.people.texture import Colour, atlas_uv
 from authoring.two_wheelers.parts import Hard
+from authoring.two_wheelers.plate import shifted
 from authoring.two_wheelers.rider import Seat, model_rider
 
 COLOURS: dict[str, Colour] = {
@@ -61,7 +62,7 @@ class TwoWheeler:
 
 
 def machine_meshes(machine: TwoWheeler) -> dict[str, Mesh]:
-    """The machine's meshes by geom."""
+    """The machine's meshes by geom. With a plate, the texture is the swatches above its picture."""
     skins = mesh_pieces(machine.soft) if machine.soft else []
     meshes = {}
     for group in GROUPS:
@@ -71,6 +72,9 @@ def machine_meshes(machine: TwoWheeler) -> dict[str, Mesh]:
             parts.append(combine(moulded, lambda skin: atlas_uv(skin, COLOURS)))
         if parts:
             meshes[group] = merge(parts)
+    if machine.hard.plate is not None:
+        meshes = {group: shifted(mesh) for group, mesh in meshes.items()}
+        meshes["trim"] = merge([meshes["trim"], machine.hard.plate.face])
     return meshes
 
 

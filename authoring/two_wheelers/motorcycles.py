@@ -80,7 +80,7 @@ def standard_hard() -> Hard:
     hard.both("trim", "amber", block((-0.72, 0.14, 0.735), (-0.67, 0.18, 0.765), 0.01))
     hard.add("trim", "black", tube([(-0.69, -0.15, 0.75), (-0.69, 0.15, 0.75)], 0.007, 6))
     hard.add("trim", "black", block((-0.80, -0.035, 0.55), (-0.70, 0.035, 0.79), 0.02, pitch_deg=22))
-    hard.add("trim", "plate", block((-0.862, -0.10, 0.50), (-0.852, 0.10, 0.66), 0.004, pitch_deg=20))
+    hard.add_plate("MB 58 R", (-0.934, -0.10, 0.52), (-0.924, 0.10, 0.68), pitch_deg=20)
     hard.add("trim", "black", arch(rear, 0.335, 0.085, 60.0, 128.0))
     return hard
 
@@ -204,7 +204,7 @@ def scooter_hard() -> Hard:
     hard.add("trim", "red", block((-0.895, -0.09, 0.665), (-0.86, 0.09, 0.725), 0.014))
     hard.both("trim", "amber", block((-0.88, 0.10, 0.66), (-0.845, 0.145, 0.70), 0.012))
     hard.add("trim", "black", block((-0.90, -0.07, 0.36), (-0.84, 0.07, 0.64), 0.012, pitch_deg=14))
-    hard.add("trim", "plate", block((-0.925, -0.10, 0.42), (-0.915, 0.10, 0.56), 0.004, pitch_deg=14))
+    hard.add_plate("HA 26 S", (-0.925, -0.10, 0.42), (-0.915, 0.10, 0.56), pitch_deg=14)
     hard.add("metal", "black", block((-0.95, -0.12, 0.845), (-0.62, 0.12, 0.865), 0.006))
     hard.add("trim", "box", block((-1.02, -0.23, 0.87), (-0.60, 0.23, 1.24), 0.035))
     hard.add("trim", "black", block((-1.03, -0.235, 1.10), (-0.595, 0.235, 1.125), 0.01))

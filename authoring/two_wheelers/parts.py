@@ -16,6 +16,7 @@ from authoring.mesh import Mesh, bevelled_box, merge, revolve, rotation, smooth_
 from authoring.people.field import Array, Frame
 from authoring.people.texture import swatch_uv
 from authoring.tubes import outward, skinned, tube
+from authoring.two_wheelers.plate import Plate, plate_face
 
 ALONG_X = Frame(np.zeros(3), np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]]))
 """A frame for lofts whose stations run along x: rows are (x, z, -y, half-height, half-width)."""
@@ -42,10 +43,13 @@ class Hard:
 
     Attributes:
         colours: the atlas' colours in order.
+        meshes: by geom, with texture coordinates in the atlas.
+        plate: the number plate, whose face belongs to `trim`.
     """
 
     colours: Sequence[str]
     meshes: dict[str, list[Mesh]] = field(default_factory=dict)
+    plate: Plate | None = None
 
     def add(self, group: str, tint: str, mesh: Mesh, *, crease_deg: float = 40.0) -> None:
         """Gather a mesh; its texture coordinates become its colour's."""
@@ -57,6 +61,11 @@ class Hard:
         """Gather a mesh and its mirror image on the other side."""
         self.add(group, tint, mesh, crease_deg=crease_deg)
         self.add(group, tint, mesh.scaled(1.0, -1.0, 1.0), crease_deg=crease_deg)
+
+    def add_plate(self, text: str, low: Sequence[float], high: Sequence[float], *, pitch_deg: float) -> None:
+        """Gather a number plate: a thin block between two corners, and its face, which looks backwards."""
+        self.add("trim", "plate", block(low, high, 0.004, pitch_deg=pitch_deg))
+        self.plate = plate_face(text, low, high, pitch_deg=pitch_deg)
 
 
 def block(low: Sequence[float], high: Sequence[float], bevel: float = 0.006, *, pitch_deg: float = 0.0) -> Mesh:

@@ -1,51 +1,92 @@
-"""Texture cells shared by all vehicles: where each one is, and the drawing of them.
+"""Parts of textures shared by all vehicles: where each one is, and the drawing of them.
 
-`details.png` dresses trim (plastic, grilles, number plates), `lamps.png` all lights. Each is 4 × 4 cells.
+`details.png` dresses trim: its upper half has 4 × 4 cells (plastic, grilles), its lower half 2 × 8 number plates, one a
+vehicle. `lamps.png` has all lights, in 4 × 4 cells.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from PIL import Image, ImageDraw
 
 from authoring.mesh import Floats, Mesh
+from authoring.vehicles.lettering import lettering
+from authoring.vehicles.plates import PLATES, draw_plate
 
-__all__ = ["DETAILS", "LAMPS", "cell_uvs", "flat", "write_atlases"]
+__all__ = ["DETAILS", "LAMPS", "PLATE_CELLS", "Cell", "cell_uvs", "flat", "write_atlases"]
 
 _SIZE, _OVER = 512, 4
 _CELL = _SIZE // 4
 _MARGIN = 0.06
+_PLATE = (_SIZE // 2, _SIZE // 8)
+_PLATE_MARGIN_PX = 4
 
-DETAILS = {
+
+@dataclass(frozen=True)
+class Cell:
+    """A rectangle of a texture.
+
+    Attributes:
+        left, top, width, height: shares of the texture, top down.
+        margin: shares of its width and height that are left over at each end, so that neighbours never bleed in.
+    """
+
+    left: float
+    top: float
+    width: float
+    height: float
+    margin: tuple[float, float] = (_MARGIN, _MARGIN)
+
+
+def _grid(names: dict[str, tuple[int, int]], rows: int) -> dict[str, Cell]:
+    """Square cells, four beside each other, in a texture of so many rows, by (column, row)."""
+    return {name: Cell(column / 4, row / rows, 1 / 4, 1 / rows) for name, (column, row) in names.items()}
+
+
+_DETAILS = {
     "plastic": (0, 0), "gloss": (1, 0), "bars": (2, 0), "mesh": (3, 0),
-    "plate": (0, 1), "silver": (1, 1), "rescue": (2, 1), "rubber": (3, 1),
+    "silver": (1, 1), "rescue": (2, 1), "rubber": (3, 1),
     "taxi": (0, 2), "slats": (1, 2), "chequer": (2, 2), "wood": (3, 2),
     "display": (0, 3), "battenburg": (1, 3), "stripe": (2, 3), "white": (3, 3),
 }  # fmt: skip
-LAMPS = {
+_LAMPS = {
     "head": (0, 0), "head_round": (1, 0), "head_slim": (2, 0), "fog": (3, 0),
     "tail": (0, 1), "tail_led": (1, 1), "tail_tall": (2, 1), "brake": (3, 1),
     "amber": (0, 2), "reverse": (1, 2), "tail_block": (2, 2), "blue": (3, 2),
     "drl": (0, 3), "red": (1, 3), "head_block": (2, 3), "clear": (3, 3),
 }  # fmt: skip
+DETAILS = _grid(_DETAILS, 8)
+LAMPS = _grid(_LAMPS, 4)
+PLATE_CELLS = {
+    name: Cell(
+        (k % 2) / 2, 0.5 + (k // 2) / 16, 1 / 2, 1 / 16, (_PLATE_MARGIN_PX / _PLATE[0], _PLATE_MARGIN_PX / _PLATE[1])
+    )
+    for k, name in enumerate(PLATES)
+}
 
 
-def cell_uvs(cell: tuple[int, int], unit: Floats) -> Floats:
+def cell_uvs(cell: Cell, unit: Floats) -> Floats:
     """Texture coordinates of (N, 2) positions in a cell: 0 to 1, right and up."""
-    inner = _MARGIN + np.clip(unit, 0, 1) * (1 - 2 * _MARGIN)
-    return np.stack([(cell[0] + inner[:, 0]) / 4, 1 - (cell[1] + 1 - inner[:, 1]) / 4], axis=1)
+    margin = np.array(cell.margin)
+    inner = margin + np.clip(unit, 0, 1) * (1 - 2 * margin)
+    u = cell.left + inner[:, 0] * cell.width
+    return np.stack([u, 1 - (cell.top + (1 - inner[:, 1]) * cell.height)], axis=1)
 
 
-def flat(mesh: Mesh, cell: tuple[int, int]) -> Mesh:
+def flat(mesh: Mesh, cell: Cell) -> Mesh:
     """The mesh in the one colour of a cell's middle."""
     return mesh.with_uvs(cell_uvs(cell, np.array([[0.5, 0.5]]))[0])
 
 
 def write_atlases(folder: Path) -> None:
     """Draws both textures."""
-    _details().resize((_SIZE, _SIZE), Image.Resampling.LANCZOS).save(folder / "details.png", optimize=True)
+    details = Image.new("RGB", (_SIZE, 2 * _SIZE))
+    details.paste(_details().resize((_SIZE, _SIZE), Image.Resampling.LANCZOS), (0, 0))
+    details.paste(_plates().resize((_SIZE, _SIZE), Image.Resampling.LANCZOS), (0, _SIZE))
+    details.save(folder / "details.png", optimize=True)
     _lamps().resize((_SIZE, _SIZE), Image.Resampling.LANCZOS).save(folder / "lamps.png", optimize=True)
 
 
@@ -71,36 +112,25 @@ class _Cell:
     def poly(self, points: list[tuple[float, float]], fill: tuple[int, int, int]) -> None:
         self._draw.polygon([self._at(x, y) for x, y in points], fill=fill)
 
-    def glyphs(self, text: str, x0: float, y0: float, x1: float, y1: float, fill: tuple[int, int, int]) -> None:
-        """Block letters of 3 × 5 strokes, so that no font file is needed."""
-        step = (x1 - x0) / len(text)
-        for k, letter in enumerate(text):
-            rows = _GLYPHS.get(letter, ("000",) * 5)
-            dx, dy = step * 0.78 / 3, (y1 - y0) / 5
-            for r, row in enumerate(rows):
-                for c, bit in enumerate(row):
-                    if bit == "1":
-                        left, top = x0 + k * step + step * 0.11 + c * dx, y0 + r * dy
-                        self.rect(left, top, left + dx * 1.02, top + dy * 1.02, fill)
-
-
-_GLYPHS = {
-    "A": ("111", "101", "111", "101", "101"), "B": ("110", "101", "110", "101", "110"),
-    "C": ("111", "100", "100", "100", "111"), "E": ("111", "100", "110", "100", "111"),
-    "G": ("111", "100", "101", "101", "111"), "I": ("111", "010", "010", "010", "111"),
-    "N": ("111", "101", "101", "101", "101"), "R": ("110", "101", "110", "101", "101"),
-    "T": ("111", "010", "010", "010", "010"),
-    "X": ("101", "101", "010", "101", "101"), "0": ("111", "101", "101", "101", "111"),
-    "1": ("010", "110", "010", "010", "111"), "2": ("111", "001", "111", "100", "111"),
-    "4": ("101", "101", "111", "001", "001"), "7": ("111", "001", "010", "010", "010"),
-    "8": ("111", "101", "111", "101", "111"),
-}  # fmt: skip
+    def words(self, text: str, x0: float, y0: float, x1: float, y1: float, fill: tuple[int, int, int]) -> None:
+        left, top, right, bottom = (round(v) for v in (*self._at(x0, y0), *self._at(x1, y1)))
+        self.image.paste(fill, (left, top), lettering(text, right - left, bottom - top))
 
 
 def _sheet(cells: dict[str, _Cell], places: dict[str, tuple[int, int]]) -> Image.Image:
     image = Image.new("RGB", (_SIZE * _OVER,) * 2)
     for name, (column, row) in places.items():
         image.paste(cells[name].image, (column * _CELL * _OVER, row * _CELL * _OVER))
+    return image
+
+
+def _plates() -> Image.Image:
+    """All plates, each with its edge's colour in the margin round it."""
+    image = Image.new("RGB", (_SIZE * _OVER,) * 2, (20, 20, 20))
+    wide, high = (_OVER * (side - 2 * _PLATE_MARGIN_PX) for side in _PLATE)
+    for k, text in enumerate(PLATES.values()):
+        corner = (k % 2 * _PLATE[0] + _PLATE_MARGIN_PX, k // 2 * _PLATE[1] + _PLATE_MARGIN_PX)
+        image.paste(draw_plate(text, wide, high), (corner[0] * _OVER, corner[1] * _OVER))
     return image
 
 
@@ -126,23 +156,18 @@ def _details() -> Image.Image:
         for lean in (1, -1):
             x = k / 10
             mesh.poly([(x, 0), (x + 0.018, 0), (x + 0.018 + lean * 0.5, 1), (x + lean * 0.5, 1)], (40, 41, 43))
-    plate = cell("plate", (60, 60, 62))
-    plate.rect(0.0, 0.0, 1.0, 1.0, (20, 20, 20), 0.02)
-    plate.rect(0.012, 0.05, 0.988, 0.95, (232, 232, 226), 0.02)
-    plate.rect(0.012, 0.05, 0.09, 0.95, (28, 58, 150), 0.02)
-    plate.glyphs("GR 47 AE", 0.12, 0.2, 0.97, 0.8, (16, 16, 18))
     rescue = cell("rescue", (226, 214, 40))
     for k in range(12):
         for row in range(2):
             if (k + row) % 2 == 0:
                 rescue.rect(k / 12, row / 2, (k + 1) / 12, (row + 1) / 2, (186, 24, 26))
     taxi = cell("taxi", (236, 196, 40))
-    taxi.glyphs("TAXI", 0.08, 0.2, 0.94, 0.8, (18, 18, 18))
+    taxi.words("TAXI", 0.08, 0.2, 0.94, 0.8, (18, 18, 18))
     slats = cell("slats", (30, 31, 33))
     for k in range(10):
         slats.rect(-0.1, k / 10, 1.1, k / 10 + 0.06, (70, 71, 74))
     display = cell("display", (10, 10, 11))
-    display.glyphs("24 CENTER", 0.02, 0.28, 0.98, 0.72, (255, 170, 40))
+    display.words("24 CENTER", 0.02, 0.28, 0.98, 0.72, (255, 170, 40))
     chequer = cell("chequer", (222, 222, 218))
     for k in range(44):
         for row in range(2):
@@ -156,7 +181,7 @@ def _details() -> Image.Image:
     stripe = cell("stripe", (196, 24, 26))
     for k in range(-2, 6):
         stripe.poly([(k / 3, 1.1), (k / 3 + 0.18, 1.1), (k / 3 + 0.5, -0.1), (k / 3 + 0.32, -0.1)], (225, 225, 220))
-    return _sheet(cells, DETAILS)
+    return _sheet(cells, _DETAILS)
 
 
 def _lamps() -> Image.Image:
@@ -220,4 +245,4 @@ def _lamps() -> Image.Image:
         wide.disc(x, 0.5, 0.2, 0.36, steel)
         wide.disc(x, 0.5, 0.15, 0.27, (232, 238, 243))
     cell("clear", (190, 194, 198))
-    return _sheet(cells, LAMPS)
+    return _sheet(cells, _LAMPS)

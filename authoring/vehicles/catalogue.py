@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from authoring.mesh import Floats, Mesh, box
-from authoring.vehicles.atlas import DETAILS, flat, write_atlases
+from authoring.vehicles.atlas import DETAILS, PLATE_CELLS, flat, write_atlases
 from authoring.vehicles.car import CarSpec, build_car
 from authoring.vehicles.cars import ESTATE, SALOON, SPORTS
 from authoring.vehicles.finish import Box, Finish, PaintMap, write_vehicle
@@ -59,8 +59,8 @@ def _fit(spec: CarSpec, parts: Parts, body: Shell, cabin: Shell) -> None:
     behind = 0.13 if spec.kind == "car" else 0.22
     add_mirrors(parts, cabin, float(front[0]) - behind, float(front[2]), size=spec.mirror, paint=_mirror_part(spec))
     add_handles(parts, body, spec.handles)
-    add_plate(parts, body, spec.plates[0], front=True, stand_off=spec.plate_stand_off)
-    add_plate(parts, body, spec.plates[1], front=False, stand_off=spec.plate_stand_off)
+    for plate_z, ahead in zip(spec.plates, (True, False), strict=True):
+        add_plate(parts, body, plate_z, ahead, PLATE_CELLS[spec.name], stand_off=spec.plate_stand_off)
     add_wipers(parts, cabin)
     for z, ahead in zip(spec.badges, (True, False), strict=True):
         if z is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from authoring.mesh import Mesh, bevelled_box, box, extrude, grid, revolve, rotation
-from authoring.vehicles.atlas import DETAILS, LAMPS, cell_uvs, flat
+from authoring.vehicles.atlas import DETAILS, LAMPS, Cell, cell_uvs, flat
 from authoring.vehicles.parts import Parts
 from authoring.vehicles.sheet import Sheet
 from authoring.vehicles.shell import Shell, surface_point
@@ -25,7 +25,7 @@ __all__ = [
 ]
 
 
-def panel(width: float, height: float, at: tuple[float, float, float], yaw_deg: float, cell: tuple[int, int]) -> Mesh:
+def panel(width: float, height: float, at: tuple[float, float, float], yaw_deg: float, cell: Cell) -> Mesh:
     """An upright rectangle with a texture cell, facing +x when `yaw_deg` is 0; its middle is at `at`."""
     half_w, half_h = width / 2, height / 2
     sheet = Mesh.of(
@@ -75,15 +75,15 @@ def add_handles(parts: Parts, body: Shell, places: tuple[tuple[float, float], ..
         parts.add("trim", flat(cup, DETAILS["gloss"]), both_sides=True)
 
 
-def add_plate(parts: Parts, body: Shell, z: float, front: bool, *, stand_off: float = 0.012) -> None:
-    """A number plate in its holder, in the middle of the front or the rear."""
+def add_plate(parts: Parts, body: Shell, z: float, front: bool, cell: Cell, *, stand_off: float = 0.012) -> None:
+    """A number plate, which `cell` shows, in its holder, in the middle of the front or the rear."""
     v = np.linspace(0, 1, 201)
     line = body.side.patch.evaluate(np.column_stack([np.full_like(v, 0.0 if front else 1.0), v]))
     nearest = int(np.abs(line[:, 2] - z).argmin())
     x = float(line[nearest, 0]) + (stand_off if front else -stand_off)
     yaw = 0.0 if front else 180.0
     parts.add("trim", flat(box((0.03, 0.54, 0.13), (x - 0.017 if front else x + 0.017, 0, z)), DETAILS["plastic"]))
-    parts.add("trim", panel(0.52, 0.112, (x + (0.005 if front else -0.005), 0.0, z), yaw, DETAILS["plate"]))
+    parts.add("trim", panel(0.52, 0.112, (x + (0.005 if front else -0.005), 0.0, z), yaw, cell))
 
 
 def add_wipers(parts: Parts, cabin: Shell, *, rise: float = 0.1) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from PIL import Image
 
 from authoring.mesh import Mesh, bevelled_box, box, merge, revolve, write_obj
-from authoring.vehicles.atlas import DETAILS, LAMPS, flat
+from authoring.vehicles.atlas import DETAILS, LAMPS, PLATE_CELLS, flat
 from authoring.vehicles.car import build_car
 from authoring.vehicles.finish import Box, Finish, PaintMap, write_vehicle
 from authoring.vehicles.fittings import add_handles, add_mirrors, add_plate, add_wipers, panel
@@ -27,7 +27,7 @@ _BED_Z = 1.02
 
 def write_box_truck(out: Path) -> None:
     """A rigid lorry with a closed box; its rear doors carry the patch."""
-    parts = _chassis()
+    parts = _chassis("truck_box")
     low, high, width, front = _BED_Z, 3.46, 2.48, 1.98
     middle = ((front + _REAR_X + 0.03) / 2, 0.0, (low + high) / 2)
     size = (front - _REAR_X - 0.03, width, high - low)
@@ -65,7 +65,7 @@ def write_box_truck(out: Path) -> None:
 
 def write_flatbed(out: Path) -> None:
     """A rigid lorry with a wooden deck and low drop sides, loaded with pallets of crates."""
-    parts = _chassis()
+    parts = _chassis("truck_rigid")
     front, width = 1.95, 2.44
     length, middle_x = front - _REAR_X, (front + _REAR_X) / 2
     deck = box((length, width, 0.10), (middle_x, 0, _BED_Z))
@@ -97,18 +97,18 @@ def write_flatbed(out: Path) -> None:
     _write(out, "truck_rigid", parts, boxes, "A flat bed with drop sides and a load.", None, shown=1)
 
 
-def _chassis() -> Parts:
-    """Cab, frame, tanks, guards and wheels of an eight-metre lorry."""
+def _chassis(name: str) -> Parts:
+    """Cab, frame, tanks, guards, wheels and the file's own number plates of an eight-metre lorry."""
     local, body, cabin = build_car(CAB)
     front = cabin.side.patch.evaluate(np.array([[cabin.corners[0], 0.2]]))[0]
     add_mirrors(local, cabin, float(front[0]) - 0.14, float(front[2]) + 0.10, size=CAB.mirror, paint="trim")
     add_handles(local, body, CAB.handles)
-    add_plate(local, body, CAB.plates[0], front=True, stand_off=0.03)
+    add_plate(local, body, CAB.plates[0], True, PLATE_CELLS[name], stand_off=0.03)
     add_wipers(local, cabin)
     parts = Parts()
-    for name, meshes in local.meshes.items():
+    for part, meshes in local.meshes.items():
         for mesh in meshes:
-            parts.add(name, mesh.translated(_CAB_X, 0, 0))
+            parts.add(part, mesh.translated(_CAB_X, 0, 0))
 
     def dark(mesh: Mesh, both_sides: bool = False) -> None:
         parts.add("trim", flat(mesh, DETAILS["plastic"]), both_sides=both_sides)
@@ -129,7 +129,7 @@ def _chassis() -> Parts:
     lamp = panel(0.44, 0.13, (_REAR_X + 0.10, 0.86, 0.78), 180, LAMPS["tail_block"])
     parts.add("lights", lamp, both_sides=True)
     dark(box((0.08, 0.50, 0.18), (_REAR_X + 0.145, 0.86, 0.78)), True)
-    parts.add("trim", panel(0.52, 0.112, (_REAR_X + 0.10, 0, 0.78), 180, DETAILS["plate"]))
+    parts.add("trim", panel(0.52, 0.112, (_REAR_X + 0.10, 0, 0.78), 180, PLATE_CELLS[name]))
     dark(box((0.05, 0.58, 0.16), (_REAR_X + 0.13, 0, 0.78)))
     for x in (0.6, -0.9, -3.3):
         marker = box((0.09, 0.012, 0.035), (x, 1.235, 0.93))

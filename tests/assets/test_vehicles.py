@@ -100,7 +100,7 @@ def test_looks_ahead_along_x(model: mujoco.MjModel) -> None:
 def test_budgets(name: str, model: mujoco.MjModel) -> None:
     assert len(_visible(model)) <= 10
     assert model.nmeshface <= (12_600 if name in CARS else 14_000)
-    assert model.ntexdata < 3_700_000
+    assert model.ntexdata < 4_000_000
 
 
 def test_every_visible_geom_has_a_known_label_and_is_never_felt(name: str) -> None:
@@ -238,6 +238,55 @@ def test_lorry_face_shows_its_picture_the_right_way_round() -> None:
     places = {"top_left": seen[100, 120], "top_right": seen[100, 200], "bottom_right": seen[140, 200]}
     for corner, wanted in corners.items():
         assert int(places[corner].argmax()) == int(np.argmax(wanted)), f"{corner} shows {places[corner]}"
+
+
+def _plates(name: str) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Corners of a vehicle's faces that show the plates' half of `details.png`: (K, 3, 3) places, (K, 3, 2) u and v."""
+    model = mujoco.MjModel.from_xml_path(str(VEHICLES / f"{name}.xml"))
+    mesh = model.mesh("trim").id
+    faces = slice(model.mesh_faceadr[mesh], model.mesh_faceadr[mesh] + model.mesh_facenum[mesh])
+    uvs = model.mesh_texcoord[model.mesh_texcoordadr[mesh] :][model.mesh_facetexcoord[faces]].astype(np.float64)
+    shown = (uvs[:, :, 1] > 0.5).all(axis=1)
+    return _in_file_frame(model, _geom_of(model, "trim"))[model.mesh_face[faces][shown]], uvs[shown]
+
+
+def test_every_vehicle_has_a_plate_of_its_own_in_front_and_behind() -> None:
+    sheet = cv2.imread(str(VEHICLES / "common" / "details.png"), cv2.IMREAD_GRAYSCALE)
+    assert sheet is not None
+    pictures: dict[bytes, str] = {}
+    for name in NAMES:
+        corners, uvs = _plates(name)
+        ahead = corners[:, :, 0].mean(axis=1) > 0
+        assert (ahead.sum(), (~ahead).sum()) == (2, 2), f"{name}: a rectangle at each end"
+        low, high = uvs[ahead].min(axis=(0, 1)), uvs[ahead].max(axis=(0, 1))
+        assert np.array_equal(low, uvs[~ahead].min(axis=(0, 1))), f"{name}: front and rear say the same"
+        assert np.array_equal(high, uvs[~ahead].max(axis=(0, 1)))
+        for end, right in ((ahead, 1.0), (~ahead, -1.0)):
+            across, up = corners[end][:, :, 1] * right, corners[end][:, :, 2]
+            assert np.array_equal(uvs[end][:, :, 0] == high[0], across > across.mean()), f"{name}: reads to the right"
+            assert np.array_equal(uvs[end][:, :, 1] == low[1], up > up.mean()), f"{name}: stands upright"
+        left, top, right_px, bottom = np.rint(np.concatenate([low, high]) * np.tile(sheet.shape[::-1], 2)).astype(int)
+        picture = sheet[top:bottom, left:right_px]
+        ink = picture[8:-8, picture.shape[1] // 8 : -8] < 80
+        assert 0.15 < ink.mean() < 0.5, f"{name}: the plate says something"
+        assert (picture > 200).mean() > 0.3
+        assert picture.tobytes() not in pictures, f"{name} has the plate of {pictures[picture.tobytes()]}"
+        pictures[picture.tobytes()] = name
+
+
+def test_motorcycles_have_plates_of_their_own() -> None:
+    lower: list[bytes] = []
+    for name in ("motorcycle_a", "motorcycle_b"):
+        corners, uvs = _plates(name)
+        assert len(uvs) == 2
+        assert (corners[:, :, 0] < -0.5).all(), "behind"
+        assert np.array_equal(uvs[:, :, 0] > 0.5, corners[:, :, 1] < 0), "reads to the right"
+        image = cv2.imread(str(VEHICLES / name / "machine.png"), cv2.IMREAD_GRAYSCALE)
+        assert image is not None
+        picture = image[image.shape[0] // 2 :]
+        assert 0.1 < (picture < 80).mean() < 0.5
+        lower.append(picture.tobytes())
+    assert lower[0] != lower[1]
 
 
 def test_scripts_make_the_committed_files(tmp_path: Path) -> None:
