@@ -103,10 +103,10 @@ class PaintMap:
             for line in lines:
                 at = np.asarray(line, dtype=np.float64)
                 p = self.pixel(view, at[:, 0], at[:, 1]) * over
-                draw.line([(float(x), height * over - float(y)) for x, y in p], fill=10, width=stroke, joint="curve")
+                draw.line([(float(x), height * over - float(y)) for x, y in p], fill=56, width=stroke, joint="curve")
         small = core.resize((width, height), Image.Resampling.LANCZOS)
-        shade = np.asarray(small.filter(ImageFilter.GaussianBlur(float(0.009 * per_metre))), dtype=np.float64) / 255
-        value = np.asarray(small, dtype=np.float64) / 255 * (0.6 + 0.4 * shade)
+        shade = np.asarray(small.filter(ImageFilter.GaussianBlur(float(0.006 * per_metre))), dtype=np.float64) / 255
+        value = np.asarray(small, dtype=np.float64) / 255 * (0.8 + 0.2 * shade)
         rows = self._scale[1]
         up = height - 1 - np.arange(height)
         z = (up - rows[0]) / per_metre + self.low[2]

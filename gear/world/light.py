@@ -28,7 +28,7 @@ FILAMENT_LUX = 38400.0
 SKY_FACE_PX = 512
 STREET_FACE_PX = 128
 STREET_ALBEDO = np.array([0.30, 0.27, 0.23])
-STREET_TOP = 0.42
+STREET_TOP = 0.72
 """Sine of the height to which houses stand about a street."""
 
 STREET_SHARE = 0.65

@@ -29,6 +29,9 @@ _SUN_KLX = 128.0 * np.array([1.03, 1.0, 0.96])
 _WAVELENGTHS_UM = np.array([0.610, 0.550, 0.465])
 _RGB_FROM_XYZ = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 _D65 = (0.3127, 0.3290)
+_SATURATION = 0.7
+"""Skies of the model alone are bluer than measured ones: a clear one lights a level surface like 10 000 K."""
+
 _HORIZON_BLUR = 0.035
 _DISC_COSINE = math.cos(math.radians(0.5))
 _DISC_SR = 2 * math.pi * (1 - _DISC_COSINE)
@@ -167,7 +170,7 @@ class Sky:
         luminance, x, y = values["Y"], values["x"], values["y"]
         # The model's horizon is too red under a high sun: what the eye sees there is whitish.
         whitish = self.towards_sun[2] * np.exp(-directions[:, 2].clip(0) / 0.12)
-        tint = self.blueness * (1 - 0.8 * whitish)
+        tint = _SATURATION * self.blueness * (1 - 0.8 * whitish)
         x, y = _D65[0] + tint * (x - _D65[0]), _D65[1] + tint * (y - _D65[1])
         xyz = np.column_stack([luminance * x / y, luminance, luminance * (1 - x - y) / y])
         day = np.maximum(xyz @ _RGB_FROM_XYZ.T, 0.0)
