@@ -30,7 +30,8 @@ _WAVELENGTHS_UM = np.array([0.610, 0.550, 0.465])
 _RGB_FROM_XYZ = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 _D65 = (0.3127, 0.3290)
 _SATURATION = 0.7
-"""Skies of the model alone are bluer than measured ones: a clear one lights a level surface like 10 000 K."""
+"""Share of the model's own colour that is kept: without it a clear sky's light on a level surface would be bluer (2.5
+times as much blue as red) than the 10 000 to 12 000 K that skylight has."""
 
 _HORIZON_BLUR = 0.035
 _DISC_COSINE = math.cos(math.radians(0.5))
@@ -65,7 +66,7 @@ class Sky:
         sun_klx: (3,) illuminance of a surface that faces the sun, behind its clouds.
         cloud_cover: 0..1, what clouds and rain together cover.
         turbidity: haziness of the clear air; 2 is very clear.
-        blueness: how saturated the clear sky is; 1 is the model's own.
+        blueness: how saturated the clear sky is; 1 is that of clear air.
         night: 0 while the sun is up, 1 once its light is gone from the sky.
     """
 
