@@ -31,7 +31,12 @@ NO_GRADIENT = (
 
 
 class TextureOptimiser:
-    """Textures, Adam's moments and the number of steps done: all that must be kept to go on later."""
+    """Textures, Adam's moments, the number of steps done and what was felt: all that must be kept to go on later.
+
+    Attributes:
+        felt: whether any gradient has reached the textures.
+        silent: steps since the last one did.
+    """
 
     def __init__(self, surfaces: int, settings: TextureSettings, rng: np.random.Generator, saved: State | None) -> None:
         shape = (surfaces, 3, settings.height_px, settings.width_px)
@@ -40,6 +45,7 @@ class TextureOptimiser:
             self.textures = torch.from_numpy(rng.uniform(0, 1, shape).astype(np.float32))
             self.mean, self.square = torch.zeros(shape), torch.zeros(shape)
             self.done, self.seed = 0, int(rng.integers(2**62))
+            self.felt, self.silent = False, 0
             return
         if saved["textures"].shape != shape:
             raise GearError(f"the saved attack has patches of {saved['textures'].shape}, not {shape}; start it afresh")
@@ -47,6 +53,12 @@ class TextureOptimiser:
             torch.from_numpy(saved[n].copy()) for n in ("textures", "mean", "square")
         )
         self.done, self.seed = int(saved["done"]), int(saved["seed"])
+        self.felt, self.silent = bool(saved["felt"]), int(saved["silent"])
+
+    def feel(self, gradient: float | None) -> None:
+        """Takes note of how long a step's gradient was; None where nothing was left to be harmed."""
+        self.silent = self.silent + 1 if gradient == 0 else 0
+        self.felt |= (gradient or 0.0) > 0
 
     def step(self, ascent: Tensor, share: float) -> None:
         """One Adam step along the gradient, with `share` of the learning rate; textures stay in 0..1."""
@@ -65,7 +77,8 @@ class TextureOptimiser:
     def state(self) -> State:
         """To resume from."""
         arrays = {name: getattr(self, name).numpy().copy() for name in ("textures", "mean", "square")}
-        return {**arrays, "done": np.int64(self.done), "seed": np.int64(self.seed)}
+        numbers = {name: np.int64(getattr(self, name)) for name in ("done", "seed", "felt", "silent")}
+        return {**arrays, **numbers}
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -150,7 +163,7 @@ def climb(
     settings, count = problem.settings, len(problem.dataset)
     saved = watch.resume() if watch is not None else None
     optimiser = TextureOptimiser(problem.surfaces(), settings, rng, saved)
-    silent, felt, begun = 0, False, optimiser.done
+    begun = optimiser.done
     with frozen(problem.model):
         while optimiser.done < budget.steps:
             done = optimiser.done
@@ -159,15 +172,14 @@ def climb(
             indexes = batch_of(done, count, settings.batch, optimiser.seed)
             textures = optimiser.textures.clone().requires_grad_(True)
             direction, figures = ascend(textures, problem.seen(textures, indexes, done, optimiser.seed))
-            silent = silent + 1 if figures.get("gradient") == 0 else 0
-            felt |= figures.get("gradient", 0.0) > 0
-            if silent * settings.batch >= 2 * count + settings.batch:
+            optimiser.feel(figures.get("gradient"))
+            if optimiser.silent * settings.batch >= 2 * count + settings.batch:
                 raise GearError(NO_GRADIENT)
             share = 0.5 * (1 + math.cos(math.pi * done / budget.steps)) if settings.decay else 1.0
             optimiser.step(direction, share)
             if watch is not None and watch.step(optimiser.done, figures, optimiser.patches, optimiser.state):
                 break
-    if optimiser.done > begun and not felt:
+    if optimiser.done > begun and not optimiser.felt:
         raise GearError(NO_GRADIENT)
     return optimiser.patches()
 

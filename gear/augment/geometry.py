@@ -105,11 +105,17 @@ def draw_window(
     (height, width), (out_height, out_width) = size_px, out_px
     h, w = max(1, round(out_height / scale)), max(1, round(out_width / scale))
     if is_centred:
-        h, w = h + (height - h) % 2, w + (width - w) % 2
+        w = _of_parity(out_width / scale, width)
+        h = _of_parity(out_height * w / out_width, height)
         top, left = (height - h) // 2, (width - w) // 2
     else:
         top, left = _between(height - h, rng), _between(width - w, rng)
     return Window(left_px=left, top_px=top, width_px=w, height_px=h, out_width_px=out_width, out_height_px=out_height)
+
+
+def _of_parity(value: float, like: int) -> int:
+    """The nearest whole number above 0 that is as even as another one."""
+    return max(2 * round((value - like % 2) / 2) + like % 2, 2 - like % 2)
 
 
 def _between(room_px: int, rng: np.random.Generator) -> int:

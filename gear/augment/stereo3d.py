@@ -46,7 +46,7 @@ def cut(sample: Stereo3dSample, window: Window) -> Stereo3dSample:
     if 2 * window.left_px + window.width_px != width or 2 * window.top_px + window.height_px != height:
         raise ValueError(f"a window of a stereo pair shares the picture's middle, got {window}")
     before = sample.calibration.intrinsics
-    intrinsics = Intrinsics(window.out_width_px, window.out_height_px, before.focal_px * window.scale)
+    intrinsics = Intrinsics(window.out_width_px, window.out_height_px, before.focal_px * window.scale_x)
     area = window.scale_x * window.scale_y
     boxes = [(replace(thing, visible_px=round(thing.visible_px * area)), thing.box) for thing in sample.objects]
     return replace(

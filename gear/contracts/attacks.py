@@ -28,6 +28,12 @@ class Patch:
     rgb: npt.NDArray[np.float32]
 
 
+def surface_of(name: str) -> int:
+    """The surface that a patch's name says, by which patches are in order: 10 for `patch_10`; -1 if it says none."""
+    number = name.rpartition("_")[2]
+    return int(number) if number.isdecimal() else -1
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Budget:
     """What an attack may spend.

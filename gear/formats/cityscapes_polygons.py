@@ -36,8 +36,13 @@ def polygons_json(instances: npt.NDArray[np.uint16]) -> Json:
     for value, ((left, top, right, bottom), _) in runs.boxes(runs.values).items():
         label = LABELS[value // INSTANCE_FACTOR if value >= INSTANCE_FACTOR else value]
         inside = cv2.inRange(instances[top:bottom, left:right], value, value)
-        outlines, _ = cv2.findContours(inside, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE, offset=(left, top))
-        pieces += [(_enclosed_px(outline), label.name, outline) for outline in outlines]
+        outlines, tree = cv2.findContours(inside, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE, offset=(left, top))
+        # Holes, which have a parent, are what others paint; pieces inside holes have none.
+        pieces += [
+            (_enclosed_px(outline), label.name, outline)
+            for outline, (_, _, _, parent) in zip(outlines, tree[0], strict=True)
+            if parent < 0
+        ]
     kept = [piece for piece in pieces if piece[0] >= MIN_PIECE_PX]
     kept.sort(key=lambda piece: (-piece[0], piece[1], piece[2][0, 0, 0], piece[2][0, 0, 1]))
     objects = [{"label": name, "polygon": _corners(outline)} for _, name, outline in kept]

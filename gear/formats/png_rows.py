@@ -43,7 +43,7 @@ def decode_rows(data: bytes) -> npt.NDArray[Any] | None:
     size = height * (1 + width * pixel_bytes)
     try:
         inflated = isal_zlib.decompressobj().decompress(chunks.get(b"IDAT", b""), size + 1)
-    except isal_zlib.error:  # type: ignore[misc]  # its stub takes the class for an instance
+    except (isal_zlib.error, OverflowError):  # type: ignore[misc]  # its stub takes the class for an instance
         return None
     if len(inflated) != size:
         return None

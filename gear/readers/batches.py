@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -61,6 +62,7 @@ def batches(
         raise ValueError(f"size must be at least 1, got {size}")
     if start < 0:
         raise ValueError(f"start counts batches that are left out, 0 or more, got {start}")
+    dataset = copy.copy(dataset)  # another pass over the same one may be under way
     dataset.epoch = epoch
     indices = order(len(dataset), seed=seed, epoch=epoch)
     groups = [indices[i : i + size] for i in range(0, len(indices), size)]

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from gear.attacking.appearance import vary
-from gear.attacking.loop import Problem, batch_of, climb, unit_gradients
+from gear.attacking.loop import Ascend, Problem, Seen, batch_of, climb, unit_gradients
 from gear.attacking.objectives import SemsegObjective, train_labels
 from gear.attacking.settings import Appearance, Settings
 from gear.contracts.attacks import Budget, Patch, State
@@ -79,6 +79,30 @@ def test_what_was_cut_off_goes_on_as_if_it_had_not_been() -> None:
     assert not difference(run(resumed), patches, "patches")
     assert not difference(resumed.states[-1], whole.states[-1], "state")
     assert {"wrong", "gradient", "smoothness"} <= set(whole.figures[0])
+
+
+def test_what_was_felt_before_it_was_cut_off_counts() -> None:
+    """One sample in three shows the patch: steps that feel nothing may be all that are left."""
+
+    def ascend_at(steps_felt: set[int]) -> Ascend:
+        count = iter(range(100))
+
+        def ascend(textures: Tensor, seen: Seen) -> tuple[Tensor, dict[str, float]]:
+            felt = next(count) in steps_felt
+            return torch.full_like(textures, float(felt)), {"gradient": float(felt)}
+
+        return ascend
+
+    contract = Contract()
+    dataset = contract.dataset()
+    problem = Problem(model=contract.model(), dataset=dataset, compositor=TinyCompositor(dataset), settings=SETTINGS)
+    cut = Watching(stop_at=2)
+    climb(problem, ascend_at({0}), budget=Budget(steps=4), rng=derive_rng(3, "attack"), watch=cut)
+    resumed = Watching(start=cut.states[-1])
+    climb(problem, ascend_at(set()), budget=Budget(steps=4), rng=derive_rng(3, "attack"), watch=resumed)
+    whole = Watching()
+    climb(problem, ascend_at({0}), budget=Budget(steps=4), rng=derive_rng(3, "attack"), watch=whole)
+    assert not difference(resumed.states[-1], whole.states[-1], "state")
 
 
 def test_a_state_of_another_size_is_refused() -> None:

@@ -169,3 +169,14 @@ def test_windows_are_drawn_inside_or_around(scale: float, centred: bool) -> None
         for start, length, whole in ((drawn.left_px, drawn.width_px, 192), (drawn.top_px, drawn.height_px, 96)):
             assert 0 <= start <= whole - length if length <= whole else whole - length <= start <= 0
             assert not centred or 2 * start + length == whole
+
+
+@pytest.mark.parametrize("scale", [0.75, 0.93, 1.21, 1.5])
+def test_a_pairs_focal_length_is_that_of_its_columns(scale: float) -> None:
+    """Disparities are columns; rows are shown as large, as far as whole pixels allow."""
+    drawn = draw_window((370, 1224), (192, 640), scale, derive_rng(0, "window"), is_centred=True)
+    assert abs(drawn.scale_y / drawn.scale_x - 1) < 1.01 / drawn.height_px
+    sample = sample_of("stereo3d")
+    some = draw_window((HEIGHT, WIDTH), (31, 77), scale, derive_rng(0, "window"), is_centred=True)
+    focal_px = moved(sample, some).calibration.intrinsics.focal_px
+    assert focal_px == pytest.approx(some.scale_x * sample.calibration.intrinsics.focal_px)

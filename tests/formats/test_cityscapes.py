@@ -125,6 +125,18 @@ def test_polygons_of_noise_stay_close(seed: int) -> None:
     assert (painted(polygons_json(picture)) == picture).mean() > 0.995
 
 
+def test_islands_in_holes_have_outlines_too() -> None:
+    """Road seen through a car's windows, and leaves in a gap of a crown."""
+    picture = np.full((60, 60), 7, np.uint16)
+    picture[10:50, 10:50] = 26001
+    picture[20:40, 20:40] = 7
+    picture[26:34, 26:34] = 26001
+    content = polygons_json(picture)
+    assert [thing["label"] for thing in content["objects"]] == ["road", "car", "road", "car"]
+    labels = np.where(picture >= 1000, picture // 1000, picture)
+    assert (painted(content) == labels).mean() > 0.97
+
+
 def official_scores(root: Path, predictions: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Any, Any]:
     """The official pixel- and instance-level evaluations of a tree."""
     monkeypatch.setattr(np, "in1d", lambda a, b, **k: np.isin(np.ravel(a), b, **k), raising=False)

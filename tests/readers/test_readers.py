@@ -100,6 +100,10 @@ def test_passes_repeat_can_be_taken_up_and_leave_torch_alone(roots: Callable[[st
     (rest,) = batches(dataset, size=2, seed=9, epoch=1, start=1)
     assert rest.indices == first[1].indices and torch.equal(rest.views["left"], first[1].views["left"])
     assert [len(b.indices) for b in batches(dataset, size=2, only_full=True)] == [2]
+    beside = zip(batches(dataset, size=1, epoch=1), batches(dataset, size=1, epoch=2), strict=True)
+    alone = batches(dataset, size=1, epoch=1)
+    for (one, _), lone in zip(beside, alone, strict=True):
+        assert torch.equal(one.views["left"], lone.views["left"]), "another pass draws for itself"
 
 
 def test_change_keeps_ground_truth_and_pictures_together(roots: Callable[[str], Path]) -> None:

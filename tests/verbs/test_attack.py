@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import torch
 from safetensors.numpy import load_file
+from safetensors.numpy import save as to_bytes
 
 import gear
 from gear.attacking.objectives import SemsegObjective
@@ -28,6 +29,7 @@ from gear.testing.compare import difference
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import DatasetError, GearError, PluginError
+from gear.verbs.attack.folder import read_patches
 from gear.verbs.attack.run import attack
 from gear.verbs.attack.scenes import Scenes
 from gear.verbs.attack.verify import verify
@@ -164,6 +166,26 @@ def test_patience_ends_it(tmp_path: Path) -> None:
     asked = [recorder.step(n + 1, {"a": n}, lambda n=n: patches[n], dict) for n in range(4)]  # type: ignore[misc]
     assert asked == [False, False, False, True] and "validation" in recorder.stopped
     assert recorder.best is patches[1]
+
+
+def test_what_cannot_be_measured_is_never_the_best(tmp_path: Path) -> None:
+    harms = iter([float("nan"), 1.0, 2.0, float("nan"), 3.0])
+    patches = [(Patch(name="patch_0", rgb=np.full((2, 2, 3), n, np.float32)),) for n in range(5)]
+    recorder = Recorder(root=tmp_path, key="k", steps=9, judge=lambda _: next(harms), every=1, patience=2)
+    for n in range(5):
+        assert not recorder.step(n + 1, {"a": n}, lambda n=n: patches[n], dict)  # type: ignore[misc]
+    assert recorder.best is patches[4]
+
+
+def test_many_patches_stay_in_the_order_of_their_surfaces(tmp_path: Path) -> None:
+    patches = tuple(Patch(name=f"patch_{n}", rgb=np.full((2, 2, 3), n, np.float32)) for n in range(12))
+    recorder = Recorder(root=tmp_path, key="k", steps=9, best=patches)
+    recorder.save(1, {"done": np.int64(1)})
+    resumed = Recorder(root=tmp_path, key="k", steps=9)
+    resumed.resume()
+    assert [patch.name for patch in resumed.best or ()] == [patch.name for patch in patches]
+    (tmp_path / "patch.safetensors").write_bytes(to_bytes({patch.name: patch.rgb for patch in patches}))
+    assert [patch.name for patch in read_patches(tmp_path)] == [patch.name for patch in patches]
 
 
 def test_homography_needs_no_probes(small: Small, install: Install, tmp_path: Path) -> None:

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 IMAGENET_STD = (0.229, 0.224, 0.225)
 PaperTask = Literal["semseg", "depth", "detect2d", "stereo3d"]
-STEREO_LOSSES_LEFT_OUT = ("rpn_loss_cls", "RCNN_loss_cls")
+STEREO_LOSSES_LEFT_OUT = ("rpn_class", "class")
+"""Stereo R-CNN's two losses of classification, which the paper computes and does not attack."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

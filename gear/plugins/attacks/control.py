@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from gear.contracts.attacks import Budget, Compositor, Patch, Watch
+from gear.contracts.attacks import Budget, Compositor, Patch, Watch, surface_of
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec
@@ -118,7 +118,7 @@ def read_exact(folder: Path) -> list[Floats]:
         arrays = load_file(path)
     except SafetensorError as error:
         raise GearError(f"{path}: not a safetensors file ({error})") from error
-    return [arrays[name].astype(np.float64) for name in sorted(arrays, key=lambda n: int(n.rpartition("_")[2]))]
+    return [arrays[name].astype(np.float64) for name in sorted(arrays, key=surface_of)]
 
 
 control: AttackSpec[ControlConfig] = AttackSpec(

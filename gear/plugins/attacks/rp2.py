@@ -18,7 +18,7 @@ from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec
 from gear.plugins.attacks.classes import LABEL_IDS, check_classes, check_seen
-from gear.values.errors import FieldError
+from gear.values.errors import FieldError, GearError
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -91,7 +91,12 @@ class Rp2:
         from gear.attacking.objectives import SemsegObjective, default_objective, kind_of
 
         config = self._config
-        if kind_of(sample) == "semseg" and config.target:
+        if kind_of(sample) != "semseg":
+            for name in ("target", "attacked"):
+                if getattr(config, name):
+                    whose = "semantic segmentation; these are other samples"
+                    raise GearError(f"option {name} of the attack is for {whose}")
+        elif config.target:
             return SemsegObjective(attacked=LABEL_IDS.get(config.attacked), target=LABEL_IDS[config.target])
         return default_objective(sample)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from safetensors import SafetensorError
 from safetensors.numpy import load as from_bytes
 
-from gear.contracts.attacks import Patch
+from gear.contracts.attacks import Patch, surface_of
 from gear.dataset.files import clear_scratch, explained, read_bytes, sha256
 from gear.dataset.layout import GEAR
 from gear.dataset.plan import differences
@@ -67,7 +67,7 @@ def read_patches(root: Path) -> tuple[Patch, ...]:
         arrays = from_bytes(path.read_bytes())
     except (OSError, SafetensorError) as error:
         raise DatasetError(path, AGAIN) from error
-    return tuple(Patch(name=name, rgb=arrays[name]) for name in sorted(arrays))
+    return tuple(Patch(name=name, rgb=arrays[name]) for name in sorted(arrays, key=surface_of))
 
 
 def tidy(root: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -13,7 +14,7 @@ import numpy as np
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save as to_bytes
 
-from gear.contracts.attacks import Patch, State
+from gear.contracts.attacks import Patch, State, surface_of
 from gear.dataset.files import write_whole
 from gear.values.errors import DatasetError
 
@@ -82,7 +83,7 @@ class Recorder:
             )
         self.curves, self.judged = notes["curves"], [(int(step), float(harm)) for step, harm in notes["judged"]]
         self.seconds = notes["seconds"]
-        kept = sorted(name for name in arrays if name.startswith("best/"))
+        kept = sorted((name for name in arrays if name.startswith("best/")), key=surface_of)
         if kept:
             self.best = tuple(Patch(name=name.removeprefix("best/"), rgb=arrays[name]) for name in kept)
         self.tell(int(notes["done"]), notes.get("queries_left"))
@@ -149,9 +150,14 @@ class Recorder:
     def _validate(self, done: int, patches: tuple[Patch, ...]) -> None:
         assert self.judge is not None
         harm = self.judge(patches)
-        if not self.judged or harm > max(value for _, value in self.judged):
+        if not self.judged or _worth(harm) > max(_worth(value) for _, value in self.judged):
             self.best = patches
         self.judged.append((done, harm))
-        best = max(range(len(self.judged)), key=lambda number: self.judged[number][1])
+        best = max(range(len(self.judged)), key=lambda number: _worth(self.judged[number][1]))
         if self.patience and len(self.judged) - 1 - best >= self.patience:
             self.stopped = f"no better on the validation samples for {self.patience} validations"
+
+
+def _worth(harm: float) -> float:
+    """Harm that can be compared: what cannot be measured is worth less than all that can."""
+    return -math.inf if math.isnan(harm) else harm

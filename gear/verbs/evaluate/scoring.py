@@ -10,7 +10,7 @@ from typing import Any
 
 from gear.contracts.evaluation import KeepsPredictions, Reports
 from gear.contracts.tasks import Sample
-from gear.dataset.files import explained, inside, write_whole
+from gear.dataset.files import explained, inside, read_bytes, sha256, write_whole
 from gear.dataset.reading import Dataset
 from gear.dataset.sidecar import dump_json, load_json
 from gear.plugins.catalogue import Found, one_line
@@ -27,7 +27,7 @@ TASK = "task"
 
 PREDICTIONS = "predictions"
 
-KEPT = {"facts", "model_s", "defense_s", "score", "mask"}
+KEPT = {"facts", "sha256", "model_s", "defense_s", "score", "mask"}
 """Keys of a note that are read again."""
 
 
@@ -43,6 +43,7 @@ class Note:
         score: of the defense, or None.
         mask: how its mask lies on the patch, or None.
         facts: what the task must know to read the prediction back; JSON.
+        sha256: of the prediction's files, by name.
     """
 
     index: int
@@ -52,6 +53,7 @@ class Note:
     score: float | None
     mask: Mapping[str, float] | None
     facts: Json
+    sha256: Mapping[str, str]
 
     def as_json(self) -> Json:
         """As written beside the predictions."""
@@ -62,6 +64,7 @@ class Note:
             "score": self.score,
             "mask": None if self.mask is None else without_nan(self.mask),
             "facts": self.facts,
+            "sha256": dict(self.sha256),
         }
 
 
@@ -112,6 +115,7 @@ class Scorer:
             score=answer.score,
             mask=None if answer.mask is None else mask_figures(sample, answer.mask),
             facts=encoded.facts if encoded else None,
+            sha256={name: sha256(data) for name, data in (encoded.files if encoded else {}).items()},
         )
         write_whole(self._root, f"{self._folder}/samples/{index:06d}.json", dump_json(note.as_json()))
         return note
@@ -130,10 +134,15 @@ class Scorer:
             there = load_json(path)
             if not isinstance(there, dict) or not there.keys() >= KEPT:
                 raise DatasetError(path, "is no note of a sample")
+            for name, digest in dict(there["sha256"]).items():
+                if sha256(read_bytes(inside(folder, name))) != digest:
+                    raise DatasetError(inside(folder, name), "is not what was written")
             with explained(path):
                 prediction = self._keeper.decode_prediction(folder, sample, there["facts"], self._dataset.plan.info)
         except DatasetError as error:
             return DatasetError(error.path, error.problem.partition(";")[0])
+        except (ValueError, KeyError, TypeError) as error:
+            return DatasetError(path, f"cannot be read again ({one_line(error)})")
         with self._blamed(index):
             figures, parts = self._measure(sample, prediction)
         return Note(
@@ -144,6 +153,7 @@ class Scorer:
             score=there["score"],
             mask=None if there["mask"] is None else _with_nan(there["mask"]),
             facts=there["facts"],
+            sha256=there["sha256"],
         )
 
     def finish(self, notes: list[Note]) -> None:
@@ -166,7 +176,7 @@ class Scorer:
 
     @contextmanager
     def _blamed(self, index: int) -> Iterator[None]:
-        """A prediction that does not suit the task is its model's fault; gear's own keep their traceback.
+        """A prediction that does not suit the task is its model's fault, or, with one of gear's, that of its weights.
 
         Threads must not share a redirected stdout, so this is not `gear.plugins.build.blamed`.
         """
@@ -175,9 +185,12 @@ class Scorer:
         except GearError:
             raise
         except Exception as error:
-            if self._model.owner.package == DISTRIBUTION:
-                raise
-            raise accusation(self._model, f"prediction of sample {index}", one_line(error)) from error
+            if self._model.owner.package != DISTRIBUTION:
+                raise accusation(self._model, f"prediction of sample {index}", one_line(error)) from error
+            if isinstance(error, ValueError):
+                said = f"what {self._model.spec.name} says of sample {index}"
+                raise GearError(f"{said} cannot be measured ({one_line(error)}); see to its weights") from error
+            raise
 
 
 def without_nan(figures: Mapping[str, float]) -> dict[str, float | None]:

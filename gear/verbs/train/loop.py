@@ -27,7 +27,7 @@ from gear.verbs.train.adversary import Adversary
 from gear.verbs.train.checkpoint import Progress
 from gear.verbs.train.config import TrainConfig
 from gear.verbs.train.feed import Feed
-from gear.verbs.train.optimise import RunningMean, clip_gradients, optimiser_of, rate_share
+from gear.verbs.train.optimise import Buffers, RunningMean, clip_gradients, optimiser_of, rate_share
 from gear.verbs.train.validate import rank, total, validate
 
 NOTE_EVERY = 10
@@ -168,6 +168,7 @@ class Training:
         for group in self._optimiser.param_groups:
             group["lr"] = config.learning_rate * factor
         views = {name: picture.contiguous(memory_format=self._memory) for name, picture in batch.views.items()}
+        before = Buffers(self._module)
         with seeded(int(derive_rng(config.seed, "step", progress.step).integers(2**31))):
             with autocast(self._device, config.precision):
                 loss = self._loss(views, batch)
@@ -179,6 +180,8 @@ class Training:
             self._optimiser.step()
             self._mean.update(self._module, progress.step)
             progress.open_losses.append(float(loss.detach()))
+        else:
+            before.put_back()
         progress.step += 1
         progress.position = progress.position.following(self._parts.feed.batches)
         if progress.step % NOTE_EVERY == 0 and progress.open_losses:

@@ -61,6 +61,20 @@ class RunningMean:
                 self.state[key].copy_(value)
 
 
+class Buffers:
+    """What forward passes write into a module, such as running statistics, as it was at one time."""
+
+    @torch.no_grad()
+    def __init__(self, module: nn.Module) -> None:
+        self._kept = [(buffer, buffer.clone()) for buffer in module.buffers()]
+
+    @torch.no_grad()
+    def put_back(self) -> None:
+        """Undoes what has been written since."""
+        for buffer, kept in self._kept:
+            buffer.copy_(kept)
+
+
 def clip_gradients(module: nn.Module, most: float) -> Tensor:
     """Scales gradients to a norm of at most `most` (0: leaves them); returns the norm before."""
     return nn.utils.clip_grad_norm_(module.parameters(), most if most > 0 else math.inf)

@@ -88,8 +88,8 @@ class Origin:
 
 
 def known(figures: AnyMapping[str, Any]) -> dict[str, Any]:
-    """Without what is no number, for JSON."""
-    return {key: value for key, value in figures.items() if not (isinstance(value, float) and math.isnan(value))}
+    """Without what is no finite number, for JSON."""
+    return {key: value for key, value in figures.items() if not isinstance(value, float) or math.isfinite(value)}
 
 
 def figures_of(validation: AnyMapping[str, Any]) -> dict[str, float]:

@@ -15,10 +15,12 @@ from gear.attacking.objectives import default_objective
 from gear.attacking.upright import Upright
 from gear.contracts.attacks import Budget, Patch
 from gear.formats import rle
+from gear.nn.stereo_rcnn_graph import LOSSES
+from gear.plugins.attacks.carla_gear import STEREO_LOSSES_LEFT_OUT
 from gear.plugins.attacks.control import ControlConfig, control, matched
 from gear.plugins.attacks.eot import EotConfig, eot
 from gear.plugins.attacks.nes import NesConfig, nes
-from gear.plugins.attacks.rp2 import Rp2Config, rp2
+from gear.plugins.attacks.rp2 import Rp2, Rp2Config, rp2
 from gear.plugins.attacks.square import SquareConfig, square
 from gear.plugins.attacks.thys import ThysConfig, surest, thys
 from gear.testing.attack_contract import AttackContract, Counted
@@ -218,3 +220,19 @@ def test_matched_noise_is_like_the_patch_and_not_the_patch(tmp_path: Path) -> No
 def test_bad_options_are_refused(make: Any) -> None:
     with pytest.raises(FieldError, match="must"):
         make()
+
+
+def test_classes_are_for_segmentation() -> None:
+    class Depth(AttackContract):
+        spec = rp2
+        task = "depth"
+
+    (sample, *_) = Depth().dataset()
+    for options in ({"target": "road"}, {"attacked": "car", "target": "road"}):
+        with pytest.raises(GearError, match="of the attack is for semantic segmentation"):
+            Rp2(Rp2Config(**options)).objective(sample)
+
+
+def test_the_papers_stereo_attack_leaves_classification_out() -> None:
+    assert set(STEREO_LOSSES_LEFT_OUT) < set(LOSSES)
+    assert all("class" in name for name in STEREO_LOSSES_LEFT_OUT)

@@ -134,6 +134,36 @@ def test_a_sample_whose_result_is_damaged_is_predicted_again_and_that_is_told(
     assert line.startswith(f"gear: note: {note}: is no note of a sample") and "predicted again" in line
 
 
+@pytest.mark.parametrize("damaged", [lambda text: "", lambda text: text[: len(text) // 2], lambda text: "é"])
+def test_a_shortened_result_is_not_taken_for_fewer_detections(
+    tmp_path: Path, small: Small, install: Install, damaged: Callable[[str], str]
+) -> None:
+    data = small("stereo3d", samples=3)
+    install(model_spec(lambda _: Oracle([data]), "stereo3d"))
+    out = tmp_path / "out"
+    evaluate(data, model="odd", out=out, resamples=0)
+    whole = timeless(out)
+    path = max(out.glob("*/predictions/data/*.txt"), key=lambda path: path.stat().st_size)
+    path.write_bytes(damaged(path.read_text()).encode("latin-1"))
+    again = evaluate(data, model="odd", out=out, resamples=0)
+    assert again.rows[0].made == 1 and str(path) in again.rows[0].damaged[0]
+    assert timeless(out) == whole
+
+
+@pytest.mark.parametrize("facts", [{}, None, [{"score": 1}]])
+def test_facts_that_are_not_the_tasks_are_damage(tmp_path: Path, small: Small, install: Install, facts: Any) -> None:
+    data = small("detect2d")
+    install(model_spec(lambda _: Oracle([data]), "detect2d"))
+    out = tmp_path / "out"
+    evaluate(data, model="odd", out=out, resamples=0)
+    whole = timeless(out)
+    (note,) = out.glob("*/samples/000001.json")
+    note.write_text(json.dumps(json.loads(note.read_text()) | {"facts": facts}))
+    again = evaluate(data, model="odd", out=out, resamples=0)
+    assert again.rows[0].made == 1 and "000001" in again.rows[0].damaged[0]
+    assert timeless(out) == whole
+
+
 def test_the_official_script_finds_the_predictions_and_agrees(
     tmp_path: Path, small: Small, install: Install, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -23,7 +23,7 @@ from gear.values.errors import ConfigError, GearError
 from gear.verbs.train.config import TrainConfig, read_config
 from gear.verbs.train.data import Samples, all_of, keep_some, open_all, spread
 from gear.verbs.train.feed import Cache, Feed, Position
-from gear.verbs.train.optimise import RunningMean, optimiser_of, rate_share
+from gear.verbs.train.optimise import Buffers, RunningMean, optimiser_of, rate_share
 from gear.verbs.train.validate import rank
 
 CONFIG = read_node(TrainConfig, Mapping({}, Place("test")))
@@ -48,6 +48,16 @@ def test_the_running_mean_follows_and_counts_are_the_newest() -> None:
     assert mean.state["num_batches_tracked"].item() == 7
     mean.update(module, 0)
     assert mean.state["weight"].tolist() == pytest.approx([0.1 * 1.2 + 0.9 * 3] * 2)
+
+
+def test_what_a_broken_step_wrote_is_undone() -> None:
+    module = nn.BatchNorm1d(2)
+    before = Buffers(module)
+    module(torch.tensor([[1.0, float("inf")], [2.0, 3.0]]))
+    assert not torch.isfinite(module.running_mean).all()
+    before.put_back()
+    assert module.running_mean.tolist() == [0, 0] and module.running_var.tolist() == [1, 1]
+    assert module.num_batches_tracked.item() == 0
 
 
 def test_biases_do_not_decay_and_frozen_weights_are_left_out() -> None:
