@@ -38,7 +38,7 @@ def add_collection_arguments(parser: argparse.ArgumentParser) -> None:
         "--out", metavar="DIR", help="root of the dataset (data/<task>/<town>-<scene>-<weather>/<patch>)"
     )
     parser.add_argument(
-        "--config", metavar="FILE", help="collection config, gear's or CARLA-GeAR's; flags go before it"
+        "--config", metavar="FILE", help="collection config, gear's or CARLA-GeAR's; flags override it"
     )
     parser.add_argument(
         "--set",

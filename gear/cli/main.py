@@ -29,7 +29,7 @@ COMMANDS: dict[str, str] = {
     "plugins": "list the installed tasks, models, attacks and defenses",
     "new": "write a complete small package for a task, model, attack or defense of your own",
     "doctor": "render a reference frame with each renderer and say who renders",
-    "show-config": "print a config with every default filled in",
+    "show-config": "print the config that flags and files make",
 }
 """Command names with one line each; `gear.cli.<name>` holds the command."""
 

@@ -69,10 +69,11 @@ def show_all(found: Catalogue, kinds: tuple[Kind, ...], as_json: bool) -> int:
 
 def show(found: Catalogue, kinds: tuple[Kind, ...], args: argparse.Namespace) -> int:
     """Prints one plugin with its options."""
-    from gear.plugins.describe import options, source_of, summary
+    from gear.plugins.describe import options, source_of, summary, training
 
     plugin = the_one(found, kinds, args.name)
-    facts = summary(plugin) | {"source": source_of(plugin.spec), "options": options(plugin.spec.config)}
+    trained = training(plugin.spec)
+    facts = summary(plugin) | trained | {"source": source_of(plugin.spec), "options": options(plugin.spec.config)}
     if args.json:
         print(json.dumps(facts, indent=1))
         return 0
@@ -80,6 +81,8 @@ def show(found: Catalogue, kinds: tuple[Kind, ...], args: argparse.Namespace) ->
     print(f"  source: {facts['source']}")
     for key, value in facts["capabilities"].items():
         print(f"  {key}: {_text(value)}")
+    for key, value in trained.items():
+        print(f"  {key}: {_text([f'{name}={part}' for name, part in value.items()] if isinstance(value, dict) else value)}")
     where = "--set options.KEY=VALUE, or in a config under `options:`" if plugin.kind == "task" else "--set KEY=VALUE"
     print(f"options ({where}):" if facts["options"] else "no options")
     for option in facts["options"]:
@@ -121,4 +124,4 @@ def _text(value: object) -> str:
         return "yes" if value else "no"
     if isinstance(value, (list, tuple)):
         return ", ".join(map(str, value)) or "-"
-    return str(value) if value != "" else "-"
+    return "-" if value in ("", None) else str(value)

@@ -83,7 +83,7 @@ class Auxiliary:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Sidecar:
-    """What is kept beside each sample: `gear/<split>/<index>.json`.
+    """What is kept beside each sample: `gear/<split>/samples/<index>.json`.
 
     Attributes:
         record: the scene.

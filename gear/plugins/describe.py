@@ -9,12 +9,12 @@ import sys
 from typing import Any
 
 from gear.config.dump import to_plain
-from gear.contracts.specs import AnySpec, Spec
+from gear.contracts.specs import AnySpec, ModelSpec, Spec
 from gear.plugins.catalogue import Found
 
 COMMON = {field.name for field in dataclasses.fields(Spec)}
 ELSEWHERE = {"recipe", "published", "convert", "parameters", "starts"}
-"""What `gear models` says of a network."""
+"""What `training` and `gear models` say of a network."""
 
 UNITS = {
     "px": "pixels", "m": "metres", "mm": "millimetres", "deg": "degrees", "rad": "radians", "s": "seconds",
@@ -38,6 +38,15 @@ def summary(found: Found) -> dict[str, Any]:
         "summary": found.spec.summary,
         "capabilities": capabilities,
     }
+
+
+def training(spec: AnySpec) -> dict[str, Any]:
+    """How a network is trained unless one says otherwise (None where it cannot be), and the names that `gear train
+    --init` knows beside `shipped` and files; nothing for other plugins; JSON.
+    """
+    if not isinstance(spec, ModelSpec):
+        return {}
+    return {"recipe": to_plain(spec.recipe), "starts": sorted(spec.starts)}
 
 
 def options(config: type[Any], prefix: str = "") -> list[dict[str, Any]]:
