@@ -9,7 +9,7 @@ from gear.config.nodes import parse_text
 from gear.contracts.tasks import Sample
 from gear.dataset.reading import Dataset, Twins, pair_twins, read_manifest
 from gear.dataset.store import plan_of, splits_of
-from gear.plugins.build import build_task
+from gear.plugins.build import build_task, name_of_task
 from gear.values.errors import DatasetError
 
 __all__ = ["Dataset", "Twins", "open_dataset", "open_twins", "root_and_split", "roots_of"]
@@ -41,7 +41,7 @@ def open_dataset(path: str | Path, split: str | None = None) -> Dataset[Any]:
         split = names[0]
     plan = plan_of(root, split)
     manifest = read_manifest(root, split)
-    _, task = build_task(plan.task["name"], parse_text(_as_yaml(plan.options), f"{root} options"))
+    _, task = build_task(name_of_task(plan.task), parse_text(_as_yaml(plan.options), f"{root} options"))
     return Dataset(root=root, plan=plan, task=task, manifest=manifest)
 
 
@@ -55,7 +55,7 @@ def root_and_split(path: str | Path) -> tuple[Path, str | None]:
 
 def roots_of(folder: Path) -> list[Path]:
     """The folder itself where it is a dataset's root, else the roots in it, by name; none where there is none."""
-    if (folder / "gear").is_dir():
+    if next(folder.glob("gear/*/plan.json"), None) is not None:
         return [folder]
     plans = (plan for depth in range(DEEPEST + 1) for plan in folder.glob("*/" * depth + "gear/*/plan.json"))
     return sorted({plan.parents[2] for plan in plans})

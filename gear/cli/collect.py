@@ -37,9 +37,7 @@ def add_collection_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", metavar="DIR", help="root of the dataset (data/<task>/<town>-<scene>-<weather>/<patch>)"
     )
-    parser.add_argument(
-        "--config", metavar="FILE", help="collection config, gear's or CARLA-GeAR's; flags override it"
-    )
+    parser.add_argument("--config", metavar="FILE", help="collection config, gear's or CARLA-GeAR's; flags override it")
     parser.add_argument(
         "--set",
         metavar="KEY=VALUE",

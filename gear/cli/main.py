@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import importlib
 import os
 import signal
@@ -42,6 +43,13 @@ EXAMPLES = """examples:
 """
 
 
+CIRCUMSTANCES = {
+    errno.EACCES, errno.EPERM, errno.ENAMETOOLONG, errno.ELOOP, errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO,
+    errno.ESTALE,
+}  # fmt: skip
+"""What disks and permissions refuse is nobody's bug, wherever it comes up."""
+
+
 class Terminated(KeyboardInterrupt):
     """Somebody, a batch system perhaps, asks the process to end: it does as after Ctrl-C."""
 
@@ -69,6 +77,9 @@ def main(argv: Sequence[str]) -> int:
         if interrupt is not None:
             print("gear: stopped; run the same command again to go on", file=sys.stderr)
             return 143 if isinstance(interrupt, Terminated) else 130
+        if isinstance(error, OSError) and error.filename and error.errno in CIRCUMSTANCES:
+            print(f"gear: {error.filename}: {error.strerror}", file=sys.stderr)
+            return 2
         if not isinstance(error, GearError):
             raise
         print(f"gear: {error}", file=sys.stderr)

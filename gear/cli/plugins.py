@@ -82,7 +82,8 @@ def show(found: Catalogue, kinds: tuple[Kind, ...], args: argparse.Namespace) ->
     for key, value in facts["capabilities"].items():
         print(f"  {key}: {_text(value)}")
     for key, value in trained.items():
-        print(f"  {key}: {_text([f'{name}={part}' for name, part in value.items()] if isinstance(value, dict) else value)}")
+        parts = [f"{name}={part}" for name, part in value.items()] if isinstance(value, dict) else value
+        print(f"  {key}: {_text(parts)}")
     where = "--set options.KEY=VALUE, or in a config under `options:`" if plugin.kind == "task" else "--set KEY=VALUE"
     print(f"options ({where}):" if facts["options"] else "no options")
     for option in facts["options"]:

@@ -11,7 +11,8 @@ from gear.contracts.rendering import Quality
 from gear.values.errors import FieldError
 from gear.values.optics import CameraEffects
 
-SPLIT_NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
+SPLIT_NAME = re.compile(r"(?!(gear|patches|scratch)$)[a-z][a-z0-9]*(_[a-z0-9]+)*")
+"""Folders of gear's own are no splits."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

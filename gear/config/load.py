@@ -7,11 +7,11 @@ from pathlib import Path
 
 from gear.config.collection import CollectionConfig, SimulationConfig, SplitConfig
 from gear.config.nodes import Mapping as MappingNode
-from gear.config.nodes import Node, Place, Scalar, parse_file, parse_text
-from gear.config.original import from_original, is_original, simulation_from_python
-from gear.config.overrides import merged, with_overrides
-from gear.config.reader import read_node, spelled_out
-from gear.values.errors import UnknownNameError
+from gear.config.nodes import Node, Place, Scalar, parse_file
+from gear.config.original import from_original, is_original, original_root, simulation_from_python
+from gear.config.overrides import merged, with_overrides, with_value
+from gear.config.reader import read_node
+from gear.values.errors import ConfigError, UnknownNameError
 from gear.values.resources import data_dir
 
 
@@ -20,16 +20,19 @@ def find_config(kind: str, name: str) -> Path:
 
     Raises:
         UnknownNameError: neither a file nor a name that gear knows.
+        ConfigError: nobody can look there.
     """
-    path = Path(name)
-    if path.suffix in (".yml", ".yaml", ".py"):
-        if path.is_file():
-            return path
-        raise UnknownNameError(f"{kind} config", name, hint="(that file does not exist)")
-    folder = data_dir("configs") / kind
-    found = folder / f"{name}.yml"
-    if name and Path(name).name == name and found.is_file():
+    path, folder = Path(name), data_dir("configs") / kind
+    is_path = path.suffix in (".yml", ".yaml", ".py")
+    found = path if is_path else folder / f"{name}.yml"
+    try:
+        is_there = found.is_file()
+    except OSError as error:
+        raise ConfigError(name, 0, 0, "", f"cannot read it: {error.strerror}") from error
+    if is_there and (is_path or path.name == name):
         return found
+    if is_path:
+        raise UnknownNameError(f"{kind} config", name, hint="(that file does not exist)")
     raise UnknownNameError(f"{kind} config", name, (p.stem for p in folder.glob("*.yml")))
 
 
@@ -47,17 +50,20 @@ def load_collection(
         ConfigError: anything in it cannot be read; says where.
     """
     node: Node = MappingNode({}, Place("command line"))
+    original: MappingNode | None = None
     if source is not None:
         node = parse_file(find_config("collections", source))
         if isinstance(node, MappingNode) and is_original(node):
-            node = from_original(node)
+            original, node = node, from_original(node)
     given: dict[str, tuple[Place, Node]] = {
         key: (Place(f"--{key}"), Scalar(text, False, Place(f"--{key}")))
         for key, text in flags.items()
         if text is not None
     }
     node = merged(node, MappingNode(given, node.place))
-    node = with_overrides(spelled_out(CollectionConfig, node), settings)
+    node = with_overrides(node, settings, CollectionConfig)
+    if original is not None and isinstance(node, MappingNode) and "root" not in node.entries:
+        node = with_value(node, ("root",), original_root(original, node))
     if isinstance(node, MappingNode) and "task" not in node.entries:
         hint = "missing; say what to collect, such as --task stereo3d (see: gear plugins --kind task)"
         raise node.place.error("task", hint)
@@ -71,8 +77,7 @@ def load_simulation(name: str) -> SimulationConfig:
         ConfigError: it cannot be read.
     """
     path = find_config("simulation", name)
-    node = parse_text(simulation_from_python(path), str(path)) if path.suffix == ".py" else parse_file(path)
-    return read_node(SimulationConfig, node)
+    return read_node(SimulationConfig, simulation_from_python(path) if path.suffix == ".py" else parse_file(path))
 
 
 def split_of(simulation: SimulationConfig, split: str) -> SplitConfig:

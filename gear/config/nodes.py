@@ -59,30 +59,42 @@ def parse_file(path: Path) -> Node:
     Raises:
         ConfigError: the file is missing, too large, not UTF-8 or not YAML, or repeats a key.
     """
+    return parse_text(text_of(path), str(path))
+
+
+def text_of(path: Path) -> str:
+    """What a config file says.
+
+    Raises:
+        ConfigError: the file is missing, too large or not UTF-8.
+    """
     try:
         if path.stat().st_size > MAX_BYTES:
             raise ConfigError(path, 0, 0, "", f"a config of more than {MAX_BYTES >> 20} MiB is no config")
-        text = path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8")
     except OSError as error:
         raise ConfigError(path, 0, 0, "", f"cannot read it: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise ConfigError(path, 0, 0, "", "is not UTF-8 text") from error
-    return parse_text(text, str(path))
 
 
 def parse_text(text: str, name: str) -> Node:
-    """Reads YAML text; `name` stands for the file in errors."""
+    """Reads YAML text; `name` stands for the file in errors.
+
+    Raises:
+        ConfigError: it is not YAML, repeats a key, or is nested too deeply.
+    """
     try:
         root = yaml.compose(text, Loader=yaml.SafeLoader)
+        return Mapping({}, Place(name, 1, 1)) if root is None else _convert(root, name, "", {})
+    except RecursionError as error:
+        raise ConfigError(name, 0, 0, "", "is nested too deeply; no config needs so many brackets") from error
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line, column = (mark.line + 1, mark.column + 1) if mark else (0, 0)
         raise ConfigError(name, line, column, "", f"is not YAML: {error.problem or error.context}") from error
     except yaml.YAMLError as error:
         raise ConfigError(name, 0, 0, "", f"is not YAML: {error}") from error
-    if root is None:
-        return Mapping({}, Place(name, 1, 1))
-    return _convert(root, name, "", {})
 
 
 def parse_value(text: str, name: str) -> Node:

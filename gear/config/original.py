@@ -9,7 +9,7 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
-from gear.config.nodes import Mapping, Node, Place, Scalar
+from gear.config.nodes import Mapping, Node, Place, Scalar, text_of
 from gear.values.errors import ConfigError
 
 ORIGINAL_KEYS = frozenset(
@@ -28,6 +28,8 @@ ORIGINAL_KEYS = frozenset(
     )
 )
 ORIGINAL_ONLY = frozenset(("basepath", "town_name", "billboard", "patch_folder"))
+SIMULATION_NAMES = ("SEED_VALUES", "ITERATION_VALUES", "MAX_VEHICLE_NPC", "MAX_WALKER_NPC")
+COMPUTED = "is computed, and gear runs no configs; write it as YAML: `splits: {test: {seed: 363, samples: 50}}`"
 TASKS = {"ss": "semseg", "2dod": "detect2d", "3dod": "stereo3d", "depth": "depth"}
 TOWNS = {"Town10HD": "town10", "Town10HD_Opt": "town10"}
 
@@ -38,7 +40,7 @@ def is_original(node: Node) -> bool:
 
 
 def from_original(node: Mapping) -> Mapping:
-    """The same wishes as a collection config of gear's. Its files lie under `basepath/root/billboard`, as they did.
+    """The same wishes as a collection config of gear's, but for the folder: `original_root`.
 
     Raises:
         ConfigError: a key is neither the original's nor can be understood, or its task is none of the four.
@@ -66,9 +68,24 @@ def from_original(node: Mapping) -> Mapping:
         text = _text(node, source)
         if text is not None:
             keep(name, text, source)
-    root = Path(_text(node, "basepath") or ".") / (_text(node, "root") or task) / (_text(node, "billboard") or "")
-    keep("root", str(root), "root" if "root" in node.entries else "task")
     return Mapping(entries, node.place)
+
+
+def original_root(node: Mapping, above: Mapping) -> Scalar:
+    """Where the files of a CARLA-GeAR config lie: under `basepath/root/billboard`, as they did.
+
+    Args:
+        node: the original's config.
+        above: what became of it, with what was given beside it: another scene's files must not lie with this one's.
+
+    Raises:
+        ConfigError: the scene or the task is not one word.
+    """
+    task, scene = _text(above, "task") or "", _text(above, "scene") or ""
+    words = {name: word for word, name in TASKS.items()}
+    root = Path(_text(node, "basepath") or ".") / (_text(node, "root") or words.get(task, task))
+    place, _ = node.entries["root" if "root" in node.entries else "task"]
+    return Scalar(str(root / Path(scene.rpartition(":")[2]).name), False, place)
 
 
 def _text(node: Mapping, key: str) -> str | None:
@@ -80,8 +97,8 @@ def _text(node: Mapping, key: str) -> str | None:
     return None if item.is_null else item.text
 
 
-def simulation_from_python(path: Path) -> str:
-    """The original's `simulation_configs.py` as the YAML of gear's simulation config. Nothing of it is run.
+def simulation_from_python(path: Path) -> Mapping:
+    """The original's `simulation_configs.py` as gear's simulation config. Nothing of it is run.
 
     Only plain assignments of literals are understood (`SEED_VALUES`, `ITERATION_VALUES`, `MAX_VEHICLE_NPC`,
     `MAX_WALKER_NPC`); everything else in the file is passed over.
@@ -90,42 +107,63 @@ def simulation_from_python(path: Path) -> str:
         ConfigError: the file is not Python, or one of those four is computed instead of written; the text to write in
             its place is in the message.
     """
-    wanted: dict[str, object] = {}
     try:
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(path, 0, 0, "", f"cannot read it: {error}") from error
-    except (SyntaxError, ValueError) as error:
+        tree = ast.parse(text_of(path))
+    except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
         line = getattr(error, "lineno", None) or 0
         raise ConfigError(path, line, 1, "", "is not Python; write a YAML simulation config instead") from error
+    wanted: dict[str, Node] = {}
     for statement in tree.body:
-        if not (isinstance(statement, ast.Assign) and isinstance(statement.targets[0], ast.Name)):
+        if isinstance(statement, ast.Assign):
+            target, value = statement.targets[0], statement.value
+        elif isinstance(statement, ast.AnnAssign) and statement.value is not None:
+            target, value = statement.target, statement.value
+        else:
             continue
-        name = statement.targets[0].id
-        if name not in ("SEED_VALUES", "ITERATION_VALUES", "MAX_VEHICLE_NPC", "MAX_WALKER_NPC"):
-            continue
-        try:
-            wanted[name] = ast.literal_eval(statement.value)
-        except (ValueError, TypeError, SyntaxError, MemoryError, RecursionError) as error:
-            problem = (
-                "is computed, and gear runs no configs; write it as YAML: `splits: {test: {seed: 363, samples: 50}}`"
-            )
-            raise ConfigError(path, statement.lineno, statement.col_offset + 1, name, problem) from error
-    return _simulation_yaml(path, wanted)
+        if isinstance(target, ast.Name) and target.id in SIMULATION_NAMES:
+            try:
+                wanted[target.id] = _node_of(value, path)
+            except (ValueError, TypeError, SyntaxError, MemoryError, RecursionError) as error:
+                raise _place(statement, path).error(target.id, COMPUTED) from error
+    return _simulation(path, wanted)
 
 
-def _simulation_yaml(path: Path, wanted: dict[str, object]) -> str:
+def _node_of(expression: ast.expr, path: Path) -> Node:
+    """A literal as a node.
+
+    Raises:
+        ValueError, TypeError, SyntaxError, MemoryError, RecursionError: it is none.
+    """
+    value = ast.literal_eval(expression)
+    if not isinstance(expression, ast.Dict):
+        return Scalar(str(value), False, _place(expression, path))
+    entries: dict[str, tuple[Place, Node]] = {}
+    for key, below in zip(expression.keys, expression.values, strict=True):
+        assert key is not None  # `**other` is no literal
+        entries[str(ast.literal_eval(key))] = (_place(key, path), _node_of(below, path))
+    return Mapping(entries, _place(expression, path))
+
+
+def _place(found: ast.expr | ast.stmt, path: Path) -> Place:
+    return Place(str(path), found.lineno, found.col_offset + 1)
+
+
+def _simulation(path: Path, wanted: dict[str, Node]) -> Mapping:
     seeds, counts = wanted.get("SEED_VALUES"), wanted.get("ITERATION_VALUES")
-    if not (isinstance(seeds, dict) and isinstance(counts, dict)):
+    if not (isinstance(seeds, Mapping) and isinstance(counts, Mapping)):
         raise ConfigError(
             path, 0, 0, "", "has no SEED_VALUES and ITERATION_VALUES; is it a CARLA-GeAR simulation config?"
         )
-    lines = ["splits:"]
-    for split in seeds:
-        if split in counts:
-            drive = ", frames: 105" if split == "video" else ""
-            lines.append(f"  {split}: {{seed: {seeds[split]}, samples: {counts[split]}{drive}}}")
+    splits: dict[str, tuple[Place, Node]] = {}
+    for split, (place, seed) in seeds.entries.items():
+        if split not in counts.entries:
+            continue
+        entries = {"seed": (place, seed), "samples": counts.entries[split]}
+        if split == "video":
+            entries["frames"] = (place, Scalar("105", False, place))
+        splits[split] = (place, Mapping(entries, place))
+    given: dict[str, tuple[Place, Node]] = {"splits": (seeds.place, Mapping(splits, seeds.place))}
     for name, key in (("MAX_VEHICLE_NPC", "max_vehicles"), ("MAX_WALKER_NPC", "max_pedestrians")):
         if name in wanted:
-            lines.append(f"{key}: {wanted[name]}")
-    return "\n".join(lines) + "\n"
+            given[key] = (wanted[name].place, wanted[name])
+    return Mapping(given, seeds.place)

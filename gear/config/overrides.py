@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
-from gear.config.nodes import Mapping, Node, Place, parse_value
+from gear.config.nodes import Mapping, Node, Place, Scalar, parse_value
+from gear.config.reader import spelled_out
 from gear.values.errors import ConfigError
 
 
-def with_overrides(node: Node, settings: Iterable[str]) -> Node:
+def with_overrides(node: Node, settings: Iterable[str], kind: Any = None) -> Node:
     """The tree with every `a.b.c=value` put in; later ones win.
+
+    Args:
+        node: the tree.
+        settings: `KEY=VALUE` texts.
+        kind: dataclass of the tree, whose bare words are kept where a setting goes below them; None for any.
 
     Raises:
         ConfigError: a setting has no `=`, or goes through something that has no keys.
@@ -20,19 +27,27 @@ def with_overrides(node: Node, settings: Iterable[str]) -> Node:
         if not separator or not key.strip():
             raise ConfigError(name, 0, 0, "", "expected KEY=VALUE, such as --set weather.cloudiness=30")
         text = f"'{text.strip()}'" if text.strip() == "-" else text  # to YAML a minus alone begins a list
-        node = with_value(node, tuple(key.strip().split(".")), parse_value(text, name))
+        below = node if kind is None else spelled_out(kind, node)  # each time: a setting may be a bare word itself
+        node = with_value(below, tuple(key.strip().split(".")), parse_value(text, name))
     return node
 
 
-def with_value(node: Node, path: tuple[str, ...], value: Node) -> Node:
-    """The tree with one value replaced or added."""
+def with_value(node: Node, path: tuple[str, ...], value: Node, above: str = "") -> Node:
+    """The tree with one value replaced or added; `above` is the key of the tree itself.
+
+    Raises:
+        ConfigError: the path goes through a list or a word.
+    """
     if not path:
         return value
     place = Place(value.place.path)
-    if not isinstance(node, Mapping):
+    if isinstance(node, Scalar) and node.is_null:
         node = Mapping({}, place)
+    if not isinstance(node, Mapping):
+        shown = repr(node.text) if isinstance(node, Scalar) else "a list"
+        raise place.error(above, f"is {shown}, which has no key {path[0]!r}; set it as a whole")
     key_place, below = node.entries.get(path[0], (place, Mapping({}, place)))
-    entry = (key_place, with_value(below, path[1:], value))
+    entry = (key_place, with_value(below, path[1:], value, f"{above}.{path[0]}" if above else path[0]))
     return Mapping({**node.entries, path[0]: entry}, node.place)
 
 

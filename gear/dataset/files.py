@@ -6,6 +6,7 @@ import contextlib
 import errno
 import hashlib
 import os
+import platform
 import threading
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
@@ -13,7 +14,10 @@ from pathlib import Path, PurePosixPath
 from gear.values.errors import DatasetError
 
 SCRATCH = "gear/scratch"
-"""Half-written files live here, away from the folders that foreign loaders list."""
+"""Half-written files live here, away from the folders that foreign loaders list, by host, process and thread."""
+
+TRIES = 5
+"""Another process may tidy up the folder of half-written files between two steps."""
 
 
 def sha256(data: bytes) -> str:
@@ -68,18 +72,25 @@ def write_whole(root: Path, relative: str, data: bytes) -> None:
     target = inside(root, relative)
     with explained(target):
         scratch = root / SCRATCH
-        scratch.mkdir(parents=True, exist_ok=True)
         target.parent.mkdir(parents=True, exist_ok=True)
-        temporary = scratch / f"{os.getpid()}-{threading.get_ident()}"
-        _write_and_rename(temporary, target, data)
+        for left in reversed(range(TRIES)):
+            scratch.mkdir(parents=True, exist_ok=True)
+            try:
+                _write_and_rename(scratch / f"{_host()}-{os.getpid()}-{threading.get_ident()}", target, data)
+            except FileNotFoundError:
+                if not left:
+                    raise
+            else:
+                return
 
 
 def write_alone(path: Path, data: bytes) -> None:
     """The same for a file that belongs to no dataset; what is half-written lies beside it under a hidden name.
 
     Raises:
-        DatasetError: the disk refuses.
+        DatasetError: the disk refuses, or a folder is there.
     """
+    refuse_folder(path)
     with explained(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary = path.with_name(f".{path.name}.{os.getpid()}-{threading.get_ident()}")
@@ -98,14 +109,50 @@ def _write_and_rename(temporary: Path, target: Path, data: bytes) -> None:
         raise
 
 
+def refuse_folder(path: Path) -> None:
+    """Where a file is to be written.
+
+    Raises:
+        DatasetError: it is a folder.
+    """
+    with explained(path):
+        if not path.name or path.is_dir():
+            raise DatasetError(path, "is a folder, a file was asked for; name one in it")
+
+
 def clear_scratch(root: Path) -> None:
-    """Removes what a killed run left half-written. Call it when nobody writes."""
+    """Removes what killed runs left half-written, but nothing of other runs that are alive. Call it when nobody in this
+    process writes there.
+    """
     scratch = root / SCRATCH
-    if scratch.is_dir():
-        with explained(scratch):
-            for leftover in scratch.iterdir():
-                leftover.unlink()
+    with explained(scratch):
+        if not scratch.is_dir():
+            return
+        for leftover in scratch.iterdir():
+            if not _is_being_written(leftover.name):
+                leftover.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # others' files are in it, or they have just removed it
             scratch.rmdir()
+
+
+def _is_being_written(name: str) -> bool:
+    """Whether a half-written file's writer is another process that is alive, or on a host that cannot be asked."""
+    host, _, rest = name.rpartition("-")[0].rpartition("-")
+    if not rest.isdecimal() or int(rest) == os.getpid():
+        return False
+    if host != _host():
+        return bool(host)
+    try:
+        os.kill(int(rest), 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True
+
+
+def _host() -> str:
+    return platform.node().replace("/", "_")
 
 
 def sync_folder(path: Path) -> None:

@@ -25,6 +25,11 @@ def plan_path(split: str) -> str:
     return f"{split_folder(split)}/plan.json"
 
 
+def begun_path(split: str, what: str) -> str:
+    """Names files that are being written, a sample's or the index files, until what makes them whole is there."""
+    return f"{split_folder(split)}/begun/{what}.json"
+
+
 def manifest_path(split: str) -> str:
     """What the finished split holds; written last."""
     return f"{split_folder(split)}/manifest.json"

@@ -69,7 +69,11 @@ def read_plan(root: Path, split: str) -> Plan | None:
     if not path.exists():
         return None
     try:
-        return from_json(Plan, load_json(path), "plan")
+        plan: Plan = from_json(Plan, load_json(path), "plan")
+        for field, keys in (("task", ("name",)), ("patch", ("label", "sha256"))):
+            if not isinstance(there := getattr(plan, field), dict) or any(key not in there for key in keys):
+                raise FieldError(f"plan.{field}", f"must have {' and '.join(keys)}")
+        return plan
     except FieldError as error:
         raise DatasetError(path, f"is not of this version of gear ({error}); use another --out, or --force") from error
 

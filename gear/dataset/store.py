@@ -10,7 +10,7 @@ from typing import Any
 
 from gear.contracts.tasks import Auxiliary, Encoded, Sample, Sidecar, Task
 from gear.dataset.files import clear_scratch, explained, inside, sha256, sync_folder, write_whole
-from gear.dataset.layout import GEAR, manifest_path, patch_path, plan_path, sidecar_path, split_folder
+from gear.dataset.layout import GEAR, begun_path, manifest_path, patch_path, plan_path, sidecar_path, split_folder
 from gear.dataset.plan import Plan, begin, read_plan
 from gear.dataset.sidecar import dump_json, load_json, read_sidecar, sidecar_bytes
 from gear.values.errors import DatasetError
@@ -111,7 +111,10 @@ class Store:
         """
         further = auxiliary or {}
         hashes: dict[str, str] = {}
-        for relative, data in sorted([*encoded.files.items(), *((file.path, data) for file, data in further.values())]):
+        files = sorted([*encoded.files.items(), *((file.path, data) for file, data in further.values())])
+        begun = begun_path(self.split, f"{sample.record.index:06d}")
+        write_whole(self.root, begun, dump_json([relative for relative, _ in files]))
+        for relative, data in files:
             write_whole(self.root, relative, data)
             hashes[relative] = sha256(data)
         sidecar = Sidecar(
@@ -122,6 +125,7 @@ class Store:
             auxiliary={name: file for name, (file, _) in further.items()},
         )
         write_whole(self.root, sidecar_path(self.split, sample.record.index), sidecar_bytes(sidecar))
+        inside(self.root, begun).unlink(missing_ok=True)
 
     def sidecars(self) -> list[Sidecar]:
         """All of them, in order of index.
@@ -141,7 +145,11 @@ class Store:
         """
         sidecars = self.sidecars()
         indexes: dict[str, str] = {}
-        for relative, data in sorted(task.finalise(sidecars, self.plan.info).items()):
+        files = sorted(task.finalise(sidecars, self.plan.info).items())
+        begun = inside(self.root, begun_path(self.split, "indexes"))
+        if not inside(self.root, manifest_path(self.split)).exists():
+            write_whole(self.root, begun_path(self.split, "indexes"), dump_json([relative for relative, _ in files]))
+        for relative, data in files:
             target = inside(self.root, relative)
             if not (target.exists() and target.read_bytes() == data):
                 write_whole(self.root, relative, data)
@@ -167,6 +175,10 @@ class Store:
         target = inside(self.root, manifest_path(self.split))
         if not (target.exists() and target.read_bytes() == data):
             write_whole(self.root, manifest_path(self.split), data)
+        for left in begun.parent.glob("*.json"):  # of samples that were whole when they were killed, too
+            left.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            begun.parent.rmdir()
         clear_scratch(self.root)
         sync_folder(target.parent)
 
@@ -187,8 +199,10 @@ def _forget_empty(root: Path, plan: Plan) -> None:
 
 
 def remove_split(root: Path, split: str) -> None:
-    """Deletes what gear wrote for a split, and nothing else: the files its sidecars and manifest name, and the copy of
-    its patches, unless another split shows them.
+    """Deletes what gear wrote for a split, and nothing else: the files that its sidecars, its manifest and the notes of
+    what was being written name, and the copy of its patches, unless another split shows them.
+
+    A sample's sidecar goes before its files: where this is cut short, no sample without them is taken for whole.
 
     Raises:
         DatasetError: a file cannot be deleted, or names a path outside the root.
@@ -196,18 +210,21 @@ def remove_split(root: Path, split: str) -> None:
     folder = inside(root, split_folder(split))
     if not folder.is_dir():
         return
-    doomed: list[str] = []
+    sidecars = sorted((folder / "samples").glob("*.json"))
+    begun = sorted(inside(root, begun_path(split, "x")).parent.glob("*.json"))
     manifest = inside(root, manifest_path(split))
-    if manifest.exists():
-        doomed += load_json(manifest).get("indexes", {})
-    sidecars = sorted((folder / "samples").glob("*.json")) if (folder / "samples").is_dir() else []
-    for path in sidecars:
-        doomed += load_json(path).get("files", {})
-    own = [manifest, *sidecars, inside(root, plan_path(split))]
+    doomed = [(path, _files_named(root, path)) for path in (manifest, *sidecars)]
+    unfinished = [(path, _files_named(root, path)) for path in begun]
     label = _patch_label(root, split)
     with explained(root):
-        for path in [manifest, *(inside(root, relative) for relative in doomed), *own]:
+        for path, files in doomed:
             path.unlink(missing_ok=True)
+            for file in files:
+                file.unlink(missing_ok=True)
+        for path, files in unfinished:
+            for file in (*files, path):
+                file.unlink(missing_ok=True)
+        inside(root, plan_path(split)).unlink(missing_ok=True)
         for path in sorted((p for p in folder.rglob("*") if p.is_dir()), reverse=True):
             path.rmdir()
         folder.rmdir()
@@ -217,6 +234,22 @@ def remove_split(root: Path, split: str) -> None:
                 path.unlink()
             if not any(copies.iterdir()):
                 copies.rmdir()
+
+
+def _files_named(root: Path, path: Path) -> list[Path]:
+    """What a sidecar, a manifest or a note of what was being written names; nothing where it is gone or damaged.
+
+    Raises:
+        DatasetError: a path outside the root.
+    """
+    try:
+        there = load_json(path)
+    except DatasetError:
+        return []
+    named = there if isinstance(there, list) else []
+    if isinstance(there, dict):
+        named = [name for key in ("files", "indexes") if isinstance(there.get(key), dict) for name in there[key]]
+    return [inside(root, name) for name in named if isinstance(name, str)]
 
 
 def _patch_label(root: Path, split: str) -> str:

@@ -6,6 +6,7 @@ import contextlib
 import sys
 import traceback
 from collections.abc import Iterable, Iterator
+from collections.abc import Mapping as JsonMapping
 from typing import Any
 
 from gear.config.nodes import Mapping, Node, Place
@@ -22,6 +23,14 @@ NO_OPTIONS = Mapping({}, Place("defaults"))
 def find(kind: Kind, name: str) -> Found:
     """The plugin that answers to a name."""
     return catalogue().get(kind, name)
+
+
+def name_of_task(written: JsonMapping[str, Any]) -> str:
+    """How the task that wrote a dataset is asked for, from what its plan says of it: with its package, if that is
+    installed, since another's task may have the same name.
+    """
+    full = f"{written.get('package')}/{written['name']}"
+    return full if any(found.full_name == full for found in catalogue().of_kind("task")) else written["name"]
 
 
 def build(found: Found, options: Node = NO_OPTIONS) -> Any:

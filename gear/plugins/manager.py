@@ -9,14 +9,15 @@ import importlib.metadata
 import io
 import os
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from typing import Any
 
 import pluggy
 
 from gear.contracts import hookspecs
-from gear.contracts.specs import PROTOCOL_VERSION, SPEC_TYPES, AnySpec, Kind
+from gear.contracts.models import PublishedWeights, Recipe
+from gear.contracts.specs import PROTOCOL_VERSION, SPEC_TYPES, AnySpec, Kind, ModelSpec
 from gear.plugins.builtins import BUILTINS
 from gear.plugins.catalogue import Broken, Catalogue, Found, Owner, as_iterable, one_line
 
@@ -40,8 +41,20 @@ CAPABILITY_TYPES: dict[str, type] = {
     "needs_model": bool,
     "normalisation": str,
     "parameters": int,
+    "input_scale": float,
     "needs": tuple,
+    "published": tuple,
+    "starts": Mapping,
+    "original_name": str,
+    "figure": str,
+    "less_is_better": bool,
+    "needs_probes": bool,
+    "max_surfaces": int,
+    "is_control": bool,
 }
+ITEM_TYPES: dict[str, type] = {"published": PublishedWeights}
+"""Of what does not hold names."""
+
 NAME = re.compile(r"[a-z][a-z0-9_]*")
 DISTRIBUTION = "mujoco-gear"
 
@@ -153,17 +166,38 @@ def _capability_problem(spec: AnySpec) -> str | None:
     if not isinstance(summary, str) or not summary.strip() or "\n" in summary:
         return f"{spec.name!r}: its summary is not one line"
     for name, kind in CAPABILITY_TYPES.items():
-        value = getattr(spec, name, None)
-        if value is None:
+        if not hasattr(spec, name):
             continue
-        if not isinstance(value, kind):
+        value = getattr(spec, name)
+        if not isinstance(value, (int, float) if kind is float else kind):
             return f"{spec.name!r}: its {name} must be a {kind.__name__}, got {type(value).__name__}"
-        if isinstance(value, (tuple, frozenset)) and not all(isinstance(item, str) for item in value):
-            return f"{spec.name!r}: its {name} must hold names"
+        item_kind = ITEM_TYPES.get(name, str)
+        if isinstance(value, (tuple, frozenset)) and not all(isinstance(item, item_kind) for item in value):
+            return f"{spec.name!r}: its {name} must hold {'names' if item_kind is str else item_kind.__name__}"
+    if isinstance(spec, ModelSpec) and (problem := _model_problem(spec)) is not None:
+        return f"{spec.name!r}: {problem}"
     try:
         spec.config()
     except Exception as error:
         return f"{spec.name!r}: its own defaults are refused: {one_line(error)}"
+    return None
+
+
+def _model_problem(spec: ModelSpec[Any]) -> str | None:
+    recipe: object = spec.recipe
+    convert: object = spec.convert
+    starts: Mapping[Any, object] = spec.starts
+    if not (recipe is None or isinstance(recipe, Recipe)):
+        return f"its recipe must be a Recipe or None, got {type(recipe).__name__}"
+    if not (convert is None or callable(convert)):
+        return "its convert cannot be called"
+    if not all(isinstance(name, str) and callable(start) for name, start in starts.items()):
+        return "its starts must be functions by name"
+    for weights in spec.published:
+        texts: tuple[object, ...] = (weights.data, weights.source, weights.licence)
+        size_mb: object = weights.size_mb
+        if not (all(isinstance(text, str) for text in texts) and isinstance(size_mb, (int, float))):
+            return "its published must say data, source and licence as texts and size_mb as a number"
     return None
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from gear.dataset.files import write_alone
+from gear.dataset.files import refuse_folder, write_alone
 from gear.opening import open_dataset
 from gear.values.frames import UInt8Image
 
@@ -45,6 +45,7 @@ def write_sheet(path: str | Path, out: str | Path, *, split: str | None = None, 
         DatasetError: there is nothing to show, or `out` cannot be written.
     """
     target = Path(out)
+    refuse_folder(target)
     data = cv2.imencode(".png", contact_sheet(path, split=split, samples=samples)[..., ::-1])[1].tobytes()
     write_alone(target, data)
     return target

@@ -15,6 +15,9 @@ QUALITY = 80
 SCALES = (1.0, 0.8, 0.65, 0.5, 0.45, 0.4, 0.35, 0.3, 0.25, 0.2, 0.15, 0.1)
 """Sides of an embedded picture as shares of the original's; one for the whole page, so that samples compare."""
 
+MOST_PX = 16383
+"""WebP's longest side."""
+
 LEAST_WIDTH_PX = 160
 """Nothing is made narrower than this, whatever the budget."""
 
@@ -39,6 +42,7 @@ def encode(pixels: UInt8Image, scale: float) -> Picture:
     """Scales (H, W, 3) RGB down by area and compresses it."""
     height, width = pixels.shape[:2]
     target = max(round(width * scale), min(width, LEAST_WIDTH_PX))
+    target = max(1, min(target, MOST_PX, MOST_PX * width // height))
     small = pixels
     if target < width:
         size = (target, max(1, round(height * target / width)))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from gear.dataset.files import explained
+from gear.dataset.files import explained, refuse_folder
 from gear.dataset.reading import Dataset
 from gear.opening import open_dataset
 from gear.values.serial import Json
@@ -90,6 +90,7 @@ def write_page(
 ) -> ViewReport:
     """`write_view` of a dataset that is open already."""
     target = Path(out)
+    refuse_folder(target)
     with explained(target):
         target.parent.mkdir(parents=True, exist_ok=True)
     total = len(dataset)

@@ -120,16 +120,17 @@ class AssetLibrary:
         Raises:
             UnknownNameError: there is no such town.
         """
-        text = str(town)
-        if text.endswith(".xml") or "/" in text:
-            path = Path(text).expanduser()
-            if not path.is_file():
-                raise UnknownNameError("town", text, _names(data_dir("mjcf") / "towns"), "(or give the path of a MJCF)")
-            return AssetLibrary(path.resolve())
-        path = data_dir("mjcf") / "towns" / f"{text}.xml"
-        if not path.is_file():
-            raise UnknownNameError("town", text, _names(path.parent))
-        return AssetLibrary(path)
+        text, towns = str(town), data_dir("mjcf") / "towns"
+        is_path = text.endswith(".xml") or "/" in text
+        try:
+            path = Path(text).expanduser() if is_path else towns / f"{text}.xml"
+            is_there = path.is_file()
+        except (OSError, RuntimeError) as error:  # no such user's home, no permission, too long a name
+            problem = getattr(error, "strerror", None) or error
+            raise UnknownNameError("town", text, hint=f"(cannot look there: {problem})") from error
+        if not is_there:
+            raise UnknownNameError("town", text, _names(towns), "(or give the path of a MJCF)" if is_path else "")
+        return AssetLibrary(path.resolve() if is_path else path)
 
     @property
     def town_name(self) -> str:
@@ -151,7 +152,7 @@ class AssetLibrary:
         """
         folder = self.folder(kind)
         path = folder / f"{name}.xml"
-        if not path.is_file():
+        if Path(name).name != name or not _is_there(path):
             is_own = folder != data_dir("mjcf") / FOLDERS[kind]
             raise UnknownNameError(
                 kind, name, _names(folder), f"({folder} takes the place of gear's)" if is_own else ""
@@ -177,6 +178,13 @@ class AssetLibrary:
             if (fact.kind == "person") != (kind == "pedestrian"):
                 raise TownError(fact.path, f"a {fact.kind} does not belong into {folder.name}")
         return facts
+
+
+def _is_there(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # too long a name, or no permission
+        return False
 
 
 def _names(folder: Path) -> list[str]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
 from pathlib import Path
 
 from gear.values.resources import data_dir
@@ -23,7 +25,35 @@ def asset_files(library: AssetLibrary) -> dict[str, Path]:
         for path in root.rglob("*") if root.is_dir() else [root]:
             if path.suffix.lower() in ASSET_SUFFIXES and path.is_file():
                 files[f"{root.name}/{path.relative_to(root).as_posix()}"] = path
+    known = {path.resolve() for path in files.values()}
+    for path in [path for path in files.values() if path.suffix.lower() == ".xml"]:
+        for name, referred in _referred(path):
+            if referred.resolve() not in known:
+                files.setdefault(f"referred/{path.name}/{name}", referred)
     return files
+
+
+def _referred(path: Path) -> Iterator[tuple[str, Path]]:
+    """What an MJCF file and what is included in it name, as far as it is there: by how it is written, and where."""
+    elements: list[ET.Element] = []
+    files, folders = [path], dict[str, str]()
+    for file in files:  # grows: what is included is looked at in turn
+        try:
+            root = ET.parse(file).getroot()
+        except (OSError, ET.ParseError):
+            continue  # whoever reads it says so
+        for compiler in root.iter("compiler"):
+            folders.update({key: value for key, value in compiler.items() if key.endswith("dir")})
+        elements += root.iter()
+        included = [path.parent / name for include in root.iter("include") if (name := include.get("file"))]
+        files += [one for one in included if one not in files]
+    usual = folders.get("assetdir", "")
+    for element in elements:
+        folder = folders.get("texturedir" if element.tag == "texture" else "meshdir", usual)
+        for key, name in element.items():
+            target = path.parent / ("" if element.tag == "include" else folder) / name
+            if key.startswith("file") and target.is_file():
+                yield name, target
 
 
 def assets_digest(library: AssetLibrary) -> str:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from gear.config.collection import SplitConfig
+from gear.values.errors import PlacementError
+from gear.values.frames import STATIC_OBJECT_BASE
 from gear.values.geometry import RigidTransform
 from gear.values.rig import Rig
 from gear.values.scene import POSE_DIGITS, ActorRecord, Pose, SceneRecord, Vec3
@@ -91,6 +93,9 @@ class ScenePlanner:
 
     def _record(self, moment: Moment, index: int, sequence: int, frame: int) -> SceneRecord:
         world = self._world
+        if len(moment.drafts) >= STATIC_OBJECT_BASE:
+            most = STATIC_OBJECT_BASE - 1
+            raise PlacementError(world.scene_name, f"{len(moment.drafts)} road users, {most} at most; lower the counts")
         actors = tuple(
             _actor(number, draft, moment.poses[body])
             for number, (body, draft) in enumerate(moment.drafts.items(), start=1)

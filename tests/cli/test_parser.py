@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 import pytest
 
@@ -69,6 +70,17 @@ def test_ctrl_c_is_one_line_whatever_was_made_of_it(
     for more in ([], ["--of-ours"]):
         assert main(["doctor", *more]) == 130
         assert capsys.readouterr().err == "gear: stopped; run the same command again to go on\n"
+
+
+def test_what_a_disk_refuses_is_one_line(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(doctor, "run", lambda args: (tmp_path / ("x" * 300)).read_bytes())
+    assert main(["doctor"]) == 2
+    assert capsys.readouterr().err == f"gear: {tmp_path / ('x' * 300)}: File name too long\n"
+    monkeypatch.setattr(doctor, "run", lambda args: (tmp_path / "gone").read_bytes())
+    with pytest.raises(FileNotFoundError):
+        main(["doctor"])
 
 
 def test_a_bug_keeps_its_traceback(monkeypatch: pytest.MonkeyPatch) -> None:

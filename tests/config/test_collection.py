@@ -37,6 +37,11 @@ def test_a_setting_below_a_bare_word_keeps_the_word(tmp_path: Path) -> None:
     assert load_collection(str(file), {}, ["weather.preset=CloudyNoon"]).weather.preset == "CloudyNoon"
 
 
+def test_a_setting_below_the_word_of_another_setting_keeps_the_word() -> None:
+    weather = load_collection(None, {"task": "semseg"}, ["weather=WetNight", "weather.fog_density=10"]).weather
+    assert (weather.preset, weather.fog_density) == ("WetNight", 10.0)
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -79,6 +84,22 @@ def test_a_carla_gear_config_is_accepted_as_it_is(tmp_path: Path) -> None:
     assert load_collection(str(file), {"scene": "truck"}).scene == "truck"
 
 
+def test_a_carla_gear_configs_folder_is_that_of_the_scene_in_effect(tmp_path: Path) -> None:
+    file = tmp_path / "c.yml"
+    file.write_text("basepath: /data\ntask: ss\nbillboard: billboard02\n")
+
+    def root(flags: dict[str, str | None], *settings: str) -> Path:
+        return Path(load_collection(str(file), flags, settings).root)
+
+    assert root({}) == Path("/data/ss/billboard02")
+    assert root({"scene": "billboard05"}) == root({}, "scene=billboard05") == Path("/data/ss/billboard05")
+    assert root({"scene": "/somewhere/my.yml:corner"}) == Path("/data/ss/corner")
+    assert root({"task": "depth"}) == Path("/data/depth/billboard02")
+    assert root({"scene": "billboard05", "root": "mine"}) == root({"scene": "a"}, "root=mine") == Path("mine")
+    file.write_text("basepath: /data\nroot: three\ntask: ss\n")
+    assert root({}) == Path("/data/three")
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -112,6 +133,34 @@ def test_the_original_simulation_config_is_read_and_never_run(tmp_path: Path) ->
     file.write_text("SEED_VALUES = dict(test=5)\nITERATION_VALUES = {'test': 7}\n")
     with pytest.raises(ConfigError, match=r"simulation_configs.py:1:1: SEED_VALUES: is computed.*write it as YAML"):
         load_simulation(str(file))
+
+
+def test_mistakes_in_the_original_simulation_config_stand_in_its_own_lines(tmp_path: Path) -> None:
+    file, trap = tmp_path / "sim.py", tmp_path / "trap"
+    seeds = "# seeds\n\nSEED_VALUES: dict = {'val': 131}\nITERATION_VALUES = {\n"
+    file.write_text(f"{seeds}  'val': 5,\n}}\n")
+    assert load_simulation(str(file)).splits == {"val": SplitConfig(seed=131, samples=5)}
+    for value, message in (
+        ("-4", r"sim.py:5:10: splits.val.samples: must be 1 to 1000000, got -4"),
+        ("'a: b'", r"sim.py:5:10: splits.val.samples: expected int, got 'a: b'"),
+        ("None", r"sim.py:5:10: splits.val.samples: expected int, got 'None'"),
+        ("{'a': 1}", r"sim.py:5:10: splits.val.samples: expected int, got keys and values"),
+        (f"open({str(trap)!r}, 'w')", r"sim.py:4:1: ITERATION_VALUES: is computed"),
+        ("[" * 5000, r"sim.py:5:\d+: is not Python|sim.py: is not Python"),
+    ):
+        file.write_text(f"{seeds}  'val': {value},\n}}\n")
+        with pytest.raises(ConfigError, match=message):
+            load_simulation(str(file))
+    assert not trap.exists()
+    file.write_text("SEED_VALUES: dict\nITERATION_VALUES = {'val': 5}\n")
+    with pytest.raises(ConfigError, match="has no SEED_VALUES"):
+        load_simulation(str(file))
+
+
+def test_a_config_that_nobody_can_look_at_is_one_line() -> None:
+    for name in ("a" * 300, f"{'a' * 300}.yml"):
+        with pytest.raises(ConfigError, match=f"^{name}: cannot read it: File name too long"):
+            load_simulation(name)
 
 
 def test_unknown_configs_say_what_there_is() -> None:

@@ -96,6 +96,29 @@ def test_settings_go_through_the_same_reader() -> None:
         with_overrides(node, ["lens"])
 
 
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("name.b.c=2", r"^--set name.b.c=2: name: is 'a', which has no key 'b'; set it as a whole$"),
+        ("lens.size_px.0=2", r"^--set lens.size_px.0=2: lens.size_px: is a list, which has no key '0'"),
+    ],
+)
+def test_a_setting_goes_through_keys_alone(setting: str, message: str) -> None:
+    node = parse_text("name: a\nlens: {size_px: [1, 2]}\ncounts: ~\n", "run.yaml")
+    with pytest.raises(ConfigError, match=message):
+        with_overrides(node, [setting])
+    assert read_node(Run, with_overrides(node, ["counts.one=1"])).counts == {"one": 1}
+
+
+def test_brackets_without_end_are_one_line(tmp_path: Path) -> None:
+    deep = "[" * 3000 + "]" * 3000
+    (tmp_path / "deep.yml").write_text(f"name: {deep}\n")
+    with pytest.raises(ConfigError, match=r"deep.yml: is nested too deeply"):
+        parse_file(tmp_path / "deep.yml")
+    with pytest.raises(ConfigError, match=r"is nested too deeply"):
+        with_overrides(parse_text("name: a\n", "run.yaml"), [f"name={deep}"])
+
+
 def test_a_file_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="cannot read it"):
         parse_file(tmp_path / "none.yml")

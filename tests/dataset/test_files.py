@@ -2,6 +2,9 @@ from __future__ import annotations
 
 import errno
 import os
+import platform
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -66,3 +69,42 @@ def test_a_file_where_a_folder_should_be(tmp_path: Path) -> None:
     (tmp_path / "a").write_text("x")
     with pytest.raises(DatasetError, match="a file is where a folder should be"):
         write_whole(tmp_path, "a/b", b"1")
+
+
+def test_what_others_are_writing_is_left_alone(tmp_path: Path) -> None:
+    scratch = tmp_path / "gear/scratch"
+    scratch.mkdir(parents=True)
+    with subprocess.Popen([sys.executable, "-c", "pass"]) as gone:
+        gone.wait()
+    here = platform.node().replace("/", "_")
+    alive = f"{here}-{os.getppid()}-1"
+    elsewhere = f"not-{here}-{gone.pid}-1"
+    for name in (alive, elsewhere, f"{here}-{gone.pid}-1", f"{here}-{os.getpid()}-1", "123-456", "odd"):
+        (scratch / name).write_bytes(b"half")
+    clear_scratch(tmp_path)
+    assert {path.name for path in scratch.iterdir()} == {alive, elsewhere}
+    write_whole(tmp_path, "a.bin", b"1")
+    assert (tmp_path / "a.bin").read_bytes() == b"1"
+
+
+def test_tidying_up_beside_a_writer_costs_nothing(tmp_path: Path) -> None:
+    """A folder of half-written files goes whenever it is empty, whoever writes next."""
+    tidying = (
+        "import sys\nfrom pathlib import Path\nfrom gear.dataset.files import clear_scratch\n"
+        "while not Path(sys.argv[1], 'end').exists(): clear_scratch(Path(sys.argv[1]))"
+    )
+    with subprocess.Popen([sys.executable, "-c", tidying, str(tmp_path)], stderr=subprocess.PIPE) as other:
+        try:
+            for number in range(150):
+                write_whole(tmp_path, f"{number}.bin", b"1")
+        finally:
+            (tmp_path / "end").touch()
+        _, errors = other.communicate(timeout=60)
+    assert other.returncode == 0, errors
+    assert len(list(tmp_path.glob("*.bin"))) == 150
+
+
+def test_a_folder_is_no_file(tmp_path: Path) -> None:
+    for path in (tmp_path, Path()):
+        with pytest.raises(DatasetError, match="is a folder, a file was asked for"):
+            write_alone(path, b"1")

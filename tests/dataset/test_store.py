@@ -8,14 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gear.config.load import load_collection
 from gear.config.nodes import parse_text
 from gear.contracts.tasks import SplitInfo
 from gear.dataset.plan import Plan
 from gear.dataset.store import Store, remove_split, splits_of
-from gear.opening import open_dataset, open_twins
+from gear.opening import open_dataset, open_twins, roots_of
 from gear.plugins.build import build_task
+from gear.plugins.manager import catalogue
 from gear.testing.synthetic import synthetic_frame
-from gear.values.errors import DatasetError
+from gear.values.errors import DatasetError, GearError
 from gear.verbs.export import export
 from gear.verbs.sheet import contact_sheet
 
@@ -201,3 +203,85 @@ def test_the_copy_of_the_patches_is_that_of_the_pictures(tmp_path: Path) -> None
     begin("test", "1")
     begin("test", "2")
     assert copy.read_bytes() == b"2"
+
+
+def test_replacing_that_is_cut_short_leaves_no_sample_without_its_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fill(tmp_path, plan())
+    count = iter(range(5))
+    unlink = Path.unlink
+
+    def cut_short(path: Path, missing_ok: bool = False) -> None:
+        if next(count, None) is None:
+            raise KeyboardInterrupt
+        unlink(path, missing_ok=missing_ok)
+
+    with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
+        patched.setattr(Path, "unlink", cut_short)
+        remove_split(tmp_path, "test")
+    left = Store(tmp_path, plan())
+    assert 0 in left.missing() and left.missing() != [0, 1, 2]
+    fill(tmp_path, plan())
+    assert len(open_dataset(tmp_path)[:]) == 3
+
+
+def test_what_a_killed_run_had_not_finished_goes_with_its_split(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fill(tmp_path, plan(), [0], is_closed=False)
+    whole = set(tree(tmp_path))
+
+    def killed(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
+        patched.setattr("gear.dataset.store.sidecar_bytes", killed)
+        fill(tmp_path, plan(), [1], is_closed=False)
+    assert {path for path in set(tree(tmp_path)) - whole if path.endswith(".png")}, "a sample without its sidecar"
+    remove_split(tmp_path, "test")
+    assert tree(tmp_path) == {}
+    fill(tmp_path, plan(), [0, 1, 2], is_closed=False)
+    with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
+        patched.setattr("gear.dataset.store.dump_json", lambda value: killed() if "format" in value else b"[]")
+        fill(tmp_path, plan())
+    fill(tmp_path, plan())
+    assert not any("/begun/" in path for path in tree(tmp_path))
+
+
+@pytest.mark.parametrize("text", ["[]", "{", '{"files": [1], "indexes": 3}'])
+def test_what_is_damaged_can_be_replaced(tmp_path: Path, text: str) -> None:
+    fill(tmp_path, plan())
+    (tmp_path / "gear/test/samples/000001.json").write_text(text)
+    (tmp_path / "gear/test/manifest.json").write_text(text)
+    remove_split(tmp_path, "test")
+    assert not (tmp_path / "gear/test").exists()
+
+
+@pytest.mark.parametrize("field", ["task", "patch"])
+def test_a_plan_that_says_too_little_is_one_line(tmp_path: Path, field: str) -> None:
+    fill(tmp_path, plan())
+    path = tmp_path / "gear/test/plan.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {field: {}}))
+    with pytest.raises(DatasetError, match=f"plan.{field}: must have"):
+        fill(tmp_path, plan())
+
+
+def test_folders_of_gears_own_are_no_datasets_and_no_splits(tmp_path: Path) -> None:
+    (tmp_path / "code/gear/world").mkdir(parents=True)
+    fill(tmp_path / "code/data", plan())
+    assert roots_of(tmp_path / "code") == [tmp_path / "code/data"]
+    for name in ("scratch", "patches", "gear"):
+        with pytest.raises(GearError, match="split"):
+            load_collection(None, {"task": "depth", "split": name}, ())
+
+
+def test_a_dataset_is_read_by_the_task_that_wrote_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Somebody else's task may have the same name."""
+    fill(tmp_path, plan())
+    there = catalogue()
+    (own,) = (found for found in there.found if found.full_name == "mujoco-gear/depth")
+    other = dataclasses.replace(own, owner=dataclasses.replace(own.owner, package="somebody"))
+    both = dataclasses.replace(there, found=(*there.found, other))
+    monkeypatch.setattr("gear.plugins.build.catalogue", lambda: both)
+    assert len(open_dataset(tmp_path)[:]) == 3

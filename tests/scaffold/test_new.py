@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import subprocess
 import sys
@@ -41,6 +42,31 @@ def test_bad_names_get_one_line_and_no_files(name: str, tmp_path: Path) -> None:
         new_package("defense", name, out=tmp_path)
     assert "\n" not in str(caught.value) and repr(name) in str(caught.value)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["spec", "build", "hookimpl", "gear_defenses"])
+def test_words_of_the_package_itself_are_refused(name: str, tmp_path: Path) -> None:
+    with pytest.raises(GearError, match=f"'{name}' is a word of every plugin package's; choose another, such as my_"):
+        new_package("defense", name, out=tmp_path)
+
+
+def test_a_plugin_that_is_there_is_not_written_again(tmp_path: Path) -> None:
+    with pytest.raises(GearError, match="there is a task named 'semseg' already; choose another name, such as my_"):
+        new_package("task", "semseg", out=tmp_path)
+    assert list(tmp_path.iterdir()) == []
+    assert new_package("defense", "semseg", out=tmp_path).is_dir()
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [("attack", "patch"), ("task", "rig"), ("task", "encoded"), ("defense", "defense_result"), ("model", "tensor")],
+)
+def test_its_classes_take_no_name_that_it_uses(kind: str, name: str, tmp_path: Path) -> None:
+    for path in new_package(kind, name, out=tmp_path).rglob("*.py"):
+        nodes = list(ast.walk(ast.parse(path.read_text())))
+        classes = {node.name for node in nodes if isinstance(node, ast.ClassDef)}
+        imported = {alias.name for node in nodes if isinstance(node, ast.ImportFrom) for alias in node.names}
+        assert not classes & imported
 
 
 def test_a_folder_that_is_there_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

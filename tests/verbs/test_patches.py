@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import errno
 import json
 from pathlib import Path
 
@@ -109,6 +110,21 @@ def test_what_is_no_patch_is_refused_in_one_line(tmp_path: Path, picture: np.nda
     (tmp_path / "bare").mkdir()
     with pytest.raises(PatchError, match=r"has no patch_0\.png"):
         resolve_patch(str(tmp_path / "bare"), surfaces=2, seed=0)
+
+
+def test_a_patch_that_nobody_can_look_at_is_one_line(
+    tmp_path: Path, picture: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(PatchError, match="cannot be read: File name too long"):
+        resolve_patch("a" * 300, surfaces=1, seed=0)
+
+    def closed(folder: Path) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied", str(folder))
+
+    save(tmp_path / "patch_0.png", picture)
+    monkeypatch.setattr(Path, "iterdir", closed)
+    with pytest.raises(PatchError, match=f"{tmp_path}: cannot be read: Permission denied"):
+        resolve_patch(str(tmp_path), surfaces=1, seed=0)
 
 
 def test_shipped_patches_are_found_by_name(

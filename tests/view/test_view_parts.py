@@ -101,6 +101,16 @@ def test_pictures_shrink_by_whole_pages_and_never_below_the_least() -> None:
     assert {(p.width_px, p.height_px) for p in (whole, half, least)} == {(400, 100)}
 
 
+def test_pictures_longer_than_the_format_allows_shrink() -> None:
+    import cv2
+
+    for shape in ((16, 16400, 3), (16400, 400, 3)):
+        picture = encode(np.zeros(shape, np.uint8), 1.0)
+        shown = cv2.imdecode(np.frombuffer(picture.data, np.uint8), cv2.IMREAD_COLOR)
+        assert max(shown.shape) <= 16383 and not picture.is_whole
+        assert (picture.height_px, picture.width_px) == shape[:2]
+
+
 def test_pictures_keep_their_colours_and_their_side() -> None:
     import cv2
 

@@ -7,8 +7,10 @@ import pytest
 from gear.testing.tiny_town import CLEAR, TINY_TOWN, tiny_scenes
 from gear.values.errors import TownError, UnknownNameError
 from gear.world.assets import AssetLibrary, read_actor_facts
+from gear.world.compiled import carrier_of
+from gear.world.digest import assets_digest
 from gear.world.pool import plan_pool
-from gear.world.scene_spec import NpcLimits, SceneSpec, VehicleLimits
+from gear.world.scene_spec import NpcLimits, SceneSpec, TruckSpec, VehicleLimits
 from gear.world.world import World
 
 
@@ -43,6 +45,42 @@ def test_a_town_elsewhere_without_assets_of_its_own_uses_those_of_gear(tmp_path:
     assert AssetLibrary.for_town(town).folder("vehicle").parent.name == "mjcf"
     with pytest.raises(UnknownNameError, match="path of a MJCF"):
         AssetLibrary.for_town(tmp_path / "other.xml")
+
+
+def test_the_digest_covers_whatever_a_town_refers_to(tmp_path: Path) -> None:
+    """Meshes, textures and included files may lie anywhere."""
+    town = tmp_path / "towns/mine.xml"
+    files = {
+        "towns/mine.xml": '<mujoco><compiler meshdir="../shapes" texturedir="../paint"/><include file="more.inc"/>'
+        '<asset><mesh name="a" file="a.obj"/><texture name="b" type="2d" file="b.jpg"/></asset></mujoco>',
+        "towns/more.inc": '<mujoco><asset><mesh name="c" file="c.obj"/></asset><include file="more.inc"/></mujoco>',
+        "shapes/a.obj": "a",
+        "shapes/c.obj": "c",
+        "paint/b.jpg": "b",
+    }
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    digests = {assets_digest(AssetLibrary.for_town(town))}
+    for name in files:
+        (tmp_path / name).write_text(files[name] + " ")
+        digests.add(assets_digest(AssetLibrary.for_town(town)))
+    assert len(digests) == 1 + len(files)
+
+
+@pytest.mark.parametrize("name", ["../vehicles/truck_box", "./truck_box", "a" * 300, ""])
+def test_an_asset_is_asked_for_by_a_plain_name(name: str) -> None:
+    library = AssetLibrary.for_town(TINY_TOWN)
+    with pytest.raises(UnknownNameError, match="no vehicle named"):
+        library.path("vehicle", name)
+    with pytest.raises(UnknownNameError, match="no vehicle named"):
+        carrier_of(SceneSpec(truck=TruckSpec(asset=name)), library)
+
+
+@pytest.mark.parametrize("town", ["~nosuchuser/x.xml", "a" * 300, f"/{'a' * 300}/x.xml"])
+def test_a_town_where_nobody_can_look_is_one_line(town: str) -> None:
+    with pytest.raises(UnknownNameError, match=r"\(cannot look there: (Could not determine home|File name too long)"):
+        AssetLibrary.for_town(town)
 
 
 @pytest.mark.parametrize(

@@ -224,6 +224,13 @@ def test_colours_come_from_the_palette() -> None:
     assert len(painted) > 1
 
 
+def test_road_users_never_share_a_number_with_things_of_the_town(monkeypatch: pytest.MonkeyPatch) -> None:
+    (record, *_) = records("board", 1)
+    monkeypatch.setattr("gear.world.planner.STATIC_OBJECT_BASE", len(record.actors))
+    with pytest.raises(PlacementError, match=f"{len(record.actors)} road users, {len(record.actors) - 1} at most"):
+        planner("board").plan(0)
+
+
 def plan_scene(scene: SceneSpec) -> SceneRecord:
     world = World.build(town=TINY_TOWN, scene_name="odd", scene=scene, weather=CLEAR)
     return ScenePlanner(world, SMALL_RIG, STILL, split_name="test").plan(0)

@@ -61,8 +61,15 @@ def resolve_patch(patch: str, *, surfaces: int, seed: int) -> PatchSet:
         seed: of random patches.
 
     Raises:
-        PatchError: it is not there, not a picture, of an absurd size, or numbered with a gap.
+        PatchError: it is not there, cannot be read, is not a picture, of an absurd size, or numbered with a gap.
     """
+    try:
+        return _resolved(patch, surfaces, seed)
+    except OSError as error:
+        raise PatchError(patch, f"cannot be read: {error.strerror}") from error
+
+
+def _resolved(patch: str, surfaces: int, seed: int) -> PatchSet:
     if patch in ("", "none"):
         return PatchSet(label="none", images=(), digest="", source="none")
     if patch == "random":

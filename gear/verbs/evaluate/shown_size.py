@@ -17,7 +17,7 @@ from gear.dataset.reading import Dataset
 from gear.nn.input_scale import OPTION
 from gear.nn.options import NONE
 from gear.nn.shipped import trained_option
-from gear.plugins.build import find
+from gear.plugins.build import find, name_of_task
 from gear.values.errors import ConfigError
 from gear.verbs.evaluate.choice import Chosen
 
@@ -34,7 +34,7 @@ def size_note(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> str
     spec = model.found.spec
     assert isinstance(spec, ModelSpec)
     config = read_node(spec.config, model.options, "")
-    task = find("task", dataset.plan.task["name"]).spec
+    task = find("task", name_of_task(dataset.plan.task)).spec
     assert isinstance(task, TaskSpec)
     width_px, usual_px = dataset.plan.options.get("width_px"), getattr(task.config(), "width_px", None)
     if getattr(config, OPTION, 1.0) is not None or not width_px or not usual_px or width_px == usual_px:

@@ -10,7 +10,7 @@ from typing import Any
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Evaluator
 from gear.dataset.reading import Dataset
-from gear.plugins.build import find
+from gear.plugins.build import find, name_of_task
 from gear.verbs.evaluate.choice import check_defense, check_model, chosen_defense, chosen_model
 from gear.verbs.evaluate.player import Player
 from gear.verbs.evaluate.shown_size import size_note
@@ -77,7 +77,7 @@ class Effect:
         guard = chosen_defense(defense, defense_settings)
         if guard is not None:
             check_defense(guard, chosen, task, is_calibrated=False)
-        spec = find("task", task).spec
+        spec = find("task", name_of_task(dataset.plan.task)).spec
         assert isinstance(spec, TaskSpec)
         names = (CLEAN, *compositors, RENDERED)
         return Effect(

@@ -6,6 +6,7 @@ the untouched pictures, on the composed ones and on the rendered ones.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gear.dataset.files import clear_scratch, explained, inside, write_whole
-from gear.dataset.layout import patch_path
+from gear.dataset.layout import GEAR, patch_path
 from gear.dataset.reading import Dataset, Twins
 from gear.dataset.sidecar import dump_json
 from gear.dataset.store import refuse_dataset
@@ -25,7 +26,7 @@ from gear.verbs.collect.patches import digest_of, read_patch
 from gear.verbs.gap.effect import RENDERED, Effect
 from gear.verbs.gap.figures import PictureGap, picture_gap, visible_mask
 from gear.verbs.gap.report import GapReport, SampleGap
-from gear.verbs.gap.twin import checked_twin, collect_twin
+from gear.verbs.gap.twin import check_clean, checked_twin, collect_twin
 
 if TYPE_CHECKING:
     from gear.compositor.pasting import Pasting
@@ -95,6 +96,7 @@ def gap(
         raise DatasetError(clean.root, "options are given for a model: name it with --model")
     if out is not None:
         refuse_dataset(Path(out), "write the gap into a folder of its own")
+    check_clean(clean)
     root = Path(twin) if twin is not None else Path(out or "") / "twin"
     if patch is None:
         pairs = checked_twin(clean, open_dataset(root, clean.plan.info.split))
@@ -141,6 +143,8 @@ def gap(
         write_whole(folder, REPORT, dump_json(report.as_json()))
         write_whole(folder, TABLE, (report.table() + "\n").encode())
         clear_scratch(folder)
+        with contextlib.suppress(OSError):
+            (folder / GEAR).rmdir()  # only a dataset has one
     return report
 
 

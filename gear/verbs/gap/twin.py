@@ -24,10 +24,19 @@ def checked_twin(clean: Dataset[Any], twin: Dataset[Any]) -> Twins[Any]:
     Raises:
         DatasetError: they are no twins, or the first one shows a patch itself.
     """
-    pairs = pair_twins(clean, twin)
-    if clean.plan.auxiliary == () and twin.plan.auxiliary:
-        raise DatasetError(clean.root, f"has no probes, its twin {twin.root} has; name them the other way around")
-    return pairs
+    check_clean(clean)
+    return pair_twins(clean, twin)
+
+
+def check_clean(clean: Dataset[Any]) -> None:
+    """Whether a split can stand for what is there without a patch.
+
+    Raises:
+        DatasetError: it shows one.
+    """
+    label = clean.plan.patch["label"]
+    if label != "none":
+        raise DatasetError(clean.root, f"shows the patch {label} itself; name a dataset collected with --patch none")
 
 
 def collect_twin(

@@ -13,10 +13,13 @@ from pathlib import Path
 
 from gear.contracts.specs import KINDS, Kind
 from gear.dataset.files import explained
+from gear.plugins.manager import HOOK_OF, catalogue
 from gear.values.errors import GearError, UnknownNameError
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 TOKEN = re.compile(r"\{\{(\w+)\}\}")
+TAKEN = ("spec", "build", "hookimpl", *HOOK_OF.values())
+"""What the package itself calls something by: a module of that name would take its place."""
 
 USE: dict[Kind, str] = {
     "task": "Use it: `gear collect --task {{name}}`, then `gear view` or `gear sheet` on what it wrote, and"
@@ -49,12 +52,15 @@ def new_package(kind: str, name: str, *, out: str | Path = ".") -> Path:
     if kind not in KINDS:
         raise UnknownNameError("kind of plugin", kind, KINDS)
     chosen = checked_name(name)
+    if any(found.spec.name == chosen for found in catalogue().of_kind(kind)):
+        raise GearError(f"there is a {kind} named {chosen!r} already; choose another name, such as my_{chosen}")
     words = {
         "kind": kind,
         "name": chosen,
         "dist": f"gear-{kind}-{chosen.replace('_', '-')}",
         "module": f"gear_{kind}_{chosen}",
         "Class": "".join(part.capitalize() for part in chosen.split("_")),
+        "Kind": kind.capitalize(),
     }
     parent = Path(out)
     target = parent / words["dist"]
@@ -109,6 +115,8 @@ def checked_name(name: str) -> str:
         )
     if keyword.iskeyword(chosen) or chosen in sys.stdlib_module_names:
         raise GearError(f"{name!r} is a word of Python's own; choose another, such as my_{chosen}")
+    if chosen in TAKEN:
+        raise GearError(f"{name!r} is a word of every plugin package's; choose another, such as my_{chosen}")
     return chosen
 
 

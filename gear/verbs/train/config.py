@@ -11,7 +11,7 @@ from gear.config.dump import to_yaml
 from gear.config.nodes import Mapping as MappingNode
 from gear.config.nodes import Node, Place, Scalar, parse_text
 from gear.config.overrides import merged, with_overrides
-from gear.config.reader import read_node, spelled_out
+from gear.config.reader import read_node
 from gear.contracts.models import Recipe
 from gear.values.errors import FieldError
 
@@ -142,5 +142,5 @@ def read_config(recipe: Recipe, flags: Mapping[str, Any], settings: Iterable[str
         if value is not None:
             place = Place(f"--{FLAGS.get(key, key)}")
             given[key] = (place, Scalar(str(value), False, place))
-    node = spelled_out(TrainConfig, merged(base, MappingNode(given, base.place)))
-    return read_node(TrainConfig, with_overrides(node, settings))
+    node = merged(base, MappingNode(given, base.place))
+    return read_node(TrainConfig, with_overrides(node, settings, TrainConfig))

@@ -110,6 +110,11 @@ def test_settings_go_before_flags_and_flags_before_the_recipe() -> None:
             read_config(recipe, {}, [setting])
 
 
+def test_a_setting_below_the_word_of_another_setting_keeps_the_word() -> None:
+    adversarial = read_config(Recipe(), {}, ["adversarial=scene_specific", "adversarial.share=0.25"]).adversarial
+    assert (adversarial.attack, adversarial.share) == ("scene_specific", 0.25)
+
+
 @dataclass(frozen=True)
 class Numbered:
     images: dict[str, Any]
