@@ -55,6 +55,8 @@ def load_collection(
         node = parse_file(find_config("collections", source))
         if isinstance(node, MappingNode) and is_original(node):
             original, node = node, from_original(node)
+        if not isinstance(node, MappingNode):
+            return read_node(CollectionConfig, node)  # says what is wrong, which flags would cover up
     given: dict[str, tuple[Place, Node]] = {
         key: (Place(f"--{key}"), Scalar(text, False, Place(f"--{key}")))
         for key, text in flags.items()

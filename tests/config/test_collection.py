@@ -37,6 +37,14 @@ def test_a_setting_below_a_bare_word_keeps_the_word(tmp_path: Path) -> None:
     assert load_collection(str(file), {}, ["weather.preset=CloudyNoon"]).weather.preset == "CloudyNoon"
 
 
+def test_a_file_without_keys_is_refused_whatever_the_flags(tmp_path: Path) -> None:
+    file = tmp_path / "c.yml"
+    for text in ("[task, semseg]", "semseg"):
+        file.write_text(text)
+        with pytest.raises(ConfigError, match=r"c.yml:1:1: expected keys and values"):
+            load_collection(str(file), {"task": "semseg"})
+
+
 def test_a_setting_below_the_word_of_another_setting_keeps_the_word() -> None:
     weather = load_collection(None, {"task": "semseg"}, ["weather=WetNight", "weather.fog_density=10"]).weather
     assert (weather.preset, weather.fog_density) == ("WetNight", 10.0)
