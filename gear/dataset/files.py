@@ -16,7 +16,7 @@ from gear.values.errors import DatasetError
 SCRATCH = "gear/scratch"
 """Half-written files live here, away from the folders that foreign loaders list, by host, process and thread."""
 
-TRIES = 5
+TRIES = 100
 """Another process may tidy up the folder of half-written files between two steps."""
 
 
@@ -125,9 +125,7 @@ def clear_scratch(root: Path) -> None:
     process writes there.
     """
     scratch = root / SCRATCH
-    with explained(scratch):
-        if not scratch.is_dir():
-            return
+    with explained(scratch), contextlib.suppress(FileNotFoundError):  # others tidy up, too
         for leftover in scratch.iterdir():
             if not _is_being_written(leftover.name):
                 leftover.unlink(missing_ok=True)

@@ -70,9 +70,9 @@ def read_plan(root: Path, split: str) -> Plan | None:
         return None
     try:
         plan: Plan = from_json(Plan, load_json(path), "plan")
-        for field, keys in (("task", ("name",)), ("patch", ("label", "sha256"))):
-            if not isinstance(there := getattr(plan, field), dict) or any(key not in there for key in keys):
-                raise FieldError(f"plan.{field}", f"must have {' and '.join(keys)}")
+        for field, key in (("task", "name"), ("patch", "label")):
+            if not isinstance(there := getattr(plan, field), dict) or key not in there:
+                raise FieldError(f"plan.{field}", f"must have a {key}")
         return plan
     except FieldError as error:
         raise DatasetError(path, f"is not of this version of gear ({error}); use another --out, or --force") from error

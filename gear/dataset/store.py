@@ -63,7 +63,7 @@ class Store:
         label, digest = self.plan.patch["label"], self.plan.patch["sha256"]
         for split in splits_of(self.root):
             other = plan_of(self.root, split).patch
-            if target.exists() and other["label"] == label and other["sha256"] != digest:
+            if target.exists() and other["label"] == label and other.get("sha256") != digest:
                 problem = f"split {split!r} shows other patches of the name {label!r}; use another --out"
                 raise DatasetError(self.root, problem)
         write_whole(self.root, relative, data)

@@ -77,22 +77,29 @@ def test_an_edit_makes_another_world(tmp_path: Path, town: Path, monkeypatch: py
     assert len(worlds(tmp_path)) == 3
 
 
-def test_a_world_with_files_from_afar_is_not_kept(tmp_path: Path, town: Path) -> None:
+def test_files_from_afar_make_another_world_when_they_change(tmp_path: Path, town: Path) -> None:
     part = tmp_path / "part.xml"
     part.write_text("<mujoco><worldbody/></mujoco>")
     town.write_text(town.read_text().replace("<worldbody>", '<include file="../../part.xml"/><worldbody>', 1))
     assert "part.xml" in town.read_text()
     assert take(tmp_path, town).model.ngeom
-    assert not worlds(tmp_path)
+    assert len(worlds(tmp_path)) == 1
+    part.write_text('<mujoco><worldbody><body name="far"/></worldbody></mujoco>')
+    assert take(tmp_path, town).model.body("far").id >= 0
+    assert len(worlds(tmp_path)) == 2
 
 
-def test_a_world_with_a_mesh_from_afar_is_not_kept(tmp_path: Path, town: Path) -> None:
-    (tmp_path / "far.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+def test_a_mesh_from_afar_makes_another_world_when_it_changes(tmp_path: Path, town: Path) -> None:
+    far = tmp_path / "far.obj"
+    far.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
     text = town.read_text()
     assert "<asset>" in text
     town.write_text(text.replace("<asset>", '<asset><mesh name="far" file="../../far.obj"/>', 1))
     assert take(tmp_path, town).model.mesh("far").id >= 0
-    assert not worlds(tmp_path)
+    assert len(worlds(tmp_path)) == 1
+    far.write_text(far.read_text().replace("v 0 0 1", "v 0 0 2"))
+    assert take(tmp_path, town).model.mesh("far").id >= 0
+    assert len(worlds(tmp_path)) == 2
 
 
 def test_a_town_that_strips_paths_finds_its_meshes(tmp_path: Path, town: Path) -> None:
