@@ -74,8 +74,8 @@ def write_whole(root: Path, relative: str, data: bytes) -> None:
         scratch = root / SCRATCH
         target.parent.mkdir(parents=True, exist_ok=True)
         for left in reversed(range(TRIES)):
-            scratch.mkdir(parents=True, exist_ok=True)
             try:
+                scratch.mkdir(parents=True, exist_ok=True)
                 _write_and_rename(scratch / f"{_host()}-{os.getpid()}-{threading.get_ident()}", target, data)
             except FileNotFoundError:
                 if not left:
@@ -121,16 +121,17 @@ def refuse_folder(path: Path) -> None:
 
 
 def clear_scratch(root: Path) -> None:
-    """Removes what killed runs left half-written, but nothing of other runs that are alive. Call it when nobody in this
-    process writes there.
+    """Removes what killed runs left half-written, but nothing of other runs that are alive, and the folder `gear` where
+    nothing else is in it: only a dataset has one. Call it when nobody in this process writes there.
     """
     scratch = root / SCRATCH
     with explained(scratch), contextlib.suppress(FileNotFoundError):  # others tidy up, too
         for leftover in scratch.iterdir():
             if not _is_being_written(leftover.name):
                 leftover.unlink(missing_ok=True)
-        with contextlib.suppress(OSError):  # others' files are in it, or they have just removed it
-            scratch.rmdir()
+    for folder in (scratch, scratch.parent):
+        with contextlib.suppress(OSError):  # something is in it, or others have just removed it
+            folder.rmdir()
 
 
 def _is_being_written(name: str) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -19,7 +18,6 @@ from gear.contracts.defenses import Defense, DefenseResult
 from gear.contracts.models import Model
 from gear.contracts.specs import DefenseSpec
 from gear.dataset.files import clear_scratch, explained, inside, write_whole
-from gear.dataset.layout import GEAR
 from gear.dataset.reading import Dataset
 from gear.dataset.sidecar import dump_json, load_json
 from gear.dataset.store import refuse_dataset
@@ -121,8 +119,6 @@ def defend(
         scores = [load_json(inside(root, _marker(name, i)))["score"] for i in range(len(opened))]
         write_whole(root, f"{FOLDER}/{name}/scores.json", dump_json({"scores": scores}))
     clear_scratch(root)
-    with contextlib.suppress(OSError):
-        (root / GEAR).rmdir()
     return DefendReport(root=root, split=name, samples=len(opened), made=len(missing))
 
 

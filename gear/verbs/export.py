@@ -58,6 +58,4 @@ def export(
         if progress is not None:
             progress(written, 0)
     clear_scratch(target)
-    with explained(target):
-        (target / "gear").rmdir()
     return sum(len(split.records) for split in splits)

@@ -26,7 +26,9 @@ def asset_files(library: AssetLibrary) -> dict[str, Path]:
             if path.suffix.lower() in ASSET_SUFFIXES and path.is_file():
                 files[f"{root.name}/{path.relative_to(root).as_posix()}"] = path
     known = {path.resolve() for path in files.values()}
-    for path in [path for path in files.values() if path.suffix.lower() == ".xml"]:
+    # gear's own refer to nothing else, and there are many.
+    others = [path for path in files.values() if path.suffix.lower() == ".xml" and not path.is_relative_to(own)]
+    for path in others:
         for name, referred in _referred(path):
             if referred.resolve() not in known:
                 files.setdefault(f"referred/{path.name}/{name}", referred)

@@ -8,7 +8,7 @@ from gear.testing.tiny_town import CLEAR, TINY_TOWN, tiny_scenes
 from gear.values.errors import TownError, UnknownNameError
 from gear.world.assets import AssetLibrary, read_actor_facts
 from gear.world.compiled import carrier_of
-from gear.world.digest import assets_digest
+from gear.world.digest import _referred, asset_files, assets_digest
 from gear.world.pool import plan_pool
 from gear.world.scene_spec import NpcLimits, SceneSpec, TruckSpec, VehicleLimits
 from gear.world.world import World
@@ -45,6 +45,15 @@ def test_a_town_elsewhere_without_assets_of_its_own_uses_those_of_gear(tmp_path:
     assert AssetLibrary.for_town(town).folder("vehicle").parent.name == "mjcf"
     with pytest.raises(UnknownNameError, match="path of a MJCF"):
         AssetLibrary.for_town(tmp_path / "other.xml")
+
+
+@pytest.mark.parametrize("town", ["town10", "suburb", "harbour"])
+def test_gears_own_files_refer_to_nothing_from_afar(town: str) -> None:
+    """So the digest need not look into each."""
+    files = asset_files(AssetLibrary.for_town(town))
+    known = {path.resolve() for path in files.values()}
+    named = [found for path in files.values() if path.suffix == ".xml" for _, found in _referred(path)]
+    assert len(named) > 100 and {found.resolve() for found in named} <= known
 
 
 def test_the_digest_covers_whatever_a_town_refers_to(tmp_path: Path) -> None:

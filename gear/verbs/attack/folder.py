@@ -12,7 +12,6 @@ from safetensors.numpy import load as from_bytes
 
 from gear.contracts.attacks import Patch, surface_of
 from gear.dataset.files import clear_scratch, explained, read_bytes, sha256
-from gear.dataset.layout import GEAR
 from gear.dataset.plan import differences
 from gear.dataset.store import refuse_dataset
 from gear.values.errors import DatasetError
@@ -75,8 +74,6 @@ def tidy(root: Path) -> None:
     with contextlib.suppress(FileNotFoundError):
         (root / CHECKPOINT).unlink()
     clear_scratch(root)
-    with contextlib.suppress(OSError):
-        (root / GEAR).rmdir()
 
 
 def _read_notes(path: Path) -> Json:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import importlib.metadata
 import platform
 import sys
@@ -11,7 +10,6 @@ from pathlib import Path
 
 from gear.config.dump import to_plain
 from gear.dataset.files import clear_scratch, explained, inside, write_whole
-from gear.dataset.layout import GEAR
 from gear.dataset.plan import differences
 from gear.dataset.sidecar import dump_json, load_json
 from gear.dataset.store import refuse_dataset
@@ -156,8 +154,6 @@ def _end(root: Path, found: EvaluateReport) -> None:
     write_whole(root, "results.json", dump_json(found.as_json()))
     write_whole(root, "table.txt", table(found).encode())
     clear_scratch(root)
-    with contextlib.suppress(OSError):
-        (root / GEAR).rmdir()
 
 
 def _counter(progress: Progress | None, total: int) -> Callable[[], None]:

@@ -6,7 +6,6 @@ the untouched pictures, on the composed ones and on the rendered ones.
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gear.dataset.files import clear_scratch, explained, inside, write_whole
-from gear.dataset.layout import GEAR, patch_path
-from gear.dataset.reading import Dataset, Twins
+from gear.dataset.layout import patch_path
+from gear.dataset.reading import Dataset, Twins, pair_twins
 from gear.dataset.sidecar import dump_json
 from gear.dataset.store import refuse_dataset
 from gear.opening import open_dataset
@@ -26,7 +25,7 @@ from gear.verbs.collect.patches import digest_of, read_patch
 from gear.verbs.gap.effect import RENDERED, Effect
 from gear.verbs.gap.figures import PictureGap, picture_gap, visible_mask
 from gear.verbs.gap.report import GapReport, SampleGap
-from gear.verbs.gap.twin import check_clean, checked_twin, collect_twin
+from gear.verbs.gap.twin import check_clean, collect_twin
 
 if TYPE_CHECKING:
     from gear.compositor.pasting import Pasting
@@ -99,7 +98,7 @@ def gap(
     check_clean(clean)
     root = Path(twin) if twin is not None else Path(out or "") / "twin"
     if patch is None:
-        pairs = checked_twin(clean, open_dataset(root, clean.plan.info.split))
+        pairs = pair_twins(clean, open_dataset(root, clean.plan.info.split))
     # What does not suit the dataset is to be found before a twin is rendered.
     engines = {name: open_compositor(name, clean, rounding=True) for name in compositors}
     effect = (
@@ -111,7 +110,7 @@ def gap(
         noted(effect.note)
     if patch is not None:
         collect_twin(clean, patch, root, town=town, scenes=scenes)
-        pairs = checked_twin(clean, open_dataset(root, clean.plan.info.split))
+        pairs = pair_twins(clean, open_dataset(root, clean.plan.info.split))
     if out is not None:
         with explained(Path(out)):
             Path(out).mkdir(parents=True, exist_ok=True)
@@ -143,8 +142,6 @@ def gap(
         write_whole(folder, REPORT, dump_json(report.as_json()))
         write_whole(folder, TABLE, (report.table() + "\n").encode())
         clear_scratch(folder)
-        with contextlib.suppress(OSError):
-            (folder / GEAR).rmdir()  # only a dataset has one
     return report
 
 

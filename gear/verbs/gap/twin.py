@@ -11,21 +11,11 @@ from gear.config.collection import CollectionConfig
 from gear.config.nodes import parse_text
 from gear.config.reader import read_node
 from gear.dataset.plan import read_plan
-from gear.dataset.reading import Dataset, Twins, pair_twins
+from gear.dataset.reading import Dataset
 from gear.dataset.store import Store
 from gear.values.errors import ConfigError, DatasetError, UnknownNameError
 from gear.verbs.collect.job import resolve
 from gear.verbs.collect.run import run_job
-
-
-def checked_twin(clean: Dataset[Any], twin: Dataset[Any]) -> Twins[Any]:
-    """Both as pairs.
-
-    Raises:
-        DatasetError: they are no twins, or the first one shows a patch itself.
-    """
-    check_clean(clean)
-    return pair_twins(clean, twin)
 
 
 def check_clean(clean: Dataset[Any]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,7 +10,6 @@ from typing import Any
 from gear.config.dump import to_plain
 from gear.contracts.specs import ModelSpec, TaskSpec
 from gear.dataset.files import clear_scratch, explained
-from gear.dataset.layout import GEAR
 from gear.dataset.reading import scenes_of
 from gear.dataset.store import refuse_dataset
 from gear.nn.runtime import device_of, prepare
@@ -170,8 +168,6 @@ def train(
     write_curves(root, spec, progress, f"{found.spec.name} on {task}")
     write_history(root, origin, progress)
     clear_scratch(root)
-    with contextlib.suppress(OSError):
-        (root / GEAR).rmdir()
     best = next(entry for entry in progress.validations if entry["step"] == progress.best_step)
     return TrainReport(
         root=root,
