@@ -24,6 +24,7 @@ PAINTERS: tuple[Painter, ...] = (
     masonry.tactile,
     masonry.gravel,
     ground.asphalt,
+    ground.asphalt_lanes,
     ground.concrete,
     ground.plaster,
     ground.metal_panel,

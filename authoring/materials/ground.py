@@ -11,6 +11,8 @@ from authoring.materials.noise import tileable_noise, worley, wrapped_blur
 
 Array = npt.NDArray[np.float64]
 Textures = dict[str, Image]
+# Linear albedo of a road some years old.
+ASPHALT = 0.112
 
 
 def asphalt(*, rng: np.random.Generator) -> Textures:
@@ -19,7 +21,7 @@ def asphalt(*, rng: np.random.Generator) -> Textures:
     stones = tileable_noise(size, period=256, octaves=3, rng=rng, gain=0.9)
     broad = tileable_noise(size, period=3, octaves=5, rng=rng, gain=0.6)
     speck = np.clip(tileable_noise(size, period=512, octaves=1, rng=rng) - 0.75, 0, 1) * 2.5
-    grey = 0.098 * (1 + 0.14 * stones + 0.06 * broad + 0.28 * speck)
+    grey = ASPHALT * (1 + 0.14 * stones + 0.06 * broad + 0.28 * speck)
     tint = np.array([1.0, 0.985, 0.955])
     height = 0.0016 * stones + 0.0022 * speck
     textures: Textures = {
@@ -31,12 +33,33 @@ def asphalt(*, rng: np.random.Generator) -> Textures:
     sealed = _cracks(size, paths=4, rng=rng, width_px=9)
     patch = _patch(size, rng=rng)
     rim = np.abs(patch - wrapped_blur(patch, 2.0)) * 2
-    worn = grey * 1.12 * (1 + 0.14 * tileable_noise(size, period=6, octaves=4, rng=rng))
+    worn = grey * 1.1 * (1 + 0.14 * tileable_noise(size, period=6, octaves=4, rng=rng))
     worn = worn * (1 - patch) + patch * 0.060 * (1 + 0.12 * stones)
     worn = worn * (1 - 0.45 * rim.clip(0, 1)) * (1 - 0.72 * crack) * (1 - sealed) + sealed * 0.030 * (1 + 0.1 * stones)
     worn_height = height * (1 - 0.6 * sealed) - 0.006 * crack + 0.003 * sealed + 0.003 * patch
     textures["asphalt_worn"] = linear_to_srgb(worn[..., None] * tint)
     textures["asphalt_worn_n"] = normal_from_height(worn_height, (tile_m, tile_m))
+    return textures
+
+
+def asphalt_lanes(*, rng: np.random.Generator) -> Textures:
+    """A driven lane, u across it with its middle at 0.5: tracks that tyres polish, a line of oil between them.
+
+    Its margins are those of `asphalt`. In the end piece all that fades away from v = 0 to v = 1.
+    """
+    size, tile_m, track_m = 1024, 6.0, 0.78
+    across_m = ((np.arange(size) + 0.5) / size - 0.5)[None, :] * tile_m
+    textures: Textures = {}
+    for stem, share in (("asphalt_lane", np.ones(size)), ("asphalt_lane_end", (np.arange(size) + 0.5) / size)):
+        stones = tileable_noise(size, period=256, octaves=3, rng=rng, gain=0.9)
+        broad = tileable_noise(size, period=3, octaves=5, rng=rng, gain=0.6)
+        drops = tileable_noise(size, period=12, octaves=4, rng=rng)
+        speck = np.clip(tileable_noise(size, period=512, octaves=1, rng=rng) - 0.75, 0, 1) * 2.5
+        oil = np.exp(-((across_m / 0.36) ** 2)) * (0.24 + 0.10 * drops + 0.05 * broad)
+        tracks = np.exp(-(((np.abs(across_m) - track_m) / 0.30) ** 2)) * (0.13 + 0.04 * broad)
+        wear = 1 + share[:, None] * (tracks - oil)
+        grey = ASPHALT * (1 + 0.14 * stones + 0.06 * broad + 0.28 * speck) * wear
+        textures[stem] = linear_to_srgb(grey[..., None] * np.array([1.0, 0.985, 0.955]))
     return textures
 
 

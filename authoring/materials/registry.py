@@ -76,6 +76,14 @@ MATERIALS: dict[str, Material] = {
     # streets
     "asphalt": Material(rgb="asphalt", normal="asphalt_n", orm="asphalt_orm", tile_m=6.0),
     "asphalt_worn": Material(rgb="asphalt_worn", normal="asphalt_worn_n", orm="asphalt_orm", tile_m=6.0),
+    "asphalt_lane": Material(rgb="asphalt_lane", normal="asphalt_n", orm="asphalt_orm", tile_m=6.0),
+    "asphalt_lane_end": Material(rgb="asphalt_lane_end", normal="asphalt_n", orm="asphalt_orm", tile_m=6.0),
+    "asphalt_fresh": Material(
+        rgb="asphalt", normal="asphalt_n", orm="asphalt_orm", tile_m=6.0, tint=(0.53, 0.53, 0.55)
+    ),
+    "asphalt_patch": Material(
+        rgb="asphalt", normal="asphalt_n", orm="asphalt_orm", tile_m=6.0, tint=(0.76, 0.75, 0.74)
+    ),
     "pavement": Material(rgb="pavement", normal="pavement_n", tile_m=3.0, roughness=0.88),
     "cobbles": Material(rgb="cobbles", normal="cobbles_n", tile_m=2.0, roughness=0.85),
     "tactile": Material(rgb="tactile", normal="tactile_n", tile_m=1.6, roughness=0.8),

@@ -28,6 +28,7 @@ from authoring.towns.regions import Regions, canal_polygon
 from authoring.towns.sites import SiteBuilder
 from authoring.towns.skyline import build_skyline
 from authoring.towns.walks import crosswalks, sidewalks
+from authoring.towns.wear import wear_streets
 
 CELL_M = 110.0
 SEED = 10
@@ -53,6 +54,7 @@ def write_town10(folder: Path) -> None:
     sites = _sites(regions)
     sink = Sink("static")
     lay_ground(sink, regions, sites)
+    wear_streets(sink, regions.network, seed=SEED)
     paint_streets(sink, regions, lambda lane: turns_of(lanes, lane))
     for street in regions.network.streets.values():
         if street.hump_m:

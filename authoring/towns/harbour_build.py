@@ -28,6 +28,7 @@ from authoring.towns.markings import paint_streets
 from authoring.towns.props import Ground, Props
 from authoring.towns.regions import KERB_M, Regions
 from authoring.towns.walks import crosswalks, sidewalks
+from authoring.towns.wear import wear_streets
 
 CELL_M = 110.0
 SEED = 12
@@ -60,7 +61,8 @@ def write_harbour(folder: Path) -> None:
     ground = Ground(regions.sidewalks.buffer(-0.25), tactile_paving(regions), views)
     yards = Yards(props, regions, rng=np.random.default_rng([SEED, 1]))
     _lay_ground(sink, regions, yards)
-    lay_motorway(sink, regions.level_roads)
+    lay_motorway(sink, regions.level_roads, rng=np.random.default_rng([SEED, 8]))
+    wear_streets(sink, regions.network, seed=SEED)
     paint_streets(sink, regions, lambda lane: turns_of(lanes, lane))
     build_bridge(sink, regions.network, regions.network.streets["bridge"])
     finish_bridge(sink, regions.network)

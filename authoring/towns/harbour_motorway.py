@@ -16,6 +16,7 @@ from authoring.towns.lanes import Lane
 from authoring.towns.markings import LABEL, LIFT_M, WHITE
 from authoring.towns.network import Network, Street
 from authoring.towns.regions import BRIDGE_SIDEWALK_M, KERB_M, OUTER_M
+from authoring.towns.wear import Carriageway, wear
 
 Array = npt.NDArray[np.float64]
 MEDIAN_HALF_M = 2.0
@@ -119,15 +120,29 @@ def ramp_profile(network: Network, street: Street) -> tuple[Array, Array]:
     return line, network.height_m(street.name, paths.stations(line) + start)
 
 
-def lay_motorway(sink: Sink, level_roads: BaseGeometry) -> None:
-    """Asphalt, median, kerbs and paint of the motorway."""
+def lay_motorway(sink: Sink, level_roads: BaseGeometry, *, rng: np.random.Generator) -> None:
+    """Asphalt and its wear, median, kerbs and paint of the motorway."""
     solids.flat(sink, paved().difference(median()).difference(level_roads), 0.0, "asphalt", "road")
+    wear(sink, _carriageways(), rng=rng)
     solids.flat(sink, median(), KERB_M, "roof_gravel", "terrain", cell_m=110.0)
     for side in (1, -1):
         edge = np.array([(-OUTER_M, side * MEDIAN_HALF_M), (OUTER_M, side * MEDIAN_HALF_M)])
         rim = paths.densified(edge if side < 0 else edge[::-1], 110.0)
         solids.wall(sink, rim, 0.0, KERB_M, "kerb", "road")
         _paint(sink, side)
+
+
+def _carriageways() -> Carriageway:
+    """Both of them as one road, a little above the slips that lead into it."""
+    return Carriageway(
+        line=np.array([(-OUTER_M, 0.0), (OUTER_M, 0.0)]),
+        span=(0.0, 2 * OUTER_M),
+        lanes=tuple(lane_y(index, side) for side in (1, -1) for index in range(LANES)),
+        lane_m=LANE_M,
+        half_m=EDGE_M,
+        height_m=np.zeros_like,
+        lift_m=0.0004,
+    )
 
 
 def _stripe(sink: Sink, x0: float, x1: float, y: float, width_m: float) -> None:

@@ -68,8 +68,13 @@ def wall(sink: Sink, line: Array, low_m: npt.ArrayLike, high_m: npt.ArrayLike, m
         sink.triangles(material, corners, faces, uvs=uvs, normals=np.tile(normal, (4, 1)), label=label)
 
 
-def ribbon(sink: Sink, left: Array, right: Array, material: str, label: str) -> None:
-    """Add a strip between two lines (N, 3) of equally many points, seen from above; UVs lie in the plane."""
+def ribbon(
+    sink: Sink, left: Array, right: Array, material: str, label: str, *, uvs: Array | None = None
+) -> None:
+    """Add a strip between two lines (N, 3) of equally many points, seen from above.
+
+    UVs (2N, 2), of the left line and then the right, lie in the plane unless they are given.
+    """
     tile_m = tile_m_of(material)
     count = len(left)
     vertices = np.concatenate([left, right])
@@ -84,9 +89,8 @@ def ribbon(sink: Sink, left: Array, right: Array, material: str, label: str) -> 
     across = right - left
     normals = np.cross(across, along)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    sink.triangles(
-        material, vertices, faces, uvs=vertices[:, :2] / tile_m, normals=np.concatenate([normals, normals]), label=label
-    )
+    uvs = vertices[:, :2] / tile_m if uvs is None else uvs
+    sink.triangles(material, vertices, faces, uvs=uvs, normals=np.concatenate([normals, normals]), label=label)
 
 
 def boundary_towards(land: Polygon, road: BaseGeometry, *, reach_m: float = 0.06) -> list[Array]:

@@ -29,6 +29,7 @@ from authoring.towns.suburb_plots import plan_plots
 from authoring.towns.suburb_skyline import build_skyline
 from authoring.towns.suburb_streets import lay_streets, paint, tactile
 from authoring.towns.walks import crosswalks, sidewalks
+from authoring.towns.wear import wear_streets
 
 CELL_M = 165.0
 SEED = 20
@@ -77,6 +78,7 @@ def write_suburb(folder: Path) -> None:
     paved = unary_union([*gardener.paved, park, forecourt])
     lay_streets(sink, regions, crossovers, paved)
     solids.flat(sink, forecourt, KERB_M, "cobbles", "sidewalk")
+    wear_streets(sink, regions.network, seed=SEED)
     paint(sink, regions)
     occupied = unary_union(
         [
