@@ -84,6 +84,7 @@ MATERIALS: dict[str, Material] = {
     "asphalt_patch": Material(
         rgb="asphalt", normal="asphalt_n", orm="asphalt_orm", tile_m=6.0, tint=(0.76, 0.75, 0.74)
     ),
+    "asphalt_seal": Material(rgb="asphalt", orm="asphalt_orm", tile_m=6.0, tint=(0.32, 0.32, 0.33)),
     "pavement": Material(rgb="pavement", normal="pavement_n", tile_m=3.0, roughness=0.88),
     "cobbles": Material(rgb="cobbles", normal="cobbles_n", tile_m=2.0, roughness=0.85),
     "tactile": Material(rgb="tactile", normal="tactile_n", tile_m=1.6, roughness=0.8),

@@ -68,9 +68,7 @@ def wall(sink: Sink, line: Array, low_m: npt.ArrayLike, high_m: npt.ArrayLike, m
         sink.triangles(material, corners, faces, uvs=uvs, normals=np.tile(normal, (4, 1)), label=label)
 
 
-def ribbon(
-    sink: Sink, left: Array, right: Array, material: str, label: str, *, uvs: Array | None = None
-) -> None:
+def ribbon(sink: Sink, left: Array, right: Array, material: str, label: str, *, uvs: Array | None = None) -> None:
     """Add a strip between two lines (N, 3) of equally many points, seen from above.
 
     UVs (2N, 2), of the left line and then the right, lie in the plane unless they are given.

@@ -12,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 
 from authoring.kit.parts import Sink
-from authoring.materials.palette import swatch_rect
 from authoring.towns import paths, solids
 from authoring.towns.network import Network, Street
 
@@ -232,9 +231,7 @@ def _band(sink: Sink, points: Array, widths: Array) -> None:
     along = np.gradient(points[:, :2], axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     normal = np.stack([-along[:, 1], along[:, 0], np.zeros(len(along))], 1) * widths[:, None] / 2
-    low, high = np.asarray(swatch_rect("bitumen")).reshape(2, 2)
-    middle = np.broadcast_to((low + high) / 2, (2 * len(points), 2))
-    solids.ribbon(sink, points + normal, points - normal, "palette", LABEL, uvs=middle)
+    solids.ribbon(sink, points + normal, points - normal, "asphalt_seal", LABEL)
 
 
 def _junction(sink: Sink, centre: Array, *, rng: np.random.Generator) -> None:
