@@ -54,7 +54,7 @@ def write_town10(folder: Path) -> None:
     sites = _sites(regions)
     sink = Sink("static")
     lay_ground(sink, regions, sites)
-    wear_streets(sink, regions.network, seed=SEED)
+    wear_streets(sink, regions, seed=SEED)
     paint_streets(sink, regions, lambda lane: turns_of(lanes, lane))
     for street in regions.network.streets.values():
         if street.hump_m:

@@ -62,7 +62,7 @@ def write_harbour(folder: Path) -> None:
     yards = Yards(props, regions, rng=np.random.default_rng([SEED, 1]))
     _lay_ground(sink, regions, yards)
     lay_motorway(sink, regions.level_roads, rng=np.random.default_rng([SEED, 8]))
-    wear_streets(sink, regions.network, seed=SEED)
+    wear_streets(sink, regions, seed=SEED)
     paint_streets(sink, regions, lambda lane: turns_of(lanes, lane))
     build_bridge(sink, regions.network, regions.network.streets["bridge"])
     finish_bridge(sink, regions.network)

@@ -78,7 +78,7 @@ def write_suburb(folder: Path) -> None:
     paved = unary_union([*gardener.paved, park, forecourt])
     lay_streets(sink, regions, crossovers, paved)
     solids.flat(sink, forecourt, KERB_M, "cobbles", "sidewalk")
-    wear_streets(sink, regions.network, seed=SEED)
+    wear_streets(sink, regions, seed=SEED)
     paint(sink, regions)
     occupied = unary_union(
         [

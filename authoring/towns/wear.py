@@ -10,10 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from shapely.geometry import LineString  # type: ignore[import-untyped]
+from shapely.geometry.base import BaseGeometry  # type: ignore[import-untyped]
 
 from authoring.kit.parts import Sink
 from authoring.towns import paths, solids
 from authoring.towns.network import Network, Street
+from authoring.towns.regions import Regions
 
 Array = npt.NDArray[np.float64]
 LANE_LIFT_M, PATCH_LIFT_M, SEAL_LIFT_M = 0.001, 0.002, 0.003
@@ -94,12 +97,13 @@ def of_street(network: Network, street: Street) -> Carriageway:
     )
 
 
-def wear_streets(sink: Sink, network: Network, *, seed: int) -> None:
-    """Wear every street of a network; each has its own age and its own marks."""
+def wear_streets(sink: Sink, regions: Regions, *, seed: int) -> None:
+    """Wear every street and junction of a town; each has its own age and its own marks."""
+    network = regions.network
     for index, street in enumerate(network.streets.values()):
         wear(sink, of_street(network, street), rng=np.random.default_rng([seed, 100, index]))
     for index, node in enumerate(network.nodes.values()):
-        _junction(sink, np.asarray(node.position), rng=np.random.default_rng([seed, 101, index]))
+        _junction(sink, regions.carriageways, np.asarray(node.position), rng=np.random.default_rng([seed, 101, index]))
 
 
 def wear(sink: Sink, road: Carriageway, *, rng: np.random.Generator) -> None:
@@ -234,10 +238,11 @@ def _band(sink: Sink, points: Array, widths: Array) -> None:
     solids.ribbon(sink, points + normal, points - normal, "asphalt_seal", LABEL)
 
 
-def _junction(sink: Sink, centre: Array, *, rng: np.random.Generator) -> None:
+def _junction(sink: Sink, asphalt: BaseGeometry, centre: Array, *, rng: np.random.Generator) -> None:
     """Sealed cracks across the middle of a junction."""
     for _ in range(int(rng.integers(1, 4))):
         heading, at = float(rng.uniform(0, np.pi)), centre + rng.uniform(-1.5, 1.5, 2)
         reach = float(rng.uniform(1.2, 2.4)) * np.array([np.cos(heading), np.sin(heading)])
         track, widths = _wander(at - reach, at + reach, 0.042, rng)
-        _band(sink, np.column_stack([track, np.full(len(track), SEAL_LIFT_M)]), widths)
+        if asphalt.contains(LineString(track).buffer(EDGE_M)):
+            _band(sink, np.column_stack([track, np.full(len(track), SEAL_LIFT_M)]), widths)
