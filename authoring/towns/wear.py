@@ -130,7 +130,7 @@ def wear(sink: Sink, road: Carriageway, *, rng: np.random.Generator) -> None:
             low, high = (low, 0.0) if rng.uniform() < 0.5 else (0.0, high)
         _crack(sink, road, (station, low), (station + float(rng.normal(0, 0.5)), high), 0.042, rng)
     for station in _places(road, ALONG_EVERY_M / age, rng):
-        left, length = _somewhere(road, 0.4, rng), float(rng.uniform(3, 14))
+        left, length = _somewhere(road, 0.4, rng), min(float(rng.uniform(3, 14)), end - station)
         _crack(sink, road, (station, left), (station + length, left + float(rng.normal(0, 0.15))), 0.042, rng)
     for station in _places(road, HAIRLINE_EVERY_M / age, rng):
         left, heading = _somewhere(road, 1.5, rng), float(rng.uniform(0, 2 * np.pi))
@@ -208,6 +208,7 @@ def _crack(
 ) -> None:
     """A wandering line between two places (distance, left): sealed with bitumen where it is wide."""
     track, widths = _wander(np.array(begin), np.array(end), width_m, rng)
+    track[:, 0] = track[:, 0].clip(*road.span)
     track[:, 1] = track[:, 1].clip(-road.half_m + EDGE_M, road.half_m - EDGE_M)
     _strip(sink, road, track, widths)
 
