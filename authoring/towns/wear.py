@@ -24,7 +24,7 @@ LABEL = "road"
 TILE_M = 6.0
 BRIDGE_STEP_M = 2.0
 LONGEST_M = 30.0
-CRACK_STEP_M = 0.22
+CRACK_STEP_M = 0.32
 EDGE_M = 0.35
 # Metres of street to one of each, on a street of middle age.
 PATCH_EVERY_M, ACROSS_EVERY_M, TRANSVERSE_EVERY_M, ALONG_EVERY_M, HAIRLINE_EVERY_M = 24.0, 70.0, 14.0, 18.0, 5.0
@@ -219,7 +219,7 @@ def _wander(begin: Array, end: Array, width_m: float, rng: np.random.Generator) 
     length = float(np.linalg.norm(span))
     count = max(4, int(length / CRACK_STEP_M) + 1)
     share = np.linspace(0, 1, count)
-    sway = np.cumsum(rng.normal(0, 0.055, count))
+    sway = np.cumsum(rng.normal(0, 0.066, count))
     sway -= sway[0] + share * (sway[-1] - sway[0])
     normal = np.array([-span[1], span[0]]) / max(length, 1e-6)
     widths = width_m * rng.uniform(0.7, 1.3, count)

@@ -30,6 +30,10 @@ NO_GRADIENT = (
 )
 
 
+NUMBERS = ("done", "seed", "felt", "silent")
+"""What a checkpoint holds beside arrays."""
+
+
 class TextureOptimiser:
     """Textures, Adam's moments, the number of steps done and what was felt: all that must be kept to go on later.
 
@@ -47,6 +51,8 @@ class TextureOptimiser:
             self.done, self.seed = 0, int(rng.integers(2**62))
             self.felt, self.silent = False, 0
             return
+        if missing := {"textures", "mean", "square", *NUMBERS} - set(saved):
+            raise GearError(f"the saved attack, of another gear, lacks {', '.join(sorted(missing))}; start it afresh")
         if saved["textures"].shape != shape:
             raise GearError(f"the saved attack has patches of {saved['textures'].shape}, not {shape}; start it afresh")
         self.textures, self.mean, self.square = (
@@ -77,7 +83,7 @@ class TextureOptimiser:
     def state(self) -> State:
         """To resume from."""
         arrays = {name: getattr(self, name).numpy().copy() for name in ("textures", "mean", "square")}
-        numbers = {name: np.int64(getattr(self, name)) for name in ("done", "seed", "felt", "silent")}
+        numbers = {name: np.int64(getattr(self, name)) for name in NUMBERS}
         return {**arrays, **numbers}
 
 

@@ -59,7 +59,7 @@ def new_package(kind: str, name: str, *, out: str | Path = ".") -> Path:
         "name": chosen,
         "dist": f"gear-{kind}-{chosen.replace('_', '-')}",
         "module": f"gear_{kind}_{chosen}",
-        "Class": "".join(part.capitalize() for part in chosen.split("_")),
+        "Class": "".join(part.capitalize() for part in chosen.removesuffix(f"_{kind}").split("_")),
         "Kind": kind.capitalize(),
     }
     parent = Path(out)
