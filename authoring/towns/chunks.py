@@ -15,8 +15,8 @@ REACH = 2
 LETTERS = "abcdef"
 # How coarse a part's cells are by its triangles: few large chunks are cheaper than many small ones.
 LEVELS = ((25000, 1), (9000, 2), (0, 4))
-# A cell with fewer triangles joins the fullest one.
-CRUMBS = 24
+# A cell with fewer triangles joins the fullest one, and so do all cells of a part with fewer than `WHOLE`.
+CRUMBS, WHOLE = 24, 250
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,7 +43,8 @@ def chunked(parts: Iterable[Part], *, cell_m: float) -> Iterator[Chunk]:
         cells = np.clip(np.floor(middles / (cell_m * coarse)), -REACH - 1, REACH).astype(np.int64)
         keys = (cells[:, 0] + REACH + 1) * 10 + cells[:, 1] + REACH + 1
         names, counts = np.unique(keys, return_counts=True)
-        keys[np.isin(keys, names[counts < CRUMBS])] = names[counts.argmax()]
+        crumbs = names if len(faces) < WHOLE else names[counts < CRUMBS]
+        keys[np.isin(keys, crumbs)] = names[counts.argmax()]
         for key in np.unique(keys):
             name = f"{part.label}_{part.material}_{LETTERS[key // 10]}{LETTERS[key % 10]}"
             yield Chunk(name, part.material, part.label, _submesh(mesh, faces[keys == key]))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import mujoco
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -9,12 +12,21 @@ from shapely import contains_xy  # type: ignore[import-untyped]
 
 from authoring.kit.parts import Part, Sink
 from authoring.materials import MATERIALS, ground
+from authoring.towns.chunks import chunked
 from authoring.towns.markings import LIFT_M
 from authoring.towns.network import Network, Node, Profile, Street
 from authoring.towns.regions import Regions, canal_polygon
-from authoring.towns.wear import LANE_LIFT_M, PATCH_LIFT_M, SEAL_LIFT_M, of_street, wear_streets
+from authoring.towns.wear import (
+    LANE_LIFT_M,
+    PATCH_LIFT_M,
+    SEAL_LIFT_M,
+    of_street,
+    wear_streets,
+)
+from gear.world.wet import WET_LABELS
 
 Array = npt.NDArray[np.float64]
+TOWNS = Path(__file__).parents[2] / "mjcf" / "towns"
 NODES = (
     Node(name="a", position=(0.0, 0.0)),
     Node(name="b", position=(160.0, 0.0)),
@@ -30,7 +42,7 @@ REGIONS = Regions(NETWORK, canal_polygon([(-300, -300), (-290, -300)], 1.0))
 
 
 def worn(seed: int) -> list[Part]:
-    """The marks on all streets, with more than chance needs to give one of each kind."""
+    """The marks on all streets and junctions."""
     sink = Sink("static")
     wear_streets(sink, REGIONS, seed=seed)
     return sink.parts()
@@ -108,7 +120,22 @@ def test_oil_and_tracks_fade_into_plain_asphalt() -> None:
     assert middle[:100].mean() == pytest.approx(plain, rel=0.02) and middle[-100:].mean() < 0.93 * plain
 
 
-def test_marks_of_roads_have_materials_that_rain_may_wet() -> None:
-    walls_and_things = {"palette"}
-    assert not {part.material for part in worn(0)} & walls_and_things
-    assert {part.material for part in worn(0)} <= set(MATERIALS)
+@pytest.mark.parametrize("town", ["town10", "suburb", "harbour"])
+def test_rain_does_not_wet_the_palette_of_plain_things(town: str) -> None:
+    spec = mujoco.MjSpec.from_file(str(TOWNS / f"{town}.xml"))
+    open_ground = {geom.material for geom in spec.geoms if geom.classname.name.partition(".")[0] in WET_LABELS}
+    assert "asphalt_seal" in open_ground and "palette" not in open_ground
+    assert open_ground & set(MATERIALS)
+
+
+def test_parts_with_few_triangles_are_one_mesh() -> None:
+    sink = Sink("static")
+    for index in range(200):
+        x = 40.0 * index - 4000
+        sink.polygon("asphalt", [(x, 0, 0), (x + 1, 0, 0), (x + 1, 1, 0)], [(0, 0), (1, 0), (1, 1)], label="few")
+        for _ in range(2):
+            sink.polygon("asphalt", [(x, 0, 0), (x + 1, 0, 0), (x + 1, 1, 0)], [(0, 0), (1, 0), (1, 1)], label="many")
+    chunks = list(chunked(sink.parts(), cell_m=110.0))
+    assert [len(c.mesh.faces) for c in chunks if c.label == "few"] == [200]
+    assert len([c for c in chunks if c.label == "many"]) > 1
+    assert sum(len(c.mesh.faces) for c in chunks) == 600
