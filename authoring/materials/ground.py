@@ -11,8 +11,8 @@ from authoring.materials.noise import tileable_noise, worley, wrapped_blur
 
 Array = npt.NDArray[np.float64]
 Textures = dict[str, Image]
-# Linear albedo of a road some years old.
-ASPHALT = 0.112
+# Linear albedo of a road some years old, and its tint.
+ASPHALT, ASPHALT_TINT = 0.112, np.array([1.0, 0.985, 0.955])
 
 
 def asphalt(*, rng: np.random.Generator) -> Textures:
@@ -20,12 +20,11 @@ def asphalt(*, rng: np.random.Generator) -> Textures:
     size, tile_m = 1024, 6.0
     stones = tileable_noise(size, period=256, octaves=3, rng=rng, gain=0.9)
     broad = tileable_noise(size, period=3, octaves=5, rng=rng, gain=0.6)
-    speck = np.clip(tileable_noise(size, period=512, octaves=1, rng=rng) - 0.75, 0, 1) * 2.5
-    grey = ASPHALT * (1 + 0.14 * stones + 0.06 * broad + 0.28 * speck)
-    tint = np.array([1.0, 0.985, 0.955])
+    speck = _specks(size, rng=rng)
+    grey = _aggregate(stones, broad, speck)
     height = 0.0016 * stones + 0.0022 * speck
     textures: Textures = {
-        "asphalt": linear_to_srgb(grey[..., None] * tint),
+        "asphalt": linear_to_srgb(grey[..., None] * ASPHALT_TINT),
         "asphalt_n": normal_from_height(height, (tile_m, tile_m)),
         "asphalt_orm": orm(1.0, np.clip(0.86 + 0.05 * broad + 0.03 * stones, 0, 1), 0.0),
     }
@@ -37,7 +36,7 @@ def asphalt(*, rng: np.random.Generator) -> Textures:
     worn = worn * (1 - patch) + patch * 0.060 * (1 + 0.12 * stones)
     worn = worn * (1 - 0.45 * rim.clip(0, 1)) * (1 - 0.72 * crack) * (1 - sealed) + sealed * 0.030 * (1 + 0.1 * stones)
     worn_height = height * (1 - 0.6 * sealed) - 0.006 * crack + 0.003 * sealed + 0.003 * patch
-    textures["asphalt_worn"] = linear_to_srgb(worn[..., None] * tint)
+    textures["asphalt_worn"] = linear_to_srgb(worn[..., None] * ASPHALT_TINT)
     textures["asphalt_worn_n"] = normal_from_height(worn_height, (tile_m, tile_m))
     return textures
 
@@ -54,12 +53,11 @@ def asphalt_lanes(*, rng: np.random.Generator) -> Textures:
         stones = tileable_noise(size, period=256, octaves=3, rng=rng, gain=0.9)
         broad = tileable_noise(size, period=3, octaves=5, rng=rng, gain=0.6)
         drops = tileable_noise(size, period=12, octaves=4, rng=rng)
-        speck = np.clip(tileable_noise(size, period=512, octaves=1, rng=rng) - 0.75, 0, 1) * 2.5
         oil = np.exp(-((across_m / 0.36) ** 2)) * (0.24 + 0.10 * drops + 0.05 * broad)
         tracks = np.exp(-(((np.abs(across_m) - track_m) / 0.30) ** 2)) * (0.13 + 0.04 * broad)
         wear = 1 + share[:, None] * (tracks - oil)
-        grey = ASPHALT * (1 + 0.14 * stones + 0.06 * broad + 0.28 * speck) * wear
-        textures[stem] = linear_to_srgb(grey[..., None] * np.array([1.0, 0.985, 0.955]))
+        grey = _aggregate(stones, broad, _specks(size, rng=rng)) * wear
+        textures[stem] = linear_to_srgb(grey[..., None] * ASPHALT_TINT)
     return textures
 
 
@@ -255,6 +253,16 @@ def _grain(size_px: int, *, rng: np.random.Generator, along_px: float = 22, acro
 def _streaks(size_px: int, *, rng: np.random.Generator) -> Array:
     """Rain streaks that run down a wall, 0..1."""
     return np.clip(_grain(size_px, rng=rng, along_px=60, across_px=3), 0, 1)
+
+
+def _specks(size_px: int, *, rng: np.random.Generator) -> Array:
+    """Single light stones of asphalt, 0 elsewhere."""
+    return np.clip(tileable_noise(size_px, period=512, octaves=1, rng=rng) - 0.75, 0, 1) * 2.5
+
+
+def _aggregate(stones: Array, broad: Array, speck: Array) -> Array:
+    """The linear albedo of asphalt from its stones, its blotches and its specks."""
+    return ASPHALT * (1 + 0.14 * stones + 0.06 * broad + 0.28 * speck)
 
 
 def _cracks(size_px: int, *, paths: int, rng: np.random.Generator, width_px: int = 2) -> Array:

@@ -1,6 +1,7 @@
 """What traffic, frost and fitters leave on asphalt: wheel tracks and oil, patches, trenches, cracks and their seals.
 
 Everything lies on the carriageway in sheets of its own height, all lower than the paint, so that no two of them meet.
+The asphalt that lanes cover stays: cut out of the road, it made frames no faster that could be measured.
 """
 
 from __future__ import annotations
@@ -14,18 +15,20 @@ from shapely.geometry import LineString  # type: ignore[import-untyped]
 from shapely.geometry.base import BaseGeometry  # type: ignore[import-untyped]
 
 from authoring.kit.parts import Sink
-from authoring.towns import paths, solids
+from authoring.towns import bridges, paths, solids
 from authoring.towns.network import Network, Street
 from authoring.towns.regions import Regions
 
 Array = npt.NDArray[np.float64]
 LANE_LIFT_M, PATCH_LIFT_M, SEAL_LIFT_M = 0.001, 0.002, 0.003
 LABEL = "road"
-TILE_M = 6.0
-BRIDGE_STEP_M = 2.0
+TILE_M = solids.tile_m_of("asphalt_lane")
 LONGEST_M = 30.0
 CRACK_STEP_M = 0.32
+SEAM_M, CRACK_M, HAIRLINE_M = 0.045, 0.042, 0.011
 EDGE_M = 0.35
+# How far before and behind a place its marks may reach.
+REACH_M = (5.0, 16.0)
 # Metres of street to one of each, on a street of middle age.
 PATCH_EVERY_M, ACROSS_EVERY_M, TRANSVERSE_EVERY_M, ALONG_EVERY_M, HAIRLINE_EVERY_M = 24.0, 70.0, 14.0, 18.0, 5.0
 # Wider roads are not dug up from side to side.
@@ -62,7 +65,7 @@ class Carriageway:
         stations = paths.stations(line) + start_m
         low, high = self.bridge
         if low < high:
-            folds = np.linspace(low, high, int(np.ceil((high - low) / BRIDGE_STEP_M - 1e-6)) + 1)
+            folds = np.linspace(low, high, int(np.ceil((high - low) / bridges.STEP_M - 1e-6)) + 1)
             beside = stations[(stations < low - 1e-3) | (stations > high + 1e-3)]
             ends = np.array([start_m, end_m])
             inner = folds[(folds > start_m + 1e-3) & (folds < end_m - 1e-3)]
@@ -75,6 +78,13 @@ class Carriageway:
         at = [paths.at(self.line, float(station)) for station in stations]
         plan = np.array([p + side * np.array([-d[1], d[0]]) for (p, d), side in zip(at, left, strict=True)])
         return np.column_stack([plan, self.height_m(stations) + self.lift_m + lift_m])
+
+    def edges(self, start_m: float, end_m: float, left_m: float, width_m: float, lift_m: float) -> tuple[Array, Array]:
+        """The left and right edge (N, 3) of a strip along the road."""
+        line, stations = self.piece(start_m, end_m)
+        z = (self.height_m(stations) + self.lift_m + lift_m)[:, None]
+        left, right = (np.hstack([paths.offset(line, left_m + side * width_m / 2), z]) for side in (1, -1))
+        return left, right
 
     def is_level(self, start_m: float, end_m: float) -> bool:
         """Whether a stretch keeps off the bridge."""
@@ -128,22 +138,23 @@ def wear(sink: Sink, road: Carriageway, *, rng: np.random.Generator) -> None:
         low, high = -road.half_m + EDGE_M, road.half_m - EDGE_M
         if rng.uniform() < 0.5:
             low, high = (low, 0.0) if rng.uniform() < 0.5 else (0.0, high)
-        _crack(sink, road, (station, low), (station + float(rng.normal(0, 0.5)), high), 0.042, rng)
+        _crack(sink, road, (station, low), (station + float(rng.normal(0, 0.5)), high), CRACK_M, rng)
     for station in _places(road, ALONG_EVERY_M / age, rng):
         left, length = _somewhere(road, 0.4, rng), min(float(rng.uniform(3, 14)), end - station)
-        _crack(sink, road, (station, left), (station + length, left + float(rng.normal(0, 0.15))), 0.042, rng)
+        _crack(sink, road, (station, left), (station + length, left + float(rng.normal(0, 0.15))), CRACK_M, rng)
     for station in _places(road, HAIRLINE_EVERY_M / age, rng):
         left, heading = _somewhere(road, 1.5, rng), float(rng.uniform(0, 2 * np.pi))
-        reach = float(rng.uniform(0.8, 3.0)) * np.array([np.cos(heading), 0.6 * np.sin(heading)])
-        _crack(sink, road, (station, left), (station + reach[0], left + reach[1]), 0.011, rng)
+        along, aside = float(rng.uniform(0.8, 3.0)) * np.array([np.cos(heading), 0.6 * np.sin(heading)])
+        _crack(sink, road, (station, left), (station + along, left + aside), HAIRLINE_M, rng)
 
 
 def _places(road: Carriageway, every_m: float, rng: np.random.Generator) -> Iterator[float]:
     """Distances along a road, `every_m` apart in the mean, none within reach of its ends or on a bridge."""
     start, end = road.span
     station = start + 1.5
-    while (station := station + float(rng.exponential(every_m))) < end - 5.0:
-        if road.is_level(station - 5.0, station + 16.0):
+    before, behind = REACH_M
+    while (station := station + float(rng.exponential(every_m))) < end - before:
+        if road.is_level(station - before, station + behind):
             yield station
 
 
@@ -158,18 +169,18 @@ def _tracks(sink: Sink, road: Carriageway, left_m: float) -> None:
     start, end = road.span
     whole = int((end - start - 2 * TILE_M) // TILE_M)
     fade = (end - start - whole * TILE_M) / 2
-    for a, b, v, material in (
-        (start + fade, start, (0.0, 1.0), "asphalt_lane_end"),
-        (start + fade, end - fade, (0.0, float(whole)), "asphalt_lane"),
-        (end - fade, end, (0.0, 1.0), "asphalt_lane_end"),
+    # From where to where a piece goes, and v there: both end pieces fade outwards.
+    for a, b, tiles, material in (
+        (start + fade, start, 1.0, "asphalt_lane_end"),
+        (start + fade, end - fade, float(whole), "asphalt_lane"),
+        (end - fade, end, 1.0, "asphalt_lane_end"),
     ):
-        line, stations = road.piece(min(a, b), max(a, b))
-        along = v[0] + (v[1] - v[0]) * (stations - a) / (b - a)
-        half = road.lane_m / 2
-        z = (road.height_m(stations) + road.lift_m + LANE_LIFT_M)[:, None]
-        edges = [np.hstack([paths.offset(line, left_m + side * half), z]) for side in (1, -1)]
-        uvs = [np.column_stack([np.full(len(along), 0.5 - side * half / TILE_M), along]) for side in (1, -1)]
-        solids.ribbon(sink, edges[0], edges[1], material, LABEL, uvs=np.concatenate(uvs))
+        low, high = min(a, b), max(a, b)
+        left, right = road.edges(low, high, left_m, road.lane_m, LANE_LIFT_M)
+        v = tiles * (road.piece(low, high)[1] - a) / (b - a)
+        half_u = road.lane_m / 2 / TILE_M
+        uvs = [np.column_stack([np.full(len(v), u), v]) for u in (0.5 - half_u, 0.5 + half_u)]
+        solids.ribbon(sink, left, right, material, LABEL, uvs=np.concatenate(uvs))
 
 
 def _patch(
@@ -182,20 +193,18 @@ def _patch(
     points = road.points(corners[:, 0], corners[:, 1], PATCH_LIFT_M)
     sink.polygon(material, points, points[:, :2] / TILE_M, label=LABEL)
     for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        _strip(sink, road, np.stack([a, b]), np.full(2, 0.045))
+        _strip(sink, road, np.stack([a, b]), np.full(2, SEAM_M))
 
 
 def _trench(sink: Sink, road: Carriageway, start: float, end: float, left: float, width: float) -> None:
     """A strip along the road where a pipe or cable was laid."""
     if not road.is_level(start, end):
         return
-    line, stations = road.piece(start, end)
-    z = (road.height_m(stations) + road.lift_m + PATCH_LIFT_M)[:, None]
-    edges = [np.hstack([paths.offset(line, left + side * width / 2), z]) for side in (1, -1)]
-    solids.ribbon(sink, edges[0], edges[1], "asphalt_fresh", LABEL)
+    solids.ribbon(sink, *road.edges(start, end, left, width, PATCH_LIFT_M), "asphalt_fresh", LABEL)
+    stations = road.piece(start, end)[1]
     for side in (1, -1):
         track = np.column_stack([stations, np.full(len(stations), left + side * width / 2)])
-        _strip(sink, road, track, np.full(len(stations), 0.045))
+        _strip(sink, road, track, np.full(len(stations), SEAM_M))
 
 
 def _crack(
@@ -244,6 +253,6 @@ def _junction(sink: Sink, asphalt: BaseGeometry, centre: Array, *, rng: np.rando
     for _ in range(int(rng.integers(1, 4))):
         heading, at = float(rng.uniform(0, np.pi)), centre + rng.uniform(-1.5, 1.5, 2)
         reach = float(rng.uniform(1.2, 2.4)) * np.array([np.cos(heading), np.sin(heading)])
-        track, widths = _wander(at - reach, at + reach, 0.042, rng)
+        track, widths = _wander(at - reach, at + reach, CRACK_M, rng)
         if asphalt.contains(LineString(track).buffer(EDGE_M)):
             _band(sink, np.column_stack([track, np.full(len(track), SEAL_LIFT_M)]), widths)
