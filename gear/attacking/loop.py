@@ -30,8 +30,8 @@ NO_GRADIENT = (
 )
 
 
-NUMBERS = ("done", "seed", "felt", "silent")
-"""What a checkpoint holds beside arrays."""
+ARRAYS, NUMBERS = ("textures", "mean", "square"), ("done", "seed", "felt", "silent")
+"""What a checkpoint holds."""
 
 
 class TextureOptimiser:
@@ -51,13 +51,13 @@ class TextureOptimiser:
             self.done, self.seed = 0, int(rng.integers(2**62))
             self.felt, self.silent = False, 0
             return
-        if missing := {"textures", "mean", "square", *NUMBERS} - set(saved):
-            raise GearError(f"the saved attack, of another gear, lacks {', '.join(sorted(missing))}; start it afresh")
+        if missing := {*ARRAYS, *NUMBERS} - set(saved):
+            raise GearError(
+                f"the saved attack is of an older gear, it lacks {', '.join(sorted(missing))}; start it afresh"
+            )
         if saved["textures"].shape != shape:
             raise GearError(f"the saved attack has patches of {saved['textures'].shape}, not {shape}; start it afresh")
-        self.textures, self.mean, self.square = (
-            torch.from_numpy(saved[n].copy()) for n in ("textures", "mean", "square")
-        )
+        self.textures, self.mean, self.square = (torch.from_numpy(saved[n].copy()) for n in ARRAYS)
         self.done, self.seed = int(saved["done"]), int(saved["seed"])
         self.felt, self.silent = bool(saved["felt"]), int(saved["silent"])
 
@@ -82,7 +82,7 @@ class TextureOptimiser:
 
     def state(self) -> State:
         """To resume from."""
-        arrays = {name: getattr(self, name).numpy().copy() for name in ("textures", "mean", "square")}
+        arrays = {name: getattr(self, name).numpy().copy() for name in ARRAYS}
         numbers = {name: np.int64(getattr(self, name)) for name in NUMBERS}
         return {**arrays, **numbers}
 

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from gear.attacking.appearance import vary
-from gear.attacking.loop import Ascend, Problem, Seen, batch_of, climb, unit_gradients
+from gear.attacking.loop import ARRAYS, Ascend, Problem, Seen, batch_of, climb, unit_gradients
 from gear.attacking.objectives import SemsegObjective, train_labels
 from gear.attacking.settings import Appearance, Settings
 from gear.contracts.attacks import Budget, Patch, State
@@ -106,9 +106,19 @@ def test_what_was_felt_before_it_was_cut_off_counts() -> None:
 
 
 def test_a_state_of_another_size_is_refused() -> None:
-    state = {name: np.zeros((1, 3, 4, 4), np.float32) for name in ("textures", "mean", "square")}
-    with pytest.raises(GearError, match="start it afresh"):
-        run(Watching(start={**state, "done": np.int64(1), "seed": np.int64(1)}))
+    whole = Watching()
+    run(whole)
+    state = whole.states[-1] | {name: np.zeros((1, 3, 4, 4), np.float32) for name in ARRAYS}
+    with pytest.raises(GearError, match=r"patches of \(1, 3, 4, 4\).*start it afresh"):
+        run(Watching(start=state))
+
+
+def test_a_state_of_an_older_gear_is_refused() -> None:
+    whole = Watching()
+    run(whole)
+    state = {name: value for name, value in whole.states[-1].items() if name not in ("felt", "silent")}
+    with pytest.raises(GearError, match="older gear, it lacks felt, silent; start it afresh"):
+        run(Watching(start=state))
 
 
 def test_a_model_that_passes_no_gradient_is_told_of() -> None:

@@ -69,6 +69,11 @@ def test_its_classes_take_no_name_that_it_uses(kind: str, name: str, tmp_path: P
         assert not classes & imported
 
 
+def test_a_class_says_its_kind_once(tmp_path: Path) -> None:
+    text = (new_package("attack", "my_attack", out=tmp_path) / "src/gear_attack_my_attack/my_attack.py").read_text()
+    assert "class MyAttack:" in text and "import MyConfig" in text
+
+
 def test_a_folder_that_is_there_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     kept = tmp_path / "gear-task-lanes"
     kept.mkdir()
