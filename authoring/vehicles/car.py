@@ -64,9 +64,11 @@ class CarSpec:
         glass_posts: (x, width) of dark posts across the side windows.
         blind_sides: the stretch in x without windows.
         lines_side, lines_top, lines_front, lines_rear: shut lines, as `PaintMap` takes them.
-        handles: (x, z) of door handles. rails: front x, rear x and y of roof rails. mirror: size of a mirror.
+        handles: (x, z) of door handles. rails: front x, rear x and y of roof rails.
+        mirror: size of a door mirror, if it has any.
         plates, badges: z at front and rear; `plate_stand_off` is how far plates stand before the body.
         bed: rear x, front x and half width of a pick-up's bed.
+        paint_px: width and height of the paint's texture.
     """
 
     name: str
@@ -110,8 +112,9 @@ class CarSpec:
     badges: tuple[float | None, float | None] = (None, None)
     shown: int = 0
     rails: tuple[float, float, float] | None = None
-    mirror: tuple[float, float, float] = (0.11, 0.20, 0.14)
+    mirror: tuple[float, float, float] | None = (0.11, 0.20, 0.14)
     bed: tuple[float, float, float] | None = None
+    paint_px: tuple[int, int] = (1024, 512)
 
 
 def build_car(spec: CarSpec) -> tuple[Parts, Shell, Shell]:

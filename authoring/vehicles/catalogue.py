@@ -7,9 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from authoring.mesh import Floats, Mesh, box
-from authoring.vehicles.atlas import DETAILS, PLATE_CELLS, flat, write_atlases
+from authoring.mesh import Floats
+from authoring.vehicles.atlas import PLATE_CELLS, write_atlases
+from authoring.vehicles.bus import fit_bus
+from authoring.vehicles.bus_inside import write_bus_inside
 from authoring.vehicles.car import CarSpec, build_car
+from authoring.vehicles.car_inside import look_inside, write_car_inside
 from authoring.vehicles.cars import ESTATE, SALOON, SPORTS
 from authoring.vehicles.finish import Box, Finish, PaintMap, write_vehicle
 from authoring.vehicles.fittings import (
@@ -23,7 +26,6 @@ from authoring.vehicles.fittings import (
     add_rails,
     add_roof_sign,
     add_wipers,
-    panel,
 )
 from authoring.vehicles.hatchbacks import CITY, HATCHBACK, SUV
 from authoring.vehicles.heavy import BUS
@@ -37,19 +39,28 @@ __all__ = ["CATALOGUE", "write"]
 Extra = Callable[[CarSpec, Parts, Shell, Shell], None]
 
 
-def _car(spec: CarSpec, extra: Extra | None = None) -> Callable[[Path], None]:
+def _car(
+    spec: CarSpec, extra: Extra | None = None, draw_inside: Callable[[Path], None] | None = None
+) -> Callable[[Path], None]:
     def make(out: Path) -> None:
         parts, body, cabin = build_car(spec)
+        if draw_inside is None:
+            look_inside(parts, cabin)
         _fit(spec, parts, body, cabin)
         if extra is not None:
             extra(spec, parts, body, cabin)
         meshes = parts.merged()
         bounds = meshes["paint"].bounds
-        finish = Finish(spec.name, spec.kind, spec.palette, _boxes(spec, bounds, cabin), shown=spec.shown)
+        finish = Finish(
+            spec.name, spec.kind, spec.palette, _boxes(spec, bounds, cabin), shown=spec.shown,
+            own_inside=draw_inside is not None,
+        )  # fmt: skip
         paint = PaintMap(
-            bounds[0], bounds[1], (1024, 512), spec.lines_side, spec.lines_top, spec.lines_front, spec.lines_rear
+            bounds[0], bounds[1], spec.paint_px, spec.lines_side, spec.lines_top, spec.lines_front, spec.lines_rear
         )
         write_vehicle(out, finish, meshes, paint)
+        if draw_inside is not None:
+            draw_inside(out / spec.name / "inside.png")
 
     return make
 
@@ -57,7 +68,8 @@ def _car(spec: CarSpec, extra: Extra | None = None) -> Callable[[Path], None]:
 def _fit(spec: CarSpec, parts: Parts, body: Shell, cabin: Shell) -> None:
     front = cabin.side.patch.evaluate(np.array([[cabin.corners[0], 0.14]]))[0]
     behind = 0.13 if spec.kind == "car" else 0.22
-    add_mirrors(parts, cabin, float(front[0]) - behind, float(front[2]), size=spec.mirror, paint=_mirror_part(spec))
+    if spec.mirror is not None:
+        add_mirrors(parts, cabin, float(front[0]) - behind, float(front[2]), size=spec.mirror, paint=_mirror_part(spec))
     add_handles(parts, body, spec.handles)
     for plate_z, ahead in zip(spec.plates, (True, False), strict=True):
         add_plate(parts, body, plate_z, ahead, PLATE_CELLS[spec.name], stand_off=spec.plate_stand_off)
@@ -117,28 +129,6 @@ def _ambulance(spec: CarSpec, parts: Parts, body: Shell, cabin: Shell) -> None:
     add_light_bar(parts, cabin, 0.35, 1.3)
 
 
-def _bus(spec: CarSpec, parts: Parts, body: Shell, cabin: Shell) -> None:
-    """Doors on the kerb side (the right), the destination over the windscreen, a cooling unit on the roof."""
-    y = -1.274
-    for x, width in ((4.72, 1.25), (0.35, 1.35), (-4.55, 1.2)):
-        parts.add("trim", flat(box((width + 0.08, 0.04, 2.16), (x, y, 1.44)), DETAILS["gloss"]))
-        for side in (-1, 1):
-            pane = box((width / 2 - 0.06, 0.012, 1.96), (x + side * width / 4, y - 0.018, 1.44))
-            parts.add("glass", pane)
-    parts.add("trim", panel(1.9, 0.26, (5.905, 0, 2.62), 0.0, DETAILS["display"]))
-    pod = box((2.6, 1.7, 0.22), (-2.2, 0, 3.12))
-    parts.add("paint", _rounded(pod))
-
-
-def _rounded(mesh: Mesh) -> Mesh:
-    low, high = mesh.bounds
-    v = mesh.vertices.copy()
-    top = v[:, 2] > (low[2] + high[2]) / 2
-    centre = (low + high) / 2
-    v[top, :2] = centre[:2] + (v[top, :2] - centre[:2]) * 0.93
-    return Mesh(v, mesh.faces, mesh.uvs)
-
-
 CATALOGUE: dict[str, Callable[[Path], None]] = {
     **{spec.name: _car(spec, _fin) for spec in (HATCHBACK, SALOON, ESTATE, SUV)},
     **{spec.name: _car(spec) for spec in (CITY, PICKUP, VAN)},
@@ -146,7 +136,7 @@ CATALOGUE: dict[str, Callable[[Path], None]] = {
     TAXI.name: _car(TAXI, _taxi),
     POLICE.name: _car(POLICE, _police),
     AMBULANCE.name: _car(AMBULANCE, _ambulance),
-    BUS.name: _car(BUS, _bus),
+    BUS.name: _car(BUS, fit_bus, write_bus_inside),
     "truck_box": write_box_truck,
     "truck_rigid": write_flatbed,
 }
@@ -157,5 +147,6 @@ def write(out: Path, names: Sequence[str]) -> None:
     common = out / "common"
     common.mkdir(parents=True, exist_ok=True)
     write_atlases(common)
+    write_car_inside(common / "inside.png")
     for name in names:
         CATALOGUE[name](out)

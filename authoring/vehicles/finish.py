@@ -135,6 +135,7 @@ class Finish:
         metallic, roughness: of the paint.
         comment: what the file says about itself.
         shown: which colour of the palette the file itself has.
+        own_inside: whether its glass shows `<name>/inside.png` rather than `common/inside.png`.
     """
 
     name: str
@@ -145,10 +146,11 @@ class Finish:
     roughness: float = 0.15
     comment: str = ""
     shown: int = 0
+    own_inside: bool = False
 
 
 _MATERIALS = {
-    "glass": 'rgba="0.018 0.021 0.024 1" metallic="0" roughness="0.05"',
+    "glass": 'texture="inside" metallic="0" roughness="0.05"',
     "trim": 'texture="details" metallic="0" roughness="0.5"',
     "lights": 'texture="lamps" metallic="0" roughness="0.08"',
     "tyre": 'rgba="0.022 0.022 0.023 1" metallic="0" roughness="0.85"',
@@ -178,6 +180,7 @@ def write_vehicle(
         mesh = meshes[name]
         write_obj(folder / f"{name}.obj", paint_map.unwrap(mesh) if name == "paint" else mesh)
     kind, stem = finish.kind, finish.name
+    inside = f"{stem if finish.own_inside else 'common'}/inside.png"
     rgb = " ".join(f"{v:g}" for v in PALETTES[finish.palette][finish.shown][:3])
     palette = "  ".join(" ".join(f"{v:g}" for v in row) for row in PALETTES[finish.palette])
     lines = [
@@ -200,6 +203,7 @@ def write_vehicle(
         f'    <texture name="paint" type="2d" file="{stem}/paint.png" colorspace="sRGB"/>',
         '    <texture name="details" type="2d" file="common/details.png" colorspace="sRGB"/>',
         '    <texture name="lamps" type="2d" file="common/lamps.png" colorspace="sRGB"/>',
+        f'    <texture name="inside" type="2d" file="{inside}" colorspace="sRGB"/>',
         f'    <material name="paint" texture="paint" rgba="{rgb} 1" metallic="{finish.metallic:g}" '
         f'roughness="{finish.roughness:g}"/>',
         *(f'    <material name="{n}" {_MATERIALS[n]}/>' for n in names if n != "paint"),

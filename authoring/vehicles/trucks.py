@@ -10,6 +10,7 @@ from PIL import Image
 from authoring.mesh import Mesh, bevelled_box, box, merge, revolve, write_obj
 from authoring.vehicles.atlas import DETAILS, LAMPS, PLATE_CELLS, flat
 from authoring.vehicles.car import build_car
+from authoring.vehicles.car_inside import look_inside
 from authoring.vehicles.finish import Box, Finish, PaintMap, write_vehicle
 from authoring.vehicles.fittings import add_handles, add_mirrors, add_plate, add_wipers, panel
 from authoring.vehicles.heavy import CAB
@@ -100,6 +101,7 @@ def write_flatbed(out: Path) -> None:
 def _chassis(name: str) -> Parts:
     """Cab, frame, tanks, guards, wheels and the file's own number plates of an eight-metre lorry."""
     local, body, cabin = build_car(CAB)
+    look_inside(local, cabin)
     front = cabin.side.patch.evaluate(np.array([[cabin.corners[0], 0.2]]))[0]
     add_mirrors(local, cabin, float(front[0]) - 0.14, float(front[2]) + 0.10, size=CAB.mirror, paint="trim")
     add_handles(local, body, CAB.handles)

@@ -187,6 +187,33 @@ def test_no_back_of_a_face_is_seen_from_outside(name: str, model: mujoco.MjModel
     assert backs <= 0.002 * hits
 
 
+def test_panes_show_the_inside_the_right_way_round(model: mujoco.MjModel) -> None:
+    geom = _geom_of(model, "glass")
+    mesh = model.geom_dataid[geom]
+    points = _in_file_frame(model, geom)
+    first, count = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
+    corners = points[model.mesh_face[first : first + count]]
+    uvs = model.mesh_texcoord[model.mesh_texcoordadr[mesh] :]
+    right = uvs[model.mesh_facetexcoord[first : first + count], 0].mean(axis=1)
+    ahead = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 0]
+    across = corners[:, :, 1].mean(axis=1)
+    is_middle = np.abs(across) < 0.3
+    screens = [end for end in (is_middle & (ahead > 0), is_middle & (ahead < 0)) if end.any()]
+    assert len(screens) >= 1
+    for chosen in screens:
+        # Who looks at a screen from outside has the vehicle's left on the right before it, and on the left behind it.
+        facing = np.sign(ahead[chosen][0])
+        assert facing * np.corrcoef(across[chosen], right[chosen])[0, 1] > 0.95
+
+
+def test_every_pane_has_an_inside_of_many_shades(name: str) -> None:
+    spec = mujoco.MjSpec.from_file(str(VEHICLES / f"{name}.xml"))
+    inside = cv2.imread(str(VEHICLES / next(texture.file for texture in spec.textures if texture.name == "inside")))
+    assert inside is not None
+    assert inside.mean() < 90, "darker than the street"
+    assert inside.std() > 15, "not one dark sheet"
+
+
 def test_composes_under_dm_control_twice_over(name: str, model: mujoco.MjModel) -> None:
     town = mjcf.RootElement(model="town")
     for copy in ("first", "second"):
