@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from gear.camera.beams import Headlamps, Lamps, Spots, headlamps
 from gear.camera.glow import Shine, Windows
-from gear.camera.own_light import board_light, lens_light
+from gear.camera.own_light import INSIDE_LIGHT, board_light, inside_light, lens_light
 from gear.camera.response import DISPLAY_POWER
 from gear.camera.slant import STRIP_ROWS, Strip, strips_of
 from gear.contracts.rendering import RawView
@@ -89,6 +89,7 @@ class Night:
         wetness: of open ground, 0..1.
         is_signal: (ngeom,) what glows by itself in the frame, the lenses of traffic lights.
         is_lens: (ngeom,) the glass of vehicles' lamps.
+        is_pane: (ngeom,) the panes of buses.
         is_display: whether frames hold display values instead of light.
     """
 
@@ -102,6 +103,7 @@ class Night:
     wetness: float
     is_signal: npt.NDArray[np.bool_]
     is_lens: npt.NDArray[np.bool_]
+    is_pane: npt.NDArray[np.bool_]
     is_display: bool
 
     def light(self, truth: RawView, camera: CameraRecord, record: SceneRecord, geoms: GeomTable) -> NightLight:
@@ -165,6 +167,8 @@ class Night:
         lenses = np.append(self.is_lens, False)
         for where, gain, light in lens_light(lenses, geom_id, depth_m, camera, record, geoms, self.vehicles):
             share[where], glow[where] = gain, light
+        inside = inside_light(np.append(self.is_pane, False), geom_id, record, geoms, self.vehicles)
+        share[inside] = np.array(INSIDE_LIGHT) / self.even[1]
         for where, lit in board_light(geom_id, depth_m, camera, record, geoms):
             share[where] = lit[:, None] / self.even[1].astype(np.float32)
         return share, glow

@@ -1,4 +1,4 @@
-"""What has light of its own at night: the lenses of signals, the lamps of vehicles, boards under their lamps."""
+"""What has light of its own at night: signals, lamps of vehicles, the insides of buses, boards under their lamps."""
 
 from __future__ import annotations
 
@@ -16,6 +16,9 @@ Where = tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]
 
 BOARD_LIGHT, BOARD_FALL = 0.33, 0.3
 """What a white board shows at its upper edge in the light of its own lamps, and by what share less at its lower one."""
+
+INSIDE_LIGHT = (0.62, 0.60, 0.54)
+"""What a white thing in a bus shows in the light of the lamps there."""
 
 FRONT_LIGHT, BACK_LIGHT = (0.9, 0.85, 0.75), (0.30, 0.008, 0.004)
 BACK_GAIN = 0.35
@@ -54,6 +57,27 @@ def lens_light(
         for chosen, gain, light in ((ahead_m > end_m, 0.0, FRONT_LIGHT), (ahead_m < -end_m, BACK_GAIN, BACK_LIGHT)):
             mine = chosen & (owner == actor.id)
             yield (rows[mine], columns[mine]), gain, light
+
+
+def inside_light(
+    panes: npt.NDArray[np.bool_],
+    geom_id: IdImage,
+    record: SceneRecord,
+    geoms: GeomTable,
+    vehicles: Mapping[str, Headlamps],
+) -> Where:
+    """Rows and columns of the panes of buses that drive; what is seen through them is lit from within.
+
+    Args:
+        panes: (ngeom + 1,) whether a geom is a bus's panes; the last entry is what id -1 finds.
+        geom_id: (H, W) of a view.
+        record, geoms: the scene, and what each geom is.
+        vehicles: assets that have lamps.
+    """
+    rows, columns = np.nonzero(panes[geom_id])
+    driving = [actor.id for actor in drivers(record, vehicles)]
+    mine = np.isin(geoms.object_id[geom_id[rows, columns]], driving)
+    return rows[mine], columns[mine]
 
 
 def board_light(

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 
 from gear.camera.beams import Headlamps
 from gear.camera.night import Night
+from gear.values.labels import LABEL_BY_NAME
 from gear.values.rng import derive_rng
 from gear.values.scene import Weather
 from gear.world.lamps import find_lamps, find_windows
@@ -35,7 +37,7 @@ def night_of(world: World, weather: Weather, renderer_name: str) -> Night | None
     model = world.model
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    material = [model.mat(index).name.rsplit("/", 1)[-1] if index >= 0 else "" for index in model.geom_matid]
+    material = materials_of(model)
     level = LEVEL**weather.night
     return Night(
         level=level,
@@ -55,5 +57,16 @@ def night_of(world: World, weather: Weather, renderer_name: str) -> Night | None
         wetness=wetness(weather),
         is_signal=np.array([index >= 0 and model.mat_emission[index] > 0 for index in model.geom_matid]),
         is_lens=np.array([name == "lights" for name in material]),
+        is_pane=panes_of_buses(material, world.classes.label_code),
         is_display=renderer_name == "classic",
     )
+
+
+def materials_of(model: mujoco.MjModel) -> list[str]:
+    """The name of each geom's material in the file that it came with; empty where it has none."""
+    return [model.mat(index).name.rsplit("/", 1)[-1] if index >= 0 else "" for index in model.geom_matid]
+
+
+def panes_of_buses(material: list[str], label_code: npt.NDArray[np.uint8]) -> npt.NDArray[np.bool_]:
+    """(ngeom,) what of a world is the glass of a bus, by each geom's material and label."""
+    return np.asarray((np.array(material) == "glass") & (label_code == LABEL_BY_NAME["bus"].code))

@@ -208,6 +208,7 @@ def test_panes_show_the_inside_the_right_way_round(model: mujoco.MjModel) -> Non
 
 def test_every_pane_has_an_inside_of_many_shades(name: str) -> None:
     spec = mujoco.MjSpec.from_file(str(VEHICLES / f"{name}.xml"))
+    assert [geom.classname.name.split(".")[1] for geom in spec.geoms if geom.material == "glass"] == ["glass"]
     inside = cv2.imread(str(VEHICLES / next(texture.file for texture in spec.textures if texture.name == "inside")))
     assert inside is not None
     assert inside.mean() < 90, "darker than the street"

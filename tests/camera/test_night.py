@@ -11,6 +11,7 @@ import pytest
 from gear.camera.beams import Headlamps, Lamps, Spots, headlamps, low_beam, street_beam
 from gear.camera.glow import Shine, Windows
 from gear.camera.night import Night, NightLight
+from gear.camera.own_light import INSIDE_LIGHT
 from gear.camera.slant import strips_of
 from gear.contracts.rendering import RawView
 from gear.values.frames import LINEAR_FULL_SCALE, GeomTable
@@ -89,6 +90,7 @@ def night(*places_m: tuple[float, float, float], **changes: object) -> Night:
         wetness=0.0,
         is_signal=np.zeros(2, bool),
         is_lens=np.zeros(2, bool),
+        is_pane=np.zeros(2, bool),
         is_display=False,
     )
     return replace(plain, **changes)  # type: ignore[arg-type]
@@ -274,6 +276,23 @@ def test_vehicles_show_white_ahead_and_red_behind_and_nothing_on_the_roof_or_whe
         red, _, blue = light_of(one, record(van), table).glow[geom_id == WALL][0] / LINEAR_FULL_SCALE
         shown = "dark" if red < 0.1 else "red" if blue < 0.1 * red else "white"
         assert shown == expected
+
+
+def test_buses_that_drive_are_lit_inside() -> None:
+    vehicles = {"bus": Headlamps(front_m=6.0, half_gauge_m=0.9)}
+    _, geom_id = street()
+    table = geoms(object_id=np.array([-1, 2], np.int32))
+    one = night(vehicles=vehicles, is_pane=np.array([False, True]))
+    for role, lit in (("npc", True), ("parked", False)):
+        # It drives away, so that its own lamps are not seen.
+        pose = RigidTransform.from_yaw("world", "actor", (WALL_M + 7, 0.0, 0.0), 0.0)
+        bus = ActorRecord(id=2, asset="bus", role=role, world_from_actor=Pose.from_transform(pose))  # type: ignore[arg-type]
+        shares = light_of(one, record(bus), table).share[geom_id == WALL]
+        if lit:
+            white = 0.95 * np.array(INSIDE_LIGHT) + one.level * one.even[1]
+            np.testing.assert_allclose(shares * one.even[1], np.broadcast_to(white, shares.shape), rtol=5e-3)
+        else:
+            np.testing.assert_allclose(shares, one.level, rtol=1e-2)
 
 
 def test_standing_boards_are_lit_from_above_and_those_on_trucks_are_not() -> None:

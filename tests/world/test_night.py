@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from gear.testing.tiny_town import CLEAR, tiny_world
+from gear.values.labels import LABEL_BY_NAME
 from gear.values.resources import data_dir
 from gear.values.rng import derive_rng
 from gear.values.scene import Weather
 from gear.world.lamps import GLAZINGS, find_lamps, find_windows
 from gear.world.light import even_light, lighting_of
-from gear.world.night import night_of
+from gear.world.night import materials_of, night_of, panes_of_buses
 
 NIGHT = Weather(name="night", sun_altitude_deg=-90)
 
@@ -109,6 +110,15 @@ def test_there_is_a_night_only_without_the_sun() -> None:
     assert dark.level < 0.1 < dusk.level < 1 and 0 < dusk.lit < dark.lit < 1 and dark.is_display
     assert not len(dark.windows.geom_id) and not len(dark.lamps["street"].intensity)
     assert dark.vehicles and all(lamps.front_m > 0 for lamps in dark.vehicles.values())
+    assert not dark.is_pane.any(), "the tiny town has no bus"
+
+
+def test_a_bus_is_found_by_its_label_and_its_glass() -> None:
+    model = mujoco.MjModel.from_xml_path(str(data_dir("mjcf") / "vehicles" / "bus_city.xml"))
+    names = [model.mesh(mesh).name if mesh >= 0 else "" for mesh in model.geom_dataid]
+    for label, panes in (("bus", [name == "glass" for name in names]), ("van", [False] * model.ngeom)):
+        labels = np.full(model.ngeom, LABEL_BY_NAME[label].code, np.uint8)
+        np.testing.assert_array_equal(panes_of_buses(materials_of(model), labels), panes)
 
 
 def test_even_light_is_what_the_sky_and_the_houses_give() -> None:
