@@ -16,13 +16,7 @@ from authoring.towns.chunks import chunked
 from authoring.towns.markings import LIFT_M
 from authoring.towns.network import Network, Node, Profile, Street
 from authoring.towns.regions import Regions, canal_polygon
-from authoring.towns.wear import (
-    LANE_LIFT_M,
-    PATCH_LIFT_M,
-    SEAL_LIFT_M,
-    of_street,
-    wear_streets,
-)
+from authoring.towns.wear import LANE_LIFT_M, PATCH_LIFT_M, SEAL_LIFT_M, of_street, wear_streets
 from gear.world.wet import WET_LABELS
 
 Array = npt.NDArray[np.float64]
