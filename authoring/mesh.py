@@ -92,6 +92,12 @@ class Mesh:
         """Replaces the texture coordinates; one (2,) pair is given to every vertex."""
         return replace(self, uvs=np.broadcast_to(np.asarray(uvs, dtype=np.float64), (len(self.vertices), 2)).copy())
 
+    def part(self, faces: Ints) -> Mesh:
+        """Some of its (K, 3) faces as a mesh of their own, with the vertices that they use."""
+        used, renumbered = np.unique(faces, return_inverse=True)
+        normals = None if self.normals is None else self.normals[used]
+        return Mesh(self.vertices[used], renumbered.reshape(-1, 3), self.uvs[used], normals)
+
     def face_areas(self) -> Floats:
         """(M,) areas in square metres."""
         corners = self.vertices[self.faces]

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from authoring.kit.parts import Part
 from authoring.mesh import Mesh
@@ -47,10 +46,4 @@ def chunked(parts: Iterable[Part], *, cell_m: float) -> Iterator[Chunk]:
         keys[np.isin(keys, crumbs)] = names[counts.argmax()]
         for key in np.unique(keys):
             name = f"{part.label}_{part.material}_{LETTERS[key // 10]}{LETTERS[key % 10]}"
-            yield Chunk(name, part.material, part.label, _submesh(mesh, faces[keys == key]))
-
-
-def _submesh(mesh: Mesh, faces: npt.NDArray[np.int64]) -> Mesh:
-    used, renumbered = np.unique(faces, return_inverse=True)
-    normals = None if mesh.normals is None else np.asarray(mesh.normals)[used]
-    return Mesh(np.asarray(mesh.vertices)[used], renumbered.reshape(-1, 3), np.asarray(mesh.uvs)[used], normals)
+            yield Chunk(name, part.material, part.label, mesh.part(faces[keys == key]))

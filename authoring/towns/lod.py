@@ -7,7 +7,6 @@ from collections.abc import Iterable
 import numpy as np
 
 from authoring.kit.parts import Part
-from authoring.mesh import Mesh
 
 FROM_M = 8.5
 THIN_M = 0.11
@@ -40,7 +39,4 @@ def _trimmed(part: Part, width_m: float, depth_m: float) -> Part:
     roof = corners[..., 2].max() - 2.5
     high = (middle[:, 2] > FROM_M) & (middle[:, 2] < roof)
     hidden = high & ~faces_out & ((thickness < THIN_M) | ((unit[:, 2] > 0.7) & (thickness < TOP_THIN_M)))
-    used, renumbered = np.unique(faces[~hidden], return_inverse=True)
-    normals = None if part.mesh.normals is None else np.asarray(part.mesh.normals)[used]
-    mesh = Mesh(vertices[used], renumbered.reshape(-1, 3), np.asarray(part.mesh.uvs)[used], normals)
-    return Part(part.material, part.label, mesh)
+    return Part(part.material, part.label, part.mesh.part(faces[~hidden]))

@@ -157,9 +157,6 @@ def _objects(parts: Sequence[Part]) -> list[list[Part]]:
             middle = vertices[faces].mean(1)[:, 0]
             chosen = faces[(middle > low) & (middle < high)]
             if len(chosen):
-                used, renumbered = np.unique(chosen, return_inverse=True)
-                normals = None if part.mesh.normals is None else np.asarray(part.mesh.normals)[used]
-                mesh = Mesh(vertices[used], renumbered.reshape(-1, 3), np.asarray(part.mesh.uvs)[used], normals)
-                piece.append(Part(part.material, part.label, mesh))
+                piece.append(Part(part.material, part.label, part.mesh.part(chosen)))
         objects.append(piece)
     return objects

@@ -7,7 +7,6 @@ from shapely.geometry import Point  # type: ignore[import-untyped]
 
 from authoring import kit
 from authoring.kit.parts import Part
-from authoring.mesh import Mesh
 from authoring.towns import suburb
 from authoring.towns.furniture import FAR_M, Furnisher
 from authoring.towns.network import Street
@@ -119,8 +118,6 @@ def _with_trunk_only(parts: list[Part]) -> list[Part]:
     for part in parts:
         mesh = part.mesh
         if part.material == "bark":
-            used, renumbered = np.unique(mesh.faces[:TRUNK_FACES], return_inverse=True)
-            normals = None if mesh.normals is None else mesh.normals[used]
-            mesh = Mesh(mesh.vertices[used], renumbered.reshape(-1, 3), mesh.uvs[used], normals)
+            mesh = mesh.part(mesh.faces[:TRUNK_FACES])
         kept.append(Part(part.material, part.label, mesh))
     return kept

@@ -75,7 +75,6 @@ class PaintMap:
 
     def unwrap(self, mesh: Mesh) -> Mesh:
         """Gives every face the view it looks at; vertices between views are doubled."""
-        assert mesh.normals is not None
         corners = mesh.vertices[mesh.faces]
         normal = np.abs(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
         facing = normal.argmax(axis=1)
@@ -83,12 +82,11 @@ class PaintMap:
         view = np.where(facing == 1, 0, np.where(facing == 2, 1, np.where(ahead, 2, 3)))
         pieces = []
         for k, name in enumerate(("side", "top", "front", "rear")):
-            used, inverse = np.unique(mesh.faces[view == k], return_inverse=True)
-            p = mesh.vertices[used]
+            piece = mesh.part(mesh.faces[view == k])
+            p = piece.vertices
             a = np.abs(p[:, 1]) if k > 1 else p[:, 0]
             b = np.abs(p[:, 1]) if k == 1 else p[:, 2]
-            uvs = self.pixel(name, a, b) / np.array(self.size)
-            pieces.append(Mesh(p, inverse.reshape(-1, 3), uvs, mesh.normals[used]))
+            pieces.append(piece.with_uvs(self.pixel(name, a, b) / np.array(self.size)))
         return merge(pieces)
 
     def draw(self, path: Path) -> None:

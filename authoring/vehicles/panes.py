@@ -88,9 +88,7 @@ class Picture:
 def pieces(mesh: Mesh, group: Ints) -> Iterator[tuple[int, Mesh]]:
     """The mesh by the (M,) group of its faces; vertices between groups are doubled."""
     for k in np.unique(group):
-        used, inverse = np.unique(mesh.faces[group == k], return_inverse=True)
-        normals = None if mesh.normals is None else mesh.normals[used]
-        yield int(k), Mesh(mesh.vertices[used], inverse.reshape(-1, 3), mesh.uvs[used], normals)
+        yield int(k), mesh.part(mesh.faces[group == k])
 
 
 def write_panes(path: Path, ground: Colour, pictures: Sequence[tuple[Pane, Picture]]) -> None:
