@@ -206,6 +206,32 @@ def test_panes_show_the_inside_the_right_way_round(model: mujoco.MjModel) -> Non
         assert facing * np.corrcoef(across[chosen], right[chosen])[0, 1] > 0.95
 
 
+@pytest.mark.parametrize("side", [1, -1], ids=["left", "right"])
+def test_a_car_s_wheel_is_seen_at_the_front_of_its_side(name: str, model: mujoco.MjModel, side: int) -> None:
+    if name not in CARS:
+        pytest.skip("buses and the like have sides of their own")
+    geom = _geom_of(model, "glass")
+    mesh = model.geom_dataid[geom]
+    first, count = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
+    corners = _in_file_frame(model, geom)[model.mesh_face[first : first + count]]
+    uvs = model.mesh_texcoord[model.mesh_texcoordadr[mesh] :][model.mesh_facetexcoord[first : first + count]]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    is_side = normals[:, 1] * side > 0.8 * np.linalg.norm(normals, axis=1)
+    shares = np.random.default_rng(3).dirichlet([1, 1, 1], 400)
+    ahead = np.ravel(shares @ corners[is_side, :, 0].T)
+    u, v = (np.ravel(shares @ uvs[is_side, :, axis].T) for axis in (0, 1))
+    spec = mujoco.MjSpec.from_file(str(VEHICLES / f"{name}.xml"))
+    inside = cv2.imread(str(VEHICLES / next(texture.file for texture in spec.textures if texture.name == "inside")))
+    assert inside is not None
+    high, wide = inside.shape[:2]
+    # MuJoCo turns v over as it loads a mesh: it counts down, as the picture's rows do.
+    shade = inside[np.minimum(v * high, high - 1).astype(int), np.minimum(u * wide, wide - 1).astype(int)].max(-1)
+    front, rear = ahead.max(), ahead.min()
+    is_wheel = shade < 13
+    assert is_wheel.sum() > 100
+    assert (ahead[is_wheel].min() - rear) / (front - rear) > 0.6
+
+
 def test_every_pane_has_an_inside_of_many_shades(name: str) -> None:
     spec = mujoco.MjSpec.from_file(str(VEHICLES / f"{name}.xml"))
     assert [geom.classname.name.split(".")[1] for geom in spec.geoms if geom.material == "glass"] == ["glass"]
