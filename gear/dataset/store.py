@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from gear.dataset.files import clear_scratch, explained, inside, sha256, sync_fo
 from gear.dataset.layout import GEAR, begun_path, manifest_path, patch_path, plan_path, sidecar_path, split_folder
 from gear.dataset.plan import Plan, begin, read_plan
 from gear.dataset.sidecar import dump_json, load_json, read_sidecar, sidecar_bytes
+from gear.dataset.turns import at_work, is_at_work, turn
 from gear.values.errors import DatasetError
 from gear.values.serial import Json
 
@@ -69,29 +70,50 @@ class Store:
         write_whole(self.root, relative, data)
 
     @contextlib.contextmanager
-    def begun(self, patch_files: Mapping[str, bytes]) -> Iterator[None]:
-        """`open`; where what follows fails before a new split has a sample, all of it is taken back: what made nothing
-        must not stand in the way of the next try, with another configuration.
+    def begun(self, patch_files: Mapping[str, bytes], *, force: bool = False) -> Iterator[None]:
+        """`open` for as long as a run is at work; where what follows fails before a new split has a sample, all of it
+        is taken back: what made nothing must not stand in the way of the next try, with another configuration.
+
+        Args:
+            patch_files: as of `open`.
+            force: removes the split that is there first.
 
         Raises:
-            DatasetError: as `open`.
+            DatasetError: as `open`, or another run is at work on what would have to be removed.
         """
-        here = [self.root, *self.root.parents]
-        was_there = {folder for folder in here if folder.exists()}
-        is_new = not inside(self.root, plan_path(self.split)).exists()
-        try:
-            with explained(self.root):
-                self.root.mkdir(parents=True, exist_ok=True)
-            self.open(patch_files)
-            yield
-        except BaseException:
-            if is_new and len(self.missing()) == self.plan.samples:
-                with contextlib.suppress(OSError, DatasetError):
-                    remove_split(self.root, self.split)
-                    for folder in [*sorted((self.root / GEAR).rglob("*"), reverse=True), self.root / GEAR, *here]:
-                        if folder not in was_there and folder.is_dir() and not any(folder.iterdir()):
-                            folder.rmdir()
-            raise
+        was_there = {folder for folder in self._folders() if folder.exists()}
+        is_new = not self._is_begun()
+        with contextlib.ExitStack() as work:
+            try:
+                with turn(self.root):
+                    if force:
+                        _remove_idle(self.root, self.split)
+                    is_new = not self._is_begun()
+                    self.open(patch_files)
+                    work.enter_context(at_work(inside(self.root, split_folder(self.split))))
+                yield
+            except BaseException:
+                work.close()
+                if is_new and len(self.missing()) == self.plan.samples:
+                    self._take_back(was_there)
+                raise
+
+    def _is_begun(self) -> bool:
+        return inside(self.root, plan_path(self.split)).exists()
+
+    def _folders(self) -> Sequence[Path]:
+        return [self.root, *self.root.parents]
+
+    def _take_back(self, was_there: Set[Path]) -> None:
+        """Removes the split and all folders that are empty then, but for those that were there before."""
+        with contextlib.suppress(OSError, DatasetError):
+            if self.root.is_dir():
+                with turn(self.root):
+                    _remove_idle(self.root, self.split)
+            gear = self.root / GEAR
+            for folder in [*sorted(gear.rglob("*"), reverse=True), gear, *self._folders()]:
+                if folder not in was_there and folder.is_dir() and not any(folder.iterdir()):
+                    folder.rmdir()
 
     def missing(self) -> list[int]:
         """Indices of samples that have no sidecar yet; a sample with one is whole and is never made again."""
@@ -195,7 +217,19 @@ def _forget_empty(root: Path, plan: Plan) -> None:
         there = read_plan(root, split)
         is_same_task = there is not None and there.task["name"] == plan.task["name"]
         if not is_same_task or (split == plan.info.split and there != plan):
-            remove_split(root, split)
+            _remove_idle(root, split)
+
+
+def _remove_idle(root: Path, split: str) -> None:
+    """`remove_split`, unless a run is at work on it.
+
+    Raises:
+        DatasetError: one is, or as `remove_split`.
+    """
+    if is_at_work(inside(root, split_folder(split))):
+        problem = f"another run is making split {split!r} just now; wait for its end, or use another --out"
+        raise DatasetError(root, problem)
+    remove_split(root, split)
 
 
 def remove_split(root: Path, split: str) -> None:

@@ -2,6 +2,12 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import pickle
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +18,7 @@ from gear.config.load import load_collection
 from gear.config.nodes import parse_text
 from gear.contracts.tasks import SplitInfo
 from gear.dataset.plan import Plan
-from gear.dataset.store import Store, remove_split, splits_of
+from gear.dataset.store import Store, plan_of, remove_split, splits_of
 from gear.opening import open_dataset, open_twins, roots_of
 from gear.plugins.build import build_task
 from gear.plugins.manager import catalogue
@@ -285,3 +291,84 @@ def test_a_dataset_is_read_by_the_task_that_wrote_it(tmp_path: Path, monkeypatch
     both = dataclasses.replace(there, found=(*there.found, other))
     monkeypatch.setattr("gear.plugins.build.catalogue", lambda: both)
     assert len(open_dataset(tmp_path)[:]) == 3
+
+
+def begun_elsewhere(root: Path, given: Plan, held: Path) -> subprocess.Popen[bytes]:
+    """Another process that has begun a split and is at work on it until it is killed."""
+    script = """
+import pickle, sys, time
+from pathlib import Path
+from gear.dataset.store import Store
+root, plan, held = pickle.loads(sys.stdin.buffer.read())
+with Store(root, plan).begun({}):
+    held.touch()
+    time.sleep(600)
+"""
+    other = subprocess.Popen([sys.executable, "-c", script], stdin=subprocess.PIPE)
+    assert other.stdin is not None
+    other.stdin.write(pickle.dumps((root, given, held)))
+    other.stdin.close()
+    while not held.exists():
+        assert other.poll() is None, "it has ended by itself"
+        time.sleep(0.02)
+    return other
+
+
+def test_what_another_run_has_just_begun_is_not_forgotten(tmp_path: Path) -> None:
+    other = begun_elsewhere(tmp_path / "d", plan(), tmp_path / "held")
+    changed = Store(tmp_path / "d", plan(content={"scene": "billboard02", "seed": 5}))
+    try:
+        before = tree(tmp_path / "d")
+        for force in (False, True):
+            with pytest.raises(DatasetError, match="another run is making split 'test' just now"):
+                changed.begun({}, force=force).__enter__()
+        assert tree(tmp_path / "d") == before
+        fill(tmp_path / "d", plan(), [1], is_closed=False)
+        with pytest.raises(DatasetError, match="another run is making split 'test' just now"):
+            changed.begun({}, force=True).__enter__()
+        with pytest.raises(DatasetError, match="was made with another configuration"):
+            changed.begun({}).__enter__()
+    finally:
+        other.kill()
+        other.wait()
+    assert Store(tmp_path / "d", plan()).missing() == [0, 2]
+    with changed.begun({}, force=True):
+        assert changed.missing() == [0, 1, 2]
+
+
+def test_runs_that_make_the_same_work_side_by_side_and_one_that_fails_takes_nothing_from_the_other(
+    tmp_path: Path,
+) -> None:
+    other = begun_elsewhere(tmp_path / "d", plan(), tmp_path / "held")
+    try:
+        with pytest.raises(KeyboardInterrupt), Store(tmp_path / "d", plan()).begun({}):
+            raise KeyboardInterrupt
+        assert splits_of(tmp_path / "d") == ["test"]
+    finally:
+        other.kill()
+        other.wait()
+    changed = Store(tmp_path / "d", plan(content={"scene": "billboard02", "seed": 5}))
+    with changed.begun({}):  # nobody is at work any more, and no sample was made
+        assert plan_of(tmp_path / "d", "test") == changed.plan
+
+
+def test_of_many_that_begin_one_split_differently_at_once_one_does(tmp_path: Path) -> None:
+    ready, outcomes = threading.Barrier(8), []
+
+    def run(scene: int) -> None:
+        store = Store(tmp_path / "d", plan(content={"scene": f"billboard{scene:02d}", "seed": 5}))
+        ready.wait()
+        try:
+            with store.begun({}):
+                assert plan_of(tmp_path / "d", "test") == store.plan
+                outcomes.append(True)
+                while len(outcomes) < 8:
+                    time.sleep(0.01)
+                assert plan_of(tmp_path / "d", "test") == store.plan
+        except DatasetError as error:
+            assert "another run is making split" in str(error)
+            outcomes.append(False)
+
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(run, range(8)))
+    assert sorted(outcomes) == [False] * 7 + [True]

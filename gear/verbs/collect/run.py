@@ -10,7 +10,7 @@ from typing import Any
 from gear.config.collection import CollectionConfig
 from gear.config.dump import to_plain
 from gear.config.load import load_collection
-from gear.dataset.store import Store, remove_split
+from gear.dataset.store import Store
 from gear.plugins.build import blamed, build, find
 from gear.values.serial import Json, to_json
 from gear.verbs.collect.job import Job, resolve
@@ -130,14 +130,12 @@ def collect_config(
 def run_job(job: Job, *, workers: int = 1, force: bool = False, progress: Progress | None = None) -> CollectReport:
     """Collects what is missing of a resolved job and closes the split."""
     store = Store(job.root, job.plan)
-    if force:
-        remove_split(job.root, job.plan.info.split)
-    with store.begun(job.patch.files):
-        made = _collect_missing(job, store, workers, progress)
     plugin = find("task", job.config.task)
-    task = build(plugin, job.config.options)
-    with blamed(plugin, "finalise"):
-        store.close(task, manifest_facts(job))
+    with store.begun(job.patch.files, force=force):
+        made = _collect_missing(job, store, workers, progress)
+        task = build(plugin, job.config.options)
+        with blamed(plugin, "finalise"):
+            store.close(task, manifest_facts(job))
     return CollectReport(root=job.root, split=job.plan.info.split, samples=job.plan.samples, made=made)
 
 

@@ -1,0 +1,90 @@
+"""Which runs are at work on a dataset: locks of its folders, which the system lets go of when a run is killed.
+
+Where a file system knows no locks, or the system has none of this kind, all runs are taken for lone ones.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from gear.dataset.files import explained
+
+if sys.platform != "win32":
+    import fcntl
+
+__all__ = ["at_work", "is_at_work", "turn"]
+
+
+@contextlib.contextmanager
+def turn(root: Path) -> Iterator[None]:
+    """Runs that begin or forget splits of one dataset do so one after the other; makes the root where it is missing.
+
+    Raises:
+        DatasetError: the root cannot be made.
+    """
+    while True:
+        with explained(root):
+            root.mkdir(parents=True, exist_ok=True)
+        with _locked(root, alone=True, wait=True) as lock:
+            # Who had the turn before may have taken back all of it, the folder that was waited for included.
+            if lock is not None and not _is_still(root, lock):
+                continue
+            yield
+            return
+
+
+@contextlib.contextmanager
+def at_work(folder: Path) -> Iterator[None]:
+    """While a run writes what belongs to a split; `folder` is gear's own of it. Several may, if they make the same."""
+    with _locked(folder, alone=False, wait=True):
+        yield
+
+
+def is_at_work(folder: Path) -> bool:
+    """Whether some run is `at_work` there, this one included."""
+    try:
+        with _locked(folder, alone=True, wait=False):
+            return False
+    except BlockingIOError:
+        return True
+
+
+@contextlib.contextmanager
+def _locked(folder: Path, *, alone: bool, wait: bool) -> Iterator[int | None]:
+    """The folder's descriptor while it is locked; None where there is no lock to be had.
+
+    Raises:
+        BlockingIOError: others have it, and waiting was not asked for.
+    """
+    if sys.platform == "win32":
+        yield None
+        return
+    descriptor: int | None = None
+    try:
+        with contextlib.suppress(FileNotFoundError, NotADirectoryError, PermissionError):
+            descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        if descriptor is None:
+            yield None
+            return
+        try:
+            fcntl.flock(descriptor, (fcntl.LOCK_EX if alone else fcntl.LOCK_SH) | (0 if wait else fcntl.LOCK_NB))
+        except BlockingIOError:
+            raise
+        except OSError:  # a network file system
+            yield None
+        else:
+            yield descriptor
+    finally:
+        if descriptor is not None:
+            os.close(descriptor)
+
+
+def _is_still(folder: Path, descriptor: int) -> bool:
+    try:
+        return os.path.samestat(folder.stat(), os.fstat(descriptor))
+    except FileNotFoundError:
+        return False
