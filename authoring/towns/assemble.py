@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +11,10 @@ from shapely.geometry.base import BaseGeometry  # type: ignore[import-untyped]
 from shapely.ops import unary_union  # type: ignore[import-untyped]
 
 from authoring.kit.parts import Sink
-from authoring.mesh import write_obj
 from authoring.towns import town10
 from authoring.towns.bridges import build_bridge
-from authoring.towns.chunks import chunked
 from authoring.towns.collision import town_solids
-from authoring.towns.document import Document, Geom, bay_rows
+from authoring.towns.document import bay_rows
 from authoring.towns.furniture import Furnisher
 from authoring.towns.ground import lay_ground, tactile_paving
 from authoring.towns.lanes import Lane, lane_graph, turns_of
@@ -29,6 +26,7 @@ from authoring.towns.sites import SiteBuilder
 from authoring.towns.skyline import build_skyline
 from authoring.towns.walks import crosswalks, sidewalks
 from authoring.towns.wear import wear_streets
+from authoring.towns.writing import write_document, write_meshes
 
 CELL_M = 110.0
 SEED = 10
@@ -65,25 +63,13 @@ def write_town10(folder: Path) -> None:
 
     props, lot_bays = _furnish(sink, regions, lots)
 
-    document = Document("town10", town10.BOUNDS)
-    meshes = folder / "town10"
-    shutil.rmtree(meshes, ignore_errors=True)
-    meshes.mkdir(parents=True)
-    for chunk in chunked(sink.parts(), cell_m=CELL_M):
-        write_obj(meshes / f"{chunk.name}.obj", chunk.mesh, is_patchwork=True)
-        document.meshes.append(chunk.name)
-        document.geoms.append(Geom(mesh=chunk.name, material=chunk.material, label=chunk.label))
-    for name, mesh in props.meshes.items():
-        write_obj(meshes / f"{name}.obj", mesh, is_patchwork=True)
-        document.meshes.append(name)
-    document.geoms.extend(props.geoms)
-    document.bodies.extend(props.bodies)
+    document = write_meshes(folder, "town10", town10.BOUNDS, sink, props, cell_m=CELL_M)
     document.solids.extend([*town_solids(regions, lots), *props.solids])
     document.lanes.extend(lanes.values())
     document.sidewalks.extend(sidewalks(regions, town10.BOUNDS))
     document.crosswalks.extend(crosswalks(regions))
     document.bays.extend([*bay_rows(regions.bay_groups), *lot_bays])
-    (folder / "town10.xml").write_text(document.text(), encoding="utf-8", newline="\n")
+    write_document(folder, document)
 
 
 def _furnish(

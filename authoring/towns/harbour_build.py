@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -11,12 +10,10 @@ from shapely.ops import unary_union  # type: ignore[import-untyped]
 
 from authoring import kit
 from authoring.kit.parts import Sink
-from authoring.mesh import write_obj
 from authoring.towns import harbour, solids
 from authoring.towns.bridges import build_bridge
-from authoring.towns.chunks import chunked
 from authoring.towns.collision import town_solids
-from authoring.towns.document import Document, Geom, bay_rows
+from authoring.towns.document import bay_rows
 from authoring.towns.furniture import Furnisher
 from authoring.towns.ground import tactile_paving
 from authoring.towns.harbour_far import QUAY, WATER, build_surroundings, plant_fields
@@ -29,6 +26,7 @@ from authoring.towns.props import Ground, Props
 from authoring.towns.regions import KERB_M, Regions
 from authoring.towns.walks import crosswalks, sidewalks
 from authoring.towns.wear import wear_streets
+from authoring.towns.writing import write_document, write_meshes
 
 CELL_M = 110.0
 SEED = 12
@@ -102,19 +100,7 @@ def _lay_ground(sink: Sink, regions: Regions, yards: Yards) -> None:
 
 
 def _write(folder: Path, sink: Sink, props: Props, regions: Regions, lanes: dict[str, Lane], yards: Yards) -> None:
-    document = Document("harbour", harbour.BOUNDS)
-    meshes = folder / "harbour"
-    shutil.rmtree(meshes, ignore_errors=True)
-    meshes.mkdir(parents=True)
-    for chunk in chunked(sink.parts(), cell_m=CELL_M):
-        write_obj(meshes / f"{chunk.name}.obj", chunk.mesh, is_patchwork=True)
-        document.meshes.append(chunk.name)
-        document.geoms.append(Geom(mesh=chunk.name, material=chunk.material, label=chunk.label))
-    for name, mesh in props.meshes.items():
-        write_obj(meshes / f"{name}.obj", mesh, is_patchwork=True)
-        document.meshes.append(name)
-    document.geoms.extend(props.geoms)
-    document.bodies.extend(props.bodies)
+    document = write_meshes(folder, "harbour", harbour.BOUNDS, sink, props, cell_m=CELL_M)
     document.solids.extend([*town_solids(regions, [], reach_m=SOLID_M), *props.solids])
     document.lanes.extend(lanes.values())
     document.sidewalks.extend(sidewalks(regions, harbour.BOUNDS))
@@ -122,4 +108,4 @@ def _write(folder: Path, sink: Sink, props: Props, regions: Regions, lanes: dict
     dead = tuple(f"_{street.name}" for street in regions.network.streets.values() if street.end is None)
     document.crosswalks.extend(walk for walk in crosswalks(regions) if not walk.name.endswith(dead))
     document.bays.extend([*bay_rows(regions.bay_groups), *yards.bays])
-    (folder / "harbour.xml").write_text(document.text(), encoding="utf-8", newline="\n")
+    write_document(folder, document)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -13,11 +12,9 @@ from shapely.geometry.base import BaseGeometry  # type: ignore[import-untyped]
 from shapely.ops import unary_union  # type: ignore[import-untyped]
 
 from authoring.kit.parts import Sink
-from authoring.mesh import write_obj
 from authoring.towns import solids, suburb
-from authoring.towns.chunks import chunked
 from authoring.towns.collision import town_solids
-from authoring.towns.document import Document, Geom, bay_rows
+from authoring.towns.document import bay_rows
 from authoring.towns.lanes import Lane, lane_graph
 from authoring.towns.network import BAY_M
 from authoring.towns.props import Ground, Props
@@ -30,6 +27,7 @@ from authoring.towns.suburb_skyline import build_skyline
 from authoring.towns.suburb_streets import lay_streets, paint, tactile
 from authoring.towns.walks import crosswalks, sidewalks
 from authoring.towns.wear import wear_streets
+from authoring.towns.writing import write_document, write_meshes
 
 CELL_M = 165.0
 SEED = 20
@@ -92,25 +90,13 @@ def write_suburb(folder: Path) -> None:
     build_skyline(sink, occupied, np.random.default_rng([SEED, 7]))
     props.solids.extend(board_solids(suburb.BOARDS))
 
-    document = Document("suburb", suburb.BOUNDS)
-    meshes = folder / "suburb"
-    shutil.rmtree(meshes, ignore_errors=True)
-    meshes.mkdir(parents=True)
-    for chunk in chunked(sink.parts(), cell_m=CELL_M):
-        write_obj(meshes / f"{chunk.name}.obj", chunk.mesh, is_patchwork=True)
-        document.meshes.append(chunk.name)
-        document.geoms.append(Geom(mesh=chunk.name, material=chunk.material, label=chunk.label))
-    for name, mesh in props.meshes.items():
-        write_obj(meshes / f"{name}.obj", mesh, is_patchwork=True)
-        document.meshes.append(name)
-    document.geoms.extend(props.geoms)
-    document.bodies.extend(props.bodies)
+    document = write_meshes(folder, "suburb", suburb.BOUNDS, sink, props, cell_m=CELL_M)
     document.solids.extend([*town_solids(regions, ()), *props.solids])
     document.lanes.extend(suburb_lanes().values())
     document.sidewalks.extend(sidewalks(regions, suburb.BOUNDS))
     document.crosswalks.extend(walk for walk in crosswalks(regions) if "_out_" not in walk.name)
     document.bays.extend([*bay_rows(_usable(regions)), ("drives", *CAR_M, np.asarray(gardener.drive_bays))])
-    (folder / "suburb.xml").write_text(document.text(), encoding="utf-8", newline="\n")
+    write_document(folder, document)
 
 
 def _usable(regions: Regions) -> Iterator[BayGroup]:
