@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from gear.verbs.gap.run import gap
     from gear.verbs.models import ModelFacts, list_models
     from gear.verbs.train.run import TrainReport, train
+    from gear.verbs.weights.average import average_weights
     from gear.verbs.weights.convert import ConvertReport, convert_weights
     from gear.view.write import ViewReport, write_view
 
@@ -44,6 +45,7 @@ __all__ = [
     "Twins",
     "ViewReport",
     "attack",
+    "average_weights",
     "collect",
     "convert_weights",
     "defend",
@@ -70,6 +72,7 @@ _HOME = {
     "Twins": "gear.opening",
     "ViewReport": "gear.view.write",
     "attack": "gear.verbs.attack.run",
+    "average_weights": "gear.verbs.weights.average",
     "collect": "gear.verbs.collect.run",
     "convert_weights": "gear.verbs.weights.convert",
     "defend": "gear.verbs.defend",

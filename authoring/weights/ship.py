@@ -37,13 +37,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--base", type=Path, default=Path(), help="folder of data and runs, to leave out of what is said"
     )
+    parser.add_argument(
+        "--averaged", type=Path, help="ship these: gear weights average of what the runs began with and their end"
+    )
     parser.add_argument("--note", default="", help="what else there is to say of how they were made")
     parser.add_argument("--samples", type=int, help="of the training data, as their collection was told")
 
 
 def run(args: argparse.Namespace) -> int:
     """Ships one network."""
-    print(ship(args.runs, args.evaluation, args.base, samples=args.samples, note=args.note))
+    print(ship(args.runs, args.evaluation, args.base, samples=args.samples, averaged=args.averaged, note=args.note))
     return 0
 
 
@@ -54,22 +57,24 @@ def ship(
     models: Path = MODELS,
     *,
     samples: int | None = None,
+    averaged: Path | None = None,
     note: str = "",
 ) -> Path:
     """Writes `<model>.safetensors` and `<model>.md`; returns the former.
 
     Args:
         runs: folders of `gear train`; each but the first began with the one before.
-        evaluation: folder of `gear evaluate --report reference` with the last run's weights.
+        evaluation: folder of `gear evaluate --report reference` with the weights that are shipped.
         base: commands name files below it by what follows it.
         models: the package's folder.
         samples: that the collection of the training data was told, if any.
+        averaged: a file of `gear weights average` that is shipped in place of the last run's weights.
         note: what else there is to say of how they were made.
 
     Raises:
         GearError: the evaluation is of another network or other weights, or lacks the report.
     """
-    weights = runs[-1] / WEIGHTS
+    weights = averaged or runs[-1] / WEIGHTS
     state, metadata = read(weights)
     name = metadata["model"]
     measured = Measured.read(evaluation, name, weights)
@@ -79,6 +84,8 @@ def ship(
                 for history, one in zip(histories, runs, strict=True)]  # fmt: skip
     collected = f"python -m authoring.weights training --task {metadata['task']} --out ."
     commands.insert(0, collected + (f" --samples {samples}" if samples else ""))
+    if averaged is not None:
+        commands.append(_without(base, metadata["command"]))
     metadata["command"] = " && ".join(commands)
     target = models / f"{name}.safetensors"
     models.mkdir(parents=True, exist_ok=True)
@@ -170,6 +177,7 @@ def _card(
         "",
         *(f"- {one['finished_steps']} steps in {one['elapsed_s'] / 60:.0f} minutes; the weights are those after step "
           f"{one['best_step']}" for one in histories),
+        *(["- what is shipped is the mean that the last command makes"] if "averaged" in metadata else []),
         "",
         *wrapped(note),
         TRAINING,

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import argparse
 import json
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from gear.verbs.weights.convert import ConvertReport
 
 EXAMPLE = """examples:
   gear weights convert ddrnet23_slim best_val.pth ddrnet.safetensors
   gear weights convert bisenet_x39 cityscapes-bisenet-X39.pth bisenet.safetensors --set auxiliary=false
+  gear weights average ddrnet23_slim runs/semseg/model.safetensors mean.safetensors
   gear weights show ddrnet.safetensors
   gear weights show ddrnet23_slim --json           the shipped reference weights of a model
 
@@ -30,21 +35,42 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="an option of the model that changes its graph; repeatable",
     )  # fmt: skip
     converting.add_argument("--json", action="store_true", help="print JSON")
+    averaging = actions.add_parser(
+        "average", help="make the mean of two states of one network, such as before and after fine-tuning"
+    )
+    averaging.add_argument(
+        "first", metavar="FIRST", help="a safetensors file, or a model whose shipped weights are meant"
+    )
+    averaging.add_argument("second", metavar="SECOND", help="likewise")
+    averaging.add_argument("out", metavar="OUT", help="the file to write; ends in .safetensors")
+    averaging.add_argument("--share", type=float, default=0.5, metavar="X", help="of the second, between 0 and 1 (0.5)")
+    averaging.add_argument("--half", action="store_true", help="store matrices in float16, half the size")
+    averaging.add_argument("--json", action="store_true", help="print JSON")
     showing = actions.add_parser("show", help="print what a weights file says of itself")
     showing.add_argument("file", metavar="FILE", help="a safetensors file, or a model whose shipped weights are meant")
     showing.add_argument("--json", action="store_true", help="print JSON")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Converts or shows."""
-    return convert(args) if args.action == "convert" else show(args)
+    """Converts, averages or shows."""
+    return {"convert": convert, "average": average, "show": show}[args.action](args)
 
 
 def convert(args: argparse.Namespace) -> int:
     """Converts and prints the hash."""
     from gear.verbs.weights.convert import convert_weights
 
-    report = convert_weights(args.model, args.source, args.out, settings=args.settings, halves=args.half)
+    return _say(convert_weights(args.model, args.source, args.out, settings=args.settings, halves=args.half), args)
+
+
+def average(args: argparse.Namespace) -> int:
+    """Averages and prints the hash."""
+    from gear.verbs.weights.average import average_weights
+
+    return _say(average_weights(args.first, args.second, args.out, share=args.share, halves=args.half), args)
+
+
+def _say(report: ConvertReport, args: argparse.Namespace) -> int:
     if args.json:
         facts = {"model": report.model, "path": str(report.path), "sha256": report.sha256,
                  "size_mb": round(report.size_mb, 3), "tensors": report.tensors}  # fmt: skip

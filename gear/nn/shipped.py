@@ -21,7 +21,7 @@ GROUP = "gear.weights"
 
 CHECKOUT = Path(__file__).resolve().parents[2] / "weights" / "gear_weights"
 
-JSON_KEYS = ("metrics", "intervals", "options", "data", "look")
+JSON_KEYS = ("metrics", "intervals", "options", "data", "look", "averaged")
 """Metadata whose texts are JSON."""
 
 
@@ -36,7 +36,8 @@ class WeightsFile:
         metadata: as written, all texts. gear writes, as far as it knows: `model`, `task`, `gear` (version), `source`
             and `source_sha256` (of a published file), `licence`, `command`, `seed`, `look_hash`, and as JSON `data`
             (what it was trained on), `metrics` (figures by name), `intervals` (their bounds of 95 %), `options` (of
-            the model, such as `input_scale`) and `look` (`gear.verbs.look.Look`).
+            the model, such as `input_scale`), `look` (`gear.verbs.look.Look`) and `averaged` (hashes of the two states
+            whose mean it is).
     """
 
     path: Path

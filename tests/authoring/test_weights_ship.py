@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import torch
 
 from authoring.weights.renew import renew
 from authoring.weights.ship import ship
@@ -18,6 +19,7 @@ from gear.values.errors import GearError
 from gear.values.serial import to_json
 from gear.verbs.evaluate.player import weights_digest
 from gear.verbs.look import Look, light_digest
+from gear.verbs.weights.average import average_weights
 
 MODEL = "ddrnet23_slim"
 
@@ -71,6 +73,28 @@ def test_the_file_has_the_same_numbers_and_says_what_was_measured(run: Path, eva
     assert train == f"gear train --task semseg --model {MODEL} --data data --out runs/semseg"
     before, after = read(run / "model.safetensors")[0], read(path)[0]
     assert before.keys() == after.keys() and all(bool((before[key] == after[key]).all()) for key in before)
+
+
+def test_a_mean_is_shipped_in_place_of_the_run_s_own(run: Path, tmp_path: Path, evaluation: Path) -> None:
+    mean = run.parents[1] / "mean.safetensors"
+    other = build(SegmentationOptions(weights="none", device="cpu", seed=1)).module().state_dict()
+    write(tmp_path / "before.safetensors", other, {"model": MODEL})
+    average_weights(tmp_path / "before.safetensors", run / "model.safetensors", mean, share=0.25)
+    results = json.loads((evaluation / "results.json").read_text())
+    with pytest.raises(GearError, match="not an evaluation of"):
+        ship([run], evaluation, run.parents[1], tmp_path / "models", averaged=mean)
+    loaded = build(SegmentationOptions(weights=str(mean), device="cpu"))
+    results["model"]["weights_sha256"] = weights_digest(loaded)
+    (evaluation / "results.json").write_text(json.dumps(results))
+    path = ship([run], evaluation, run.parents[1], tmp_path / "models", averaged=mean)
+    last = inspect(path).metadata["command"].split(" && ")[-1]
+    assert last.startswith("gear weights average ") and last.endswith(
+        "/model.safetensors mean.safetensors --share 0.25"
+    )
+    assert "the mean that the last command makes" in path.with_suffix(".md").read_text()
+    key = "conv1.0.weight"
+    wanted = 0.75 * other[key] + 0.25 * read(run / "model.safetensors")[0][key]
+    assert torch.allclose(read(path)[0][key], wanted, atol=1e-3)
 
 
 def test_the_card_says_how_they_came_and_how_good_they_are(run: Path, evaluation: Path, tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from gear.nn.ddrnet import DDRNet23Slim
 from gear.nn.weights import read, write
 from gear.plugins.build import NO_OPTIONS, build, find
 from gear.values.errors import GearError, UnknownNameError
+from gear.verbs.weights.average import average_weights
 from gear.verbs.weights.convert import convert_weights
 from gear.verbs.weights.show import show_weights
 
@@ -121,3 +122,68 @@ def test_show_prints_what_the_file_says(
         show_weights(str(tmp_path))
     assert main(["weights", "show", str(official["bisenet"])]) == 2
     assert "gear weights convert" in capsys.readouterr().err
+
+
+def _two(folder: Path) -> tuple[Path, Path]:
+    """A network's states before and after, as files."""
+    before, after = folder / "before.safetensors", folder / "after.safetensors"
+    data = [json.dumps({"training": [{"scene": "town10/truck", "seed": seed}]}) for seed in (1, 2)]
+    said = {"model": "ddrnet23_slim", "task": "semseg", "options": '{"input_scale": 0.5}'}
+    for seed, path in enumerate((before, after)):
+        torch.manual_seed(seed)
+        state = DDRNet23Slim(19).state_dict()
+        state["conv1.1.num_batches_tracked"] = torch.tensor(3 + seed)
+        write(path, state, said | {"data": data[seed], "metrics": '{"miou": 0.5}', "look_hash": f"look{seed}"})
+    return before, after
+
+
+def test_a_mean_lies_between_and_says_of_what_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before, after = _two(tmp_path)
+    out = tmp_path / "mean.safetensors"
+    assert main(["weights", "average", str(before), str(after), str(out), "--share", "0.25", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["sha256"] == show_weights(out).sha256
+    (one, _), (two, _), (mean, _) = read(before), read(after), read(out)
+    for key, value in mean.items():
+        wanted = 0.75 * one[key] + 0.25 * two[key] if value.is_floating_point() else two[key]
+        torch.testing.assert_close(value, wanted)
+        assert value.dtype == two[key].dtype
+    facts = show_weights(out).file.facts()
+    assert facts["averaged"] == {
+        "first_sha256": show_weights(before).sha256, "second_sha256": show_weights(after).sha256, "share": 0.25,
+    }  # fmt: skip
+    assert facts["data"] == {"training": [{"scene": "town10/truck", "seed": seed} for seed in (1, 2)]}
+    assert facts["look_hash"] == "look1" and facts["options"] == {"input_scale": 0.5} and "metrics" not in facts
+    network = build(find("model", "ddrnet23_slim"), with_overrides(NO_OPTIONS, [f"weights={out}"]))
+    assert network.input_scale == 0.5
+    again = average_weights(before, after, out, share=0.25)
+    assert again.sha256 == show_weights(out).sha256
+    assert average_weights(before, after, tmp_path / "half.safetensors", halves=True).size_mb < 0.6 * again.size_mb
+
+
+def test_what_has_no_mean_is_refused(
+    tmp_path: Path, official: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before, after = _two(tmp_path)
+    out = tmp_path / "out.safetensors"
+    other = _converted(official, tmp_path)
+    state, said = read(after)
+    for share in (0.0, 1.0, -1.0, float("nan")):
+        with pytest.raises(GearError, match="must be between 0 and 1"):
+            average_weights(before, after, out, share=share)
+    with pytest.raises(GearError, match=r"is of model bisenet_x39, .* of ddrnet23_slim; only states of one network"):
+        average_weights(before, other, out)
+    write(tmp_path / "larger.safetensors", state, said | {"options": '{"input_scale": 1.0}'})
+    with pytest.raises(GearError, match=r"is of options .*1\.0"):
+        average_weights(before, tmp_path / "larger.safetensors", out)
+    write(tmp_path / "short.safetensors", {k: v for k, v in state.items() if k != "conv1.0.bias"}, said)
+    with pytest.raises(GearError, match=r"not of the same network as .*1 missing \(conv1\.0\.bias\)"):
+        average_weights(before, tmp_path / "short.safetensors", out)
+    with pytest.raises(GearError, match="is the file to read"):
+        average_weights(before, after, after)
+    with pytest.raises(GearError, match="there is no such weights file"):
+        average_weights(before, tmp_path / "none.safetensors", out)
+    assert not out.exists()
+    (tmp_path / "models").mkdir()
+    before.rename(tmp_path / "models" / "ddrnet23_slim.safetensors")
+    monkeypatch.setattr(shipped, "shipped_folders", lambda: (tmp_path,))
+    assert average_weights("ddrnet23_slim", after, out).model == "ddrnet23_slim"

@@ -76,10 +76,7 @@ def convert_weights(
         GearError: anything that the user can put right; its text is one line.
     """
     target, origin = Path(out), Path(source)
-    if target.suffix != SUFFIX:
-        raise GearError(f"{target}: the file to write is to end in {SUFFIX}")
-    if target.exists() and origin.exists() and target.samefile(origin):
-        raise GearError(f"{target}: is the file to read; write another one")
+    check_target(target, origin)
     found, settings = find("model", model), tuple(settings)
     graph = _graph(found, settings)
     state: Mapping[str, Any] = read_published(origin)
@@ -108,6 +105,18 @@ def convert_weights(
     write(target, state, metadata, halves=halves)
     data = read_bytes(target)
     return ConvertReport(model=spec.name, path=target, sha256=sha256(data), size_mb=len(data) / 1e6, tensors=len(state))
+
+
+def check_target(target: Path, *origins: Path) -> None:
+    """Where a weights file is to be written.
+
+    Raises:
+        GearError: its name does not end as it should, or it is one of the files to read.
+    """
+    if target.suffix != SUFFIX:
+        raise GearError(f"{target}: the file to write is to end in {SUFFIX}")
+    if any(target.exists() and origin.exists() and target.samefile(origin) for origin in origins):
+        raise GearError(f"{target}: is the file to read; write another one")
 
 
 def _graph(found: Found, settings: Iterable[str]) -> Any:

@@ -38,7 +38,7 @@ class WeightsFacts:
         }
 
 
-def show_weights(name: str) -> WeightsFacts:
+def show_weights(name: str | Path) -> WeightsFacts:
     """Reads a file's header and hashes it.
 
     Args:
@@ -48,12 +48,23 @@ def show_weights(name: str) -> WeightsFacts:
         UnknownNameError: it is no file and no model.
         GearError: there is no such file, nothing is shipped under that name, or it is no safetensors.
     """
-    path = Path(name)
-    if not path.exists() and not path.suffix and path.name == name:
-        path = resolve(SHIPPED, find("model", name).spec.name) or path
+    path = file_of(name)
     file = inspect(path)
     digest = hashlib.sha256()
     with path.open("rb") as stream:
         while chunk := stream.read(CHUNK_BYTES):
             digest.update(chunk)
     return WeightsFacts(file=file, sha256=digest.hexdigest())
+
+
+def file_of(name: str | Path) -> Path:
+    """The file that is meant: one of that path, or the shipped weights of the model of that name.
+
+    Raises:
+        UnknownNameError: it is no file and no model.
+        GearError: nothing is shipped under that name.
+    """
+    path = Path(name)
+    if not path.exists() and not path.suffix and path.name == str(name):
+        return resolve(SHIPPED, find("model", path.name).spec.name) or path
+    return path

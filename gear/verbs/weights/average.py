@@ -1,0 +1,100 @@
+"""`gear.average_weights`: the mean of two states of one network.
+
+A fine-tuned network and the one that it began with often lie in one valley of the loss, and on scenes that neither has
+seen a network between them does better than both (Wortsman et al., "Robust fine-tuning of zero-shot models", CVPR 2022,
+section 3).
+"""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from torch import Tensor
+
+from gear.dataset.files import read_bytes, sha256
+from gear.nn.shipped import inspect
+from gear.nn.weights import mismatches, read, write
+from gear.values.errors import GearError
+from gear.values.serial import Json
+from gear.verbs.weights.convert import ConvertReport, check_target
+from gear.verbs.weights.show import file_of
+
+NETWORK = ("model", "task", "options")
+"""What both files must say alike, or one of them not at all."""
+
+MEASURED = ("metrics", "intervals", "source", "source_sha256")
+"""What is no longer true of the mean."""
+
+
+def average_weights(
+    first: str | Path, second: str | Path, out: str | Path, *, share: float = 0.5, halves: bool = False
+) -> ConvertReport:
+    """Writes `(1 - share) · first + share · second`; counters are the second's.
+
+    The file says what the second says, without figures; its data are those of both, and `averaged` names both hashes.
+
+    Args:
+        first: a safetensors file, or the name of a model whose shipped weights are meant.
+        second: likewise.
+        out: file to write.
+        share: of the second, between 0 and 1.
+        halves: whether weights of two dimensions and more are stored in float16.
+
+    Raises:
+        GearError: the files are of different networks, or anything else that the user can put right.
+    """
+    if not 0 < share < 1:
+        raise GearError(f"--share {share:g}: must be between 0 and 1, and neither")
+    one, two, target = file_of(first), file_of(second), Path(out)
+    check_target(target, one, two)
+    (state_one, said_one), (state_two, said_two) = read(one), read(two)
+    for key in NETWORK:
+        if key in said_one and key in said_two and said_one[key] != said_two[key]:
+            raise GearError(
+                f"{two}: is of {key} {said_two[key]}, {one} of {said_one[key]}; only states of one network have a mean"
+            )
+    problems = mismatches(state_one, state_two)
+    if problems:
+        raise GearError(f"{two}: not of the same network as {one}: {'; '.join(problems)}")
+    state = {key: _between(state_one.get(key, value), value, share) for key, value in state_two.items()}
+    metadata = {key: text for key, text in (said_one | said_two).items() if key not in MEASURED}
+    metadata["averaged"] = json.dumps(
+        {"first_sha256": sha256(read_bytes(one)), "second_sha256": sha256(read_bytes(two)), "share": share}
+    )
+    metadata["command"] = shlex.join(
+        ["gear", "weights", "average", str(first), str(second), str(out), "--share", f"{share:g}"]
+    )
+    data = _both(inspect(one).facts().get("data"), inspect(two).facts().get("data"))
+    if data is not None:
+        metadata["data"] = json.dumps(data, sort_keys=True)
+    write(target, state, metadata, halves=halves)
+    written = read_bytes(target)
+    return ConvertReport(
+        model=metadata.get("model", target.stem),
+        path=target,
+        sha256=sha256(written),
+        size_mb=len(written) / 1e6,
+        tensors=len(state),
+    )
+
+
+def _between(one: Tensor, two: Tensor, share: float) -> Tensor:
+    if not two.is_floating_point():
+        return two
+    return ((1 - share) * one.double() + share * two.double()).to(two.dtype)
+
+
+def _both(one: Json, two: Json) -> Json:
+    """What either was trained on, by part; what the second was, where the first says nothing that can be added."""
+    if not (isinstance(one, Mapping) and isinstance(two, Mapping)):
+        return two if two is not None else one
+    merged: dict[str, Any] = dict(two)
+    for key, rows in one.items():
+        there = merged.get(key, [])
+        if isinstance(rows, list) and isinstance(there, list):
+            merged[key] = [*rows, *(row for row in there if row not in rows)]
+    return merged
