@@ -65,6 +65,23 @@ def _geom_of(model: mujoco.MjModel, mesh: str) -> int:
     return next(g for g in _visible(model) if model.geom_dataid[g] == model.mesh(mesh).id)
 
 
+def _panes(model: mujoco.MjModel) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float32]]:
+    """Corners of the glass's faces, (N, 3, 3) metres, and their texture coordinates, (N, 3, 2)."""
+    geom = _geom_of(model, "glass")
+    mesh = model.geom_dataid[geom]
+    faces = slice(model.mesh_faceadr[mesh], model.mesh_faceadr[mesh] + model.mesh_facenum[mesh])
+    uvs = model.mesh_texcoord[model.mesh_texcoordadr[mesh] :]
+    return _in_file_frame(model, geom)[model.mesh_face[faces]], uvs[model.mesh_facetexcoord[faces]]
+
+
+def _inside(name: str) -> npt.NDArray[np.uint8]:
+    """The picture of what is seen through a vehicle's panes."""
+    spec = mujoco.MjSpec.from_file(str(VEHICLES / f"{name}.xml"))
+    picture = cv2.imread(str(VEHICLES / next(texture.file for texture in spec.textures if texture.name == "inside")))
+    assert picture is not None
+    return np.asarray(picture, dtype=np.uint8)
+
+
 def test_every_file_has_its_script_and_every_script_its_file() -> None:
     assert sorted(path.stem for path in VEHICLES.glob("car_*.xml")) == CARS
     assert all((VEHICLES / f"{name}.xml").is_file() for name in NAMES)
@@ -188,13 +205,8 @@ def test_no_back_of_a_face_is_seen_from_outside(name: str, model: mujoco.MjModel
 
 
 def test_panes_show_the_inside_the_right_way_round(model: mujoco.MjModel) -> None:
-    geom = _geom_of(model, "glass")
-    mesh = model.geom_dataid[geom]
-    points = _in_file_frame(model, geom)
-    first, count = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
-    corners = points[model.mesh_face[first : first + count]]
-    uvs = model.mesh_texcoord[model.mesh_texcoordadr[mesh] :]
-    right = uvs[model.mesh_facetexcoord[first : first + count], 0].mean(axis=1)
+    corners, uvs = _panes(model)
+    right = uvs[..., 0].mean(axis=1)
     ahead = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 0]
     across = corners[:, :, 1].mean(axis=1)
     is_middle = np.abs(across) < 0.3
@@ -206,23 +218,16 @@ def test_panes_show_the_inside_the_right_way_round(model: mujoco.MjModel) -> Non
         assert facing * np.corrcoef(across[chosen], right[chosen])[0, 1] > 0.95
 
 
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "bus_city"], indirect=True)
 @pytest.mark.parametrize("side", [1, -1], ids=["left", "right"])
-def test_a_car_s_wheel_is_seen_at_the_front_of_its_side(name: str, model: mujoco.MjModel, side: int) -> None:
-    if name not in CARS:
-        pytest.skip("buses and the like have sides of their own")
-    geom = _geom_of(model, "glass")
-    mesh = model.geom_dataid[geom]
-    first, count = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
-    corners = _in_file_frame(model, geom)[model.mesh_face[first : first + count]]
-    uvs = model.mesh_texcoord[model.mesh_texcoordadr[mesh] :][model.mesh_facetexcoord[first : first + count]]
+def test_the_wheel_is_seen_at_the_front_of_either_side(name: str, model: mujoco.MjModel, side: int) -> None:
+    corners, uvs = _panes(model)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     is_side = normals[:, 1] * side > 0.8 * np.linalg.norm(normals, axis=1)
     shares = np.random.default_rng(3).dirichlet([1, 1, 1], 400)
     ahead = np.ravel(shares @ corners[is_side, :, 0].T)
     u, v = (np.ravel(shares @ uvs[is_side, :, axis].T) for axis in (0, 1))
-    spec = mujoco.MjSpec.from_file(str(VEHICLES / f"{name}.xml"))
-    inside = cv2.imread(str(VEHICLES / next(texture.file for texture in spec.textures if texture.name == "inside")))
-    assert inside is not None
+    inside = _inside(name)
     high, wide = inside.shape[:2]
     # MuJoCo turns v over as it loads a mesh: it counts down, as the picture's rows do.
     shade = inside[np.minimum(v * high, high - 1).astype(int), np.minimum(u * wide, wide - 1).astype(int)].max(-1)
@@ -235,8 +240,7 @@ def test_a_car_s_wheel_is_seen_at_the_front_of_its_side(name: str, model: mujoco
 def test_every_pane_has_an_inside_of_many_shades(name: str) -> None:
     spec = mujoco.MjSpec.from_file(str(VEHICLES / f"{name}.xml"))
     assert [geom.classname.name.split(".")[1] for geom in spec.geoms if geom.material == "glass"] == ["glass"]
-    inside = cv2.imread(str(VEHICLES / next(texture.file for texture in spec.textures if texture.name == "inside")))
-    assert inside is not None
+    inside = _inside(name)
     assert inside.mean() < 90, "darker than the street"
     assert inside.std() > 15, "not one dark sheet"
 
