@@ -88,7 +88,7 @@ class Store:
                 with turn(self.root):
                     if force:
                         _remove_idle(self.root, self.split)
-                    is_new = not self._is_begun()
+                    is_new = not self._is_begun()  # others may have begun it, or taken it back, while this one waited
                     self.open(patch_files)
                     work.enter_context(at_work(inside(self.root, split_folder(self.split))))
                 yield
@@ -158,13 +158,17 @@ class Store:
         return [read_sidecar(inside(self.root, sidecar_path(self.split, i))) for i in range(self.plan.samples)]
 
     def close(self, task: Task[Any, Any], facts: Mapping[str, Json]) -> None:
-        """Writes the format's index files and then the manifest.
+        """Writes the format's index files and then the manifest; nothing where a run of more samples has begun since:
+        the split is whole when that one closes it.
 
         `facts` are what the manifest says of versions, renderer and configuration.
 
         Raises:
             DatasetError: the disk refuses, or a sample is missing.
         """
+        there = read_plan(self.root, self.split)
+        if there is not None and there.samples > self.plan.samples:
+            return
         sidecars = self.sidecars()
         indexes: dict[str, str] = {}
         files = sorted(task.finalise(sidecars, self.plan.info).items())

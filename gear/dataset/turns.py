@@ -60,27 +60,29 @@ def _locked(folder: Path, *, alone: bool, wait: bool) -> Iterator[int | None]:
     Raises:
         BlockingIOError: others have it, and waiting was not asked for.
     """
-    if sys.platform == "win32":
-        yield None
-        return
-    descriptor: int | None = None
+    descriptor = _lock(folder, alone=alone, wait=wait)
     try:
-        with contextlib.suppress(FileNotFoundError, NotADirectoryError, PermissionError):
-            descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-        if descriptor is None:
-            yield None
-            return
-        try:
-            fcntl.flock(descriptor, (fcntl.LOCK_EX if alone else fcntl.LOCK_SH) | (0 if wait else fcntl.LOCK_NB))
-        except BlockingIOError:
-            raise
-        except OSError:  # a network file system
-            yield None
-        else:
-            yield descriptor
+        yield descriptor
     finally:
         if descriptor is not None:
             os.close(descriptor)
+
+
+def _lock(folder: Path, *, alone: bool, wait: bool) -> int | None:
+    if sys.platform == "win32":
+        return None
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+    except OSError:  # there is no such folder, or it is not for us to read
+        return None
+    try:
+        fcntl.flock(descriptor, (fcntl.LOCK_EX if alone else fcntl.LOCK_SH) | (0 if wait else fcntl.LOCK_NB))
+    except BaseException as error:
+        os.close(descriptor)
+        if isinstance(error, OSError) and not isinstance(error, BlockingIOError):
+            return None  # a network file system
+        raise
+    return descriptor
 
 
 def _is_still(folder: Path, descriptor: int) -> bool:

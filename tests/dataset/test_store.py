@@ -293,6 +293,19 @@ def test_a_dataset_is_read_by_the_task_that_wrote_it(tmp_path: Path, monkeypatch
     assert len(open_dataset(tmp_path)[:]) == 3
 
 
+@pytest.mark.parametrize("is_more_first", [True, False])
+def test_of_two_runs_side_by_side_the_one_of_more_samples_has_the_last_word(
+    tmp_path: Path, is_more_first: bool
+) -> None:
+    fewer = fill(tmp_path, plan(samples=2), is_closed=False)
+    more = fill(tmp_path, plan(), is_closed=False)
+    _, task = build_task("depth", parse_text(json.dumps(OPTIONS), "options"))
+    for store in (more, fewer) if is_more_first else (fewer, more):
+        store.close(task, {"seed": 5})
+    assert len(open_dataset(tmp_path)) == 3
+    assert open_dataset(tmp_path).verify() == []
+
+
 def begun_elsewhere(root: Path, given: Plan, held: Path) -> subprocess.Popen[bytes]:
     """Another process that has begun a split and is at work on it until it is killed."""
     script = """
