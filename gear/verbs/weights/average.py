@@ -72,14 +72,7 @@ def average_weights(
     if data is not None:
         metadata["data"] = json.dumps(data, sort_keys=True)
     write(target, state, metadata, halves=halves)
-    written = read_bytes(target)
-    return ConvertReport(
-        model=metadata.get("model", target.stem),
-        path=target,
-        sha256=sha256(written),
-        size_mb=len(written) / 1e6,
-        tensors=len(state),
-    )
+    return ConvertReport.of(metadata.get("model", target.stem), target, len(state))
 
 
 def _between(one: Tensor, two: Tensor, share: float) -> Tensor:

@@ -49,6 +49,12 @@ class ConvertReport:
     size_mb: float
     tensors: int
 
+    @classmethod
+    def of(cls, model: str, path: Path, tensors: int) -> ConvertReport:
+        """Of a file that has just been written."""
+        data = read_bytes(path)
+        return cls(model=model, path=path, sha256=sha256(data), size_mb=len(data) / 1e6, tensors=tensors)
+
     def summary(self) -> str:
         """For a person."""
         return (
@@ -103,8 +109,7 @@ def convert_weights(
     if options:
         metadata["options"] = json.dumps(options, sort_keys=True)
     write(target, state, metadata, halves=halves)
-    data = read_bytes(target)
-    return ConvertReport(model=spec.name, path=target, sha256=sha256(data), size_mb=len(data) / 1e6, tensors=len(state))
+    return ConvertReport.of(spec.name, target, len(state))
 
 
 def check_target(target: Path, *origins: Path) -> None:
