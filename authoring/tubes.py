@@ -12,7 +12,7 @@ from authoring.mesh import Mesh, grid, merge
 __all__ = ["outward", "skinned", "tube"]
 
 
-def tube(path: ArrayLike, radius: float | Sequence[float], sides: int = 8) -> Mesh:
+def tube(path: NDArray[np.float64] | Sequence[ArrayLike], radius: float | Sequence[float], sides: int = 8) -> Mesh:
     """A tube along (P, 3) points, with closed ends; one radius or one a point."""
     points = np.asarray(path, dtype=np.float64)
     radii = np.broadcast_to(np.asarray(radius, dtype=np.float64), (len(points),))

@@ -89,8 +89,8 @@ def shed(
     doors = max(1, int((width_m - 4) // 7.5))
     for index in range(doors):
         u = -x + 3.5 + (index + 0.5) * (width_m - 7) / doors
-        high = min(4.2, eaves_m - 0.6)
-        _door(sink, u - 2.1, u + 2.1, 0.0, high, -y, str(rng.choice(["signal_blue", "dark_green", "galvanised"])))
+        top_m = min(4.2, eaves_m - 0.6)
+        _door(sink, u - 2.1, u + 2.1, 0.0, top_m, -y, str(rng.choice(["signal_blue", "dark_green", "galvanised"])))
     _picture(sink, "shop_fronts", door_rect("steel"), x - 2.2, x - 1.2, 0.0, 2.1, -y - 0.03)
     _fascia(sink, int(rng.integers(FASCIA_COUNT)), -x * 0.1, -y - 0.1, eaves_m - 0.55, min(7.0, width_m * 0.4))
     return sink.parts()

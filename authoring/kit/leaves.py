@@ -49,7 +49,7 @@ def lump(
     spin = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
     points = centre + (unit @ spin.T) * dent * radii_m
     faces = np.asarray(ball.faces, np.int64)
-    corners = points[faces]
+    corners: Array = points[faces]
     flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     axis = np.abs(flat).argmax(1)
     tile_m = MATERIALS[material].tile_m

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 from scipy import sparse
 
 from authoring.people.field import Array
@@ -100,7 +101,9 @@ def _independent(edges: Faces, cost: Array, count: int) -> Faces:
     return np.flatnonzero((rank == nearest[edges].min(axis=1)) & np.isfinite(cost))
 
 
-def _keeps_the_surface(vertices: Array, faces: Faces, edges: Faces, chosen: Faces, place: Array) -> np.ndarray:
+def _keeps_the_surface(
+    vertices: Array, faces: Faces, edges: Faces, chosen: Faces, place: Array
+) -> npt.NDArray[np.bool_]:
     """Whether each chosen collapse keeps the surface closed and turns no face over."""
     count = len(vertices)
     ends = np.concatenate([edges, edges[:, ::-1]])
@@ -118,6 +121,6 @@ def _keeps_the_surface(vertices: Array, faces: Faces, edges: Faces, chosen: Face
     old, new = (np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]) for t in (corners, moved))
     lengths = np.linalg.norm(old, axis=1) * np.linalg.norm(new, axis=1)
     turned = (old * new).sum(axis=1) < _MIN_TURN_COS * lengths
-    fine = shared == 2
+    fine: npt.NDArray[np.bool_] = shared == 2
     np.logical_and.at(fine, belongs[affected], ~turned)
     return fine

@@ -27,11 +27,11 @@ class Frame:
         """(N, 3) points of the figure's frame in this frame."""
         # Written out, not a matrix product: the same sums in the same order whatever BLAS is linked.
         away, axes = points - self.origin, self.figure_from_local
-        return away[:, 0:1] * axes[0] + away[:, 1:2] * axes[1] + away[:, 2:3] * axes[2]
+        return np.asarray(away[:, 0:1] * axes[0] + away[:, 1:2] * axes[1] + away[:, 2:3] * axes[2])
 
     def at(self, x: float, y: float, z: float) -> Array:
         """A local point in the figure's frame, (3,)."""
-        return self.origin + self.figure_from_local @ np.array([x, y, z])
+        return np.asarray(self.origin + self.figure_from_local @ np.array([x, y, z]))
 
     def child(self, offset: Sequence[float], turn: Array | None = None) -> Frame:
         """The frame at a local offset, turned by a (3, 3) rotation of its own."""
@@ -101,7 +101,7 @@ def ellipsoid(frame: Frame, centre: Sequence[float], radii: Sequence[float]) -> 
         local = frame.to_local(points) - middle
         ratio = np.linalg.norm(local / size, axis=1)
         slope = np.linalg.norm(local / size**2, axis=1)
-        return np.where(slope > 1e-9, ratio * (ratio - 1.0) / np.maximum(slope, 1e-9), -size.min())
+        return np.asarray(np.where(slope > 1e-9, ratio * (ratio - 1.0) / np.maximum(slope, 1e-9), -size.min()))
 
     return distance
 
@@ -116,7 +116,7 @@ def capsule(
     def distance(points: Array) -> Array:
         axis = b - a
         share = np.clip((points - a) @ axis / (axis @ axis), 0.0, 1.0)
-        return np.linalg.norm(points - a - share[:, None] * axis, axis=1) - radius - (last - radius) * share
+        return np.asarray(np.linalg.norm(points - a - share[:, None] * axis, axis=1) - radius - (last - radius) * share)
 
     return distance
 
@@ -128,7 +128,7 @@ def rounded_box(frame: Frame, centre: Sequence[float], half: Sequence[float], ra
     def distance(points: Array) -> Array:
         over = np.abs(frame.to_local(points) - middle) - size
         outside = np.linalg.norm(np.maximum(over, 0.0), axis=1)
-        return outside + np.minimum(over.max(axis=1), 0.0) - radius
+        return np.asarray(outside + np.minimum(over.max(axis=1), 0.0) - radius)
 
     return distance
 
@@ -166,7 +166,7 @@ def attach(body: Field, limb: Field, joint: Array, *, radius: float, reach: floa
         near = np.exp(-((np.linalg.norm(points - joint, axis=1) / reach) ** 2))
         width = radius * near + 0.003
         overlap = np.maximum(width - np.abs(a - b), 0.0)
-        return np.minimum(a, b) - overlap**2 / (4.0 * width)
+        return np.asarray(np.minimum(a, b) - overlap**2 / (4.0 * width))
 
     return distance
 
@@ -186,7 +186,7 @@ def union(fields: Sequence[Field]) -> Field:
     """All shapes, unblended."""
 
     def distance(points: Array) -> Array:
-        return np.minimum.reduce([field(points) for field in fields])
+        return np.asarray(np.minimum.reduce([field(points) for field in fields]))
 
     return distance
 

@@ -56,7 +56,7 @@ def project(field: Field, points: Array, *, limit: float, rounds: int = 3) -> Ar
 def normals(field: Field, points: Array) -> Array:
     """(V, 3) unit normals of the field, pointing out."""
     slope = gradient(field, points, step=2e-3)
-    return slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9)
+    return np.asarray(slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9))
 
 
 def _surface_nets(values: Array) -> tuple[Array, Faces]:

@@ -75,7 +75,7 @@ def band(base: Field, frame: Frame, z: float, *, half_m: float, thick_m: float) 
     def distance(points: Array) -> Array:
         skin = base(points)
         level = np.abs(frame.to_local(points)[:, 2] - z) - half_m
-        return np.maximum.reduce([skin - thick_m, -skin - thick_m, level])
+        return np.asarray(np.maximum.reduce([skin - thick_m, -skin - thick_m, level]))
 
     return distance
 
@@ -89,7 +89,7 @@ def sheet(frame: Frame, base: Field, rows: Sequence[tuple[float, float, float]],
         middle, half = (np.interp(z, table[:, 0], table[:, k]) for k in (1, 2))
         edge = np.maximum(np.abs(np.abs(y) - middle) - half, np.maximum(table[0, 0] - z, z - table[-1, 0]))
         skin = base(points)
-        return np.maximum.reduce([skin - thick_m, -skin - thick_m, edge, 0.02 - x])
+        return np.asarray(np.maximum.reduce([skin - thick_m, -skin - thick_m, edge, 0.02 - x]))
 
     return distance
 
@@ -136,7 +136,7 @@ def skirt_field(skeleton: Skeleton, *, hem_m: float, ease: float, flare: float, 
         depth = np.interp(z, heights, [0.010, 0.006, 0.001, 0.0]) * min(1.0, 0.3 + 12.0 * flare) * s
         pleats = depth * np.sin(7.0 * angle + 1.2 * np.sin(2.0 * angle + 1.0))
         wall = np.linalg.norm(offset, axis=1) - np.interp(z, heights, radii) - pleats
-        return np.maximum(wall, np.maximum(heights[0] - points[:, 2], points[:, 2] - heights[-1]))
+        return np.asarray(np.maximum(wall, np.maximum(heights[0] - points[:, 2], points[:, 2] - heights[-1])))
 
     return distance
 

@@ -204,10 +204,18 @@ class Yards:
 
     def _goods(self) -> None:
         """Pallets, boxes and skips about the yards, along walls and fences."""
-        spots = [(-134, y, np.pi / 2) for y in (-60.0, -72.0, -84.0)] + [(x, -36.5, 0.0) for x in (-120, -96, -70, -44)]
-        spots += [(64.5, y, np.pi / 2) for y in (-52.0, -64.0, -74.0)] + [(x, -38.0, 0.0) for x in (34, 52, 80, 98)]
-        spots += [(x, -226.0, 0.0) for x in (-110, -88, -60, -40)] + [(149.0, y, np.pi / 2) for y in (54.0, 66.0)]
-        spots += [(x, 38.0, 0.0) for x in (-200, -180, -158)] + [(x, 74.5, 0.0) for x in (122, 138, 160, 176)]
+        spots = [(-134.0, y, np.pi / 2) for y in (-60.0, -72.0, -84.0)] + [
+            (x, -36.5, 0.0) for x in (-120.0, -96.0, -70.0, -44.0)
+        ]
+        spots += [(64.5, y, np.pi / 2) for y in (-52.0, -64.0, -74.0)] + [
+            (x, -38.0, 0.0) for x in (34.0, 52.0, 80.0, 98.0)
+        ]
+        spots += [(x, -226.0, 0.0) for x in (-110.0, -88.0, -60.0, -40.0)] + [
+            (149.0, y, np.pi / 2) for y in (54.0, 66.0)
+        ]
+        spots += [(x, 38.0, 0.0) for x in (-200.0, -180.0, -158.0)] + [
+            (x, 74.5, 0.0) for x in (122.0, 138.0, 160.0, 176.0)
+        ]
         spots += [(-30.0, y, np.pi / 2) for y in (-90.0, -104.0)] + [(100.0, y, np.pi / 2) for y in (-96.0, -110.0)]
         for x, y, yaw in spots:
             if self.props.is_free(float(x), y, -2.0):

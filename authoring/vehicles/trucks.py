@@ -103,6 +103,7 @@ def _chassis(name: str) -> Parts:
     local, body, cabin = build_car(CAB)
     look_inside(local, cabin)
     front = cabin.side.patch.evaluate(np.array([[cabin.corners[0], 0.2]]))[0]
+    assert CAB.mirror is not None
     add_mirrors(local, cabin, float(front[0]) - 0.14, float(front[2]) + 0.10, size=CAB.mirror, paint="trim")
     add_handles(local, body, CAB.handles)
     add_plate(local, body, CAB.plates[0], True, PLATE_CELLS[name], stand_off=0.03)
