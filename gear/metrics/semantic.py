@@ -73,7 +73,11 @@ class SemanticEvaluator:
         confusion = _confusion(sample.label_ids.reshape(-1), prediction.reshape(-1))
         self.confusion += confusion
         self._weigh(sample.instance_ids, prediction)
-        return {"miou": _mean(_class_iou(confusion).values())}
+        return {"miou": _mean(self._classes(confusion).values())}
+
+    def _classes(self, confusion: npt.NDArray[np.int64]) -> dict[str, float]:
+        """IoU by name of the classes that the mean is over, of one picture or of all."""
+        return _class_iou(confusion)
 
     def _weigh(self, instances: npt.NDArray[np.uint16], prediction: npt.NDArray[np.uint8]) -> None:
         chosen = instances >= INSTANCE_FACTOR
@@ -107,7 +111,7 @@ class SemanticEvaluator:
 
     def result(self) -> Mapping[str, float]:
         """`miou`, `iiou`, `category_miou`, `category_iiou`, `pixel_accuracy`, and `iou_<class>`; shares, 0..1."""
-        classes = _class_iou(self.confusion)
+        classes = self._classes(self.confusion)
         figures = {
             "miou": _mean(classes.values()),
             "iiou": _mean(self._instance_iou().values()),
@@ -159,12 +163,16 @@ class PresentClasses(SemanticEvaluator):
 
     def result(self) -> Mapping[str, float]:
         """`miou` and `iou_<class>`; shares, 0..1, NaN for what does not occur."""
-        figures = {
-            f"iou_{label.name.replace(' ', '_')}": iou if self.confusion[label.id].any() else float("nan")
-            for label, iou in zip(EVALUATED, _class_iou(self.confusion).values(), strict=True)
+        classes = self._classes(self.confusion)
+        return {"miou": _mean(classes.values())} | {f"iou_{n.replace(' ', '_')}": iou for n, iou in classes.items()}
+
+    def _classes(self, confusion: npt.NDArray[np.int64]) -> dict[str, float]:
+        """NaN for what does not occur."""
+        return {
+            label.name: iou if confusion[label.id].any() else float("nan")
+            for label, iou in zip(EVALUATED, _class_iou(confusion).values(), strict=True)
             if label.name != "train"
         }
-        return {"miou": _mean(figures.values()), **figures}
 
 
 def _ids(category: str, among: Sequence[CityscapesLabel] = EVALUATED) -> list[int]:
