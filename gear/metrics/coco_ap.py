@@ -50,11 +50,16 @@ class CocoEvaluator(Generic[SampleT]):
         picture = self._as_picture(sample)
         self.pictures.append(picture)
         self.detections.append(tuple(prediction))
+        return self._single(picture, prediction)
+
+    def _single(self, picture: Picture, found: Sequence[Detection], low_px: float = 0.0) -> dict[str, float]:
+        """One picture's own figures; detections less high than `low_px` are no false alarms."""
         edges = [(_edges(item.box_xywh), item) for item in picture.annotations]
         return single_figures(
             boxes([(box, item.category_id, 1.0) for box, item in edges if not item.is_crowd]),
-            boxes([(one.box_px, one.category_id, one.score) for one in prediction]),
+            boxes([(one.box_px, one.category_id, one.score) for one in found]),
             np.array([box for box, item in edges if item.is_crowd]).reshape(-1, 4),
+            low_px,
         )
 
     def merge(self, other: Any) -> None:

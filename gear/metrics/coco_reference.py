@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from gear.contracts.evaluation import Draws, Spread
-from gear.formats.coco import CATEGORY_NAMES
+from gear.formats.coco import CATEGORY_NAMES, Detection, Picture
 from gear.metrics.coco_ap import CocoEvaluator, SampleT
 from gear.metrics.coco_curves import Matches, average_precision, known_mean, matches, resampled
 from gear.values.serial import Json
@@ -48,6 +49,17 @@ class TallObjects(CocoEvaluator[SampleT]):
         found = {name: one for name, one in self._found().items() if int(one.wanted.sum()) >= MIN_INSTANCES}
         values = resampled(list(found.values()), draws)[:, :, 0]
         return {"ap50": known_mean(values, (1,)), **{f"ap50_{name}": values[:, i] for i, name in enumerate(found)}}
+
+    def _single(self, picture: Picture, found: Sequence[Detection], low_px: float = 0.0) -> dict[str, float]:
+        """Of the same categories, and of what is tall enough."""
+        low_px = MIN_HEIGHT_PX * picture.height_px / AT_HEIGHT_PX
+        labels = [
+            replace(item, is_crowd=item.is_crowd or item.box_xywh[3] < low_px)
+            for item in picture.annotations
+            if CATEGORY_NAMES[item.category_id] in CATEGORIES
+        ]
+        counted = [one for one in found if CATEGORY_NAMES[one.category_id] in CATEGORIES]
+        return super()._single(replace(picture, annotations=tuple(labels)), counted, low_px)
 
     def _found(self) -> dict[str, Matches]:
         if not self.pictures:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+
+import numpy as np
 
 from gear.contracts.evaluation import Draws, Spread
+from gear.formats.kitti_object import KittiLabel
 from gear.metrics.kitti_ap import STEPS, KittiEvaluator, SampleT, curves, perfect_curve, resampled_r40
-from gear.metrics.kitti_match import DIFFICULTIES, Chosen, Difficulty, choose
+from gear.metrics.kitti_match import DIFFICULTIES, Chosen, Difficulty, PictureBoxes, choose, count
+from gear.metrics.single_picture import SURE
 
 MAX_DISTANCE_M = 40.0
 MIN_OVERLAP = 0.5
@@ -17,6 +21,19 @@ class NearCars(KittiEvaluator[SampleT]):
 
     Labels and detections more than 40 m ahead are ignored. Everything else, the difficulties too, is the devkit's.
     """
+
+    def update(self, sample: SampleT, prediction: Sequence[KittiLabel]) -> Mapping[str, float]:
+        """Takes the detections of one sample; returns `found_share` and `false_alarms` of its near cars from above.
+
+        They are those of moderate difficulty; detections count from a score of 0.5 on.
+
+        Raises:
+            ValueError: a detection has no score, a box turned inside out, or a number that is not finite.
+        """
+        super().update(sample, prediction)
+        here = count(_near(self.pictures[-1], _moderate_first()[0]), np.array([SURE]))
+        hits, wanted = float(here.tp[0]), float(here.tp[0] + here.fn[0])
+        return {"found_share": hits / wanted if wanted else float("nan"), "false_alarms": float(here.fp[0])}
 
     def result(self) -> Mapping[str, float]:
         """`car_bev_<moderate|easy|hard>_r40`, shares, 0..1; NaN where no label is to be found."""
@@ -37,10 +54,11 @@ class NearCars(KittiEvaluator[SampleT]):
         return {name: value for name, value in most.items() if value < 1}
 
     def _chosen(self, difficulty: Difficulty) -> list[Chosen]:
-        return [
-            choose(picture, "Car", difficulty, "bev", min_overlap=MIN_OVERLAP, max_distance_m=MAX_DISTANCE_M)
-            for picture in self.pictures
-        ]
+        return [_near(picture, difficulty) for picture in self.pictures]
+
+
+def _near(picture: PictureBoxes, difficulty: Difficulty) -> Chosen:
+    return choose(picture, "Car", difficulty, "bev", min_overlap=MIN_OVERLAP, max_distance_m=MAX_DISTANCE_M)
 
 
 def _name(difficulty: Difficulty) -> str:

@@ -39,7 +39,7 @@ def boxes(rows: Sequence[tuple[Sequence[float], int, float]]) -> Boxes:
     )
 
 
-def single_figures(labels: Boxes, found: Boxes, ignored_px: Array) -> dict[str, float]:
+def single_figures(labels: Boxes, found: Boxes, ignored_px: Array, low_px: float = 0.0) -> dict[str, float]:
     """`found_share` of the labels, NaN without any, and the number of `false_alarms`.
 
     Detections of at least 0.5, surest first, each take the label of their class that they overlap most, by 0.5 at
@@ -49,11 +49,13 @@ def single_figures(labels: Boxes, found: Boxes, ignored_px: Array) -> dict[str, 
         labels: those to be looked for.
         found: detections.
         ignored_px: (M, 4) boxes of what is not to be looked for.
+        low_px: what is less high and finds nothing is no false alarm.
     """
     sure = np.flatnonzero(found.weight >= SURE)
     sure = sure[np.argsort(-found.weight[sure], kind="stable")]
     overlaps = iou_2d(found.box_px, labels.box_px)
     excused = share_of_first(found.box_px, ignored_px).max(axis=1, initial=0.0) >= MIN_OVERLAP
+    excused |= found.box_px[:, 3] - found.box_px[:, 1] < low_px
     taken, alarms = np.zeros(len(labels.kind), dtype=np.bool_), 0
     for index in sure:
         fits = np.where((labels.kind == found.kind[index]) & ~taken, overlaps[index], 0.0)

@@ -111,6 +111,15 @@ def test_a_low_label_is_neither_missed_nor_a_false_alarm() -> None:
     assert ap((sure, wrong)) == pytest.approx(0.5)
     assert ap((sure,), height_px=400) == pytest.approx(0.505, abs=0.01), "20 of 400 rows are 40 of 800"
 
+    def single(found: tuple[Detection, ...], height_px: int = 800) -> tuple[float, float]:
+        own = TallObjects(same).update(replace(shown, height_px=height_px), found)
+        return own["found_share"], own["false_alarms"]
+
+    light = Detection(category_id=10, box_px=(700, 0, 760, 90), score=0.9)  # of no concern to this report
+    assert single((sure, on_low, nowhere, light)) == (1, 0)
+    assert single((sure, wrong)) == (1, 1)
+    assert single((sure,), height_px=400) == (0.5, 0)
+
 
 def car(ahead_m: float, right_m: float = 0.0, score: float | None = None) -> KittiLabel:
     return KittiLabel(
@@ -168,6 +177,17 @@ def test_near_cars_ignore_what_is_far() -> None:
     assert ap([car(20), car(30)], [car(20, score=0.9)]) == pytest.approx(0.5, abs=0.03)
     assert ap([car(20)], [car(20, 1.3, score=0.9)]) == pytest.approx(1), "0.5 is enough of an overlap"
     assert ap([car(20)], [car(20, 1.5, score=0.9)]) == pytest.approx(0)
+
+    def single(labels: list[KittiLabel], found: list[KittiLabel]) -> tuple[float, float]:
+        own = NearCars(lambda one: one.labels).update(Lines(tuple(labels)), tuple(found))
+        return own["found_share"], own["false_alarms"]
+
+    walker = replace(car(20, 5), type="Pedestrian", box_px=(300, 100, 320, 160))
+    far = car(50, score=0.95)
+    assert single([car(20), car(50), walker], [car(20, score=0.9), far, replace(walker, score=0.9)]) == (1, 0)
+    assert single([car(20), car(30)], [car(20, score=0.9), car(30, 1.5, score=0.6)]) == (0.5, 1), "seen from above"
+    assert single([car(20)], [car(20, score=0.4)]) == (0, 0), "not sure enough"
+    assert np.isnan(single([car(50)], [])[0])
 
 
 @dataclass(frozen=True)
