@@ -75,6 +75,18 @@ def row_report(row: Measured, seed: int, resamples: int) -> RowReport:
     )
 
 
+def drive_note(dataset: Dataset[Any]) -> str | None:
+    """One line where samples are frames of drives, which intervals and tests take for scenes of their own."""
+    last = dataset.sidecar(-1).record
+    if not last.frame:
+        return None
+    drives = last.sequence + 1
+    return (
+        f"{dataset.root}: {len(dataset)} samples are frames of {drives} drive{'s' * (drives > 1)}, each like the one "
+        "before; intervals are too narrow and p too small for more than these frames"
+    )
+
+
 def together(rows: Sequence[Measured], seed: int, resamples: int) -> Iterable[Together]:
     """Datasets of several scenes or weathers with patches of one label, as if they were one dataset."""
     labelled: dict[str, list[Measured]] = {}

@@ -22,7 +22,7 @@ from gear.verbs.evaluate.choice import (
     chosen_defense,
     chosen_model,
 )
-from gear.verbs.evaluate.compare import Measured, compared, row_report, together
+from gear.verbs.evaluate.compare import Measured, compared, drive_note, row_report, together
 from gear.verbs.evaluate.opened import opened, row_names
 from gear.verbs.evaluate.player import Player
 from gear.verbs.evaluate.report import EvaluateReport
@@ -119,7 +119,8 @@ def evaluate(
         rows.append(
             Measured(name=name, dataset=dataset, scorer=scorer, notes=row.notes, made=row.made, damaged=row.damaged)
         )
-    notes = [note for note in (size_note(chosen, dataset) for dataset in datasets) if note]
+    said = [note for dataset in datasets for note in (size_note(chosen, dataset), drive_note(dataset))]
+    notes = [note for note in said if note]
     more = {"reports": list(reports), "resamples": resamples, "versions": _versions(player), "notes": notes}
     found = EvaluateReport(
         out=root,

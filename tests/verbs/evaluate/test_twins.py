@@ -101,6 +101,20 @@ def test_twins_are_tested_sample_by_sample(tmp_path: Path, small: Small, install
     assert "minus none: mae_m +" in line and "outside_patch.mae_m +2.000 (p 0.25, 3 pairs)" in line
 
 
+def test_frames_of_a_drive_are_not_taken_for_scenes_without_a_word(
+    tmp_path: Path, small: Small, collect_small: Any, install: Install
+) -> None:
+    simulation, drive = tmp_path / "simulation.yaml", tmp_path / "drive"
+    simulation.write_text("splits: {video: {seed: 60, samples: 2, frames: 3, interval_s: 0.2}}\n")
+    collect_small("depth", drive, split="video", samples=2, settings=[f"simulation={simulation}"])
+    roots = [drive, small("depth", "none")]
+    install(model_spec(lambda _: Oracle(roots), "depth"))
+    report = evaluate(roots, model="odd", out=tmp_path / "out", resamples=10)
+    (note,) = report.as_json()["notes"]
+    assert note.startswith(f"{drive}: 6 samples are frames of 2 drives")
+    assert note in (tmp_path / "out" / "table.txt").read_text()
+
+
 def test_figures_outside_the_patch_do_not_see_it(tmp_path: Path, small: Small, install: Install) -> None:
     data = small("depth")
 
