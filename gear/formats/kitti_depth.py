@@ -23,6 +23,14 @@ def to_units(depth_m: FloatImage) -> npt.NDArray[np.uint16]:
     return units.astype(np.uint16)
 
 
+def to_predicted_units(depth_m: FloatImage) -> npt.NDArray[np.uint16]:
+    """(H, W) predicted metres to 1/256 m, the nearest that 16 bits can say; 0 only for NaN.
+
+    In a prediction 0 stands for none, and the devkit fills such pixels from their neighbours before it measures.
+    """
+    return to_units(np.clip(depth_m, np.float32(1 / UNITS_PER_M), np.float32(MAX_PNG_DEPTH_M)))
+
+
 def from_units(units: npt.NDArray[np.uint16]) -> FloatImage:
     """(H, W) 1/256 m to metres, NaN for 0."""
     return np.where(units > 0, units / np.float32(UNITS_PER_M), np.nan).astype(np.float32)

@@ -10,6 +10,7 @@ from gear.formats.kitti_depth import (
     from_units,
     intrinsics_text,
     to_metres_file,
+    to_predicted_units,
     to_units,
 )
 from gear.values.geometry import Intrinsics
@@ -26,6 +27,12 @@ def test_units_are_256ths_of_a_metre(depth_m: np.ndarray) -> None:
 def test_what_cannot_be_said_is_no_ground_truth() -> None:
     depth_m = np.array([np.nan, np.inf, 300.0, MAX_PNG_DEPTH_M, 1.0, 0.001], dtype=np.float32)
     np.testing.assert_array_equal(to_units(depth_m), [0, 0, 0, 65535, 256, 0])
+
+
+def test_a_prediction_beyond_16_bits_is_still_one() -> None:
+    """The devkit takes 0 for no prediction and fills it in: what lies too far would be measured as its neighbours."""
+    depth_m = np.array([np.nan, np.inf, 300.0, MAX_PNG_DEPTH_M, 1.0, 0.001], dtype=np.float32)
+    np.testing.assert_array_equal(to_predicted_units(depth_m), [0, 65535, 65535, 65535, 256, 1])
 
 
 @given(hnp.arrays(np.float32, (3, 4), elements=st.floats(0.015625, 1e4, width=32) | st.just(float("nan"))))

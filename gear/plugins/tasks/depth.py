@@ -143,11 +143,11 @@ class DepthTask:
         return replace(sample, depth_m=np.where(masks[VIEW], np.float32(np.nan), sample.depth_m))
 
     def encode_prediction(self, sample: DepthSample, prediction: FloatImage, info: SplitInfo) -> Encoded:
-        """The devkit's 16-bit picture, which ends at 256 m, and every bit of it in metres."""
+        """The devkit's 16-bit picture, which says 256 m of all that lies beyond, and every bit of it in metres."""
         units, metres = results.kitti_depth_paths(sample.record.index)
         depth_m = np.asarray(prediction, dtype=np.float32)
         return Encoded(
-            files={units: encode_deep(kitti_depth.to_units(depth_m)), metres: encode_tiff(depth_m)}, facts={}
+            files={units: encode_deep(kitti_depth.to_predicted_units(depth_m)), metres: encode_tiff(depth_m)}, facts={}
         )
 
     def decode_prediction(self, root: Path, sample: DepthSample, facts: Json, info: SplitInfo) -> FloatImage:

@@ -7,7 +7,7 @@ import pytest
 
 from gear.plugins.tasks.depth import DepthConfig, DepthTask, depth
 from gear.testing.synthetic import synthetic_frame
-from gear.testing.task_contract import TaskContract
+from gear.testing.task_contract import INFO, TaskContract
 from gear.values.errors import FieldError
 
 
@@ -47,6 +47,17 @@ class TestDepth(TaskContract):
                 # Loaders append with +, so the paths must start with a slash.
                 assert Path(str(tmp_path) + image).is_file() and Path(str(tmp_path) + truth).is_file()
                 assert truth.endswith(suffix)
+
+
+def test_the_devkit_sees_a_prediction_beyond_256_m() -> None:
+    """It takes 0 for no prediction and fills it in from the neighbours, as if it were right."""
+    task = DepthTask(DepthConfig(width_px=64, height_px=32))
+    frame, record = synthetic_frame(task.rig())
+    said = np.full((32, 64), 300.0, dtype=np.float32)
+    said[0] = 0.001
+    files = task.encode_prediction(task.ground_truth(frame, record), said, INFO).files
+    units = cv2.imdecode(np.frombuffer(files["depth/rgb_0000.png"], np.uint8), cv2.IMREAD_UNCHANGED)
+    assert (units[1:] == 65535).all() and (units[0] == 1).all()
 
 
 def test_depth_ends_at_the_range() -> None:
