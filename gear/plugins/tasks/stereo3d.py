@@ -226,11 +226,11 @@ class Stereo3dTask:
 
     def evaluator(self) -> Evaluator[Stereo3dSample, tuple[KittiLabel, ...]]:
         """KITTI's average precisions."""
-        return KittiEvaluator(lambda sample: [thing.label() for thing in sample.objects])
+        return KittiEvaluator(_lines)
 
     def reports(self) -> Mapping[str, Evaluator[Stereo3dSample, tuple[KittiLabel, ...]]]:
         """`reference`: cars seen from above, at IoU 0.5, below 40 m."""
-        return {"reference": NearCars(lambda sample: [thing.label() for thing in sample.objects])}
+        return {"reference": NearCars(_lines)}
 
     def encode_prediction(self, sample: Stereo3dSample, prediction: Sequence[KittiLabel], info: SplitInfo) -> Encoded:
         """A result file."""
@@ -272,6 +272,11 @@ WIRES = tuple((i, (i + 1) % 4) for i in range(4)) + tuple((i + 4, (i + 1) % 4 + 
     (i, i + 4) for i in range(4)
 )  # fmt: skip
 """Edges of a box in the order of `label_corners`; its front is the face of corners 0, 1, 4, 5."""
+
+
+def _lines(sample: Stereo3dSample) -> tuple[KittiLabel, ...]:
+    """Its label file as the devkit reads it: two decimals decide which level a label at the border of one is of."""
+    return parse_labels(format_labels(thing.label() for thing in sample.objects).decode())
 
 
 def _name(index: int) -> str:

@@ -118,6 +118,20 @@ def test_truncation_is_the_share_outside() -> None:
     assert cut.box_px[0] == 0
 
 
+def test_the_evaluation_is_that_of_the_label_files() -> None:
+    """The devkit reads 0.15, which is easy, where 0.1532 would not be."""
+    task = Stereo3dTask(Stereo3dConfig(width_px=306, height_px=92))
+    sample = task.ground_truth(*synthetic_frame(task.rig(), []))
+    thing = replace(label(car(14.0, 0.0, 0.0)), truncated=0.1532, occluded=0, is_ignored=False)
+    sample = replace(sample, objects=(thing,))
+    evaluators = {"task": task.evaluator(), **task.reports()}
+    for _ in range(60):
+        for evaluator in evaluators.values():
+            evaluator.update(sample, task.as_prediction(sample))
+    assert evaluators["task"].result()["car_2d_easy_r40"] == pytest.approx(1)
+    assert evaluators["reference"].result()["car_bev_easy_r40"] == pytest.approx(1)
+
+
 def test_a_car_beside_the_camera_is_truncated_not_turned_inside_out() -> None:
     beside = label(car(2.5, 2.2, 0.0))
     left, top, right, bottom = beside.box_px
