@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from gear.formats.kitti_depth import MAX_PNG_DEPTH_M
 from gear.values.frames import FloatImage
 from gear.values.geometry import Array
 
@@ -46,8 +47,9 @@ class DepthTruth(Protocol):
 class DepthEvaluator:
     """Gathers the figures of every picture.
 
-    Plain names are the devkit's, over every pixel with ground truth; `eigen_` names look at ground truth between 1 mm
-    and `max_depth_m` inside the crop, with predictions clipped to the same range.
+    Plain names are the devkit's, over every pixel whose ground truth its 16-bit pictures can say, which end at 256 m;
+    `eigen_` names look at ground truth between 1 mm and `max_depth_m` inside the crop, with predictions clipped to the
+    same range.
     """
 
     _wants_devkit = True
@@ -69,7 +71,7 @@ class DepthEvaluator:
         near = (truth_m > MIN_DEPTH_M) & (truth_m < self.max_depth_m)
         if self.crop != "none":
             near &= self._window(truth_m.shape)
-        both = near & (prediction >= MIN_DEPTH_M) & (prediction <= self.max_depth_m)
+        both = near & (prediction >= MIN_DEPTH_M) & (prediction <= self.max_depth_m) & (truth_m <= MAX_PNG_DEPTH_M)
         others = np.isfinite(truth_m) & ~both
         other_truth_m, other_found_m = truth_m[others], prediction[others]
         if not np.isfinite(other_found_m).all() or (other_found_m <= 0).any():
@@ -77,7 +79,8 @@ class DepthEvaluator:
         shared = _summed(truth_m[both], prediction[both])  # most pixels, and worked on once for both kinds of figures
         found = {}
         if self._wants_devkit:
-            found = _devkit(shared + _summed(other_truth_m, other_found_m))
+            told = other_truth_m <= MAX_PNG_DEPTH_M
+            found = _devkit(shared + _summed(other_truth_m[told], other_found_m[told]))
         strays = near[others]
         clipped_m = other_found_m[strays].clip(MIN_DEPTH_M, self.max_depth_m)
         found |= _eigen(shared + _summed(other_truth_m[strays], clipped_m))

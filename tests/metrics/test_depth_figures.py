@@ -5,6 +5,7 @@ from typing import Literal
 import numpy as np
 import pytest
 
+from gear.formats.kitti_depth import MAX_PNG_DEPTH_M, to_units
 from gear.metrics.depth import CROPS, PIECE, DepthEvaluator
 
 
@@ -50,6 +51,32 @@ def test_far_things_count_in_the_devkits_figures_alone() -> None:
     result = DepthEvaluator().update(sample, np.array([[10.0, 100.0]], dtype=np.float32))
     assert result["mae_m"] == pytest.approx(50.0)
     assert result["eigen_rmse_m"] == 0.0
+
+
+def test_the_devkits_figures_are_those_of_its_own_pictures() -> None:
+    rng = np.random.default_rng(11)
+    truth = rng.uniform(2, 900, (40, 60)).astype(np.float32)
+    found = (truth * rng.uniform(0.7, 1.2, truth.shape)).clip(0, 250).astype(np.float32)
+    t, p = (to_units(each).astype(float) / 256 for each in (truth, found))  # as `evaluate_depth.cpp` reads the files
+    t, p = t[t > 0], p[t > 0]
+    result = DepthEvaluator().update(Deep(truth), found)
+    assert 0.1 < len(t) / truth.size < 0.5
+    assert result["mae_m"] == pytest.approx(np.mean(np.abs(t - p)), rel=1e-3)
+    assert result["rmse_m"] == pytest.approx(np.sqrt(np.mean((t - p) ** 2)), rel=1e-3)
+    assert result["silog"] == pytest.approx(100 * np.std(np.log(p) - np.log(t)), rel=1e-3)
+
+
+@pytest.mark.parametrize("most_m", [80.0, 500.0])
+def test_how_far_eigens_figures_look_changes_none_of_the_devkits(most_m: float) -> None:
+    truth = np.linspace(2, 900, 4000, dtype=np.float32)[None]
+    found = truth * np.float32(0.9)
+    expected = DepthEvaluator().update(Deep(truth), found)
+    result = DepthEvaluator(max_depth_m=most_m).update(Deep(truth), found)
+    assert {name: result[name] for name in ("mae_m", "rmse_m", "abs_rel")} == pytest.approx(
+        {name: expected[name] for name in ("mae_m", "rmse_m", "abs_rel")}
+    )
+    seen = truth[truth < most_m].astype(float)
+    assert result["eigen_rmse_m"] == pytest.approx(np.sqrt(np.mean((0.1 * seen) ** 2)), rel=1e-3)
 
 
 def test_predictions_are_clipped_for_eigens_figures() -> None:
@@ -98,7 +125,8 @@ def test_many_pieces_are_one_picture(crop: Literal["none", "garg"]) -> None:
     rows, columns = truth.shape
     window[int(top * rows) : int(bottom * rows), int(left * columns) : int(right * columns)] = True
     known = np.isfinite(truth)
-    t, p = truth[known].astype(float), found[known].astype(float)
+    told = known & (truth <= MAX_PNG_DEPTH_M)
+    t, p = truth[told].astype(float), found[told].astype(float)
     assert result["rmse_m"] == pytest.approx(np.sqrt(np.mean((t - p) ** 2)), rel=1e-8)
     assert result["irmse_per_km"] == pytest.approx(1000 * np.sqrt(np.mean((1 / t - 1 / p) ** 2)), rel=1e-8)
     assert result["silog"] == pytest.approx(100 * np.std(np.log(p) - np.log(t)), rel=1e-8)
