@@ -162,6 +162,9 @@ def begin(root: Path, split: str, plan: Json) -> None:
         )
 
 
+NUMBERS = (int, float, np.floating, np.integer)
+
+
 class Guard:
     """A third party's defense, whose failures say whose they are."""
 
@@ -187,7 +190,8 @@ class Guard:
         problem = self._problem(result, views)
         if problem:
             raise self._error(index, problem)
-        return result
+        # NumPy's numbers will do, but are no JSON.
+        return result if result.score is None else dataclasses.replace(result, score=float(result.score))
 
     def _problem(self, result: Any, views: Mapping[str, UInt8Image]) -> str:
         """What is wrong with a result, or nothing."""
@@ -200,7 +204,7 @@ class Guard:
                 return f"views[{name!r}] must have shape {(*size, 3)} of uint8"
             if "mask" in outputs and not _is_array((result.mask or {}).get(name), size, np.float32):
                 return f"mask[{name!r}] must have shape {size} of float32"
-        if "score" in outputs and not (isinstance(result.score, (int, float)) and 0 <= result.score <= 1):
+        if "score" in outputs and not (isinstance(result.score, NUMBERS) and 0 <= result.score <= 1):
             return f"score must be in 0..1, got {result.score!r}"
         return ""
 

@@ -164,6 +164,13 @@ def test_a_defense_that_breaks_is_named(
             defend(stereo, defense="odd", out=tmp_path / "x", seed=seed)
 
 
+def test_a_score_may_be_a_number_of_numpys(stereo: Path, tmp_path: Path, stranger: Callable[..., None]) -> None:
+    stranger(lambda views: DefenseResult(views=views, score=np.float32(0.5)), outputs=frozenset({"images", "score"}))
+    defend(stereo, defense="odd", out=tmp_path / "x")
+    (scores,) = (json.loads(path.read_text())["scores"] for path in (tmp_path / "x").rglob("scores.json"))
+    assert set(scores) == {0.5}
+
+
 def test_what_a_defense_prints_stays_off_stdout(
     stereo: Path, tmp_path: Path, stranger: Callable[..., None], capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -314,6 +314,12 @@ def test_statistics_count_what_is_shown(browser: Browser, page: Path, tmp_path: 
     browser.open(page, "#/statistics?distance=0~11")
     few = browser.value(BARS)["Actors by role"]
     assert few["ego"] == text(browser, "#count").split(" ")[0] != "8"
+    for asset in actors:  # an ego car of that kind is in every sample, and is not what was chosen
+        browser.open(page, f"#/statistics?asset={asset}")
+        among = sum(
+            any(a.asset == asset and a.role != "ego" for a in dataset.sidecar(i).record.actors) for i in range(8)
+        )
+        assert text(browser, "#count").split(" ")[0] == str(among)
     no_trouble(browser)
 
 

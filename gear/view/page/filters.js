@@ -21,7 +21,7 @@ for (const metric of METRICS) {
 const OBJECT_LABELS = unique(SAMPLES.flatMap((sample) => sample.things.labels)).filter((label) => label);
 const SURFACE_NAMES = unique(SAMPLES.flatMap((sample) => sample.surfaces.map((surface) => surface.name)));
 const CAMERA_NAMES = unique(SAMPLES.flatMap((sample) => sample.surfaces.map((surface) => surface.camera)));
-const ASSETS = unique(SAMPLES.flatMap((sample) => sample.actors.map((actor) => actor[0])));
+const ASSETS = unique(SAMPLES.flatMap(others));
 
 const ASKED = [...(SURFACE_NAMES.length ? ["one surface in one camera"] : []), ...(OBJECT_METRICS.length ? ["one object"] : [])];
 const RULE = ASKED.length ? `A sample is shown when ${ASKED.join(", and ")}, satisfies everything at once that is asked of it.` : "A sample is shown when it satisfies all of this.";
@@ -30,6 +30,11 @@ const CHOICES = { surface: "", camera: "", thing: "", asset: "", text: "" };
 const filters = { ranges: new Map(), ...CHOICES };
 const whenFiltered = [];
 let shown = SAMPLES;
+
+// Assets of the actors, without the ego car: it is in every sample.
+function others(sample) {
+  return sample.actors.filter((actor) => actor[1] !== "ego").map((actor) => actor[0]);
+}
 
 function valuesOf(metric, samples) {
   return samples.flatMap(metric.of).filter(isNumber).map((value) => value * metric.factor);
@@ -42,7 +47,7 @@ function isWithin(metric, value) {
 
 function passes(sample) {
   const { ranges, surface: name, camera, thing, asset, text } = filters;
-  if (asset && !sample.actors.some((actor) => actor[0] === asset)) return false;
+  if (asset && !others(sample).includes(asset)) return false;
   if (text && !`${sampleName(sample)} ${sample.sequence} ${sample.weather} ${sample.problem && "problem"}`.toLowerCase().includes(text)) return false;
   const isAsked = (metrics) => metrics.some((metric) => ranges.has(metric.key));
   const surfacePasses = (surface) =>
