@@ -263,9 +263,9 @@ def remove_split(root: Path, split: str) -> None:
             for file in (*files, path):
                 file.unlink(missing_ok=True)
         inside(root, plan_path(split)).unlink(missing_ok=True)
-        for path in sorted((p for p in folder.rglob("*") if p.is_dir()), reverse=True):
-            path.rmdir()
-        folder.rmdir()
+        for path in [*sorted((p for p in folder.rglob("*") if p.is_dir()), reverse=True), folder]:
+            with contextlib.suppress(OSError):  # somebody else's file is in it, or one that a damaged sidecar named
+                path.rmdir()
         others = {_patch_label(root, path.parent.name) for path in (root / GEAR).glob("*/plan.json")}
         if label and label not in others and (copies := inside(root, patch_path(label, "patch_0.png")).parent).is_dir():
             for path in copies.glob("patch_*.png"):

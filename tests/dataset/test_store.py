@@ -264,6 +264,19 @@ def test_what_is_damaged_can_be_replaced(tmp_path: Path, text: str) -> None:
     assert not (tmp_path / "gear/test").exists()
 
 
+def test_what_is_not_gears_stays_and_stands_in_no_ones_way(tmp_path: Path) -> None:
+    fill(tmp_path, plan())
+    strays = {"gear/test/.DS_Store", "gear/test/samples/.nfs0001", "gear/test/probes/000001_surface_0.png"}
+    for stray in strays:
+        (tmp_path / stray).parent.mkdir(exist_ok=True)
+        (tmp_path / stray).touch()
+    changed = Store(tmp_path, plan(content={"scene": "billboard02", "seed": 5}))
+    with changed.begun({}, force=True):
+        assert changed.missing() == [0, 1, 2]
+    remove_split(tmp_path, "test")
+    assert tree(tmp_path).keys() == strays
+
+
 @pytest.mark.parametrize("field", ["task", "patch"])
 def test_a_plan_that_says_too_little_is_one_line(tmp_path: Path, field: str) -> None:
     fill(tmp_path, plan())
