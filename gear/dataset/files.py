@@ -17,7 +17,7 @@ SCRATCH = "gear/scratch"
 """Half-written files live here, away from the folders that foreign loaders list, by host, process and thread."""
 
 TRIES = 100
-"""Another process may tidy up the folder of half-written files between two steps."""
+"""Another process may tidy up the folder of half-written files, or that of notes, between two steps."""
 
 
 def sha256(data: bytes) -> str:
@@ -72,9 +72,9 @@ def write_whole(root: Path, relative: str, data: bytes) -> None:
     target = inside(root, relative)
     with explained(target):
         scratch = root / SCRATCH
-        target.parent.mkdir(parents=True, exist_ok=True)
         for left in reversed(range(TRIES)):
             try:
+                target.parent.mkdir(parents=True, exist_ok=True)
                 scratch.mkdir(parents=True, exist_ok=True)
                 _write_and_rename(scratch / f"{_host()}-{os.getpid()}-{threading.get_ident()}", target, data)
             except FileNotFoundError:

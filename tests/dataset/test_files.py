@@ -104,6 +104,20 @@ def test_tidying_up_beside_a_writer_costs_nothing(tmp_path: Path) -> None:
     assert len(list(tmp_path.glob("*.bin"))) == 150
 
 
+def test_a_folder_that_another_run_tidies_up_is_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run that closes a split removes its folder of notes; one beside it may just be writing into that."""
+    fsync, notes = os.fsync, tmp_path / "gear/test/begun"
+
+    def closed_meanwhile(descriptor: int) -> None:
+        fsync(descriptor)
+        monkeypatch.setattr("os.fsync", fsync)
+        notes.rmdir()
+
+    monkeypatch.setattr("os.fsync", closed_meanwhile)
+    write_whole(tmp_path, "gear/test/begun/000003.json", b"[]")
+    assert (notes / "000003.json").read_bytes() == b"[]"
+
+
 def test_a_folder_is_no_file(tmp_path: Path) -> None:
     for path in (tmp_path, Path()):
         with pytest.raises(DatasetError, match="is a folder, a file was asked for"):
