@@ -220,7 +220,8 @@ def _forget_empty(root: Path, plan: Plan) -> None:
             continue
         there = read_plan(root, split)
         is_same_task = there is not None and there.task["name"] == plan.task["name"]
-        if not is_same_task or (split == plan.info.split and there != plan):
+        is_part = there is not None and there.content_key == plan.content_key and there.samples <= plan.samples
+        if not is_same_task or (split == plan.info.split and not is_part):
             _remove_idle(root, split)
 
 

@@ -378,6 +378,21 @@ def test_runs_that_make_the_same_work_side_by_side_and_one_that_fails_takes_noth
         assert plan_of(tmp_path / "d", "test") == changed.plan
 
 
+def test_more_samples_are_welcome_before_the_other_run_has_its_first(tmp_path: Path) -> None:
+    other = begun_elsewhere(tmp_path / "d", plan(samples=2), tmp_path / "held")
+    try:
+        with Store(tmp_path / "d", plan(samples=3)).begun({}):
+            assert plan_of(tmp_path / "d", "test").samples == 3
+        with (
+            pytest.raises(DatasetError, match="another run is making split 'test' just now"),
+            Store(tmp_path / "d", plan(samples=1)).begun({}),
+        ):
+            pass
+    finally:
+        other.kill()
+        other.wait()
+
+
 def test_of_many_that_begin_one_split_differently_at_once_one_does(tmp_path: Path) -> None:
     ready, outcomes = threading.Barrier(8), []
 
