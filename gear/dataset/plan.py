@@ -75,7 +75,8 @@ def read_plan(root: Path, split: str) -> Plan | None:
                 raise FieldError(f"plan.{field}", f"must have a {key}")
         return plan
     except FieldError as error:
-        raise DatasetError(path, f"is not of this version of gear ({error}); use another --out, or --force") from error
+        remedy = f"use another --out, or replace split {split!r} with --force"
+        raise DatasetError(path, f"is not of this version of gear ({error}); {remedy}") from error
 
 
 def begin(root: Path, plan: Plan) -> None:

@@ -286,6 +286,21 @@ def test_a_plan_that_says_too_little_is_one_line(tmp_path: Path, field: str) -> 
         fill(tmp_path, plan())
 
 
+def test_a_plan_of_another_version_says_which_split_to_replace(tmp_path: Path) -> None:
+    """Every split of a dataset is looked at; `--force` replaces the one that is collected."""
+    fill(tmp_path, plan("val"))
+    path = tmp_path / "gear/val/plan.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"colour": "blue"}))
+    for force in (False, True):
+        with (
+            pytest.raises(DatasetError, match="another --out, or replace split 'val' with --force"),
+            Store(tmp_path, plan("test")).begun({}, force=force),
+        ):
+            pass
+    with Store(tmp_path, plan("val")).begun({}, force=True):
+        assert splits_of(tmp_path) == ["val"]
+
+
 def test_folders_of_gears_own_are_no_datasets_and_no_splits(tmp_path: Path) -> None:
     (tmp_path / "code/gear/world").mkdir(parents=True)
     fill(tmp_path / "code/data", plan())
