@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from gear.dataset.files import clear_scratch, explained, inside, read_bytes, write_whole
@@ -32,7 +33,8 @@ def export(
 
     Raises:
         UnknownNameError: there is no such layout.
-        DatasetError: the layout is another task's, a split is not finished, or `out` holds something.
+        DatasetError: the layout is another task's, a split is not finished, or `out` holds something. An export that
+            is stopped takes back what it wrote: half a tree looks like a whole one, and the next try needs the room.
     """
     known = layouts()
     if layout not in known:
@@ -53,9 +55,26 @@ def export(
             raise DatasetError(target, "is not empty; export into a new folder")
         target.mkdir(parents=True, exist_ok=True)
     tree = known[layout].tree(splits, lambda path: read_bytes(inside(source, path)))
-    for written, (relative, data) in enumerate(tree, start=1):
-        write_whole(target, relative, data)
-        if progress is not None:
-            progress(written, 0)
+    written: list[str] = []
+    try:
+        for relative, data in tree:
+            written.append(relative)
+            write_whole(target, relative, data)
+            if progress is not None:
+                progress(len(written), 0)
+    except BaseException:  # Ctrl-C, too
+        _take_back(target, written)
+        raise
     clear_scratch(target)
     return sum(len(split.records) for split in splits)
+
+
+def _take_back(target: Path, written: Sequence[str]) -> None:
+    """Removes the files of a tree, and all folders in it that are empty then."""
+    with contextlib.suppress(OSError, DatasetError):
+        for relative in written:
+            inside(target, relative).unlink(missing_ok=True)
+        clear_scratch(target)
+        for folder in sorted((path for path in target.rglob("*") if path.is_dir()), reverse=True):
+            if not any(folder.iterdir()):
+                folder.rmdir()

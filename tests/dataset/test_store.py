@@ -175,6 +175,19 @@ def test_exports_go_into_new_folders_and_fit_their_task(tmp_path: Path) -> None:
         export(tmp_path / "a", layout="kitti", out=tmp_path / "c")
 
 
+def test_an_export_that_is_stopped_leaves_nothing_and_can_be_given_again(tmp_path: Path) -> None:
+    fill(tmp_path / "a", plan())
+
+    def stop(written: int, _: int) -> None:
+        if written == 4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b", progress=stop)
+    assert list((tmp_path / "b").iterdir()) == []
+    assert export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b") == 3
+
+
 def test_a_split_that_was_killed_before_its_first_sample_is_nothing(tmp_path: Path) -> None:
     Store(tmp_path, plan(samples=9, content={"scene": "truck", "seed": 5})).open({})
     Store(tmp_path, plan("val", task={"name": "semseg", "package": "x", "version": "1"})).open({})
