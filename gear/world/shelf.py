@@ -175,7 +175,8 @@ def _alone(place: Path) -> Iterator[None]:
     import fcntl
 
     with place.with_suffix(".lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+        with contextlib.suppress(OSError):  # a network file system
+            fcntl.flock(lock, fcntl.LOCK_EX)
         yield
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
 import shutil
 from pathlib import Path
 
@@ -131,6 +132,17 @@ def test_what_was_not_used_for_longest_goes(tmp_path: Path, monkeypatch: pytest.
     first = worlds(tmp_path)
     take(tmp_path, weather=dataclasses.replace(CLEAR, sun_altitude_deg=20.0))
     assert len(worlds(tmp_path)) == 1 and worlds(tmp_path) != first
+
+
+def test_a_cache_that_knows_no_locks_keeps_worlds_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Homes on Lustre or NFS are often such."""
+
+    def refused(*_: object) -> None:
+        raise OSError(errno.ENOSYS, "Function not implemented")
+
+    monkeypatch.setattr("fcntl.flock", refused)
+    take(tmp_path)
+    assert len(worlds(tmp_path)) == 1
 
 
 def test_a_broken_town_says_what_is_wrong_with_it(tmp_path: Path, town: Path) -> None:
