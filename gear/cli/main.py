@@ -49,6 +49,8 @@ CIRCUMSTANCES = {
 }  # fmt: skip
 """What disks and permissions refuse is nobody's bug, wherever it comes up."""
 
+FULL = {errno.ENOSPC, errno.EDQUOT}
+
 
 class Terminated(KeyboardInterrupt):
     """Somebody, a batch system perhaps, asks the process to end: it does as after Ctrl-C."""
@@ -68,9 +70,10 @@ def main(argv: Sequence[str]) -> int:
         their traceback.
     """
     try:
-        return _run(argv)
+        code = _run(argv)
+        sys.stdout.flush()  # what fails at Python's own end, nobody catches
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _print_no_more()
         return 0
     except (KeyboardInterrupt, Exception) as error:
         interrupt = _interrupt_behind(error)
@@ -80,10 +83,15 @@ def main(argv: Sequence[str]) -> int:
         if isinstance(error, OSError) and error.filename and error.errno in CIRCUMSTANCES:
             print(f"gear: {error.filename}: {error.strerror}", file=sys.stderr)
             return 2
+        if isinstance(error, OSError) and error.errno in FULL:  # a stream that says no name, as that of `> file`
+            print(f"gear: {error.strerror}", file=sys.stderr)
+            _print_no_more()
+            return 2
         if not isinstance(error, GearError):
             raise
         print(f"gear: {error}", file=sys.stderr)
         return 2
+    return code
 
 
 def _run(argv: Sequence[str]) -> int:
@@ -123,6 +131,14 @@ def _run(argv: Sequence[str]) -> int:
 
 def _terminate(number: int, frame: FrameType | None) -> None:
     raise Terminated
+
+
+def _print_no_more() -> None:
+    """Drops what is still to be printed, where it can no more be: Python tries once more at its end."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _interrupt_behind(error: BaseException | None) -> KeyboardInterrupt | None:

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import os
+import subprocess
+import sys
 from pathlib import Path
+from typing import IO
 
 import pytest
 
@@ -81,6 +85,33 @@ def test_what_a_disk_refuses_is_one_line(
     monkeypatch.setattr(doctor, "run", lambda args: (tmp_path / "gone").read_bytes())
     with pytest.raises(FileNotFoundError):
         main(["doctor"])
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no disk is full here")
+@pytest.mark.parametrize("count", ["1", "100_000"])
+def test_printing_to_a_full_disk_is_one_line(count: str) -> None:
+    """Whether it comes up while something is printed or at the end, when the rest is."""
+    with Path("/dev/full").open("wb") as full:
+        assert printing(count, full) == (2, "gear: No space left on device\n")
+
+
+def test_nobody_who_reads_any_more_is_no_error() -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    with os.fdopen(writing, "wb") as closed:
+        assert printing("1", closed) == (0, "")
+
+
+def printing(count: str, out: IO[bytes]) -> tuple[int, str]:
+    """Status and errors of a command that prints so many lines."""
+    code = (
+        "from gear.cli import doctor, main\n"
+        f"doctor.run = lambda args: [print(i) for i in range({count})] and 0\n"
+        "main.sys.argv = ['gear', 'doctor']\nmain.entry()"
+    )
+    env = {key: value for key, value in os.environ.items() if key != "PYTHONUNBUFFERED"}
+    done = subprocess.run([sys.executable, "-c", code], stdout=out, stderr=subprocess.PIPE, check=False, env=env)
+    return done.returncode, done.stderr.decode()
 
 
 def test_a_bug_keeps_its_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
