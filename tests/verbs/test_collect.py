@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 
 import gear
+from gear.config.load import load_collection
 from gear.formats import rle
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import (
@@ -31,6 +32,7 @@ from gear.values.errors import (
     TownError,
     UnknownNameError,
 )
+from gear.verbs.collect.job import resolve
 from gear.verbs.collect.run import CollectReport
 
 Collect = Callable[..., CollectReport]
@@ -315,6 +317,15 @@ def test_a_scene_can_be_a_file_with_a_name_in_it(tmp_path: Path, collect_small: 
         collect_small("depth", tmp_path / "b", scene=str(TINY_SCENES))
     with pytest.raises(UnknownNameError, match="did you mean double"):
         collect_small("depth", tmp_path / "b", scene=f"{TINY_SCENES}:dubble")
+
+
+def test_a_scenes_name_leads_nowhere(tmp_path: Path) -> None:
+    """A library may be somebody else's."""
+    scenes = tmp_path / "my.yml"
+    scenes.write_text(TINY_SCENES.read_text().replace("  board:", "  ../../../board:", 1))
+    flags = {"task": "depth", "town": str(TINY_TOWN), "scene": f"{scenes}:../../../board", "renderer": "classic"}
+    job = resolve(load_collection(None, flags))
+    assert job.root == Path("data/depth/tiny-..-..-..-board-ClearNoon/none")
 
 
 def test_a_worker_that_dies_is_reported(

@@ -233,7 +233,8 @@ def dataset_root(config: CollectionConfig, info: SplitInfo, weather: Weather) ->
     name = weather.name
     if name.endswith("*"):
         name = f"{name[:-1]}-{hashlib.sha256(repr(weather).encode()).hexdigest()[:6]}"
-    return Path("data") / config.task.replace("/", "-") / f"{info.town}-{info.scene}-{name}" / info.patch_label
+    folders = (config.task, f"{info.town}-{info.scene}-{name}", info.patch_label)
+    return Path("data", *(folder.replace("/", "-") for folder in folders))  # a scene may be called ../../x
 
 
 def versions() -> dict[str, str]:
