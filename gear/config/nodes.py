@@ -93,6 +93,10 @@ def parse_text(text: str, name: str) -> Node:
         mark = error.problem_mark or error.context_mark
         line, column = (mark.line + 1, mark.column + 1) if mark else (0, 0)
         raise ConfigError(name, line, column, "", f"is not YAML: {error.problem or error.context}") from error
+    except yaml.reader.ReaderError as error:  # its own text is two lines long
+        before = text[: error.position].split("\n")
+        problem = f"is not YAML: {error.reason} ({text[error.position]!r})"
+        raise ConfigError(name, len(before), len(before[-1]) + 1, "", problem) from error
     except yaml.YAMLError as error:
         raise ConfigError(name, 0, 0, "", f"is not YAML: {error}") from error
 

@@ -69,6 +69,7 @@ def test_the_declared_type_decides_and_yaml_never_guesses() -> None:
         ("name: a\nlens: {baseline_m: inf}\n", r"expected float, got 'inf'"),
         ("name:\n", r"run.yaml:1:6: name: expected str, got nothing"),
         ("name: a\n  mode: film\n", r"run.yaml:2:\d+: is not YAML"),
+        ("name: a\nmode: f\x01lm\n", r"run.yaml:2:8: is not YAML: special characters are not allowed \('\\x01'\)$"),
         ("name: !!python/object:os.system a\n", r"Python tags are not read"),
         ("[1, 2]\n", r"expected keys and values, got a list"),
         ("name: &a [*a]\n", r"run.yaml:1:7: name\[0\]: an alias that contains itself"),
