@@ -11,6 +11,9 @@ from gear.values.errors import ConfigError
 
 MAX_BYTES = 4 << 20
 
+MARKS = "'\"[{&*!|>"
+"""What a value of YAML begins with that is no bare word."""
+
 
 @dataclass(frozen=True, slots=True)
 class Place:
@@ -102,7 +105,9 @@ def parse_text(text: str, name: str) -> Node:
 
 
 def parse_value(text: str, name: str) -> Node:
-    """Reads one value as given on the command line: `12`, `fog`, `[1, 2]`, `{a: 1}`."""
+    """Reads one value as given on the command line: `12`, `fog`, `[1, 2]`, `{a: 1}`. Nothing is a comment there."""
+    if "#" in text and text.strip()[0] not in MARKS:
+        return Scalar(text.strip(), False, Place(name))
     return parse_text(text, name) if text.strip() else Scalar("", True, Place(name))
 
 

@@ -97,6 +97,12 @@ def test_settings_go_through_the_same_reader() -> None:
         with_overrides(node, ["lens"])
 
 
+@pytest.mark.parametrize("text", ["#1", "data/run #2", " runs/a#b ", "'data/run #2'", '"#1"'])
+def test_nothing_of_a_setting_is_a_comment(text: str) -> None:
+    node = with_overrides(parse_text("name: a\n", "run.yaml"), [f"name={text}"])
+    assert read_node(Run, node).name == text.strip().strip("'\"")
+
+
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
