@@ -87,6 +87,14 @@ def test_the_original_tools_names_are_read(tmp_path: Path, picture: np.ndarray) 
     assert np.array_equal(resolve_patch(str(tmp_path), surfaces=2, seed=0).images[1], picture[::-1, :, ::-1])
 
 
+@pytest.mark.parametrize("name", ["final.png", "final_150.png"])
+def test_the_only_picture_of_a_folder_is_the_patch_whatever_its_number(
+    name: str, tmp_path: Path, picture: np.ndarray
+) -> None:
+    save(tmp_path / name, picture)
+    assert np.array_equal(resolve_patch(str(tmp_path), surfaces=1, seed=0).images[0], picture[..., ::-1])
+
+
 def test_what_is_no_patch_is_refused_in_one_line(tmp_path: Path, picture: np.ndarray) -> None:
     (tmp_path / "text.png").write_text("hello")
     (tmp_path / "empty.png").write_bytes(b"")

@@ -145,6 +145,8 @@ def _numbered(folder: Path) -> list[Path]:
     """`patch_0.png`, `patch_1.png`, … of a folder, or the original tool's `<anything>_0.png`, or its only picture."""
     pictures = sorted(p for p in folder.iterdir() if p.suffix.lower() == ".png" and p.is_file())
     own = [p for p in pictures if re.fullmatch(r"patch_\d+\.png", p.name)]
+    if len(pictures) == 1 and not own:
+        return pictures
     numbered: dict[int, Path] = {}
     for path in own or pictures:
         match = NUMBERED.fullmatch(path.name)
@@ -153,8 +155,6 @@ def _numbered(folder: Path) -> list[Path]:
         if int(match[1]) in numbered:
             raise PatchError(folder, f"has two patches of number {match[1]}; name them patch_0.png, patch_1.png, …")
         numbered[int(match[1])] = path
-    if not numbered and len(pictures) == 1:
-        return pictures
     if not numbered:
         raise PatchError(folder, "has no patch_0.png")
     if sorted(numbered) != list(range(len(numbered))):
