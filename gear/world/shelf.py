@@ -91,7 +91,7 @@ def _take(shelf: Path, library: AssetLibrary, scene: SceneSpec, weather: Weather
     compiled = _load(place, library, scene)
     if compiled is not None:
         return compiled
-    with _alone(place):
+    with contextlib.suppress(OSError), _alone(place):  # a disk that takes no more files must stand in nobody's way
         compiled = _load(place, library, scene)
         if compiled is not None:
             return compiled

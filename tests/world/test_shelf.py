@@ -145,6 +145,22 @@ def test_a_cache_that_knows_no_locks_keeps_worlds_all_the_same(tmp_path: Path, m
     assert len(worlds(tmp_path)) == 1
 
 
+@pytest.mark.parametrize("step", ["_alone", "tempfile.TemporaryDirectory"])
+def test_a_cache_that_takes_no_more_files_stands_in_nobodys_way(
+    step: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Quotas count files, too."""
+    seen = model_bytes(build_tiny_world(SCENE).model)
+
+    def full(*_: object, **__: object) -> None:
+        monkeypatch.undo()
+        raise OSError(errno.EDQUOT, "Disk quota exceeded")
+
+    monkeypatch.setattr(f"gear.world.shelf.{step}", full)
+    assert len(model_bytes(take(tmp_path).model)) == len(seen)
+    assert not worlds(tmp_path)
+
+
 def test_a_broken_town_says_what_is_wrong_with_it(tmp_path: Path, town: Path) -> None:
     town.write_text(town.read_text().replace("<worldbody>", "<worldbody><nonsense/>", 1))
     with pytest.raises(TownError, match=r"tiny\.xml"):
