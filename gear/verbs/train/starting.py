@@ -11,11 +11,12 @@ from gear.config.overrides import with_value
 from gear.contracts.specs import ModelSpec, TaskSpec
 from gear.nn.options import NONE, SHIPPED
 from gear.nn.runtime import device_of, is_quick_in_half, seeded
-from gear.nn.shipped import resolve, shipped, shipped_networks
+from gear.nn.shipped import resolve, shipped, shipped_networks, trained_option
 from gear.nn.weights import load_into, load_trunk
 from gear.plugins.build import blamed, build
 from gear.plugins.catalogue import Found
 from gear.values.errors import GearError, UnknownNameError
+from gear.values.serial import Json
 from gear.verbs.train.config import TrainConfig
 from gear.verbs.train.data import Samples
 
@@ -51,16 +52,33 @@ def picture_share(samples: Samples, spec: TaskSpec[Any]) -> float:
 
 
 def with_scale(found: Found, config: TrainConfig, share: float) -> TrainConfig:
-    """Lets a network that would run at a share of its pictures' size see small pictures as they are.
+    """Lets a network that would run at a share of its pictures' size see small pictures as they are, and those of the
+    task's own size at the share that the weights were trained for with which it begins.
 
     Its weights then say at which share of the task's own pictures they are to be used.
     """
     by_itself = getattr(found.spec.config(), SCALE, 1.0)
     is_given = isinstance(config.options, Mapping) and SCALE in config.options.entries
-    if share == 1 or by_itself is not None or is_given:
+    if by_itself is not None or is_given:
         return config
-    options = with_value(config.options, (SCALE,), Scalar("1", False, Place("gear train")))
+    scale = _scale_of_start(found, config.init) if share == 1 else 1
+    if scale is None:
+        return config
+    options = with_value(config.options, (SCALE,), Scalar(str(scale), False, Place("gear train")))
     return dataclasses.replace(config, options=options)
+
+
+def _scale_of_start(found: Found, init: str) -> Json:
+    """What whole weights that a training begins with say of the share that they were trained for; None for nothing.
+
+    Raises:
+        GearError: they are not there, or no safetensors.
+    """
+    spec = found.spec
+    assert isinstance(spec, ModelSpec)
+    if init in spec.starts or not (init == SHIPPED or Path(init).is_file()):
+        return None
+    return trained_option(init, spec.name, SCALE)
 
 
 def precision_of(found: Found, config: TrainConfig) -> Literal["float32", "bfloat16"]:

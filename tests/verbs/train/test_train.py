@@ -19,13 +19,17 @@ from safetensors import safe_open
 
 import gear
 from gear.cli.main import main
+from gear.config.reader import read_node
 from gear.contracts.models import Recipe
 from gear.nn.weights import load_into, read, write
+from gear.plugins.build import find
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_segmenter
 from gear.values.errors import DatasetError, GearError, PluginError, UnknownNameError
 from gear.verbs.train import loop
 from gear.verbs.train.checkpoint import Progress
-from gear.verbs.train.run import TrainReport, train
+from gear.verbs.train.config import read_config
+from gear.verbs.train.run import TrainReport, train, trainable
+from gear.verbs.train.starting import with_scale
 
 Street = Callable[..., Path]
 
@@ -281,6 +285,22 @@ def test_weights_say_at_which_share_of_the_tasks_own_pictures_they_work(
         "input_scale": 0.5 * 128 / 2048,
         "width": 4,
     }
+
+
+def test_a_training_goes_on_at_the_share_that_its_first_weights_were_trained_for(tmp_path: Path, install: Any) -> None:
+    install(replace(tiny_segmenter, config=ScaledConfig, build=TinySegmenter))
+    found, first = find("model", "tiny_segmenter"), tmp_path / "first.safetensors"
+    write(first, {"stem.weight": torch.zeros(1)}, {"options": json.dumps({"input_scale": 0.75})})
+
+    def scale(init: str, share: float = 1.0, *settings: str) -> Any:
+        config = read_config(trainable(found, "semseg"), {"init": init}, settings)
+        return read_node(ScaledConfig, with_scale(found, config, share).options).input_scale
+
+    assert scale(str(first)) == 0.75
+    assert scale(str(first), 0.5) == 1, "small pictures are seen as they are"
+    assert scale(str(first), 1.0, "options.input_scale=0.5") == 0.5
+    write(first, {"stem.weight": torch.zeros(1)}, {})
+    assert scale(str(first)) is scale("") is scale(f"trunk:{first}") is None
 
 
 @dataclass(frozen=True, kw_only=True)
