@@ -92,8 +92,8 @@ def train(
 ) -> TrainReport:
     """Trains a network; takes up again what was begun in `out`, and does nothing where it is finished.
 
-    The same seed, data and settings give the same weights on one machine, stopped and taken up again or not, unless
-    time is the budget.
+    The same seed, data and settings give the same weights on the CPU of one machine, stopped and taken up again or not,
+    unless time is the budget.
 
     Args:
         task: name of a task plugin.
