@@ -10,6 +10,9 @@ from gear.values.errors import FieldError
 SHIPPED = "shipped"
 NONE = "none"
 
+CIRCUMSTANCES = ("weights", "device", "precision", "seed")
+"""Options that say nothing of how weights are to be used."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NetworkOptions:

@@ -18,6 +18,7 @@ from gear.config.dump import to_plain
 from gear.config.nodes import Mapping
 from gear.config.reader import read_node
 from gear.dataset.files import sha256, write_whole
+from gear.nn.options import CIRCUMSTANCES
 from gear.nn.weights import write as write_weights
 from gear.plugins.catalogue import Found
 from gear.values.errors import DatasetError
@@ -31,9 +32,6 @@ from gear.verbs.train.starting import SCALE
 
 WEIGHTS = "model.safetensors"
 HISTORY = "train.json"
-CIRCUMSTANCES = ("weights", "device", "precision", "seed")
-"""Options that say nothing of how weights are to be used."""
-
 CARD = "card.md"
 
 

@@ -16,7 +16,7 @@ from gear.config.reader import read_node
 from gear.contracts.specs import ModelSpec
 from gear.dataset.files import read_bytes, sha256
 from gear.nn.checkpoints import read_published
-from gear.nn.options import NONE
+from gear.nn.options import CIRCUMSTANCES, NONE
 from gear.nn.shipped import inspect
 from gear.nn.weights import mismatches, write
 from gear.plugins.build import NO_OPTIONS, blamed, build, find
@@ -151,7 +151,7 @@ def _options(spec: ModelSpec[Any], settings: Iterable[str], said: str) -> dict[s
     except ValueError:
         options = {}
     plain = to_plain(read_node(spec.config, with_overrides(NO_OPTIONS, settings), ""))
-    given = {text.partition("=")[0].partition(".")[0] for text in settings}
+    given = {text.partition("=")[0].partition(".")[0] for text in settings} - set(CIRCUMSTANCES)
     return (options if isinstance(options, dict) else {}) | {key: plain[key] for key in plain if key in given}
 
 
