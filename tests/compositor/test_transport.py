@@ -15,6 +15,7 @@ from gear.compositor.opening import open_compositor
 from gear.compositor.transport import TransportCompositor
 from gear.formats.probes import probes_of
 from gear.values.errors import DatasetError, UnknownNameError
+from gear.values.frames import LINEAR_FULL_SCALE
 
 from .conftest import MakeTwins, gaps, random_patches
 
@@ -56,6 +57,18 @@ def test_composed_and_rendered_pictures_are_the_same(
 )
 def test_what_weather_and_camera_add_is_in_the_composed_picture(twins: MakeTwins, setting: tuple[str, ...]) -> None:
     clean, twin = twins(settings=setting)
+    found = gaps(TransportCompositor(clean, rounding=True), twin)
+    assert np.median([gap.psnr_db for gap in found]) >= EXACT_DB
+
+
+@pytest.mark.parametrize("renderer", ["classic", pytest.param("filament", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("quality", ["fast", "film"])
+def test_a_low_sun_full_on_the_board_makes_white_brighter_than_a_frame_can_be(
+    twins: MakeTwins, renderer: str, quality: str
+) -> None:
+    clean, twin = twins("board", renderer, quality, "semseg", ("weather=CloudySunset", "weather.sun_azimuth_deg=175"))
+    whites = [probe.white.max() for index in range(len(clean)) for probe in probes_of(clean, index, "left")]
+    assert max(whites) > LINEAR_FULL_SCALE
     found = gaps(TransportCompositor(clean, rounding=True), twin)
     assert np.median([gap.psnr_db for gap in found]) >= EXACT_DB
 
