@@ -132,7 +132,7 @@ class DefenseContract:
             assert mask.shape == result.views[name].shape[:2]
             assert mask.dtype == np.float32
             assert 0 <= float(mask.min()) <= float(mask.max()) <= 1
-        assert result.score is None or 0 <= result.score <= 1
+        assert result.score is None or (isinstance(result.score, (int, float)) and 0 <= result.score <= 1)
 
     def test_samples_do_not_touch_each_other(self) -> None:
         """Nothing is kept between calls but the state."""
@@ -143,6 +143,17 @@ class DefenseContract:
         again = defense.apply(self.pictures(1), self.model(), state, derive_rng(SEED, "apply"))
         for name in self.views:
             assert np.array_equal(alone.views[name], again.views[name])
+            if alone.mask is not None and again.mask is not None:
+                assert np.array_equal(alone.mask[name], again.mask[name])
+        assert alone.score == again.score
+
+    def test_a_wrapped_model_is_a_model(self) -> None:
+        """`wrap` gives back the model or one around it."""
+        pytest.importorskip("torch", reason="models need torch")
+        from gear.testing.tiny_networks import TinyConfig, TinySegmenter
+
+        wrapped = self.make().wrap(self.model() or TinySegmenter(TinyConfig()))
+        assert all(callable(getattr(wrapped, name, None)) for name in ("predict", "forward", "taps"))
 
     def test_gradients_pass_as_declared(self) -> None:
         """`forward` has the values of `apply`, works alike for one and for many, and lets a gradient through."""

@@ -205,7 +205,7 @@ class Guard:
             if "mask" in outputs and not _is_array((result.mask or {}).get(name), size, np.float32):
                 return f"mask[{name!r}] must have shape {size} of float32"
         if "score" in outputs and not (isinstance(result.score, NUMBERS) and 0 <= result.score <= 1):
-            return f"score must be in 0..1, got {result.score!r}"
+            return f"score must be a float in 0..1, got {result.score!r}"
         return ""
 
     def _error(self, index: int, problem: str) -> PluginError:
