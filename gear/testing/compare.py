@@ -30,6 +30,26 @@ def difference(a: Any, b: Any, where: str = "value") -> str:
     return "" if a == b or (a != a and b != b) else f"{where}: {a!r} is not {b!r}"
 
 
+def share_apart(a: Any, b: Any, tolerance: float) -> float:
+    """Share of the numbers of two values that differ by more than `tolerance` times the largest of their array, NaN
+    equal to NaN; of those inside containers the largest share; 1 where shapes, types, names or counts differ.
+    """
+    if dataclasses.is_dataclass(a) and type(a) is type(b):
+        names = [field.name for field in dataclasses.fields(a)]
+        return max((share_apart(getattr(a, name), getattr(b, name), tolerance) for name in names), default=0.0)
+    if isinstance(a, Mapping) and isinstance(b, Mapping) and a.keys() == b.keys():
+        return max((share_apart(a[key], b[key], tolerance) for key in a), default=0.0)
+    if isinstance(a, (tuple, list)) and isinstance(b, (tuple, list)) and len(a) == len(b):
+        return max((share_apart(x, y, tolerance) for x, y in zip(a, b, strict=True)), default=0.0)
+    if isinstance(a, (Mapping, tuple, list)) or isinstance(b, (Mapping, tuple, list)):
+        return 1.0
+    x, y = np.asarray(a), np.asarray(b)
+    if x.shape != y.shape or x.dtype != y.dtype or not np.issubdtype(x.dtype, np.number):
+        return float(bool(difference(a, b)))
+    is_near = np.isclose(x, y, rtol=0, atol=tolerance * float(np.nanmax(np.abs(y), initial=0)), equal_nan=True)
+    return 1 - float(is_near.mean()) if is_near.size else 0.0
+
+
 def freeze(value: Any) -> Any:
     """Makes every array inside read-only, in place, and returns the value."""
     if isinstance(value, np.ndarray):

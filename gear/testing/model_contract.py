@@ -18,7 +18,7 @@ from torch import Tensor
 from gear.contracts.models import Model
 from gear.contracts.specs import ModelSpec, TaskSpec
 from gear.plugins.manager import catalogue
-from gear.testing.compare import difference, freeze
+from gear.testing.compare import difference, freeze, share_apart
 from gear.testing.model_state import changes, state_of
 from gear.testing.spec_checks import check_spec
 from gear.testing.synthetic import synthetic_frame
@@ -95,6 +95,22 @@ class ModelContract:
         assert not difference(first, model.predict(one), "prediction")
         assert not changes(before, state_of(model))
 
+    def test_many_are_predicted_as_one_by_one(self) -> None:
+        """Where there is `predict_many`, it gives each sample's prediction, in order."""
+        model, samples = self.make(), self.samples(self.spec.tasks[0])
+        many = getattr(model, "predict_many", None)
+        if many is None:
+            return
+        views = [freeze(self.views(sample)) for sample in samples]
+        alone = [model.predict(one) for one in views]
+        for one, prediction in zip(views, alone, strict=True):
+            (found,) = many([one])
+            assert share_apart(found, prediction, self.tolerance) <= 0.01, "a sample has another prediction than alone"
+        first, second = many(views)  # batches may round otherwise, and a detector's boxes then change places
+        for found, own, other in ((first, *alone), (second, *reversed(alone))):
+            apart, swapped = (share_apart(found, one, self.tolerance) for one in (own, other))
+            assert apart <= swapped, "predictions are not in the samples' order"
+
     def test_two_of_the_same_options_are_alike(self) -> None:
         """Weights follow from the options, not from chance."""
         pictures = self.views(self.samples(self.spec.tasks[0])[0])
@@ -116,6 +132,17 @@ class ModelContract:
         """Different pictures, different outputs."""
         outputs = self.make().forward(self.batch(self.samples(self.spec.tasks[0])))
         assert any(not torch.equal(tensor[0], tensor[1]) for tensor in outputs.values())
+
+    def test_forward_leaves_everything_alone(self) -> None:
+        """Neither weights, buffers and modes nor the samples change, with targets or without."""
+        model = self.make()
+        before = state_of(model)
+        for task in self.spec.tasks:
+            samples = self.samples(task)
+            for targets in (None, samples):
+                model.forward(self.batch(samples), targets)
+                assert not changes(before, state_of(model))
+            assert not difference(samples, self.samples(task), "samples")
 
     def test_losses_are_numbers(self) -> None:
         """With the batch's samples as targets it gives finite losses without dimensions."""

@@ -11,7 +11,7 @@ import torch
 from gear.contracts.specs import ModelSpec
 from gear.testing.model_contract import ModelContract
 from gear.testing.model_state import changes, state_of
-from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_depth, tiny_segmenter
+from gear.testing.tiny_networks import TinyConfig, TinyDepth, TinySegmenter, tiny_depth, tiny_segmenter
 
 
 class TestTinySegmenter(ModelContract):
@@ -66,6 +66,45 @@ class Transposed(TinySegmenter):
         return super().predict(views).T
 
 
+class Trains(TinySegmenter):
+    """Its losses want training's mode, in which batch normalisation learns."""
+
+    def predict(self, views: Any) -> Any:
+        self.eval()
+        return super().predict(views)
+
+    def loss(self, raw: torch.Tensor, targets: Any) -> torch.Tensor:
+        self.train()
+        return super().loss(raw, targets)
+
+
+class Relabels(TinySegmenter):
+    def loss(self, raw: torch.Tensor, targets: Any) -> torch.Tensor:
+        for sample in targets:
+            sample.label_ids[sample.label_ids == 7] = 0
+        return super().loss(raw, targets)
+
+
+class Shuffles(TinySegmenter):
+    def predict_many(self, samples: Any) -> Any:
+        return [self.predict(sample) for sample in reversed(samples)]
+
+
+class ForgetsSome(TinySegmenter):
+    def predict_many(self, samples: Any) -> Any:
+        return [self.predict(samples[0])]
+
+
+class InHalves(TinyDepth):
+    def predict_many(self, samples: Any) -> Any:
+        return [self.predict(sample) / 2 for sample in samples]
+
+
+class LastDigits(TinyDepth):
+    def predict_many(self, samples: Any) -> Any:
+        return [self.predict(sample) * np.float32(1 + 1e-6) for sample in samples]
+
+
 def random_weights(config: TinyConfig) -> TinySegmenter:
     return TinySegmenter(TinyConfig(seed=int(torch.randint(1 << 30, ()))))
 
@@ -82,12 +121,22 @@ def random_weights(config: TinyConfig) -> TinySegmenter:
         (Detached, "test_gradients_flow_where_declared"),
         (Transposed, "test_predictions_suit_the_evaluators"),
         (random_weights, "test_two_of_the_same_options_are_alike"),
+        (Trains, "test_forward_leaves_everything_alone"),
+        (Relabels, "test_forward_leaves_everything_alone"),
+        (Shuffles, "test_many_are_predicted_as_one_by_one"),
+        (ForgetsSome, "test_many_are_predicted_as_one_by_one"),
     ],
 )
 def test_the_contract_catches(build: Any, test: str) -> None:
     with pytest.raises((AssertionError, ValueError, RuntimeError)):
         getattr(contract_of(build), test)()
     getattr(contract_of(TinySegmenter), test)()
+
+
+def test_the_last_digits_of_predictions_together_may_differ() -> None:
+    with pytest.raises(AssertionError, match="another prediction than alone"):
+        contract_of(InHalves, tasks=("depth",)).test_many_are_predicted_as_one_by_one()
+    contract_of(LastDigits, tasks=("depth",)).test_many_are_predicted_as_one_by_one()
 
 
 def test_the_contract_catches_a_tap_that_is_missing_or_never_runs() -> None:
