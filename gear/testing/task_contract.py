@@ -17,7 +17,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any, ClassVar
@@ -28,6 +27,7 @@ from gear.contracts.evaluation import KeepsPredictions, Maskable, Reports
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Encoded, Sample, Sidecar, SplitInfo, Task
 from gear.testing.compare import difference, freeze
+from gear.testing.spec_checks import check_spec
 from gear.testing.synthetic import synthetic_frame
 from gear.values.frames import Frame
 from gear.values.geometry import RigidTransform
@@ -90,10 +90,8 @@ class TaskContract:
     def test_spec_says_what_it_is(self) -> None:
         """Name, summary, layout and a config with defaults."""
         spec = self.spec
-        assert re.fullmatch(r"[a-z][a-z0-9_]*", spec.name)
-        assert spec.summary and "\n" not in spec.summary
+        check_spec("task", spec, self.options)
         assert spec.layout
-        assert dataclasses.is_dataclass(spec.config)
         assert spec.config() == spec.config(), "every option needs a default"
 
     def test_rig_has_the_views_of_the_spec(self) -> None:
