@@ -94,8 +94,8 @@ class Catalogue:
         """What failed to load, for those who miss a name; "" if nothing did."""
         if not self.broken:
             return ""
-        names = ", ".join(dict.fromkeys(b.owner.plugin for b in self.broken))
-        return f"({len(self.broken)} plugin(s) failed to load: {names}; see `gear plugins`)"
+        names = dict.fromkeys(b.owner.plugin for b in self.broken)
+        return f"({len(names)} plugin(s) failed to load: {', '.join(names)}; see `gear plugins`)"
 
     def clashes(self) -> tuple[tuple[Kind, str, tuple[str, ...]], ...]:
         """Short names that more than one package claims, with their full names."""

@@ -123,6 +123,7 @@ def test_broken_plugins_are_reported_and_nobody_else_suffers(package: Any, capsy
         UnknownNameError, match=r"no defense named 'thirdprty'; did you mean thirdparty\? \(.*failed to load: "
     ):
         found.get("defense", "thirdprty")
+    assert found.broken_hint().startswith(f"({len(stages)} plugin(s) failed to load: ")
 
 
 def test_two_of_a_name_and_nobody_wins(package: Any) -> None:
