@@ -36,6 +36,15 @@ def test_a_package_is_whole(kind: str, tmp_path: Path) -> None:
         compile(path.read_text(), str(path), "exec")
 
 
+@pytest.mark.parametrize(
+    ("kind", "use"),
+    [("task", "gear collect --task my_thing"), ("model", "--model my_thing"), ("defense", "--defense my_thing"),
+     ("attack", "gear attack --attack my_thing")],
+)  # fmt: skip
+def test_its_readme_says_how_gear_uses_it(kind: str, use: str, tmp_path: Path) -> None:
+    assert use in (new_package(kind, "my_thing", out=tmp_path) / "README.md").read_text()
+
+
 @pytest.mark.parametrize("name", ["Bad", "9lives", "a b", "", "a__b", "a_", "../up", "x" * 41, "class", "random", "é"])
 def test_bad_names_get_one_line_and_no_files(name: str, tmp_path: Path) -> None:
     with pytest.raises(GearError) as caught:

@@ -26,8 +26,8 @@ USE: dict[Kind, str] = {
     " `gear evaluate` with a model that does it.",
     "model": "Use it: `gear evaluate --model {{name}} --data DIR` runs it over a dataset of its task; twins of the"
     " dataset, `--data CLEAN PATCHED`, are compared.",
-    "attack": 'Use it: `gear.plugins.build.build(find("attack", "{{name}}"))` in Python, or wherever gear asks for'
-    " an attack.",
+    "attack": "Use it: `gear attack --attack {{name}} --model NAME --data DIR --out PATCH` makes a patch, DIR a dataset"
+    " with `--probes`; `gear collect --patch PATCH` puts it into the world.",
     "defense": "Use it: `gear evaluate --model NAME --defense {{name}} --data DIR` is its row in an evaluation;"
     " `gear defend DIR --defense {{name}} --out DIR2` cleans a dataset's pictures.",
 }
