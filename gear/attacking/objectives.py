@@ -46,7 +46,11 @@ class Term:
 
 
 class Objective(Protocol):
-    """Terms of a batch."""
+    """Terms of a batch.
+
+    An objective whose weighted terms do not add up to a number that grows with the harm has a method `harm` of the same
+    arguments beside it, which gives that number (see `counted`).
+    """
 
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
@@ -154,20 +158,39 @@ class DepthObjective:
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> Mapping[str, Term]:
         """`small` and `large`, or the direction's name."""
+        depth_m, clean, free = self._answers(model, views, samples, indexes)
+        if self._direction != "any":
+            return {self._direction: Term(value=self._pushed(depth_m, clean, free))}
+        error = functional.smooth_l1_loss(depth_m, clean, reduction="none")
+        small = free & ((depth_m.detach() - clean).abs_() <= self._split_m)
+        return _split(error, {"small": (small, self._gamma), "large": (free & ~small, 1 - self._gamma)})
+
+    def harm(self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]) -> Tensor:
+        """The mean error, whatever it is split into.
+
+        The sum of both means, weighted, would fall where an error grows past `split_m`, and one pixel that is far off
+        would count for more than all of them that are a little off.
+        """
+        depth_m, clean, free = self._answers(model, views, samples, indexes)
+        if self._direction != "any":
+            return self._pushed(depth_m, clean, free)
+        return _mean(functional.smooth_l1_loss(depth_m, clean, reduction="none"), free)
+
+    def _answers(
+        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """(B, H, W) metres with the patch and without it, and where no patch is seen."""
         view = next(iter(views))
         clean = torch.stack(
             [self._answer(model, sample, index, view) for sample, index in zip(samples, indexes, strict=True)]
         )
         depth_m = _said(model, views, "depth_m")
-        clean = clean.to(depth_m.device, depth_m.dtype)
-        free = outside(samples, view, depth_m.device)
-        if self._direction != "any":
-            sign = 1.0 if self._direction == "farther" else -1.0
-            change = depth_m.clamp_min(1e-3).log() - clean.clamp_min(1e-3).log()
-            return {self._direction: Term(value=sign * _mean(change, free))}
-        error = functional.smooth_l1_loss(depth_m, clean, reduction="none")
-        small = free & ((depth_m.detach() - clean).abs_() <= self._split_m)
-        return _split(error, {"small": (small, self._gamma), "large": (free & ~small, 1 - self._gamma)})
+        return depth_m, clean.to(depth_m.device, depth_m.dtype), outside(samples, view, depth_m.device)
+
+    def _pushed(self, depth_m: Tensor, clean: Tensor, free: Tensor) -> Tensor:
+        sign = 1.0 if self._direction == "farther" else -1.0
+        change = depth_m.clamp_min(1e-3).log() - clean.clamp_min(1e-3).log()
+        return sign * _mean(change, free)
 
     def _answer(self, model: Model, sample: Any, index: int, view: str) -> Tensor:
         key = (id(model), index)
@@ -194,6 +217,27 @@ class LossObjective:
         losses = model.forward(views, samples)
         signs = {name: self.signs.get(name, 1.0) for name in losses}
         return {name: Term(value=loss, weight=signs[name]) for name, loss in losses.items() if signs[name]}
+
+
+def counted(
+    objective: Objective,
+    model: Model,
+    views: Mapping[str, Tensor],
+    samples: Sequence[Any],
+    indexes: Sequence[int],
+) -> list[Tensor]:
+    """Numbers that add up to the harm by which patches are compared, of all members of a group.
+
+    They are the objective's own `harm` where it has one, its weighted terms otherwise.
+    """
+    members, harm = members_of(model).values(), getattr(objective, "harm", None)
+    if harm is not None:
+        return [harm(member, views, samples, indexes) for member in members]
+    return [
+        term.weight * term.value
+        for member in members
+        for term in objective.terms(member, views, samples, indexes).values()
+    ]
 
 
 def loss_names(model: Model, sample: Any) -> list[str]:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import torch
 
 from gear.attacking.group import members_of
-from gear.attacking.objectives import DepthObjective, Objective
+from gear.attacking.objectives import DepthObjective, Objective, counted
 from gear.contracts.attacks import Budget, Compositor, Patch, State
 from gear.contracts.models import Model
 from gear.values.errors import GearError
@@ -51,7 +51,7 @@ class Oracle:
         return len(members_of(self._model)) * (1 + unseen)
 
     def harm(self, textures: Textures, indexes: Sequence[int]) -> float:
-        """The objective's weighted terms, summed. Only forward passes, without gradients.
+        """The objective as one number. Only forward passes, without gradients.
 
         Raises:
             RuntimeError: there are no queries left.
@@ -65,11 +65,7 @@ class Oracle:
         samples = [self._dataset[index] for index in indexes]
         with torch.no_grad():
             views = {view: self._compositor.compose(patches, indexes, view) for view in samples[0].images}
-            return sum(
-                float(term.weight * term.value)
-                for member in members_of(self._model).values()
-                for term in self._objective.terms(member, views, samples, indexes).values()
-            )
+            return sum(map(float, counted(self._objective, self._model, views, samples, indexes)))
 
 
 def as_patches(textures: Textures) -> tuple[Patch, ...]:

@@ -10,9 +10,8 @@ import torch
 from torch import Tensor
 
 from gear.attacking.borrowed import frozen
-from gear.attacking.group import members_of
 from gear.attacking.masking import promised_and_kept
-from gear.attacking.objectives import Objective
+from gear.attacking.objectives import Objective, counted
 from gear.compositor.opening import open_compositor
 from gear.contracts.attacks import Patch
 from gear.contracts.models import Model
@@ -41,15 +40,11 @@ class Scenes:
         return float(np.mean(values))
 
     def value(self, model: Model, objective: Objective, patches: Sequence[Tensor], indexes: Sequence[int]) -> Tensor:
-        """The objective of some samples: its terms, weighted and summed."""
+        """The objective of some samples as one number."""
         samples = [self.samples[index] for index in indexes]
         views = {view: self.compositor.compose(patches, indexes, view) for view in samples[0].images}
-        terms = [
-            term.weight * term.value
-            for member in members_of(model).values()
-            for term in objective.terms(member, views, samples, indexes).values()
-        ]
-        return torch.stack(terms).sum() if terms else torch.zeros(())
+        numbers = counted(objective, model, views, samples, indexes)
+        return torch.stack(numbers).sum() if numbers else torch.zeros(())
 
     def masking(self, model: Model, objective: Objective, patches: Sequence[Patch]) -> tuple[float, float]:
         """What the gradient promises at the patches, and what is kept."""
