@@ -231,14 +231,29 @@ def unit_gradients(problem: Problem, objective: Objective, settings: Settings) -
 REGULARISERS = {"smoothness": smoothness, "printability": non_printability}
 
 
-def one_gradient(value: Callable[[Tensor, Seen], Mapping[str, Tensor]]) -> Ascend:
-    """The direction of attacks that add everything up: the gradient of the sum of named numbers, as it is."""
+def one_gradient(
+    value: Callable[[Tensor, Seen], Mapping[str, Tensor]],
+    penalties: Callable[[Tensor], Mapping[str, Tensor]] | None = None,
+) -> Ascend:
+    """The direction of attacks that add everything up: the gradient of the sum of named numbers, as it is.
+
+    Args:
+        value: of the textures and a batch; no number where nothing is left to be harmed.
+        penalties: numbers more, of the textures alone, whose gradient is none of the objective's: there is one even
+            where nobody sees the patch.
+    """
 
     def ascend(textures: Tensor, seen: Seen) -> tuple[Tensor, dict[str, float]]:
         parts = value(textures, seen)
-        gradient = gradient_to(torch.stack(list(parts.values())).sum(), textures)
-        figures = {name: float(part.detach()) for name, part in parts.items()}
-        return gradient, {**figures, "gradient": float(gradient.norm())}
+        others = {} if penalties is None else penalties(textures)
+        figures = {name: float(part.detach()) for name, part in {**parts, **others}.items()}
+        gradient = torch.zeros_like(textures)
+        if parts:
+            gradient = gradient_to(torch.stack(list(parts.values())).sum(), textures)
+            figures["gradient"] = float(gradient.norm())
+        if others:
+            gradient = gradient + gradient_to(torch.stack(list(others.values())).sum(), textures)
+        return gradient, figures
 
     return ascend
 

@@ -81,10 +81,10 @@ class Rp2:
         objective = self.objective(dataset[0])
         check_seen(self._config.attacked, dataset)
 
-        def value(textures: Tensor, seen: Seen) -> Mapping[str, Tensor]:
-            return self._value(problem.model, objective, textures, seen)
+        def harm(_: Tensor, seen: Seen) -> Mapping[str, Tensor]:
+            return self._harm(problem.model, objective, seen)
 
-        return climb(problem, one_gradient(value), budget=budget, rng=rng, watch=watch)
+        return climb(problem, one_gradient(harm, self._penalties), budget=budget, rng=rng, watch=watch)
 
     def objective(self, sample: Any) -> Objective:
         """To the target class, or untargeted."""
@@ -100,20 +100,25 @@ class Rp2:
             return SemsegObjective(attacked=LABEL_IDS.get(config.attacked), target=LABEL_IDS[config.target])
         return default_objective(sample)
 
-    def _value(self, model: Model, objective: Objective, textures: Tensor, seen: Seen) -> Mapping[str, Tensor]:
+    def _harm(self, model: Model, objective: Objective, seen: Seen) -> Mapping[str, Tensor]:
         import torch
 
         from gear.attacking.group import members_of
-        from gear.attacking.regularisers import non_printability, smoothness
 
-        config, pixels = self._config, textures[:, 0].numel()
         terms = [
             term.weight * term.value
             for member in members_of(model).values()
             for term in objective.terms(member, seen.views, seen.samples, seen.indexes).values()
         ]
+        return {"harm": torch.stack(terms).sum()} if terms else {}
+
+    def _penalties(self, textures: Tensor) -> Mapping[str, Tensor]:
+        import torch
+
+        from gear.attacking.regularisers import non_printability, smoothness
+
+        config, pixels = self._config, textures[:, 0].numel()
         return {
-            "harm": torch.stack(terms).sum() if terms else textures.sum() * 0,
             "norm": -config.norm_weight * (textures - config.base).norm(),
             "printability": -config.printability_weight
             * torch.stack([non_printability(t) for t in textures]).sum()

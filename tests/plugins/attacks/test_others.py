@@ -137,6 +137,22 @@ def test_thys_needs_a_detector() -> None:
         surest({"logits": torch.zeros(1, 2, 3, 3)})
 
 
+class Opaque(TinySegmenter):
+    """Passes no gradient."""
+
+    def forward(self, views: Any, targets: Any | None = None) -> Mapping[str, torch.Tensor]:
+        with torch.no_grad():
+            return super().forward(views, targets)
+
+
+def test_penalties_are_no_gradient_of_the_objective() -> None:
+    """They shape a patch that no model feels, too."""
+    dataset, attack = AttackContract().dataset(), rp2.build(Rp2Config(**SMALL))
+    model, compositor = Opaque(TinyConfig()), TinyCompositor(dataset)
+    with pytest.raises(GearError, match="no gradient reaches the patch"):
+        attack.optimise(model, dataset, compositor, budget=Budget(steps=20), rng=derive_rng(1, "opaque"))
+
+
 def test_places_are_inside_and_change_with_every_step() -> None:
     dataset = AttackContract().dataset(boards=2)
     scenes = Upright(dataset, seed=3, aspect=0.5, share=0.4, scales=(0.8, 1.2), shift=2.0)
