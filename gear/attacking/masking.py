@@ -22,7 +22,7 @@ def promised_and_kept(value: Callable[[Sequence[Tensor]], Tensor], patches: Sequ
         patches: where to look.
 
     Returns:
-        Twice the promised change over the step, and the measured difference between both ends.
+        The change between both ends of the step that the gradient promises, and the measured one.
     """
     asked = [patch.detach().clone().requires_grad_(True) for patch in patches]
     total = value(asked)
@@ -34,11 +34,12 @@ def promised_and_kept(value: Callable[[Sequence[Tensor]], Tensor], patches: Sequ
     if size == 0:
         return 0.0, 0.0
     steps = [STEP * g / size for g in inside]
-    promised = float(torch.stack([(g * s).sum() for g, s in zip(found, steps, strict=True)]).sum())
     with torch.no_grad():
-        ahead = value([(p + s / 2).clamp(0, 1) for p, s in zip(asked, steps, strict=True)])
-        behind = value([(p - s / 2).clamp(0, 1) for p, s in zip(asked, steps, strict=True)])
-    return promised, float(ahead - behind)
+        ahead = [(p + s / 2).clamp(0, 1) for p, s in zip(asked, steps, strict=True)]
+        behind = [(p - s / 2).clamp(0, 1) for p, s in zip(asked, steps, strict=True)]
+        # Of the way that is gone: where few values carry the gradient, their share of the step is long and cut off.
+        ways = [(g * (a - b)).sum() for g, a, b in zip(found, ahead, behind, strict=True)]
+        return float(torch.stack(ways).sum()), float(value(ahead) - value(behind))
 
 
 def _room(patch: Tensor, gradient: Tensor) -> Tensor:
