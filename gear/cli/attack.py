@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
     from gear.verbs.attack.verify import check_held_out, verify
 
     if args.verify is not None:
-        check_held_out(args.data, args.verify)
+        check_held_out(args.data, args.verify, args.val)
     elif args.town is not None or args.scenes is not None:
         raise GearError(
             "--town and --scenes are of the dataset that --verify names; add --verify DIR, or leave them out"

@@ -312,6 +312,20 @@ def test_checks_want_other_samples_than_patches_are_made_on(
         verify(tmp_path / "x", data, models=["tiny_segmenter"], town=TINY_TOWN, scenes=TINY_SCENES)
 
 
+def test_patches_are_not_checked_on_what_chose_them(
+    small: Small, install: Install, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The best of many on some samples does better there than elsewhere."""
+    val = small(split="val")
+    words = ["attack", "--model=tiny_segmenter", f"--data={small()}", f"--val={val}", f"--out={tmp_path / 'x'}"]
+    assert main([*words, f"--verify={val}", f"--town={TINY_TOWN}", f"--scenes={TINY_SCENES}"]) == 2
+    assert "no patch may be made on what --verify names; give it another split than --val" in capsys.readouterr().err
+    assert not (tmp_path / "x").exists()
+    attack(small(), model="tiny_segmenter", val=val, out=tmp_path / "x", steps=1, settings=SMALL)
+    with pytest.raises(DatasetError, match="was made on; verify it on other samples"):
+        verify(tmp_path / "x", val, models=["tiny_segmenter"], town=TINY_TOWN, scenes=TINY_SCENES)
+
+
 def test_the_same_scenes_are_no_others_however_they_are_rendered(
     small: Small, install: Install, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -15,8 +15,9 @@ from gear.verbs.gap.report import GapReport
 from gear.verbs.gap.run import gap
 
 
-def check_held_out(data: Sequence[str | Path], held: str | Path) -> None:
-    """Whether a dataset is there, has probes, fits the patches, and shows none of the scenes that they are made on.
+def check_held_out(data: Sequence[str | Path], held: str | Path, val: Sequence[str | Path] = ()) -> None:
+    """Whether a dataset is there, has probes, fits the patches, and shows none of the scenes that they are made on, or
+    chosen by.
 
     Raises:
         GearError: it is not.
@@ -24,14 +25,14 @@ def check_held_out(data: Sequence[str | Path], held: str | Path) -> None:
     wanted = open_dataset(*root_and_split(held))
     if not wanted.plan.auxiliary:
         raise DatasetError(wanted.root, "has no probes, which --verify needs; collect it with --probes")
-    for one in data:
+    for flag, one in [("--data", one) for one in data] + [("--val", one) for one in val]:
         try:
             made_on = open_dataset(*root_and_split(one))
         except DatasetError:
             continue  # a folder of datasets, say: the attack knows what is wrong
         check_joined([made_on, wanted])
         if scenes_of(made_on) == scenes_of(wanted):
-            raise GearError(f"{held}: no patch may be made on what --verify names; give it another split than --data")
+            raise GearError(f"{held}: no patch may be made on what --verify names; give it another split than {flag}")
 
 
 def verify(
@@ -54,7 +55,8 @@ def verify(
 
     Args:
         out: the patch folder.
-        data: root of a dataset of the scene with probes, or `DIR:SPLIT`; not one that the patches were made on.
+        data: root of a dataset of the scene with probes, or `DIR:SPLIT`; not one that the patches were made on, or
+            by which the best of them were chosen.
         models: names of model plugins.
         settings: `KEY=VALUE` texts for their options.
         defense: a defense plugin that they stand behind.
@@ -70,7 +72,8 @@ def verify(
         GearError: anything that the user can put right; its text is one line.
     """
     root, split = root_and_split(data)
-    made_on = {(one["scene"], one["seed"]) for one in load_json(Path(out) / "attack.json")["data"]}
+    notes = load_json(Path(out) / "attack.json")
+    made_on = {(one["scene"], one["seed"]) for one in [*notes["data"], *notes["validation"]]}
     dataset = open_dataset(root, split)
     plan = dataset.plan
     if scenes_of(dataset) in made_on:
