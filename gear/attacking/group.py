@@ -43,12 +43,19 @@ class Group(nn.Module):
 
 
 class Defended(nn.Module):
-    """A model that sees what a defense lets through, for attacks that know of the defense."""
+    """A model that sees what a defense lets through, for attacks that know of the defense.
 
-    def __init__(self, model: Model, defense: Defense) -> None:
+    Args:
+        model: as the defense wraps it.
+        defense: what cleans its pictures.
+        bare: the model that was wrapped, if the wrapping is another: its networks are attacked too.
+    """
+
+    def __init__(self, model: Model, defense: Defense, bare: Model | None = None) -> None:
         super().__init__()
         self.model, self.defense = model, defense
-        self.networks = _networks(*([] if isinstance(model, nn.Module) else [model]))
+        inside = [model] if bare is None or bare is model else [bare, model]
+        self.networks = _networks(*(one for one in inside if one is not model or not isinstance(one, nn.Module)))
 
     def predict(self, views: Mapping[str, UInt8Image]) -> Any:
         """The guarded model's own, without the defense: attacks optimise `forward`."""

@@ -6,10 +6,11 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from gear.attacking.group import Defended, Group
+from gear.contracts.defenses import Defense
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec, DefenseSpec, ModelSpec
 from gear.dataset.reading import Dataset
-from gear.plugins.build import build
+from gear.plugins.build import blamed, build
 from gear.plugins.catalogue import Found
 from gear.values.errors import GearError
 from gear.verbs.evaluate.choice import Chosen, check_defense, check_model, chosen_defense, chosen_model
@@ -87,6 +88,9 @@ def build_model(models: Sequence[Chosen], defense: Chosen | None) -> Model:
     for chosen in models:
         model: Model = build(chosen.found, chosen.options)
         if defense is not None:
-            model = Defended(model, build(defense.found, defense.options))
+            guard: Defense = build(defense.found, defense.options)
+            with blamed(defense.found, "wrap"):
+                wrapped = guard.wrap(model)
+            model = Defended(wrapped, guard, model)
         built[chosen.found.spec.name] = model
     return next(iter(built.values())) if len(built) == 1 else Group(built)
