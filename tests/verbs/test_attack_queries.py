@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+import torch
 
+from gear.contracts.attacks import Budget, Patch
+from gear.contracts.specs import AttackSpec
 from gear.testing.compare import difference
+from gear.testing.tiny_networks import tiny_segmenter
 from gear.values.errors import GearError
 from gear.verbs.attack.run import attack
 
@@ -20,6 +26,31 @@ Install = Callable[..., None]
 def test_too_few_queries_are_said(small: Small, install: Install, tmp_path: Path) -> None:
     with pytest.raises(GearError, match="1 queries are too few for one step"):
         attack(small(), model="tiny_segmenter", out=tmp_path, attack="nes", queries=1, settings=SMALL[:2])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Nothing:
+    """No options."""
+
+
+class Unwatched:
+    """Asks as often as it may, and pays `watch` no attention."""
+
+    def __init__(self, config: Nothing) -> None:
+        pass
+
+    def optimise(self, model: Any, dataset: Any, compositor: Any, *, budget: Budget, **rest: Any) -> Any:
+        grey = torch.full((3, 4, 8), 0.5)
+        for _ in range(budget.queries or 0):
+            with torch.no_grad():
+                model.forward({"left": compositor.compose([grey], [0], "left")})
+        return (Patch(name="patch_0", rgb=np.full((4, 8, 3), 0.5, np.float32)),)
+
+
+def test_who_counts_queries_need_not_be_watched(small: Small, install: Install, tmp_path: Path) -> None:
+    spec = AttackSpec(name="unwatched", summary="x.", config=Nothing, build=Unwatched, needs_gradients=False)
+    install(tiny_segmenter, spec)
+    assert attack(small(), model="tiny_segmenter", out=tmp_path, attack="unwatched", queries=3).made
 
 
 def test_queries_that_end_between_two_looks_are_judged_too(small: Small, install: Install, tmp_path: Path) -> None:

@@ -40,6 +40,7 @@ class Recorder:
         curves: values by figure, one a step.
         judged: (step, harm) of every validation.
         best: the patches that did most harm there.
+        is_asked: whether the attack pays it attention.
         stopped: why the attack ended before its budget.
         seconds: spent so far, over all runs.
     """
@@ -55,6 +56,7 @@ class Recorder:
     curves: dict[str, list[float]] = field(default_factory=dict)
     judged: list[tuple[int, float]] = field(default_factory=list)
     best: tuple[Patch, ...] | None = None
+    is_asked: bool = False
     stopped: str = ""
     seconds: float = 0.0
 
@@ -68,6 +70,7 @@ class Recorder:
         Raises:
             DatasetError: the checkpoint cannot be read or is of another attack.
         """
+        self.is_asked = True
         path = self.root / CHECKPOINT
         if not path.exists():
             return None
