@@ -112,22 +112,42 @@ class SemsegObjective:
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> Mapping[str, Term]:
         """`correct` and `wrong`, or `target`."""
-        view = next(iter(views))
-        logits = _said(model, views, "logits")
-        labels = train_labels(samples, logits.shape[1]).to(logits.device)
-        counts = outside(samples, view, logits.device) & (labels != IGNORED_TRAIN_ID)
+        logits, labels, counts = self._answers(model, views, samples)
         if self.target is not None:
             return self._targeted(logits, labels, counts)
         loss = functional.cross_entropy(logits, labels, ignore_index=IGNORED_TRAIN_ID, reduction="none")
-        # The largest value is found much faster than where it is.
-        given = logits.detach().gather(1, labels.clamp(max=logits.shape[1] - 1)[:, None])[:, 0]
-        right = counts & (given == logits.detach().amax(1))
+        right = counts & _is_right(logits.detach(), labels)
         wrong = counts & ~right
         if self.gamma == "dynamic":
             gamma = float(right.sum() / counts.sum().clamp_min(1))
         else:
             gamma = self.gamma
         return _split(loss, {"correct": (right, gamma), "wrong": (wrong, 1 - gamma)})
+
+    def harm(self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]) -> Tensor:
+        """With a fixed `gamma` as the terms, but of the pixels that are right and wrong without the patch.
+
+        Those that the patch makes wrong change sides, and what is right still is what is harmed least: of it alone, the
+        figure would fall as the attack succeeds, to 0 where nothing is right any more.
+        """
+        if self.target is not None or self.gamma == "dynamic":
+            terms = self.terms(model, views, samples, indexes).values()
+            return torch.stack([term.weight * term.value for term in terms]).sum() if terms else torch.zeros(())
+        logits, labels, counts = self._answers(model, views, samples)
+        view = next(iter(views))
+        with torch.no_grad():
+            clean = _said(model, {view: torch.cat([_as_batch(sample.images[view]) for sample in samples])}, "logits")
+            right = counts & _is_right(clean.to(logits.device), labels)
+        loss = functional.cross_entropy(logits, labels, ignore_index=IGNORED_TRAIN_ID, reduction="none")
+        return self.gamma * _mean(loss, right) + (1 - self.gamma) * _mean(loss, counts & ~right)
+
+    def _answers(
+        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any]
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """Logits, the labels that they should show, and which pixels count."""
+        logits = _said(model, views, "logits")
+        labels = train_labels(samples, logits.shape[1]).to(logits.device)
+        return logits, labels, outside(samples, next(iter(views)), logits.device) & (labels != IGNORED_TRAIN_ID)
 
     def _targeted(self, logits: Tensor, labels: Tensor, counts: Tensor) -> Mapping[str, Term]:
         assert self.target is not None
@@ -266,6 +286,13 @@ def train_labels(samples: Sequence[Any], classes: int) -> Tensor:
 def class_of(label_id: int, classes: int) -> int:
     """The channel of a label id."""
     return int(TRAIN_IDS[label_id]) if classes == TRAIN_CLASSES else label_id
+
+
+def _is_right(logits: Tensor, labels: Tensor) -> Tensor:
+    """(B, H, W) bool: where the surest class is the label; anything where that is ignored."""
+    # The largest value is found much faster than where it is.
+    given = logits.gather(1, labels.clamp(max=logits.shape[1] - 1)[:, None])[:, 0]
+    return given == logits.amax(1)
 
 
 def _said(model: Model, views: Mapping[str, Tensor], name: str) -> Tensor:
