@@ -483,6 +483,20 @@ def test_a_control_takes_no_steps(small: Small, install: Install, tmp_path: Path
     assert report.summary().splitlines() == [f"{tmp_path}: 1 patch after 0 steps"]
 
 
+def test_a_control_is_like_what_is_there_now(small: Small, install: Install, tmp_path: Path) -> None:
+    def made(name: str, *settings: str, **facts: Any) -> Any:
+        out = tmp_path / name
+        return attack(small(), model="tiny_segmenter", out=out, attack="control", settings=settings, **facts)
+
+    made("like", "kind=solid", "rgb=[0.1,0.2,0.3]", *SMALL[:2])
+    matched = ("kind=matched", f"like={tmp_path / 'like'}")
+    made("control", *matched)
+    assert not made("control", *matched).made
+    made("like", "kind=solid", "rgb=[0.9,0.9,0.9]", *SMALL[:2], force=True)
+    with pytest.raises(DatasetError, match="made otherwise"):
+        made("control", *matched)
+
+
 @pytest.mark.parametrize("setting", ["goal=vanish", "direction=farther", "losses.cross_entropy=-"])
 def test_options_of_other_tasks_are_refused(small: Small, install: Install, tmp_path: Path, setting: str) -> None:
     with pytest.raises(GearError, match=f"option {setting.partition('=')[0].partition('.')[0]} of the attack is for"):

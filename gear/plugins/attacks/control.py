@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -53,6 +54,16 @@ class Control:
 
     def __init__(self, config: ControlConfig) -> None:
         self._config = config
+
+    def read_sha256(self) -> str | None:
+        """Of the exact patches of `like`, if there are any to read.
+
+        Raises:
+            GearError: there are none.
+        """
+        if not self._config.like:
+            return None
+        return hashlib.sha256(b"".join(patch.tobytes() for patch in read_exact(Path(self._config.like)))).hexdigest()
 
     def optimise(
         self,

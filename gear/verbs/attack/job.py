@@ -68,14 +68,16 @@ class Job:
     patience: int
     seed: int
 
-    def plan(self, weights_sha256: str | None) -> Json:
+    def plan(self, weights_sha256: str | None, product: Any) -> Json:
         """What decides the patches: who gives the same finds them made. Weights are those of the built network."""
+        read = product.read_sha256() if hasattr(product, "read_sha256") else None
         return {
             "attack": {
                 "name": self.spec.name,
                 "package": self.found.owner.package,
                 "version": self.found.owner.version,
                 "options": to_plain(self.config),
+                **({} if read is None else {"read_sha256": read}),
             },
             "models": [one.facts() for one in self.models],
             "weights_sha256": weights_sha256,

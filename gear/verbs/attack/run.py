@@ -127,7 +127,7 @@ def attack(
     )
     _note_sizes(job, noted)
     product, network, root = build(job.found, job.options), build_model(job.models, job.defense), Path(out)
-    plan = job.plan(weights_digest(network))
+    plan = job.plan(weights_digest(network), product)
     there = begin(root, plan, force=force)
     if there is not None:
         return AttackReport(out=root, patches=read_patches(root), facts=there, made=False)
