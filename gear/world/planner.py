@@ -87,7 +87,7 @@ class ScenePlanner:
         if not self._leads.faces:
             return None
         ego = next(iter(cast.poses.values()))
-        _, camera = reference_camera(self._rig, ego)
+        _, camera = reference_camera(self._rig, RigidTransform("world", "ego", ego.matrix))
         grids_m = tuple(face.grid_m for face in self._leads.faces_in_world(cast))
         return HidingTest(camera.world_from_camera_transform.translation_m, grids_m, self._leads.limits.min_free)
 

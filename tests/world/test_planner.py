@@ -166,6 +166,15 @@ def test_the_reference_camera_has_every_face_in_view(scene: str) -> None:
             assert hits >= 0.3 * 49, record.index
 
 
+@pytest.mark.parametrize("scene", ["board", "truck"])
+def test_a_rig_that_follows_the_road_has_every_face_in_view(scene: str) -> None:
+    follows = dataclasses.replace(SMALL_RIG, follows_road=True)
+    for index in range(4):
+        record = ScenePlanner(tiny_world(scene), follows, STILL, split_name="test").plan(index)
+        assert record.cameras == follows.place(record.ego.world_from_actor.transform("world", "ego"))
+        assert record.actors == planner(scene).plan(index).actors, "the road is level where the boards and trucks are"
+
+
 def test_the_ego_car_keeps_its_limits() -> None:
     places = np.array([record.ego.world_from_actor.position_m for record in records("board", 30)])
     facing = math.radians(175)
