@@ -20,6 +20,8 @@ from gear.world.wet import Worn, wet_materials
 _CLASSIC_WHITE = 1.1
 _CLASSIC_SKY_SHARE = (0.48, 0.95)
 _CLASSIC_TINT = 0.2
+_CLASSIC_LEAST_SUN = 1e-3
+"""More than nothing, since what Filament multiplies is divided by it."""
 
 
 def _read_presets() -> dict[str, Weather]:
@@ -57,7 +59,7 @@ def apply_weather(
     lighting = lighting or lighting_of(weather)
     _remove_old_light(root)
     _add_sky(root, lighting)
-    _add_sun(root, lighting)
+    _add_sun(root, lighting, weather.night)
     amount = wetness(weather)
     if amount > 0:
         wet_materials(root, amount, worn)
@@ -102,16 +104,17 @@ def _add_cube(root: mjcf.RootElement, name: str, kind: str, faces: UInt8Image) -
     )
 
 
-def _add_sun(root: mjcf.RootElement, lighting: Lighting) -> None:
+def _add_sun(root: mjcf.RootElement, lighting: Lighting, night: float) -> None:
     """The sun for both renderers, and for OpenGL the sky's ambient light as well.
 
     Filament multiplies `intensity` and `diffuse`; OpenGL knows `diffuse` alone. It shows light as it is added up,
     without a tone curve, so its shares of sun and sky are those of display values. Its ambient light hangs on the
-    headlight because shadows would swallow that of the sun.
+    headlight because shadows would swallow that of the sun. At night it has no sun, as Filament has none: the night is
+    laid over frames of even light, and white that has more than that clips.
     """
     sunlit = lighting.ambient + lighting.sun
     sky_share = float(np.clip((_display(lighting.ambient) / _display(sunlit)).mean(), *_CLASSIC_SKY_SHARE))
-    strength = _CLASSIC_WHITE - sky_share
+    strength = max((_CLASSIC_WHITE - sky_share) * (1 - night), _CLASSIC_LEAST_SUN)
     root.worldbody.add(
         "light",
         name="sun",
@@ -120,7 +123,7 @@ def _add_sun(root: mjcf.RootElement, lighting: Lighting) -> None:
         pos=tuple(200 * lighting.towards_sun),
         diffuse=tuple(strength * lighting.sun / lighting.sun.max()),
         ambient=(0, 0, 0),
-        specular=(0.1, 0.1, 0.1),
+        specular=(0.1 * (1 - night),) * 3,
         intensity=float(lighting.sun.max() * FILAMENT_LUX / strength),
         castshadow=True,
     )

@@ -15,7 +15,15 @@ from gear.render import RENDERERS, open_renderer
 from gear.values.geometry import Intrinsics, RigidTransform
 from gear.values.scene import CameraRecord, Pose, Weather
 from gear.world.air import RAIN_PER_M, air_of, darkroom_of, fogs_of
-from gear.world.light import FACE_ORDER, WHITE_ALBEDO, face_directions, horizon_light, lighting_of, mirrored_light
+from gear.world.light import (
+    FACE_ORDER,
+    FILAMENT_LUX,
+    WHITE_ALBEDO,
+    face_directions,
+    horizon_light,
+    lighting_of,
+    mirrored_light,
+)
 from gear.world.quiet_mjcf import mjcf
 from gear.world.sky import Sky
 from gear.world.weather import PRESETS, apply_weather, wetness
@@ -204,6 +212,17 @@ def test_white_walls_do_not_clip_and_shadows_keep_their_levels(name: str) -> Non
     assert WHITE_ALBEDO * light.ambient.min() * 255 > 10
     ring = horizon_light(PRESETS[name])
     assert (ring > 0.1).all() and (ring <= 1).all()
+
+
+@pytest.mark.parametrize("name", [name for name, weather in PRESETS.items() if weather.night == 1])
+def test_at_night_classic_has_no_sun_in_which_white_would_clip(name: str) -> None:
+    model = world(PRESETS[name])
+    sun = model.light("sun")
+    assert (model.vis.headlight.ambient + sun.diffuse <= 1).all()
+    assert sun.diffuse.max() * 1020 < 2 and sun.specular.max() == 0, "nothing casts a shadow"
+    lighting = lighting_of(PRESETS[name], sky_face_px=16)
+    shown = sun.diffuse * model.light_intensity[sun.id]
+    assert shown == pytest.approx(lighting.sun * FILAMENT_LUX, rel=1e-4), "Filament's is the weather's"
 
 
 def test_a_weather_replaces_the_light_of_its_town() -> None:
