@@ -13,7 +13,7 @@ from gear.values.errors import TownError
 from gear.values.frames import UInt8Image
 from gear.values.geometry import RigidTransform
 from gear.values.scene import Pose, SurfaceRecord
-from gear.world.faces import SurfaceAlbedo, face_from_patch, uniform_face
+from gear.world.faces import SurfaceAlbedo, face_from_patch, srgb_from_linear, uniform_face
 from gear.world.instances import FaceName
 from gear.world.shapes import geom_triangles
 from gear.world.upright import what_is_wrong
@@ -121,7 +121,8 @@ def _neutral(model: mujoco.MjModel, material: str) -> UInt8Image:
     textures = [int(model.mat_texid[material_id, role]) for role in roles]
     texture = max(textures)
     if texture < 0:
-        byte = np.floor(np.clip(model.mat_rgba[material_id, :3], 0, 1) * 255 + 0.5).astype(np.uint8)
+        # A material's colour is linear albedo, and a face's bytes are sRGB.
+        byte = np.floor(srgb_from_linear(model.mat_rgba[material_id, :3]) * 255 + 0.5).astype(np.uint8)
         return face_from_patch(byte[None, None, :])
     height, width, channels = (
         int(model.tex_height[texture]), int(model.tex_width[texture]), int(model.tex_nchannel[texture])

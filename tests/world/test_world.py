@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import shutil
 from pathlib import Path
 
 import cv2
@@ -251,6 +252,21 @@ def test_faces_show_what_they_are_told() -> None:
     assert (plain.stage.faces[second.geom_id] == 0).all()
     with pytest.raises(ValueError, match="no surface named surface_2"):
         world.place(record(world), {"surface_2": "white"})
+
+
+def test_a_face_without_a_texture_shows_the_albedo_of_its_material(tmp_path: Path) -> None:
+    (tmp_path / "towns").mkdir()
+    town = shutil.copy(TINY_TOWN, tmp_path / "towns")
+    for kind in ("vehicles", "pedestrians"):
+        (tmp_path / kind).symlink_to(TINY_TOWN.parents[1] / kind)
+    (tmp_path / "surfaces").mkdir()
+    board = (TINY_TOWN.parents[1] / "surfaces" / "billboard.xml").read_text()
+    old = '<material name="face" texture="face"'
+    assert old in board
+    (tmp_path / "surfaces" / "billboard.xml").write_text(board.replace(old, '<material name="face" rgba="0.5 0.2 0 1"'))
+    world = World.build(town=town, scene_name="board", scene=tiny_scenes().scenes["board"], weather=CLEAR)
+    (face,) = world.faces
+    assert face.neutral[0, 0] == pytest.approx([188, 124, 0], abs=1), "linear albedo, as all colours of materials are"
 
 
 def test_a_surface_is_where_its_face_is() -> None:
