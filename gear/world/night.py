@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from gear.camera.beams import Headlamps
 from gear.camera.night import Night
+from gear.values.errors import TownError
 from gear.values.labels import LABEL_BY_NAME
 from gear.values.rng import derive_rng
 from gear.values.scene import Weather
@@ -31,6 +32,9 @@ def night_of(world: World, weather: Weather, renderer_name: str) -> Night | None
         world: compiled; its meshes must still be there.
         weather: light and air.
         renderer_name: who renders.
+
+    Raises:
+        TownError: the glass of a lamp has no surface that could shine.
     """
     if not weather.night:
         return None
@@ -39,12 +43,17 @@ def night_of(world: World, weather: Weather, renderer_name: str) -> Night | None
     mujoco.mj_kinematics(model, data)
     material = materials_of(model)
     level = LEVEL**weather.night
+    try:
+        lamps = find_lamps(model, data)
+    except ValueError as error:
+        problem = f"{error}; make the glass of lamps of meshes, boxes, cylinders, capsules or ellipsoids"
+        raise TownError(world.library.town, problem) from error
     return Night(
         level=level,
         sky_level=SKY_LEVEL**weather.night,
         lit=1 - level,
         even=even_light(weather),
-        lamps=find_lamps(model, data),
+        lamps=lamps,
         windows=find_windows(model, data, derive_rng(0, "windows", world.town_name)),
         vehicles={
             name: Headlamps(

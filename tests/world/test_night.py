@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from functools import cache
+from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 
-from gear.testing.tiny_town import CLEAR, tiny_world
+from gear.testing.tiny_town import CLEAR, TINY_TOWN, tiny_scenes, tiny_world
+from gear.values.errors import TownError
 from gear.values.labels import LABEL_BY_NAME
 from gear.values.resources import data_dir
 from gear.values.rng import derive_rng
@@ -17,6 +19,7 @@ from gear.values.scene import Weather
 from gear.world.lamps import GLAZINGS, find_lamps, find_windows
 from gear.world.light import even_light, lighting_of
 from gear.world.night import materials_of, night_of, panes_of_buses
+from gear.world.world import World
 
 NIGHT = Weather(name="night", sun_altitude_deg=-90)
 
@@ -100,6 +103,19 @@ def test_lamp_glass_of_other_towns_is_a_material_of_that_name() -> None:
     np.testing.assert_allclose(found["street"].position_m, [[4.15, 5.15, 6.0]], atol=0.05)
     np.testing.assert_allclose(found["street"].axis, [[0, 0, -1]], atol=1e-6)
     np.testing.assert_allclose(found["globe"].position_m, [[-4, 5, 3]], atol=0.01)
+
+
+def test_lamp_glass_without_a_surface_is_one_line(tmp_path: Path) -> None:
+    glass = '<geom name="pane" class="pole" material="lamp_glass" type="plane" size="0.2 0.2 1" pos="0 -6 4"/>'
+    text = TINY_TOWN.read_text().replace("</asset>", '<material name="lamp_glass"/></asset>')
+    town = tmp_path / "towns" / "odd.xml"
+    town.parent.mkdir()
+    town.write_text(text.replace('<geom name="hedge"', f'{glass}<geom name="hedge"'))
+    for kind in ("vehicles", "pedestrians", "surfaces"):
+        (tmp_path / kind).symlink_to(TINY_TOWN.parents[1] / kind)
+    world = World.build(town=town, scene_name="board", scene=tiny_scenes().scenes["board"], weather=NIGHT)
+    with pytest.raises(TownError, match=r"odd\.xml: geom 'pane' is a plane.*; make the glass of lamps of meshes"):
+        night_of(world, NIGHT, "classic")
 
 
 def test_there_is_a_night_only_without_the_sun() -> None:
