@@ -14,6 +14,9 @@ from gear.values.errors import TownError
 from gear.values.geometry import Array
 from gear.world.polyline import Polyline
 
+_KINDS = ("lane", "sidewalk", "crosswalk", "parking", "town")
+"""How the names of custom fields begin that are read."""
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Lane:
@@ -124,6 +127,8 @@ class LaneGraph:
         texts = _texts(model)
         for name, numbers in _numerics(model).items():
             kind = name.partition(".")[0]
+            if kind in _KINDS and not np.isfinite(numbers).all():
+                raise TownError(path, f"{name} holds something that is no number (nan or inf)")
             if kind == "lane":
                 lanes[name] = _lane(name, numbers, texts.get(name, ""), path)
             elif kind in ("sidewalk", "crosswalk"):

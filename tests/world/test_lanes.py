@@ -49,6 +49,8 @@ def test_the_tiny_town_reads() -> None:
         ('<numeric name="lane.a" data="3 10  0 0 0  9 0"/>', "lane.a needs at least two points of three numbers"),
         ('<numeric name="lane.a" data="3 0  0 0 0  9 0 0"/>', "lane.a must have a width and a speed above 0"),
         ('<numeric name="lane.a" data="3 10  0 0 0  0 0 1"/>', "lane.a has two points in one place"),
+        ('<numeric name="lane.a" data="3 10  0 nan 0  9 0 0"/>', "lane.a holds something that is no number"),
+        (GOOD + '<numeric name="sidewalk.a" data="3  0 0 0  inf 0 0"/>', "sidewalk.a holds something that is no"),
         (GOOD + '<text name="lane.a" data="next=lane.b"/>', "lane.a: next names lane.b, which is not there"),
         (GOOD + '<text name="lane.a" data="next lane.b"/>', "lane.a: cannot read 'next'"),
         (GOOD + '<text name="lane.a" data="kind=bend"/>', "lane.a: kind must be junction"),
