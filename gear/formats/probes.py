@@ -43,7 +43,7 @@ class Probe:
         view: name of the camera.
         left_px, top_px: index pixel of the crop's first pixel.
         black: (h, w, 3) uint16, linear light 0..`LINEAR_FULL_SCALE`, every surface black.
-        white: (h, w, 3) uint16, the same with this surface white; beyond full scale where that is too bright for a frame.
+        white: (h, w, 3) uint16, the same with this surface white; beyond full scale where a frame would end.
         response: what makes pictures of such frames; the pictures of the sample were made with it.
     """
 
