@@ -72,32 +72,37 @@ class Thys:
         problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=self._config)
         objective = self.objective(dataset[0])
 
-        def value(textures: Tensor, seen: Seen) -> Mapping[str, Tensor]:
-            return self._value(problem.model, objective, textures, seen)
+        def harm(_: Tensor, seen: Seen) -> Mapping[str, Tensor]:
+            return self._harm(problem.model, objective, seen)
 
-        return climb(problem, one_gradient(value), budget=budget, rng=rng, watch=watch)
+        return climb(problem, one_gradient(harm, self._penalties), budget=budget, rng=rng, watch=watch)
 
     def objective(self, sample: Any) -> Objective:
         """The surest detection, to be made less sure."""
         return SurestObjective()
 
-    def _value(self, model: Model, objective: Objective, textures: Tensor, seen: Seen) -> Mapping[str, Tensor]:
+    def _harm(self, model: Model, objective: Objective, seen: Seen) -> Mapping[str, Tensor]:
         import torch
 
         from gear.attacking.group import members_of
-        from gear.attacking.regularisers import non_printability
 
-        config, pixels = self._config, textures[:, 0].numel()
         harm = [
             term.value
             for member in members_of(model).values()
             for term in objective.terms(member, seen.views, seen.samples, seen.indexes).values()
         ]
+        return {"objectness": torch.stack(harm).sum()}
+
+    def _penalties(self, textures: Tensor) -> Mapping[str, Tensor]:
+        import torch
+
+        from gear.attacking.regularisers import non_printability
+
+        config, pixels = self._config, textures[:, 0].numel()
         down = (textures[:, :, 1:] - textures[:, :, :-1]).abs().sum()
         right = (textures[:, :, :, 1:] - textures[:, :, :, :-1]).abs().sum()
         variation = config.variation_weight * (down + right) / textures.numel()
         return {
-            "objectness": torch.stack(harm).sum(),
             "printability": -config.printability_weight
             * torch.stack([non_printability(t) for t in textures]).sum()
             / pixels,

@@ -99,7 +99,15 @@ class TestSolid(AttackContract):
 
 
 class Detector(TinySegmenter):
-    """A tiny network whose outputs are named as a detector's."""
+    """A tiny network whose outputs are named as a detector's; every score feels one class in the whole picture."""
+
+    def outputs(self, raw: torch.Tensor) -> Mapping[str, torch.Tensor]:
+        everywhere = raw[:, 1:2].mean(dim=(2, 3), keepdim=True)
+        return {"cls_logits": (0.05 * raw + everywhere).flatten(2).permute(0, 2, 1)}
+
+
+class Shortsighted(TinySegmenter):
+    """One whose surest score lies far from the patch."""
 
     def outputs(self, raw: torch.Tensor) -> Mapping[str, torch.Tensor]:
         return {"cls_logits": raw.flatten(2).permute(0, 2, 1)}
@@ -120,7 +128,14 @@ def test_thys_hides_what_was_surest() -> None:
         return attack.optimise(model, dataset, compositor, budget=Budget(steps=steps), rng=derive_rng(1, "thys"))
 
     grey = [Patch(name="patch_0", rgb=np.full((4, 8, 3), 0.5, np.float32))]
-    assert sure(run(40)) <= min(sure(run(1)), sure(grey)) + 1e-6
+    assert sure(run(40)) < min(sure(run(1)), sure(grey)) - 1e-3
+
+
+def test_thys_says_when_the_surest_detection_does_not_feel_the_patch() -> None:
+    dataset, attack = AttackContract().dataset(), thys.build(ThysConfig(**SMALL))
+    model, compositor = Shortsighted(TinyConfig()), TinyCompositor(dataset)
+    with pytest.raises(GearError, match="no gradient reaches the patch"):
+        attack.optimise(model, dataset, compositor, budget=Budget(steps=20), rng=derive_rng(1, "thys"))
 
 
 def test_thys_is_judged_by_what_it_lowers() -> None:
