@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
+import torch
 from torch import Tensor, nn
 
 from gear.attacking.borrowed import networks_of
@@ -68,6 +70,45 @@ class Defended(nn.Module):
     def taps(self) -> Mapping[str, nn.Module]:
         """The model's."""
         return self.model.taps()
+
+
+class Cleaned(Defended):
+    """A model that sees what a defense without gradients lets through, for attacks that need none.
+
+    Pictures go through the defense as bytes, one sample at a time, and no gradient comes back.
+
+    Args:
+        model, defense, bare: as of `Defended`.
+        clean: what the defense makes of a sample's pictures.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        defense: Defense,
+        bare: Model,
+        clean: Callable[[Mapping[str, UInt8Image]], Mapping[str, UInt8Image]],
+    ) -> None:
+        super().__init__(model, defense, bare)
+        self._clean = clean
+
+    def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
+        """The model's, of the cleaned pictures."""
+        with torch.no_grad():
+            given = {name: _as_bytes(batch) for name, batch in views.items()}
+            count = len(next(iter(given.values())))
+            cleaned = [self._clean({name: batch[i] for name, batch in given.items()}) for i in range(count)]
+            seen = {}
+            for name, batch in views.items():
+                pictures = torch.from_numpy(np.stack([one[name] for one in cleaned])).permute(0, 3, 1, 2)
+                seen[name] = pictures.to(batch.device, batch.dtype) / 255
+            return self.model.forward(seen, targets)
+
+
+def _as_bytes(batch: Tensor) -> UInt8Image:
+    """(B, 3, H, W) 0..1 to (B, H, W, 3)."""
+    levels = (batch.clamp(0, 1) * 255).round().to(torch.uint8)
+    return levels.permute(0, 2, 3, 1).contiguous().cpu().numpy()
 
 
 def _networks(*models: Model) -> nn.ModuleList:

@@ -12,7 +12,8 @@ import pytest
 import torch
 
 from gear.contracts.attacks import Budget, Patch
-from gear.contracts.specs import AttackSpec
+from gear.contracts.specs import AttackSpec, DefenseSpec
+from gear.plugins.defenses.per_picture import PerPicture
 from gear.testing.compare import difference
 from gear.testing.tiny_networks import tiny_segmenter
 from gear.values.errors import GearError
@@ -97,3 +98,31 @@ def test_a_killed_search_pays_no_query_twice(
     resumed = attack(small("depth"), out=tmp_path / "cut", **facts)
     assert resumed.facts["curves"] == whole.facts["curves"]
     assert not difference(resumed.patches, whole.patches, "patches")
+
+
+class Hard(PerPicture):
+    """A defense without gradients: what is bright turns black."""
+
+    def __init__(self, config: Nothing) -> None:
+        pass
+
+    def clean(self, picture: Any) -> Any:
+        return np.where(picture > 140, 0, picture).astype(np.uint8), None
+
+    def clean_tensor(self, pictures: torch.Tensor) -> torch.Tensor:
+        raise ValueError("has no gradient")
+
+
+def test_a_defense_without_gradients_is_looked_through_by_what_needs_none(
+    small: Small, install: Install, tmp_path: Path
+) -> None:
+    hard = DefenseSpec(name="hard", summary="Blackens.", config=Nothing, build=Hard, gradient="none")
+    install(tiny_segmenter, hard)
+    facts: dict[str, Any] = {"model": "tiny_segmenter", "attack": "square", "queries": 12, "settings": SMALL[:2]}
+    plain = attack(small(), out=tmp_path / "plain", **facts)
+    aware = attack(small(), out=tmp_path / "aware", defense="hard", **facts)
+    assert aware.facts["defense"]["name"] == "hard" and aware.facts["queries"] == plain.facts["queries"]
+    assert aware.facts["masking"] is None, "there is no gradient to promise anything"
+    assert not np.array_equal(plain.patches[0].rgb, aware.patches[0].rgb)
+    with pytest.raises(GearError, match=r"'hard' declares no gradient.*--attack square"):
+        attack(small(), model="tiny_segmenter", out=tmp_path / "white", steps=2, settings=SMALL[:2], defense="hard")

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from gear.attacking.group import Defended, Group
+from gear.attacking.group import Cleaned, Defended, Group
 from gear.contracts.defenses import Defense
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec, DefenseSpec, ModelSpec
@@ -13,6 +13,9 @@ from gear.dataset.reading import Dataset
 from gear.plugins.build import blamed, build
 from gear.plugins.catalogue import Found
 from gear.values.errors import GearError
+from gear.values.frames import UInt8Image
+from gear.values.rng import derive_rng
+from gear.verbs.defend import Guard
 from gear.verbs.evaluate.choice import Chosen, check_defense, check_model, chosen_defense, chosen_model
 
 FLAG = "--model-set "
@@ -36,11 +39,13 @@ def choose_models(names: Sequence[str], settings: Iterable[str], datasets: Seque
     return chosen
 
 
-def choose_defense(name: str | None, settings: Iterable[str], models: Sequence[Chosen], task: str) -> Chosen | None:
+def choose_defense(
+    name: str | None, settings: Iterable[str], models: Sequence[Chosen], task: str, *, needs_gradients: bool
+) -> Chosen | None:
     """The defense that the attack knows of.
 
     Raises:
-        GearError: it does not fit, must learn first, or lets no gradient pass.
+        GearError: it does not fit, must learn first, or lets no gradient pass to an attack that needs one.
     """
     chosen = chosen_defense(name, settings)
     if chosen is None:
@@ -49,8 +54,11 @@ def choose_defense(name: str | None, settings: Iterable[str], models: Sequence[C
         check_defense(chosen, model, task, is_calibrated=False)
     spec = chosen.found.spec
     assert isinstance(spec, DefenseSpec)
-    if spec.gradient == "none":
-        raise GearError(f"defense {spec.name!r} declares no gradient, so an attack cannot look through it")
+    if spec.gradient == "none" and needs_gradients:
+        raise GearError(
+            f"defense {spec.name!r} declares no gradient, so an attack that needs one cannot look through it; attacks "
+            "that count queries can (--attack square --queries N)"
+        )
     return chosen
 
 
@@ -91,6 +99,19 @@ def build_model(models: Sequence[Chosen], defense: Chosen | None) -> Model:
             guard: Defense = build(defense.found, defense.options)
             with blamed(defense.found, "wrap"):
                 wrapped = guard.wrap(model)
-            model = Defended(wrapped, guard, model)
+            spec = defense.found.spec
+            assert isinstance(spec, DefenseSpec)
+            if spec.gradient == "none":
+                model = Cleaned(wrapped, guard, model, _cleaning(defense.found, spec, guard, model))
+            else:
+                model = Defended(wrapped, guard, model)
         built[chosen.found.spec.name] = model
     return next(iter(built.values())) if len(built) == 1 else Group(built)
+
+
+def _cleaning(
+    found: Found, spec: DefenseSpec[Any], product: Defense, model: Model
+) -> Callable[[Mapping[str, UInt8Image]], Mapping[str, UInt8Image]]:
+    """What a defense makes of a sample's pictures; what it draws, it draws alike each time it is asked."""
+    guard = Guard(found, product, model if spec.needs_model or spec.taps else None)
+    return lambda views: guard.apply(views, derive_rng(0, "attack", spec.name), 0).views
