@@ -350,6 +350,11 @@ def test_checks_want_other_samples_than_patches_are_made_on(
     assert "no patch may be made on what --verify names" in capsys.readouterr().err
     assert main([*words, f"--verify={tmp_path / 'nowhere'}"]) == 2
     assert main([*words, f"--town={TINY_TOWN}"]) == 2
+    (tmp_path / "several").mkdir()
+    (tmp_path / "several/one").symlink_to(data)
+    words[2] = f"--data={tmp_path / 'several'}"
+    assert main([*words, f"--verify={data}"]) == 2, "a folder of datasets is looked into"
+    assert "give it another split than --data" in capsys.readouterr().err
     assert not (tmp_path / "x").exists(), "all of it is said before anything is made"
     attack(data, model="tiny_segmenter", out=tmp_path / "x", steps=1, settings=SMALL)
     with pytest.raises(DatasetError, match="was made on; verify it on other samples"):

@@ -11,8 +11,10 @@ from gear.opening import open_dataset, root_and_split
 from gear.values.errors import DatasetError, GearError
 from gear.verbs.attack.data import check_joined
 from gear.verbs.attack.folder import VERIFY
+from gear.verbs.attack.job import TRAINING, VALIDATION
 from gear.verbs.gap.report import GapReport
 from gear.verbs.gap.run import gap
+from gear.verbs.train.data import open_all
 
 
 def check_held_out(data: Sequence[str | Path], held: str | Path, val: Sequence[str | Path] = ()) -> None:
@@ -25,14 +27,16 @@ def check_held_out(data: Sequence[str | Path], held: str | Path, val: Sequence[s
     wanted = open_dataset(*root_and_split(held))
     if not wanted.plan.auxiliary:
         raise DatasetError(wanted.root, "has no probes, which --verify needs; collect it with --probes")
-    for flag, one in [("--data", one) for one in data] + [("--val", one) for one in val]:
+    for flag, paths, names in (("--data", data, TRAINING), ("--val", val, VALIDATION)):
         try:
-            made_on = open_dataset(*root_and_split(one))
-        except DatasetError:
-            continue  # a folder of datasets, say: the attack knows what is wrong
-        check_joined([made_on, wanted])
-        if scenes_of(made_on) == scenes_of(wanted):
-            raise GearError(f"{held}: no patch may be made on what --verify names; give it another split than {flag}")
+            found = open_all(paths, wanted.plan.task["name"], names=names, allow_tests=True)
+        except GearError:
+            continue  # the attack knows what is wrong
+        for one in found:
+            check_joined([one, wanted])
+            if scenes_of(one) == scenes_of(wanted):
+                problem = "no patch may be made on what --verify names; give it another split than"
+                raise GearError(f"{held}: {problem} {flag}")
 
 
 def verify(
