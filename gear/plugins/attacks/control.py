@@ -129,6 +129,8 @@ def read_exact(folder: Path) -> list[Floats]:
         arrays = load_file(path)
     except SafetensorError as error:
         raise GearError(f"{path}: not a safetensors file ({error})") from error
+    if not arrays or any(array.ndim != 3 or array.shape[2] != 3 for array in arrays.values()):
+        raise GearError(f"{path}: holds something else than patches; name a folder that gear attack wrote")
     return [arrays[name].astype(np.float64) for name in sorted(arrays, key=surface_of)]
 
 

@@ -17,7 +17,7 @@ from gear.contracts.attacks import Budget, Patch
 from gear.formats import rle
 from gear.nn.stereo_rcnn_graph import LOSSES
 from gear.plugins.attacks.carla_gear import STEREO_LOSSES_LEFT_OUT
-from gear.plugins.attacks.control import ControlConfig, control, matched
+from gear.plugins.attacks.control import ControlConfig, control, matched, read_exact
 from gear.plugins.attacks.eot import EotConfig, eot
 from gear.plugins.attacks.nes import NesConfig, nes
 from gear.plugins.attacks.rp2 import Rp2, Rp2Config, rp2
@@ -267,3 +267,10 @@ def test_classes_are_for_segmentation() -> None:
 def test_the_papers_stereo_attack_leaves_classification_out() -> None:
     assert set(STEREO_LOSSES_LEFT_OUT) < set(LOSSES)
     assert all("class" in name for name in STEREO_LOSSES_LEFT_OUT)
+
+
+@pytest.mark.parametrize("arrays", [{}, {"bias": np.zeros(3, np.float32)}])
+def test_matched_noise_is_not_made_of_any_safetensors(tmp_path: Path, arrays: Mapping[str, Any]) -> None:
+    save_file(arrays, tmp_path / "patch.safetensors")
+    with pytest.raises(GearError, match="holds something else than patches; name a folder that gear attack wrote"):
+        read_exact(tmp_path)
