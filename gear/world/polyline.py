@@ -49,6 +49,14 @@ class Polyline:
         point[:2] += np.array([-step[1], step[0]]) * (lateral_m / length_m)
         return point, math.atan2(step[1], step[0])
 
+    def heading(self, s_m: float, reach_m: float) -> float:
+        """The mean heading from `reach_m` before an arc length to as far after it: it turns evenly round corners."""
+        steps = np.diff(self.points_m[:, :2], axis=0)
+        headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+        ends_m = np.concatenate([[-np.inf], self.s_m[1:-1], [np.inf]])
+        within_m = np.minimum(ends_m[1:], s_m + reach_m) - np.maximum(ends_m[:-1], s_m - reach_m)
+        return float(headings @ np.clip(within_m, 0.0, None) / (2 * reach_m))
+
     def sample(self, s_m: Array, lateral_m: float = 0.0) -> tuple[Array, Array]:
         """As `at`, for (N,) arc lengths: (N, 3) points and (N,) headings."""
         index = np.clip(np.searchsorted(self.s_m, s_m, side="right") - 1, 0, len(self.s_m) - 2)

@@ -14,6 +14,9 @@ from gear.world.polyline import Polyline
 HALF_WHEELBASE_SHARE = 0.6
 """Axles stand this share of half a vehicle's length from its middle; its heading is from axle to axle."""
 
+PACE_M = 0.25
+"""Way before and after a place over which the speed there is taken."""
+
 BRAKING_WAY_M = 15.0
 """Drivers heed the speed of lanes this far ahead."""
 
@@ -96,3 +99,22 @@ def vehicle_pose(line: Polyline, s_m: float, half_length_m: float, lateral_m: fl
     point, _ = line.at(s_m, lateral_m)
     rear, front = line.at(s_m - reach_m)[0], line.at(s_m + reach_m)[0]
     return point, math.atan2(front[1] - rear[1], front[0] - rear[0])
+
+
+def beside(point_m: Array, yaw_rad: float, lateral_m: float) -> Array:
+    """A point to the left of another, by a heading that turns as its owner does.
+
+    By the left of the line's pieces, who moves would jump where two of them meet, and back on the inside of a turn.
+    """
+    return point_m + lateral_m * np.array([-math.sin(yaw_rad), math.cos(yaw_rad), 0.0])
+
+
+def driven_pose(line: Polyline, s_m: float, half_length_m: float, lateral_m: float = 0.0) -> tuple[Array, float, float]:
+    """As `vehicle_pose`, of one that moves; and its way for each metre of the line, which is less inside a turn."""
+
+    def at(place_m: float) -> tuple[Array, float]:
+        point, yaw_rad = vehicle_pose(line, place_m, half_length_m)
+        return beside(point, yaw_rad, lateral_m), yaw_rad
+
+    (rear, _), (point, yaw_rad), (front, _) = (at(s_m + ahead_m) for ahead_m in (-PACE_M, 0.0, PACE_M))
+    return point, yaw_rad, float(np.linalg.norm((front - rear)[:2])) / (2 * PACE_M)

@@ -14,7 +14,7 @@ from gear.world.cast import Cast
 from gear.world.junctions import Junctions
 from gear.world.lanes import LaneGraph
 from gear.world.placement import PlacementSpace
-from gear.world.routes import Route, drive_on, vehicle_pose
+from gear.world.routes import Route, drive_on, driven_pose, vehicle_pose
 from gear.world.spawn import Draft
 from gear.world.traffic import Driver, Traffic, Walker, vehicle_discs
 
@@ -95,7 +95,7 @@ class Director:
         for frame in range(frames):
             if frame:
                 traffic.advance(interval_s)
-            moment, fallen = self._moment(cast, drivers, walkers)
+            moment, fallen = self._moment(cast, drivers, walkers, is_still=frames == 1)
             pairs = self._space.overlaps(moment.poses)
             offenders = [max(pair, key=lambda body: order.get(body, -1)) for pair in pairs] + fallen
             if offenders:
@@ -104,20 +104,29 @@ class Director:
         return moments, None
 
     def _moment(
-        self, cast: Cast, drivers: Mapping[str, Driver], walkers: Mapping[str, Walker]
+        self, cast: Cast, drivers: Mapping[str, Driver], walkers: Mapping[str, Walker], *, is_still: bool
     ) -> tuple[Moment, list[str]]:
-        """Where everybody is now, and who has no ground below."""
+        """Where everybody is now, and who has no ground below.
+
+        A single picture keeps to the pieces of lanes and walks, as its data set's seed has always placed it.
+        """
         drafts: dict[str, Draft] = {}
         poses: dict[str, RigidTransform] = {}
         fallen: list[str] = []
         for body, draft in cast.drafts.items():
             if body in drivers:
                 driver = drivers[body]
-                point, yaw_rad = vehicle_pose(driver.route.line, driver.s_m, draft.kind.half_length_m, driver.lateral_m)
-                now = _at(draft, point, yaw_rad, driver.speed_mps)
+                half_length_m = draft.kind.half_length_m
+                if is_still:
+                    point, yaw_rad = vehicle_pose(driver.route.line, driver.s_m, half_length_m, driver.lateral_m)
+                    now = _at(draft, point, yaw_rad, driver.speed_mps)
+                else:
+                    point, yaw_rad, pace = driven_pose(driver.route.line, driver.s_m, half_length_m, driver.lateral_m)
+                    now = _at(draft, point, yaw_rad, driver.speed_mps * pace)
             elif body in walkers:
-                point, yaw_rad = walkers[body].place()
-                now = _at(draft, point, yaw_rad, walkers[body].speed_mps)
+                walker = walkers[body]
+                point, yaw_rad = walker.first_place() if is_still else walker.place()
+                now = _at(draft, point, yaw_rad, walker.speed_mps)
             else:
                 drafts[body], poses[body] = draft, cast.poses[body]
                 continue

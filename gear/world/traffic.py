@@ -16,7 +16,7 @@ from gear.values.geometry import Array
 from gear.world.footprints import LEVEL_M
 from gear.world.junctions import Junctions
 from gear.world.polyline import Polyline
-from gear.world.routes import Route
+from gear.world.routes import Route, beside
 
 MAX_STEP_S = 0.05
 LOOK_AHEAD_M = 40.0
@@ -25,6 +25,11 @@ SIDE_MARGIN_M = 0.25
 PERSON_RADIUS_M = 0.35
 PERSON_REACH_M = 0.9
 """People look this far ahead before they take a step."""
+
+TURNING_M = 1.5
+"""Way before and after a corner in which people turn, for each metre beside the line, of which there is one at least:
+nobody steps back at a right angle, on its inside either.
+"""
 
 PERSON_FORESIGHT_S = (0.0, 0.7, 1.4)
 """Drivers see people where they are and where they will be."""
@@ -84,7 +89,13 @@ class Walker:
         return left_m < -self.beyond_m
 
     def place(self) -> tuple[Array, float]:
-        """Point on the ground and heading."""
+        """Point on the ground and heading, under way."""
+        heading_rad = self.line.heading(self.s_m, TURNING_M * max(1.0, abs(self.lateral_m)))
+        point = beside(self.line.at(self.s_m)[0], heading_rad, self.lateral_m)
+        return point, heading_rad if self.direction > 0 else heading_rad + math.pi
+
+    def first_place(self) -> tuple[Array, float]:
+        """The same in a picture without a before and after."""
         point, heading_rad = self.line.at(self.s_m, self.lateral_m)
         return point, heading_rad if self.direction > 0 else heading_rad + math.pi
 

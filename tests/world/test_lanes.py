@@ -12,10 +12,12 @@ from hypothesis import strategies as st
 
 from gear.testing.tiny_town import TINY_TOWN
 from gear.values.errors import TownError
+from gear.values.geometry import wrap_angle_rad
 from gear.world.junctions import Junctions
 from gear.world.lanes import LaneGraph
 from gear.world.polyline import Polyline
-from gear.world.routes import Route, back_up, drive_on, vehicle_pose
+from gear.world.routes import Route, back_up, drive_on, driven_pose, vehicle_pose
+from gear.world.traffic import Walker
 
 GRAPH = LaneGraph.from_model(mujoco.MjModel.from_xml_path(str(TINY_TOWN)), TINY_TOWN)
 
@@ -147,3 +149,38 @@ def test_a_turning_vehicle_points_from_axle_to_axle() -> None:
     corner = Polyline.through(np.array([[0.0, 0, 0], [10, 0, 0], [10, 10, 0]]))
     assert vehicle_pose(corner, 10.0, 2.0)[1] == pytest.approx(math.pi / 4)
     assert vehicle_pose(corner, 5.0, 2.0)[1] == 0
+
+
+@pytest.mark.parametrize(("turn_deg", "lateral_m"), [(12, -0.96), (-12, -0.96), (90, 0.9), (90, -0.9), (-136, -1.2)])
+def test_people_do_not_jump_where_a_line_turns(turn_deg: float, lateral_m: float) -> None:
+    turn = math.radians(turn_deg)
+    line = Polyline.through(
+        np.array([[0.0, 0.0, 0.0], [20.0, 0.0, 0.0], [20 + 20 * math.cos(turn), 20 * math.sin(turn), 0.0]])
+    )
+    places = [
+        Walker(line=line, s_m=s_m, lateral_m=lateral_m, direction=1, pace_mps=1.0, speed_mps=1.0, beyond_m=0.0).place()
+        for s_m in np.arange(10.0, 30.0, 0.05)
+    ]
+    for (before, was_rad), (after, is_rad) in itertools.pairwise(places):
+        step_m = (after - before)[:2] @ (math.cos(is_rad), math.sin(is_rad))
+        assert np.linalg.norm(after - before) < 0.1 and abs(wrap_angle_rad(is_rad - was_rad)) < 0.05
+        assert step_m > 0 or abs(turn_deg) > 90, "nobody steps back at a right angle"
+    assert wrap_angle_rad(places[-1][1] - places[0][1]) == pytest.approx(turn)
+    for point, heading_rad in (places[0], places[-1]):  # far from the corner, as for a single picture
+        s_m, beside_m, _ = line.project(point)
+        assert beside_m == pytest.approx(lateral_m) and heading_rad == pytest.approx(line.at(s_m)[1])
+
+
+def test_vehicles_beside_the_middle_do_not_jump_where_pieces_of_a_lane_meet() -> None:
+    turns_rad = np.cumsum([0.0, *(0.15,) * 6, *(-0.1,) * 8])  # a junction's arc, left and then right again
+    points_m = np.concatenate(
+        [[[0.0, 0.0]], np.cumsum(2 * np.stack([np.cos(turns_rad), np.sin(turns_rad)], 1), axis=0)]
+    )
+    line = Polyline.through(np.column_stack([points_m, np.zeros(len(points_m))]))
+    for lateral_m in (-0.96, 0.96):
+        places = [driven_pose(line, s_m, 0.9, lateral_m) for s_m in np.arange(2.0, line.length_m - 2.0, 0.05)]
+        for (before, _, _), (after, yaw_rad, pace) in itertools.pairwise(places):
+            assert (after - before)[:2] @ (math.cos(yaw_rad), math.sin(yaw_rad)) > 0
+            assert np.linalg.norm(after - before) == pytest.approx(0.05 * pace, abs=0.01)
+        paces = [pace for _, _, pace in places]
+        assert min(paces) < 0.95 and max(paces) > 1.05, "inside a turn the way is shorter"

@@ -305,6 +305,16 @@ def test_sequences_drive_without_overlaps(scene: str) -> None:
         assert 0 < v < camera.height_px
 
 
+def test_who_drives_beside_the_middle_of_a_lane_drives_evenly() -> None:
+    """A bicycle, for one, where the pieces of a turn meet on its own side."""
+    plans = planner("board", dataclasses.replace(DRIVE, seed=0, frames=40), "video")
+    for before, after in itertools.pairwise(plans.plan(index) for index in range(40, 80)):
+        for a, b in zip(before.actors, after.actors, strict=True):
+            step_m = np.subtract(b.world_from_actor.position_m, a.world_from_actor.position_m)[:2]
+            expected_m = (np.add(a.velocity_world_mps, b.velocity_world_mps) / 2 * DRIVE.interval_s)[:2]
+            assert np.linalg.norm(step_m - expected_m) < 0.1 + 0.02 * np.linalg.norm(expected_m), (b, step_m)
+
+
 def test_a_frame_alone_is_the_frame_in_its_sequence() -> None:
     plans = planner("board", DRIVE, "video")
     frames = [plans.plan(index) for index in (0, 59, 60, 75)]
