@@ -33,7 +33,8 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     wheels = home / "wheels"
     call(sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", wheels, ROOT, *EXAMPLES, cwd=home)
     venv.create(home / "env", with_pip=True)
-    install = (home / "env/bin/python", "-m", "pip", "install", "-q", "-c", ROOT / "constraints.txt")
+    # Bytecode of the few modules that are imported is made then; pip would make it of all of torch.
+    install = (home / "env/bin/python", "-m", "pip", "install", "-q", "--no-compile", "-c", ROOT / "constraints.txt")
     call(*install, *sorted(wheels.glob("*.whl")), "pytest", "cityscapesScripts", cwd=home)
     if sys.version_info >= (3, 13):
         call(*install, "--no-deps", "dm-control", cwd=home)  # pyproject.toml says why
