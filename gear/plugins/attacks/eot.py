@@ -21,6 +21,13 @@ from gear.values.errors import FieldError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class EotAppearance(Appearance):
+    """With the noise of Nesti et al. (WACV 2022); a class, so that it stays where another of its options is set."""
+
+    noise: float = 0.1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class EotConfig(Settings):
     """Options.
 
@@ -34,7 +41,7 @@ class EotConfig(Settings):
     least_scale: float = 0.8
     most_scale: float = 1.2
     shift: float = 0.5
-    appearance: Appearance = field(default_factory=lambda: Appearance(noise=0.1))
+    appearance: EotAppearance = field(default_factory=EotAppearance)
 
     def __post_init__(self) -> None:
         Settings.__post_init__(self)

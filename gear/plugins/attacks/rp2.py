@@ -28,6 +28,15 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Rp2Appearance(Appearance):
+    """Stronger light and no blur; a class, so that each stays where another option is set."""
+
+    brightness: float = 0.1
+    contrast: float = 0.3
+    blur_px: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Rp2Config(TextureSettings):
     """Options; the constants are those of the published code's GTSRB run.
 
@@ -49,7 +58,7 @@ class Rp2Config(TextureSettings):
     decay: bool = False
     attacked: str = ""
     target: str = ""
-    appearance: Appearance = field(default_factory=lambda: Appearance(brightness=0.1, contrast=0.3, blur_px=0))
+    appearance: Rp2Appearance = field(default_factory=Rp2Appearance)
 
     def __post_init__(self) -> None:
         TextureSettings.__post_init__(self)

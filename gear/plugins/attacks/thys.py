@@ -30,6 +30,15 @@ SCORES = ("objectness", "cls_logits")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ThysAppearance(Appearance):
+    """The published even spreads as standard deviations; a class, so that each stays where another option is set."""
+
+    noise: float = 0.06
+    brightness: float = 0.06
+    contrast: float = 0.12
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ThysConfig(TextureSettings):
     """Options, with the published constants.
 
@@ -43,7 +52,7 @@ class ThysConfig(TextureSettings):
     printability_weight: float = 0.01
     variation_weight: float = 2.5
     least_variation: float = 0.1
-    appearance: Appearance = field(default_factory=lambda: Appearance(noise=0.06, brightness=0.06, contrast=0.12))
+    appearance: ThysAppearance = field(default_factory=ThysAppearance)
 
 
 class Thys:

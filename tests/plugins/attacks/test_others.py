@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar
@@ -13,6 +14,10 @@ from safetensors.numpy import save_file
 
 from gear.attacking.objectives import default_objective
 from gear.attacking.upright import Upright
+from gear.config.nodes import Mapping as MappingNode
+from gear.config.nodes import Place
+from gear.config.overrides import with_overrides
+from gear.config.reader import read_node
 from gear.contracts.attacks import Budget, Patch
 from gear.formats import rle
 from gear.nn.stereo_rcnn_graph import LOSSES
@@ -23,6 +28,7 @@ from gear.plugins.attacks.nes import NesConfig, nes
 from gear.plugins.attacks.rp2 import Rp2, Rp2Config, rp2
 from gear.plugins.attacks.square import SquareConfig, square
 from gear.plugins.attacks.thys import ThysConfig, surest, thys
+from gear.plugins.describe import options as described
 from gear.testing.attack_contract import AttackContract, Counted
 from gear.testing.tiny_compositor import TinyCompositor
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter
@@ -251,6 +257,17 @@ def test_matched_noise_is_like_the_patch_and_not_the_patch(tmp_path: Path) -> No
 def test_bad_options_are_refused(make: Any) -> None:
     with pytest.raises(FieldError, match="must"):
         make()
+
+
+@pytest.mark.parametrize("kind", [EotConfig, ThysConfig, Rp2Config])
+def test_one_option_of_the_looks_leaves_the_others_as_they_were(kind: type[Any]) -> None:
+    """And what is said of them is what they are."""
+    usual = kind().appearance
+    node = with_overrides(MappingNode({}, Place("none")), ["appearance.contrast=0.25"], kind)
+    assert read_node(kind, node).appearance == dataclasses.replace(usual, contrast=0.25)
+    said = {option["name"]: option["default"] for option in described(kind)}
+    for name, value in dataclasses.asdict(usual).items():
+        assert said[f"appearance.{name}"] == value
 
 
 def test_classes_are_for_segmentation() -> None:
