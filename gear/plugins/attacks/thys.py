@@ -43,8 +43,8 @@ class ThysConfig(TextureSettings):
     """Options, with the published constants.
 
     Attributes:
-        printability_weight: of non-printability, a mean over pixels.
-        variation_weight: of total variation, a mean over pixels.
+        printability_weight: of non-printability, a sum over pixels by the number of values, three a pixel.
+        variation_weight: of total variation, a sum over values by their number.
         least_variation: below this, total variation costs nothing more.
     """
 
@@ -107,14 +107,14 @@ class Thys:
 
         from gear.attacking.regularisers import non_printability
 
-        config, pixels = self._config, textures[:, 0].numel()
+        config = self._config
         down = (textures[:, :, 1:] - textures[:, :, :-1]).abs().sum()
         right = (textures[:, :, :, 1:] - textures[:, :, :, :-1]).abs().sum()
         variation = config.variation_weight * (down + right) / textures.numel()
         return {
             "printability": -config.printability_weight
             * torch.stack([non_printability(t) for t in textures]).sum()
-            / pixels,
+            / textures.numel(),  # the published code divides both penalties by all values, not by pixels
             "variation": -variation.clamp_min(config.least_variation),
         }
 

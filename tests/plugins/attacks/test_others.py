@@ -13,6 +13,7 @@ import torch
 from safetensors.numpy import save_file
 
 from gear.attacking.objectives import default_objective
+from gear.attacking.regularisers import palette_srgb
 from gear.attacking.upright import Upright
 from gear.config.nodes import Mapping as MappingNode
 from gear.config.nodes import Place
@@ -151,6 +152,16 @@ def test_thys_is_judged_by_what_it_lowers() -> None:
     with torch.no_grad():
         (term,) = objective.terms(model, {"left": picture}, [dataset[0]], [0]).values()
         assert float(term.value) == -float(surest(model.forward({"left": picture})).mean())
+
+
+def test_thys_weighs_its_penalties_as_published() -> None:
+    """Both are sums divided by the number of values, three a pixel, whatever the number of patches."""
+    red = torch.tensor([1.0, 0.0, 0.0]).view(1, 3, 1, 1).expand(2, 3, 4, 8).contiguous()
+    config = ThysConfig(printability_weight=0.3)
+    (nearest,) = torch.cdist(torch.tensor([[1.0, 0.0, 0.0]]), palette_srgb()).min(dim=1).values
+    found = thys.build(config)._penalties(red)
+    assert float(found["printability"]) == pytest.approx(-0.3 * float(nearest) / 3, rel=1e-5)
+    assert float(found["variation"]) == pytest.approx(-0.1), "flat: no more than what costs nothing"
 
 
 def test_thys_needs_a_detector() -> None:
