@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar
@@ -12,6 +13,7 @@ import pytest
 import torch
 from safetensors.numpy import save_file
 
+from gear.attacking.group import Group
 from gear.attacking.objectives import default_objective
 from gear.attacking.regularisers import palette_srgb
 from gear.attacking.upright import Upright
@@ -224,6 +226,26 @@ def test_queries_are_counted_not_steps() -> None:
         nes.build(NesConfig(**SMALL)).optimise(
             model, dataset, TinyCompositor(dataset), budget=Budget(steps=3), rng=derive_rng(1, "q")
         )
+
+
+@pytest.mark.parametrize("models", [1, 3])
+def test_other_samples_are_drawn_as_often_whatever_the_number_of_models(models: int) -> None:
+    seen: list[int] = []
+
+    class Noting(TinyCompositor):
+        def compose(self, patches: Any, samples: Any, view: str) -> torch.Tensor:
+            seen.append(samples[0])
+            return super().compose(patches, samples, view)
+
+    contract = TestSquare()
+    dataset = contract.dataset()
+    network = Group({f"m{n}": TinySegmenter(TinyConfig(seed=n)) for n in range(models)})
+    attack = square.build(SquareConfig(**SMALL, batch=1, turns=6))
+    budget = Budget(steps=10_000, queries=66 * models)
+    attack.optimise(network, dataset, Noting(dataset), budget=budget, rng=derive_rng(1, "q"))
+    runs = [len(list(same)) for _, same in itertools.groupby(seen)]
+    assert len(seen) == 66, "as many questions as there are queries for"
+    assert max(runs) <= 2 * (66 // 6 + 1), "one turn, or two where one pass ends and the next begins"
 
 
 def test_matched_noise_is_like_the_patch_and_not_the_patch(tmp_path: Path) -> None:
