@@ -5,7 +5,7 @@ in the reference code is mended: the mask is that of the surface's outline, not 
 all patches stay; and a patch that is small in the picture is averaged, not skipped over (2 x 2 samples a pixel,
 trilinear).
 
-Source: CARLA-GeAR (Nesti et al., 2022), section on scene-specific attacks; Rossolini et al., WACV 2022.
+Source: CARLA-GeAR (Nesti et al., 2022), section on patch generation; Nesti et al., WACV 2022.
 """
 
 from __future__ import annotations

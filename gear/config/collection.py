@@ -101,8 +101,8 @@ class SimulationConfig:
 
     Attributes:
         splits: by name; `test_night` takes the entry of `test` unless it has its own.
-        max_vehicles, max_pedestrians: upper limits on NPCs around a board (a hundred times as many in scenes without
-            one, as in the original); a scene's own limits hold below them.
+        max_vehicles, max_pedestrians: upper limits on NPCs (a hundred times as many vehicles in scenes without a board,
+            as in the original); a scene's own limits hold below them.
     """
 
     splits: dict[str, SplitConfig]

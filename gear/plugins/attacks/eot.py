@@ -1,7 +1,8 @@
-"""The attack that knows no scene: patches pasted upright at random sizes and places (EOT), the paper's baseline.
+"""The attack that knows no scene: patches pasted upright at random sizes and places (EOT).
 
-Athalye et al. (ICML 2018) over the transforms of Rossolini et al. (WACV 2022): scale, shift, noise, brightness,
-contrast. Where the board stands, how it is lit and what is in front of it never enters.
+Athalye et al. (ICML 2018) over the transforms of Nesti et al. (WACV 2022), who hold their scene-specific attack against
+it: scale, shift, noise, brightness, contrast. Where the board stands, how it is lit and what is in front of it never
+enters.
 """
 
 from __future__ import annotations

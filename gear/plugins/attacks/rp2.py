@@ -38,7 +38,8 @@ class Rp2Appearance(Appearance):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rp2Config(TextureSettings):
-    """Options; the constants are those of the published code's GTSRB run.
+    """Options; the learning rate, the height and the norm's weight are those of the published code's GTSRB run, the
+    others are gear's.
 
     Attributes:
         base: grey value that the perturbation is added to, 0 to 1.

@@ -1,7 +1,7 @@
 """The scene-specific attack with gear's settings: textures of one scene's surfaces, by Adam through the compositor.
 
-The method is that of CARLA-GeAR (Nesti et al., 2022) and of Rossolini et al. (WACV 2022), kept in unit space, with a
-falling learning rate and the intentions of their losses.
+The method is that of CARLA-GeAR (Nesti et al., 2022), which took it from Nesti et al. (WACV 2022), kept in unit space,
+with a falling learning rate and the intentions of their losses.
 """
 
 from __future__ import annotations

@@ -110,7 +110,7 @@ class Lgs(PerPicture):
 
 spec = DefenseSpec(
     name="lgs",
-    summary="Local gradients smoothing: darkens what changes too quickly (the paper's baseline).",
+    summary="Local gradients smoothing: darkens what changes too quickly (one of the paper's defenses).",
     config=LgsConfig,
     build=Lgs,
     outputs=frozenset({"images", "mask", "score"}),

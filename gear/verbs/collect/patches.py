@@ -19,7 +19,7 @@ from gear.values.frames import UInt8Image
 from gear.values.rng import derive_rng
 
 RANDOM_SIZE_PX = (300, 150)
-"""Width and height of a random patch: 2 cm pixels on a 7.4 m board, as in the paper."""
+"""Width and height of a random patch: 2.5 cm pixels on a board of 7.4 m, as in the paper."""
 
 SIDE_PX = (2, 8192)
 MAX_BYTES = 256 << 20
