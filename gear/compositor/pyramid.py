@@ -106,12 +106,19 @@ class Pyramid:
             levels.append(self._next(levels[-1], patch, level))
         return torch.cat([texels.flatten(-2) for texels in levels], dim=-1).transpose(-1, -2).contiguous()
 
+    def _is_patch(self, level: int) -> bool:
+        """Whether a folded level's texels are the patch's pixels. As many of them is not enough: 37 rows that were
+        stretched to 600 and halved to 37 again are mixed by it."""
+        return self.shape(level) == (self.height_px, self.width_px) and all(
+            bool((matrix.diagonal() == 1).all()) for matrix in (self.rows[level], self.columns[level])
+        )
+
     def _next(self, last: Tensor, patch: Tensor, level: int) -> Tensor:
         """A level from the one before it, or from the patch where there is none before it."""
         import torch
 
         size = tuple(last.shape[-2:])
-        is_chained = level > 0 and self.shape(level - 1) == size
+        is_chained = level > self.folded or (level > 0 and self._is_patch(level - 1))
         if is_chained and size[0] % 2 == 0 and size[1] % 2 == 0:
             return torch.nn.functional.avg_pool2d(last, 2)
         if is_chained:

@@ -14,7 +14,7 @@ from gear.compositor.warp import warp_matrix
 from gear.values.geometry import Array
 from gear.world.faces import resample_linear
 
-SIZES = [(150, 300), (37, 50), (600, 1200), (700, 1300), (4, 4)]
+SIZES = [(150, 300), (37, 50), (37, 75), (600, 1200), (700, 1300), (4, 4)]
 
 
 def noise(height: int, width: int) -> Array:
