@@ -11,6 +11,9 @@ import yaml
 from gear.config.nodes import Items, Mapping, Node, Scalar
 from gear.values.serial import Json
 
+MAX_NODES = 100_000
+"""No options hold more: aliases of aliases, which cost nothing to read, would be written out one by one."""
+
 
 def to_yaml(config: Any) -> str:
     """YAML text that reads back as the same config."""
@@ -18,12 +21,32 @@ def to_yaml(config: Any) -> str:
 
 
 def node_to_json(node: Node) -> Json:
-    """Texts stay texts."""
+    """Texts stay texts.
+
+    Raises:
+        ConfigError: with its aliases written out it is too large.
+    """
+    if _count(node, {}) > MAX_NODES:
+        raise node.place.error("", f"holds more than {MAX_NODES} values with its aliases written out")
+    return _written_out(node)
+
+
+def _count(node: Node, known: dict[int, int]) -> int:
+    """Nodes in it, each as often as aliases repeat it; `known` has the numbers of those that were met before."""
+    if isinstance(node, Scalar):
+        return 1
+    if id(node) not in known:
+        below = node.items if isinstance(node, Items) else [item for _, item in node.entries.values()]
+        known[id(node)] = 1 + sum(_count(item, known) for item in below)
+    return known[id(node)]
+
+
+def _written_out(node: Node) -> Json:
     if isinstance(node, Scalar):
         return None if node.is_null else node.text
     if isinstance(node, Items):
-        return [node_to_json(item) for item in node.items]
-    return {key: node_to_json(item) for key, (_, item) in node.entries.items()}
+        return [_written_out(item) for item in node.items]
+    return {key: _written_out(item) for key, (_, item) in node.entries.items()}
 
 
 def to_plain(value: Any) -> Json:

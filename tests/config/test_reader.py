@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gear.config.dump import to_yaml
+from gear.config.dump import to_plain, to_yaml
 from gear.config.nodes import parse_file, parse_text
 from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
@@ -85,6 +85,17 @@ def test_aliases_of_aliases_cost_nothing() -> None:
     bomb = "a0: &a0 [x]\n" + "".join(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]\n" for i in range(1, 40))
     with pytest.raises(ConfigError, match="unknown key"):
         read(bomb)
+
+
+def test_options_of_aliases_of_aliases_are_refused_and_not_written_out() -> None:
+    bomb = "&a0 [x]"
+    for i in range(1, 40):
+        bomb = f"&a{i} [{bomb}{f', *a{i - 1}' * 9}]"
+    node = parse_text(f"name: a\noptions: {bomb}\n", "run.yaml")
+    with pytest.raises(ConfigError, match=r"run.yaml:1:1: holds more than 100000 values with its aliases written out"):
+        to_plain(node)
+    few = parse_text("a: &a [1, ~]\nb: [*a, *a]\n", "run.yaml")
+    assert to_plain(few) == {"a": ["1", None], "b": [["1", None], ["1", None]]}
 
 
 def test_settings_go_through_the_same_reader() -> None:
