@@ -79,7 +79,7 @@ class TransportCompositor(Pasting):
 
     @property
     def _renderer(self) -> str:
-        return str(self.dataset.manifest["renderer"]["name"])
+        return self.dataset.named("renderer")
 
     def _load(self, index: int, view: str, sizes: Sizes) -> Prepared:
         probes = probes_of(self.dataset, index, view)

@@ -12,8 +12,8 @@ from gear.dataset.files import inside, read_bytes, sha256
 from gear.dataset.layout import manifest_path, sidecar_path
 from gear.dataset.plan import Plan
 from gear.dataset.sidecar import load_json, read_sidecar
-from gear.values.errors import DatasetError
-from gear.values.serial import Json
+from gear.values.errors import DatasetError, FieldError
+from gear.values.serial import Json, from_json
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +57,19 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
             raise IndexError(f"sample {index} of {len(self)}")
         return read_sidecar(inside(self.root, sidecar_path(self.plan.info.split, index % len(self))))
 
+    def named(self, what: str) -> str:
+        """Name of the `renderer` or the `weather` that the manifest says it was made with.
+
+        Raises:
+            DatasetError: it says none.
+        """
+        entry = self.manifest.get(what)
+        name = entry.get("name") if isinstance(entry, dict) else None
+        if not isinstance(name, str):
+            path = self.root / manifest_path(self.plan.info.split)
+            raise DatasetError(path, f"says no name of a {what}; delete it and run the same collection again")
+        return name
+
     def verify(self) -> list[str]:
         """Files that are missing or differ from the manifest's hashes, by relative path."""
         wanted: dict[str, str] = dict(self.manifest["indexes"])
@@ -73,12 +86,26 @@ def read_manifest(root: Path, split: str) -> Json:
     """The manifest of a finished split.
 
     Raises:
-        DatasetError: it is not there: the split is not finished.
+        DatasetError: it is not there, because the split is not finished, or does not say which files there are.
     """
     path = inside(root, manifest_path(split))
     if not path.exists():
         raise DatasetError(root, f"split {split!r} is not finished; run its `gear collect` again to complete it")
-    return load_json(path)
+    manifest = load_json(path)
+    remedy = "delete it and run the same collection again"
+    try:
+        samples = manifest["samples"]
+        files = [manifest["indexes"], *(sample["files"] for sample in samples)]
+    except (KeyError, TypeError) as error:
+        raise DatasetError(path, f"is no manifest of this version of gear; {remedy}") from error
+    if not isinstance(samples, list) or not samples:
+        raise DatasetError(path, f"lists no samples; {remedy}")
+    for number, one in enumerate(files):
+        try:
+            from_json(dict[str, str], one, "indexes" if number == 0 else f"samples[{number - 1}].files")
+        except FieldError as error:
+            raise DatasetError(path, f"is no manifest of this version of gear ({error}); {remedy}") from error
+    return manifest
 
 
 def scenes_of(dataset: Dataset[Any]) -> tuple[str, int]:

@@ -290,6 +290,26 @@ def test_what_is_not_gears_stays_and_stands_in_no_ones_way(tmp_path: Path) -> No
     assert tree(tmp_path).keys() == strays
 
 
+@pytest.mark.parametrize(
+    "damage",
+    [{"samples": 3}, {"samples": []}, {"samples": [{}]}, {"samples": [{"files": [1]}]}, {"indexes": {"a": 1}}, None],
+)
+def test_a_manifest_that_lists_no_files_is_one_line(tmp_path: Path, damage: dict[str, Any] | None) -> None:
+    fill(tmp_path, plan())
+    path = tmp_path / "gear/test/manifest.json"
+    path.write_text(json.dumps(damage and json.loads(path.read_text()) | damage))
+    with pytest.raises(DatasetError, match=r"(is no manifest of|lists no samples).*run the same collection again"):
+        open_dataset(tmp_path)
+
+
+@pytest.mark.parametrize("weather", [None, "fog", {"name": 3}])
+def test_a_manifest_that_names_no_weather_is_one_line(tmp_path: Path, weather: Any) -> None:
+    fill(tmp_path, plan())
+    dataset = dataclasses.replace(open_dataset(tmp_path), manifest={"weather": weather})
+    with pytest.raises(DatasetError, match="says no name of a weather"):
+        dataset.named("weather")
+
+
 @pytest.mark.parametrize("field", ["task", "patch"])
 def test_a_plan_that_says_too_little_is_one_line(tmp_path: Path, field: str) -> None:
     fill(tmp_path, plan())

@@ -178,7 +178,7 @@ def _facts(dataset: Dataset[Any]) -> Json:
         "scene": f"{info.town}/{info.scene}",
         "split": info.split,
         "seed": info.seed,
-        "weather": dataset.manifest["weather"]["name"],
+        "weather": dataset.named("weather"),
         "samples": len(dataset),
         "content": dataset.plan.content_key,
         "sha256": sha256(dump_json(dataset.manifest["samples"])),

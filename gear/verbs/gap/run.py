@@ -128,7 +128,7 @@ def gap(
         twin=str(pairs.second.root),
         split=clean.plan.info.split,
         patch=pairs.second.plan.patch["label"],
-        renderer=str(clean.manifest["renderer"]["name"]),
+        renderer=clean.named("renderer"),
         quality=str(clean.plan.content["quality"]),
         samples=tuple(found),
         effect={} if effect is None else effect.result(),

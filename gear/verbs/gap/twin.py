@@ -51,6 +51,8 @@ def collect_twin(
         DatasetError: with these files and versions the same scenes cannot be made again.
     """
     content = clean.plan.content
+    if not isinstance(clean.manifest.get("config"), dict):
+        raise DatasetError(clean.root, "has a manifest without the config that it was collected with; give --twin DIR")
     config: dict[str, Any] = {
         **clean.manifest["config"],
         "town": str(town or content["town"]),

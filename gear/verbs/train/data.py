@@ -53,7 +53,7 @@ class Samples(Sequence[Any]):
         return [
             {
                 "scene": f"{dataset.plan.info.town}/{dataset.plan.info.scene}",
-                "weather": dataset.manifest["weather"]["name"],
+                "weather": dataset.named("weather"),
                 "split": dataset.plan.info.split,
                 "seed": dataset.plan.info.seed,
                 "patch": dataset.plan.info.patch_label,
