@@ -26,7 +26,7 @@ def load_json(path: Path) -> Json:
     """
     try:
         return json.loads(read_bytes(path))
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:  # brackets in brackets, too
         raise DatasetError(path, f"is not JSON ({error}); delete it and run the same collection again") from error
 
 

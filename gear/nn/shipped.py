@@ -160,7 +160,7 @@ def shipped_folders() -> tuple[Path, ...]:
 def _read(text: str) -> Json:
     try:
         return json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):
         return text
 
 

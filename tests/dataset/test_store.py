@@ -310,6 +310,14 @@ def test_a_manifest_that_names_no_weather_is_one_line(tmp_path: Path, weather: A
         dataset.named("weather")
 
 
+@pytest.mark.parametrize("name", ["plan.json", "manifest.json", "samples/000000.json"])
+def test_brackets_in_brackets_are_one_line(tmp_path: Path, name: str) -> None:
+    fill(tmp_path, plan())
+    (tmp_path / "gear/test" / name).write_text("[" * 200_000)
+    with pytest.raises(DatasetError, match="is not JSON"):
+        open_dataset(tmp_path)[0]
+
+
 @pytest.mark.parametrize("field", ["task", "patch"])
 def test_a_plan_that_says_too_little_is_one_line(tmp_path: Path, field: str) -> None:
     fill(tmp_path, plan())
