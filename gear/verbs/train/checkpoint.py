@@ -15,8 +15,9 @@ from safetensors.torch import save as to_bytes
 from torch import Tensor, nn
 
 from gear.dataset.files import write_whole
-from gear.values.errors import DatasetError
-from gear.values.serial import Json
+from gear.plugins.catalogue import one_line
+from gear.values.errors import DatasetError, FieldError
+from gear.values.serial import Json, from_json
 from gear.verbs.train.feed import Position
 from gear.verbs.train.optimise import RunningMean
 
@@ -53,7 +54,21 @@ class Progress:
 
     @staticmethod
     def from_json(value: Json) -> Progress:
-        """The inverse."""
+        """The inverse.
+
+        Raises:
+            ValueError, KeyError, TypeError: it says something else, or nothing of what a training goes on with.
+        """
+        kinds = {"step": int, "best_step": int, "worse": int, "elapsed_s": float}
+        for name, kind in kinds.items():
+            from_json(kind, value[name], name)
+        from_json(Position, value["position"], "position")
+        from_json(tuple[float, ...], value["open_losses"], "open_losses")
+        for name in ("steps", "validations"):
+            from_json(tuple[dict[str, float], ...], value[name], name)
+        validated = [entry["step"] for entry in value["validations"]] or [-1]
+        if value["best_step"] not in validated:
+            raise FieldError("best_step", f"no validation was after step {value['best_step']}")
         return Progress(**{**value, "position": Position(**value["position"])})
 
 
@@ -96,18 +111,45 @@ def load(
             texts = opened.metadata() or {}
             tensors = {key: opened.get_tensor(key) for key in opened.keys()}  # noqa: SIM118
         there, progress = json.loads(texts["plan"]), json.loads(texts["progress"])
-    except (SafetensorError, KeyError, ValueError) as error:
-        raise DatasetError(path, f"is damaged ({error}); delete it to train from the start") from error
+    except (SafetensorError, KeyError, ValueError, RecursionError) as error:
+        raise _damaged(path, error) from error
     check_plan(root, there, plan)
-    module.load_state_dict(_below(tensors, "module."))
-    for key, value in _below(tensors, "mean.").items():
-        mean.state[key].copy_(value)
+    try:
+        taken_up = Progress.from_json(progress)
+        module.load_state_dict(_below(tensors, "module."))
+        _fill(mean.state, _below(tensors, "mean."))
+        optimiser.load_state_dict({**optimiser.state_dict(), "state": _states(tensors, optimiser)})
+    except (KeyError, ValueError, TypeError, RuntimeError) as error:
+        raise _damaged(path, error) from error
+    return taken_up, _below(tensors, "extra.")
+
+
+def _damaged(path: Path, error: Exception) -> DatasetError:
+    return DatasetError(path, f"is damaged ({one_line(error)}); delete it to train from the start")
+
+
+def _fill(state: Mapping[str, Tensor], given: Mapping[str, Tensor]) -> None:
+    """Copies every tensor; a smaller one would be spread over a larger one, so shapes are looked at."""
+    for key, tensor in state.items():
+        if given[key].shape != tensor.shape:
+            raise ValueError(f"mean.{key} is {tuple(given[key].shape)}, not {tuple(tensor.shape)}")
+        tensor.copy_(given[key])
+
+
+def _states(tensors: Mapping[str, Tensor], optimiser: torch.optim.Optimizer) -> dict[int, dict[str, Tensor]]:
+    """What an optimiser knows of each weight: counters, and tensors of the weight's own shape."""
+    weights = [weight for group in optimiser.param_groups for weight in group["params"]]
     state: dict[int, dict[str, Tensor]] = {}
     for key, value in _below(tensors, "optimiser.").items():
         number, _, name = key.partition(".")
+        if not number.isdecimal() or int(number) >= len(weights):
+            raise ValueError(f"optimiser.{key} is of no weight")
+        if value.dim() and value.shape != weights[int(number)].shape:
+            raise ValueError(f"optimiser.{key} is {tuple(value.shape)}, not {tuple(weights[int(number)].shape)}")
         state.setdefault(int(number), {})[name] = value
-    optimiser.load_state_dict({**optimiser.state_dict(), "state": state})
-    return Progress.from_json(progress), _below(tensors, "extra.")
+    if len({tuple(sorted(entries)) for entries in state.values()}) > 1:
+        raise ValueError("the optimiser's state is of some weights only in part")
+    return state
 
 
 def check_plan(root: Path, there: Json, wanted: Json) -> None:

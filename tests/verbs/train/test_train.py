@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import torch
 from safetensors import safe_open
+from safetensors.torch import save as to_bytes
 
 import gear
 from gear.cli.main import main
@@ -145,6 +146,33 @@ def test_damaged_work_is_said_in_a_line(street: Street, tmp_path: Path, install:
             quick(street, tmp_path / "out")
     checkpoint.unlink()
     assert quick(street, tmp_path / "out").figures == first.figures
+
+
+def test_a_checkpoint_that_somebody_changed_is_said_in_a_line(street: Street, tmp_path: Path, install: Any) -> None:
+    quick(street, tmp_path / "out")
+    checkpoint = tmp_path / "out" / "checkpoint.safetensors"
+    with safe_open(str(checkpoint), framework="pt") as opened:
+        texts: dict[str, str] = dict(opened.metadata())
+        tensors = {key: opened.get_tensor(key).clone() for key in opened.keys()}  # noqa: SIM118
+    progress: dict[str, Any] = json.loads(texts["progress"])
+    broken: list[Any] = [None, [], {}, *(progress | {name: "x"} for name in progress)]
+    broken += [progress | change for change in ({"best_step": 99}, {"validations": [{}]})]
+    broken += [progress | {"position": {"epoch": 1, "batch": None}}, progress | {"steps": [{"step": None}]}]
+    cases = [(tensors, texts | {"progress": json.dumps(one)}) for one in broken]
+    cases.append((tensors, texts | {"progress": "[" * 100_000}))
+    for key in (
+        "module.stem.weight",
+        "mean.stem.weight",
+        *[key for key in tensors if key.startswith("optimiser.")][:2],
+    ):
+        cases.append(({**tensors, key: torch.zeros(3, 7)}, texts))
+        cases.append(({name: tensor for name, tensor in tensors.items() if name != key}, texts))
+    cases += [({**tensors, f"optimiser.{key}": torch.zeros(2)}, texts) for key in ("x.y", "99.exp_avg")]
+    for changed, said in cases:
+        checkpoint.write_bytes(to_bytes(changed, said))
+        with pytest.raises(DatasetError, match=r"is damaged .*; delete it to train from the start") as caught:
+            quick(street, tmp_path / "out")
+        assert "\n" not in str(caught.value)
 
 
 def test_the_seed_decides(street: Street, tmp_path: Path, install: Any) -> None:
