@@ -30,6 +30,7 @@ from gear.testing.compare import difference
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import DatasetError, GearError, PluginError
+from gear.verbs.attack import folder
 from gear.verbs.attack.folder import read_patches
 from gear.verbs.attack.run import attack
 from gear.verbs.attack.scenes import Scenes
@@ -65,6 +66,19 @@ def bad(what: str) -> AttackSpec[Any]:
 
 Small = Callable[..., Path]
 Install = Callable[..., None]
+
+
+def test_notes_that_somebody_changed_are_one_line(small: Small, install: Install, tmp_path: Path) -> None:
+    data, out = small(), tmp_path / "patches"
+    attack(data, model="tiny_segmenter", out=out, steps=2, settings=SMALL)
+    path = out / "attack.json"
+    notes = json.loads(path.read_text())
+    changed: list[Any] = [{key: value for key, value in notes.items() if key != gone} for gone in folder.TOLD]
+    changed += [notes | {key: [None]} for key in folder.TOLD] + [notes | {"masking": {}}, notes | {"patches": None}]
+    for text in (*map(json.dumps, changed), "[" * 200_000):
+        path.write_text(text)
+        with pytest.raises(DatasetError, match=r"attack\.json: is gone, damaged"):
+            attack(data, model="tiny_segmenter", out=out, steps=2, settings=SMALL)
 
 
 def test_a_patch_folder_is_whole(small: Small, install: Install, tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import contextlib
 import json
 import shutil
 from pathlib import Path
+from typing import Any
 
 from safetensors import SafetensorError
 from safetensors.numpy import load as from_bytes
@@ -14,8 +15,8 @@ from gear.contracts.attacks import Patch, surface_of
 from gear.dataset.files import clear_scratch, explained, read_bytes, sha256
 from gear.dataset.plan import differences
 from gear.dataset.store import refuse_dataset
-from gear.values.errors import DatasetError
-from gear.values.serial import Json
+from gear.values.errors import DatasetError, FieldError
+from gear.values.serial import Json, from_json
 from gear.verbs.attack.watch import CHECKPOINT
 from gear.verbs.collect.patches import read_patch
 
@@ -25,6 +26,12 @@ VERIFY = "verify"
 NOTES = "attack.json"
 
 AGAIN = "is gone, damaged or of other patches; --force makes them again"
+
+TOLD: Any = {
+    "steps_done": int, "steps_per_s": float | None, "stopped": str, "masking": dict[str, float] | None,
+    "patches": dict[str, str],
+}  # fmt: skip
+"""What finished notes say that is read again, beside the plan."""
 
 
 def begin(root: Path, plan: Json, *, force: bool) -> Json | None:
@@ -79,7 +86,7 @@ def tidy(root: Path) -> None:
 def _read_notes(path: Path) -> Json:
     try:
         there = json.loads(read_bytes(path))
-    except ValueError:
+    except (ValueError, RecursionError):
         there = None
     if not isinstance(there, dict):
         raise DatasetError(path, AGAIN)
@@ -87,11 +94,19 @@ def _read_notes(path: Path) -> Json:
 
 
 def _check_whole(root: Path, notes: Json) -> None:
-    """Whether the pictures are those that the notes speak of.
+    """Whether the notes say what is told of finished patches, and the pictures are those that they speak of.
 
     Raises:
-        DatasetError: one is not, or is gone.
+        DatasetError: they do not, or a picture is another, or is gone.
     """
+    try:
+        for key, kind in TOLD.items():
+            from_json(kind, notes[key], key)
+        if notes["masking"] is not None:
+            for key in ("promised", "kept"):
+                from_json(float, notes["masking"][key], key)
+    except (KeyError, FieldError) as error:
+        raise DatasetError(root / NOTES, AGAIN) from error
     for name, digest in notes["patches"].items():
         path = root / f"{name}.png"
         if not path.is_file() or sha256(read_patch(path).tobytes()) != digest:
