@@ -71,7 +71,10 @@ def decode_plain(data: bytes) -> npt.NDArray[Any]:
 
 
 def _decode(data: bytes, mode: int) -> npt.NDArray[Any]:
-    picture = cv2.imdecode(np.frombuffer(data, np.uint8), mode) if data else None
+    try:
+        picture = cv2.imdecode(np.frombuffer(data, np.uint8), mode) if data else None
+    except cv2.error:  # of a header that promises more pixels than OpenCV takes
+        picture = None
     if picture is None:
         raise ValueError("not a picture")
     return np.asarray(picture)

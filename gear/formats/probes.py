@@ -118,7 +118,10 @@ def _read(dataset: Dataset[Any], sidecar: Sidecar, view: str, surface: str) -> P
         file = sidecar.auxiliary[f"probe/{view}/{surface}/{shade}"]
         path, facts = inside(dataset.root, file.path), file.facts
         data = read_bytes(path)
-        picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
+        try:
+            picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
+        except cv2.error:  # of a header that promises more pixels than OpenCV takes
+            picture = None
         if picture is None or picture.dtype != np.uint16 or picture.ndim != 3:
             raise DatasetError(path, "is no probe; delete the sample's sidecar and run the same collection again")
         pictures.append(np.ascontiguousarray(picture[..., ::-1], dtype=np.uint16))

@@ -1,3 +1,5 @@
+import zlib
+
 import cv2
 import numpy as np
 import pytest
@@ -5,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gear.formats.png import decode_plain, decode_rgb, encode_labels, encode_rgb, encode_tiff
+from gear.formats.png_rows import whole
 
 sizes = st.tuples(st.integers(1, 40), st.integers(1, 40), st.integers(0, 2**32 - 1))
 
@@ -55,7 +58,9 @@ def test_pictures_need_not_be_contiguous() -> None:
     np.testing.assert_array_equal(decode_rgb(encode_rgb(rgb)), rgb)
 
 
-@pytest.mark.parametrize("data", [b"", b"not a picture", b"\x89PNG\r\n\x1a\n"])
+@pytest.mark.parametrize(
+    "data", [b"", b"not a picture", b"\x89PNG\r\n\x1a\n", whole(60_000, 60_000, 8, 2, zlib.compress(b"\0"))]
+)
 def test_rubbish_is_refused(data: bytes) -> None:
     with pytest.raises(ValueError, match="not a picture"):
         decode_rgb(data)

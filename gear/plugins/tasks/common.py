@@ -75,22 +75,47 @@ def images_of(frame: Frame) -> dict[str, UInt8Image]:
     return {name: view.rgb for name, view in frame.views.items()}
 
 
-def read_rgb(root: Path, relative: str) -> UInt8Image:
-    """A colour picture of a dataset.
+def read_rgb(root: Path, relative: str, record: SceneRecord, view: str) -> UInt8Image:
+    """A colour picture of a dataset, of one view of a record.
 
     Raises:
-        DatasetError: it is not there, or damaged.
+        DatasetError: it is not there, damaged, or of another size than the view.
     """
-    return _read(root, relative, decode_rgb)
+    picture = _read(root, relative, decode_rgb)
+    _check_size(root / relative, picture, record, view)
+    return picture
+
+
+def read_map(
+    root: Path, relative: str, record: SceneRecord, view: str, dtype: npt.DTypeLike, most: int | None = None
+) -> npt.NDArray[Any]:
+    """A label or depth picture of a dataset, of one view of a record; `most` is its largest value.
+
+    Raises:
+        DatasetError: it is not there, damaged, or of another size than the view, another kind or larger values.
+    """
+    values = read_plain(root, relative)
+    _check_size(root / relative, values, record, view)
+    if values.ndim != 2 or values.dtype != dtype or (most is not None and int(values.max()) > most):
+        limit = "" if most is None else f" of 0 to {most}"
+        raise DatasetError(root / relative, f"is no map of one {np.dtype(dtype).name}{limit} a pixel; {REPAIR}")
+    return values
 
 
 def read_plain(root: Path, relative: str) -> npt.NDArray[Any]:
-    """A label or depth picture of a dataset.
+    """A label or depth picture of whatever size.
 
     Raises:
         DatasetError: it is not there, or damaged.
     """
     return _read(root, relative, decode_plain)
+
+
+def _check_size(path: Path, picture: npt.NDArray[Any], record: SceneRecord, view: str) -> None:
+    sizes = {camera.name: (camera.width_px, camera.height_px) for camera in record.cameras}
+    height, width = picture.shape[:2]
+    if sizes.get(view) != (width, height):
+        raise DatasetError(path, f"is {width} x {height} px, its sidecar says {sizes.get(view)} of {view}; {REPAIR}")
 
 
 def _read(root: Path, relative: str, decode: Callable[[bytes], npt.NDArray[Any]]) -> npt.NDArray[Any]:

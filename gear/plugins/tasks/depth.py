@@ -19,7 +19,15 @@ from gear.formats.jsontext import dump
 from gear.formats.png import encode_labels, encode_rgb, encode_tiff
 from gear.formats.png_rows import encode_deep
 from gear.metrics.depth import Crop, DepthEvaluator, NearDepth
-from gear.plugins.tasks.common import CameraOptions, draw_surfaces, images_of, read_plain, read_rgb, surfaces_of
+from gear.plugins.tasks.common import (
+    CameraOptions,
+    draw_surfaces,
+    images_of,
+    read_map,
+    read_plain,
+    read_rgb,
+    surfaces_of,
+)
 from gear.values.errors import FieldError
 from gear.values.frames import FloatImage, Frame, UInt8Image
 from gear.values.rig import Rig
@@ -121,9 +129,9 @@ class DepthTask:
         image, _, metres = _paths(info.split, sidecar.record.index)
         return DepthSample(
             record=sidecar.record,
-            images={VIEW: read_rgb(root, image)},
+            images={VIEW: read_rgb(root, image, sidecar.record, VIEW)},
             surfaces=sidecar.surfaces,
-            depth_m=kitti_depth.from_metres_file(read_plain(root, metres)),
+            depth_m=kitti_depth.from_metres_file(read_map(root, metres, sidecar.record, VIEW, np.float32)),
         )
 
     def as_prediction(self, sample: DepthSample) -> FloatImage:

@@ -150,9 +150,10 @@ class Detect2dTask:
 
     def decode(self, root: Path, sidecar: Sidecar, info: SplitInfo) -> Detect2dSample:
         """Reads the picture; the objects are in the sidecar."""
+        record = sidecar.record
         return Detect2dSample(
-            record=sidecar.record,
-            images={VIEW: read_rgb(root, f"images/{info.split}/{_name(sidecar.record.index)}")},
+            record=record,
+            images={VIEW: read_rgb(root, f"images/{info.split}/{_name(record.index)}", record, VIEW)},
             surfaces=sidecar.surfaces,
             objects=_objects(sidecar, root),
         )

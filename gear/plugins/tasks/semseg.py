@@ -24,7 +24,15 @@ from gear.formats.png import encode_rgb
 from gear.formats.runs import Runs
 from gear.groundtruth.labelmaps import coarsen, instance_map, label_map
 from gear.metrics.semantic import PresentClasses, SemanticEvaluator
-from gear.plugins.tasks.common import CameraOptions, draw_surfaces, images_of, read_plain, read_rgb, surfaces_of
+from gear.plugins.tasks.common import (
+    CameraOptions,
+    draw_surfaces,
+    images_of,
+    read_map,
+    read_plain,
+    read_rgb,
+    surfaces_of,
+)
 from gear.values.errors import FieldError
 from gear.values.frames import Frame, UInt8Image
 from gear.values.rig import Rig
@@ -135,10 +143,10 @@ class SemsegTask:
         paths = cityscapes.paths(info.town, info.split, record.sequence, record.frame)
         return SemsegSample(
             record=record,
-            images={VIEW: read_rgb(root, paths.image)},
+            images={VIEW: read_rgb(root, paths.image, record, VIEW)},
             surfaces=sidecar.surfaces,
-            label_ids=read_plain(root, paths.label_ids),
-            instance_ids=read_plain(root, paths.instance_ids),
+            label_ids=read_map(root, paths.label_ids, record, VIEW, np.uint8, len(cityscapes.LABELS) - 1),
+            instance_ids=read_map(root, paths.instance_ids, record, VIEW, np.uint16),
         )
 
     def as_prediction(self, sample: SemsegSample) -> npt.NDArray[np.uint8]:

@@ -210,8 +210,8 @@ class Stereo3dTask:
         return Stereo3dSample(
             record=record,
             images={
-                LEFT: read_rgb(root, f"{info.split}/image_2/{name}.png"),
-                RIGHT: read_rgb(root, f"{info.split}/image_3/{name}.png"),
+                LEFT: read_rgb(root, f"{info.split}/image_2/{name}.png", record, LEFT),
+                RIGHT: read_rgb(root, f"{info.split}/image_3/{name}.png", record, RIGHT),
             },
             surfaces=sidecar.surfaces,
             calibration=Calibration(
