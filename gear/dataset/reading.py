@@ -42,7 +42,13 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
     def __getitem__(self, index: int | slice) -> SampleT | Sequence[SampleT]:
         if isinstance(index, slice):
             return [self[i] for i in range(*index.indices(len(self)))]
-        return self.task.decode(self.root, self.sidecar(index), self.plan.info)
+        sidecar = self.sidecar(index)
+        try:
+            return self.task.decode(self.root, sidecar, self.plan.info)
+        except FieldError as error:  # facts are the task's own, which reads them with `from_json`
+            path = self.root / sidecar_path(self.plan.info.split, index % len(self))
+            problem = f"is not a sidecar of this version of gear: facts.{error}"
+            raise DatasetError(path, problem) from error
 
     def __iter__(self) -> Iterator[SampleT]:
         return (self[i] for i in range(len(self)))

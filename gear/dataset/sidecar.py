@@ -25,9 +25,18 @@ def load_json(path: Path) -> Json:
         DatasetError: it is missing or not JSON.
     """
     try:
-        return json.loads(read_bytes(path))
+        return json.loads(read_bytes(path), parse_constant=_no_number)
     except (ValueError, RecursionError) as error:  # brackets in brackets, too
         raise DatasetError(path, f"is not JSON ({error}); delete it and run the same collection again") from error
+
+
+def _no_number(word: str) -> Json:
+    """`dump_json` never writes what Python's reader takes beyond JSON, and nothing that draws or measures expects it.
+
+    Raises:
+        ValueError: always.
+    """
+    raise ValueError(f"{word} is no number of JSON")
 
 
 def sidecar_bytes(sidecar: Sidecar) -> bytes:

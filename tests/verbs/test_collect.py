@@ -282,6 +282,21 @@ def test_a_picture_of_another_size_or_kind_is_named_with_its_remedy(
     assert len(list(dataset)) == 2
 
 
+@pytest.mark.parametrize("task", ["stereo3d", "detect2d"])
+@pytest.mark.parametrize("objects", [None, 3, "x", [{}], [None], float("nan")])
+def test_facts_that_somebody_changed_are_one_line(
+    task: str, objects: Any, tmp_path: Path, collect_small: Collect
+) -> None:
+    collect_small(task, tmp_path)
+    path = tmp_path / "gear/debug/samples/000000.json"
+    sidecar = json.loads(path.read_text())
+    sidecar["facts"]["objects"] = objects
+    path.write_text(json.dumps(sidecar))
+    with pytest.raises(DatasetError, match=r"000000.json: is not (a sidecar|JSON)") as caught:
+        gear.open_dataset(tmp_path)[0]
+    assert "\n" not in str(caught.value)
+
+
 def test_another_configuration_needs_force(tmp_path: Path, collect_small: Collect) -> None:
     collect_small("depth", tmp_path)
     before = tree(tmp_path)

@@ -240,7 +240,7 @@ def _name(index: int) -> str:
 
 def _objects(sidecar: Sidecar, root: Path) -> tuple[Object2d, ...]:
     facts = expect(sidecar.facts, "objects", place=root)
-    return tuple(from_json(Object2d, item, "objects") for item in facts["objects"])
+    return from_json(tuple[Object2d, ...], facts["objects"], "objects")
 
 
 def _annotation(thing: Object2d, camera: CameraRecord) -> coco.Annotation:

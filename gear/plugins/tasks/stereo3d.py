@@ -217,7 +217,7 @@ class Stereo3dTask:
             calibration=Calibration(
                 intrinsics=record.camera(LEFT).intrinsics, baseline_m=from_json(float, facts["baseline_m"])
             ),
-            objects=tuple(from_json(Object3d, item, "objects") for item in facts["objects"]),
+            objects=from_json(tuple[Object3d, ...], facts["objects"], "objects"),
         )
 
     def as_prediction(self, sample: Stereo3dSample) -> tuple[KittiLabel, ...]:
