@@ -104,8 +104,8 @@ def read_manifest(root: Path, split: str) -> Json:
         files = [manifest["indexes"], *(sample["files"] for sample in samples)]
     except (KeyError, TypeError) as error:
         raise DatasetError(path, f"is no manifest of this version of gear; {remedy}") from error
-    if not isinstance(samples, list) or not samples:
-        raise DatasetError(path, f"lists no samples; {remedy}")
+    if not isinstance(samples, list):
+        raise DatasetError(path, f"has no list of samples; {remedy}")
     for number, one in enumerate(files):
         try:
             from_json(dict[str, str], one, "indexes" if number == 0 else f"samples[{number - 1}].files")

@@ -292,13 +292,15 @@ def test_what_is_not_gears_stays_and_stands_in_no_ones_way(tmp_path: Path) -> No
 
 @pytest.mark.parametrize(
     "damage",
-    [{"samples": 3}, {"samples": []}, {"samples": [{}]}, {"samples": [{"files": [1]}]}, {"indexes": {"a": 1}}, None],
+    [{"samples": 3}, {"samples": {}}, {"samples": [{}]}, {"samples": [{"files": [1]}]}, {"indexes": {"a": 1}}, None],
 )
 def test_a_manifest_that_lists_no_files_is_one_line(tmp_path: Path, damage: dict[str, Any] | None) -> None:
     fill(tmp_path, plan())
     path = tmp_path / "gear/test/manifest.json"
     path.write_text(json.dumps(damage and json.loads(path.read_text()) | damage))
-    with pytest.raises(DatasetError, match=r"(is no manifest of|lists no samples).*run the same collection again"):
+    with pytest.raises(
+        DatasetError, match=r"(is no manifest of|has no list of samples).*run the same collection again"
+    ):
         open_dataset(tmp_path)
 
 
