@@ -75,14 +75,15 @@ def images_of(frame: Frame) -> dict[str, UInt8Image]:
     return {name: view.rgb for name, view in frame.views.items()}
 
 
-def read_rgb(root: Path, relative: str, record: SceneRecord, view: str) -> UInt8Image:
-    """A colour picture of a dataset, of one view of a record.
+def read_rgb(root: Path, relative: str, record: SceneRecord | None = None, view: str = "") -> UInt8Image:
+    """A colour picture of a dataset: of one view of a record, where that is named, and of its size then.
 
     Raises:
         DatasetError: it is not there, damaged, or of another size than the view.
     """
     picture = _read(root, relative, decode_rgb)
-    _check_size(root / relative, picture, record, view)
+    if record is not None:
+        _check_size(root / relative, picture, record, view)
     return picture
 
 
