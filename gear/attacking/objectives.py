@@ -131,8 +131,8 @@ class SemsegObjective:
         figure would fall as the attack succeeds, to 0 where nothing is right any more.
         """
         if self.target is not None or self.gamma == "dynamic":
-            terms = self.terms(model, views, samples, indexes).values()
-            return torch.stack([term.weight * term.value for term in terms]).sum() if terms else torch.zeros(())
+            terms = weighted(self, model, views, samples, indexes)
+            return torch.stack(terms).sum() if terms else torch.zeros(())
         logits, labels, counts = self._answers(model, views, samples)
         view = next(iter(views))
         with torch.no_grad():
@@ -250,12 +250,23 @@ def counted(
 
     They are the objective's own `harm` where it has one, its weighted terms otherwise.
     """
-    members, harm = members_of(model).values(), getattr(objective, "harm", None)
+    harm = getattr(objective, "harm", None)
     if harm is not None:
-        return [harm(member, views, samples, indexes) for member in members]
+        return [harm(member, views, samples, indexes) for member in members_of(model).values()]
+    return weighted(objective, model, views, samples, indexes)
+
+
+def weighted(
+    objective: Objective,
+    model: Model,
+    views: Mapping[str, Tensor],
+    samples: Sequence[Any],
+    indexes: Sequence[int],
+) -> list[Tensor]:
+    """The terms of all members of a group, times their weights: what attacks climb that add everything up."""
     return [
         term.weight * term.value
-        for member in members
+        for member in members_of(model).values()
         for term in objective.terms(member, views, samples, indexes).values()
     ]
 

@@ -113,13 +113,9 @@ class Rp2:
     def _harm(self, model: Model, objective: Objective, seen: Seen) -> Mapping[str, Tensor]:
         import torch
 
-        from gear.attacking.group import members_of
+        from gear.attacking.objectives import weighted
 
-        terms = [
-            term.weight * term.value
-            for member in members_of(model).values()
-            for term in objective.terms(member, seen.views, seen.samples, seen.indexes).values()
-        ]
+        terms = weighted(objective, model, seen.views, seen.samples, seen.indexes)
         return {"harm": torch.stack(terms).sum()} if terms else {}
 
     def _penalties(self, textures: Tensor) -> Mapping[str, Tensor]:

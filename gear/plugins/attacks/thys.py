@@ -93,13 +93,9 @@ class Thys:
     def _harm(self, model: Model, objective: Objective, seen: Seen) -> Mapping[str, Tensor]:
         import torch
 
-        from gear.attacking.group import members_of
+        from gear.attacking.objectives import weighted
 
-        harm = [
-            term.value
-            for member in members_of(model).values()
-            for term in objective.terms(member, seen.views, seen.samples, seen.indexes).values()
-        ]
+        harm = weighted(objective, model, seen.views, seen.samples, seen.indexes)
         return {"objectness": torch.stack(harm).sum()}
 
     def _penalties(self, textures: Tensor) -> Mapping[str, Tensor]:
