@@ -22,6 +22,7 @@ from gear.contracts.tasks import Auxiliary, Sidecar
 from gear.dataset.files import inside, read_bytes
 from gear.dataset.layout import auxiliary_path
 from gear.dataset.reading import Dataset
+from gear.formats.png import decode_plain
 from gear.values.errors import DatasetError
 from gear.values.frames import UInt16Image
 
@@ -117,13 +118,13 @@ def _read(dataset: Dataset[Any], sidecar: Sidecar, view: str, surface: str) -> P
     for shade in _SHADES:
         file = sidecar.auxiliary[f"probe/{view}/{surface}/{shade}"]
         path, facts = inside(dataset.root, file.path), file.facts
-        data = read_bytes(path)
+        damaged = DatasetError(path, "is no probe; delete the sample's sidecar and run the same collection again")
         try:
-            picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
-        except cv2.error:  # of a header that promises more pixels than OpenCV takes
-            picture = None
-        if picture is None or picture.dtype != np.uint16 or picture.ndim != 3:
-            raise DatasetError(path, "is no probe; delete the sample's sidecar and run the same collection again")
+            picture = decode_plain(read_bytes(path))
+        except ValueError as error:
+            raise damaged from error
+        if picture.dtype != np.uint16 or picture.ndim != 3:
+            raise damaged
         pictures.append(np.ascontiguousarray(picture[..., ::-1], dtype=np.uint16))
     black, white = pictures
     return Probe(
