@@ -52,8 +52,13 @@ class CocoEvaluator(Generic[SampleT]):
         self.detections.append(tuple(prediction))
         return self._single(picture, prediction)
 
-    def _single(self, picture: Picture, found: Sequence[Detection], low_px: float = 0.0) -> dict[str, float]:
-        """One picture's own figures; detections less high than `low_px` are no false alarms."""
+    def _single(self, picture: Picture, found: Sequence[Detection]) -> dict[str, float]:
+        """One picture's own figures."""
+        return self._figures(picture, found, 0.0)
+
+    @staticmethod
+    def _figures(picture: Picture, found: Sequence[Detection], low_px: float) -> dict[str, float]:
+        """The same, where detections less high than `low_px` are no false alarms."""
         edges = [(_edges(item.box_xywh), item) for item in picture.annotations]
         return single_figures(
             boxes([(box, item.category_id, 1.0) for box, item in edges if not item.is_crowd]),

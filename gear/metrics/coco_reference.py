@@ -50,7 +50,7 @@ class TallObjects(CocoEvaluator[SampleT]):
         values = resampled(list(found.values()), draws)[:, :, 0]
         return {"ap50": known_mean(values, (1,)), **{f"ap50_{name}": values[:, i] for i, name in enumerate(found)}}
 
-    def _single(self, picture: Picture, found: Sequence[Detection], low_px: float = 0.0) -> dict[str, float]:
+    def _single(self, picture: Picture, found: Sequence[Detection]) -> dict[str, float]:
         """Of the same categories, and of what is tall enough."""
         low_px = MIN_HEIGHT_PX * picture.height_px / AT_HEIGHT_PX
         labels = [
@@ -59,7 +59,7 @@ class TallObjects(CocoEvaluator[SampleT]):
             if CATEGORY_NAMES[item.category_id] in CATEGORIES
         ]
         counted = [one for one in found if CATEGORY_NAMES[one.category_id] in CATEGORIES]
-        return super()._single(replace(picture, annotations=tuple(labels)), counted, low_px)
+        return self._figures(replace(picture, annotations=tuple(labels)), counted, low_px)
 
     def _found(self) -> dict[str, Matches]:
         if not self.pictures:

@@ -127,11 +127,10 @@ def resolve(
     check_joined([*datasets, *validation])
     models = choose_models([model] if isinstance(model, str) else list(model), model_settings, [*datasets, *validation])
     found, options = find("attack", attack), with_overrides(NO_OPTIONS, settings)
-    needs_gradients = getattr(found.spec, "needs_gradients", True)
-    guard = choose_defense(defense, defense_settings, models, task, needs_gradients=needs_gradients)
     config = read_node(found.spec.config, options, "")
     surfaces = len(datasets[0].sidecar(0).record.surfaces)
     spec = check_attack(found, models, task, surfaces, queries)
+    guard = choose_defense(defense, defense_settings, models, task, needs_gradients=spec.needs_gradients)
     if {scenes_of(one) for one in datasets} & {scenes_of(one) for one in validation}:
         raise GearError("--data and --val hold the same samples; give --val another split")
     if steps is None:
