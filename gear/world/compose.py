@@ -60,6 +60,7 @@ class Composition:
         assets: files that it refers to, by name; of meshes, where they lie.
         folder: where those of them lie that are no longer in `assets`.
         town: path of the town's MJCF.
+        files: every MJCF file that it is composed of, the town's first.
         slots: the pool.
         faces: what takes patches, in patch order.
     """
@@ -67,6 +68,7 @@ class Composition:
     xml: str
     assets: Mapping[str, bytes]
     town: Path
+    files: tuple[Path, ...]
     slots: tuple[Slot, ...]
     faces: tuple[FaceName, ...]
     folder: Path | None = None
@@ -120,6 +122,7 @@ def compose(
         xml=statics.put_into(parts.put_defaults_into(root.to_xml_string())),
         assets=root.get_assets(),
         town=library.town,
+        files=(library.town, *parts.files),
         slots=slots,
         faces=faces,
     )

@@ -10,6 +10,7 @@ from typing import Any
 from gear.values.errors import TownError
 from gear.world.faces import FACE_SIZE_PX
 from gear.world.quiet_mjcf import mjcf
+from gear.world.refusals import one_line, refusal_of
 from gear.world.statics import UNNAMED, Place, split_asset
 
 
@@ -49,11 +50,17 @@ def load_mjcf(path: Path, text: str | None = None, places: Mapping[str, Place] |
             root = mjcf.from_path(str(path))
         else:
             root = mjcf.from_xml_string(text, model_dir=str(path.parent), assets=places)
-    except KeyError as error:
-        what = f"{error.args[0]} is not known here; write bodies where it says frame, replicate or attach"
+    except (KeyError, ValueError, OSError, AttributeError, SyntaxError, RecursionError) as error:
+        if text is not None:
+            load_mjcf(path)  # fails too, and its lines are those of the file
+        if isinstance(error, KeyError):
+            what = f"{error.args[0]} is not known here; write bodies where it says frame, replicate or attach"
+        elif isinstance(error, (SyntaxError, RecursionError)):
+            # The file itself is XML: it is one that it includes, which MuJoCo names.
+            what = refusal_of(path) or one_line(error)
+        else:
+            what = one_line(error)
         raise TownError(path, f"cannot be read as MJCF: {what}") from error
-    except (ValueError, OSError, AttributeError, SyntaxError) as error:
-        raise TownError(path, f"cannot be read as MJCF: {error}") from error
     root.model = path.stem
     # Writing an element without a name makes dm_control count all elements before it: quadratic in their number.
     for tag in ("geom", "site", "body"):
@@ -77,6 +84,11 @@ class AssetParts:
         self._textures: dict[tuple[str, ...], Any] = {}
         self._defaults: dict[str, str] = {}
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Those that were taken in."""
+        return tuple(self._models)
+
     def add_instance(self, path: Path, body: Any) -> None:
         """Fills `body` with an instance of the asset that shares everything."""
         for child in self._model(path).worldbody.all_children():
@@ -96,6 +108,8 @@ class AssetParts:
         face = faces[0]
         if model.find("site", "surface") is None or face.material is None:
             raise TownError(path, f"face {face.name!r} needs a material, and a site `surface` in its middle")
+        if isinstance(face.material, str):  # dm_control leaves what it does not find as it is written
+            raise TownError(path, f"face {face.name!r} has the material {face.material!r}, which is not there")
         geom = self._root.find("geom", f"{body.name}_{face.name}")
         geom.material = self._own_material(face.material, geom.name)
         return FaceName(

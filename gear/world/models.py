@@ -12,6 +12,7 @@ from gear.values.errors import TownError
 from gear.world.classes import GeomClasses, classify, own_class
 from gear.world.compose import Composition
 from gear.world.materials import refuse_deadly
+from gear.world.refusals import refused
 
 COLLISION_CLASS = "collision"
 GROUND_PREFIX = "ground"
@@ -174,4 +175,4 @@ def _compile(
             spec.meshdir = spec.texturedir = str(composition.folder)
         return spec, spec.compile()
     except ValueError as error:
-        raise TownError(composition.town, f"MuJoCo cannot compile it: {error}") from error
+        raise refused(error, composition.files) from error
