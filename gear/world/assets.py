@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import re
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from functools import cached_property
@@ -28,7 +28,39 @@ KIND_WEIGHTS: dict[ActorKind, float] = {
 }
 """How common one asset of a kind is, before the asset's own `actor.weight`."""
 
+MOST_WEIGHT = 1e6
+"""Of an asset among others, or of a colour: sums and shares of such are finite."""
+
+_NAN = re.compile(r"^([-+.\deE\s]*\s)?[-+]?nan(\s|$)", re.IGNORECASE)
+"""Numbers of which one is none."""
+
 FOLDERS = {"town": "towns", "vehicle": "vehicles", "pedestrian": "pedestrians", "surface": "surfaces"}
+
+
+def read_xml(path: Path) -> ET.Element:
+    """The root of a MJCF file.
+
+    Raises:
+        TownError: it is no XML, or cannot be read.
+    """
+    try:
+        return ET.parse(path).getroot()
+    except (ET.ParseError, OSError, LookupError, ValueError) as error:  # the latter two: an encoding that nobody knows
+        raise TownError(path, f"cannot be read as MJCF: {error}") from error
+
+
+def read_numbers(path: Path) -> ET.Element:
+    """As `read_xml`, for a file whose numbers are used: over a nan MuJoCo only mutters, and what has it is not drawn.
+
+    Raises:
+        TownError: it is no XML, cannot be read, or one of its numbers is none.
+    """
+    root = read_xml(path)
+    for element in root.iter():
+        for key, text in element.items():
+            if _NAN.search(text):
+                raise TownError(path, f"{key} of {element.tag} {element.get('name', '')!r} is no number: {text!r}")
+    return root
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,10 +95,7 @@ def read_actor_facts(path: Path) -> ActorFacts:
     Raises:
         TownError: it is no MJCF or breaks the conventions.
     """
-    try:
-        custom = ET.parse(path).getroot().find("custom")
-    except (ET.ParseError, OSError) as error:
-        raise TownError(path, f"cannot be read as MJCF: {error}") from error
+    custom = read_xml(path).find("custom")
     entries = {} if custom is None else {item.get("name", ""): item.get("data", "") for item in custom}
     kind = entries.get("actor.kind", "")
     if kind not in KIND_WEIGHTS:
@@ -76,10 +105,15 @@ def read_actor_facts(path: Path) -> ActorFacts:
         raise TownError(path, f"actor.pose must be walk or stand, got {gait!r}")
     weight = _numbers(path, "actor.weight", entries.get("actor.weight", "1"))
     palette = _numbers(path, "paint.palette", entries.get("paint.palette", ""))
-    if len(weight) != 1 or not 0 <= weight[0] < math.inf:
-        raise TownError(path, f"actor.weight must be one number, not negative, got {entries['actor.weight']!r}")
-    if len(palette) % 4 or not all(0 <= value < math.inf for value in palette):
-        raise TownError(path, "paint.palette must be groups of four: r g b weight, none negative")
+    if len(weight) != 1 or not 0 <= weight[0] <= MOST_WEIGHT:
+        raise TownError(
+            path,
+            f"actor.weight must be one number up to {MOST_WEIGHT:g}, not negative, got {entries['actor.weight']!r}",
+        )
+    if len(palette) % 4 or not all(0 <= value <= MOST_WEIGHT for value in palette):
+        raise TownError(
+            path, f"paint.palette must be groups of four: r g b weight, none negative or above {MOST_WEIGHT:g}"
+        )
     if max((value for i, value in enumerate(palette) if i % 4 < 3), default=0) > 1:
         raise TownError(path, "paint.palette must be albedo, 0 to 1: r g b weight r g b weight …")
     colours = tuple(((palette[i], palette[i + 1], palette[i + 2]), palette[i + 3]) for i in range(0, len(palette), 4))

@@ -7,8 +7,9 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from pathlib import Path
 
+from gear.values.errors import TownError
 from gear.values.resources import data_dir
-from gear.world.assets import AssetLibrary
+from gear.world.assets import AssetLibrary, read_xml
 
 ASSET_SUFFIXES = (".xml", ".obj", ".msh", ".stl", ".png")
 
@@ -41,8 +42,8 @@ def _referred(path: Path) -> Iterator[tuple[str, Path]]:
     files, folders = [path], dict[str, str]()
     for file in files:  # grows: what is included is looked at in turn
         try:
-            root = ET.parse(file).getroot()
-        except (OSError, ET.ParseError):
+            root = read_xml(file)
+        except TownError:
             continue  # whoever reads it says so
         for compiler in root.iter("compiler"):
             folders.update({key: value for key, value in compiler.items() if key.endswith("dir")})

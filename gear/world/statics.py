@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from gear.values.errors import TownError
+from gear.world.assets import read_numbers
 
 UNNAMED = "unnamed_"
 """How names begin that gear gives to what has none."""
@@ -61,7 +62,7 @@ def split_town(path: Path) -> tuple[str | None, Statics]:
     Raises:
         TownError: it is no XML, or cannot be read.
     """
-    root = _parsed(path)
+    root = read_numbers(path)
     worlds = root.findall("worldbody")
     taken = [child for world in worlds for child in world if child.tag in _PLAIN]
     if len(worlds) != 1 or next(root.iter("include"), None) is not None or not all(map(_is_plain, taken)):
@@ -101,7 +102,7 @@ def split_asset(path: Path) -> SplitAsset:
     Raises:
         TownError: it is no XML, or a file cannot be read.
     """
-    root = _parsed(path)
+    root = read_numbers(path)
     sections = root.findall("default")
     if (
         len(sections) != 1
@@ -137,13 +138,6 @@ def _meshes_in_place(root: ET.Element, path: Path) -> dict[str, Place]:
             raise TownError(path, f"cannot be read as MJCF: {error}") from error
         mesh.set("file", str(file))
     return places
-
-
-def _parsed(path: Path) -> ET.Element:
-    try:
-        return ET.parse(path).getroot()
-    except (OSError, ET.ParseError) as error:
-        raise TownError(path, f"cannot be read as MJCF: {error}") from error
 
 
 def _is_plain(element: ET.Element) -> bool:

@@ -105,6 +105,8 @@ def test_a_town_where_nobody_can_look_is_one_line(town: str) -> None:
         ('<text name="actor.kind" data="car"/><numeric name="paint.palette" data="nan 0 0 1"/>', "none negative"),
         ('<text name="actor.kind" data="car"/><numeric name="paint.palette" data="0 0 0 inf"/>', "none negative"),
         ('<text name="actor.kind" data="car"/><numeric name="paint.palette" data="255 0 0 1"/>', "albedo, 0 to 1"),
+        ('<text name="actor.kind" data="car"/><numeric name="actor.weight" data="1e308"/>', r"one number up to 1e\+06"),
+        ('<text name="actor.kind" data="car"/><numeric name="paint.palette" data="0 0 0 1e308"/>', r"above 1e\+06"),
         ("<text", "cannot be read as MJCF"),
     ],
 )

@@ -85,6 +85,27 @@ def test_a_broken_file_that_is_included_is_told_by_the_line_that_includes_it(tmp
     assert f"Element 'include', line {line_of(TOWN, '<worldbody>')}" in told
 
 
+@pytest.mark.parametrize("file", [TOWN, BOARD, CAR])
+@pytest.mark.parametrize(("encoding", "told"), [("klingon", "unknown encoding"), ("gb2312", "multi-byte encodings")])
+def test_a_file_in_an_unknown_encoding_is_told(tmp_path: Path, file: str, encoding: str, told: str) -> None:
+    assert told in refusal(tmp_path, file, "<mujoco", f'<?xml version="1.0" encoding="{encoding}"?><mujoco')
+
+
 def test_a_face_of_a_material_that_is_not_there_is_told(tmp_path: Path) -> None:
     told = refusal(tmp_path, BOARD, 'mesh="face" material="face"', 'mesh="face" material="fce"')
     assert "face 'face' has the material 'fce', which is not there" in told
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "told"),
+    [
+        (TOWN, 'pos="-30 -6.2 3.15"', 'pos="nan -6.2 3.15"', "pos of geom 'lamp_post' is no number: 'nan -6.2 3.15'"),
+        (TOWN, 'rgba="0.30 0.31 0.32 1"', 'rgba="0.3 0.3 NaN 1"', "rgba of material 'steel' is no number"),
+        (TOWN, 'extent="100"', 'extent="-nan"', "extent of statistic '' is no number"),
+        (BOARD, '<site name="surface" pos="0 0 2.6"', '<site name="surface" pos="0 0 nan"', "pos of site 'surface'"),
+        (CAR, 'pos="-0.35 0 1.17"', 'pos="-0.35 nan 1.17"', "pos of geom 'cabin' is no number"),
+    ],
+)
+def test_a_number_that_is_none_is_told(tmp_path: Path, file: str, old: str, new: str, told: str) -> None:
+    """MuJoCo compiles it, and what has it is missing from the pictures."""
+    assert told in refusal(tmp_path, file, old, new)

@@ -12,7 +12,7 @@ from gear.config.reader import read_node
 from gear.values.errors import ConfigError, TownError, UnknownNameError
 from gear.values.resources import data_dir
 from gear.values.serial import Json, to_json
-from gear.world.assets import AssetLibrary
+from gear.world.assets import AssetLibrary, read_numbers
 from gear.world.lanes import LaneGraph
 from gear.world.scene_spec import SceneLibrary
 
@@ -88,8 +88,9 @@ def read_lanes(path: Path) -> LaneGraph:
     """The lane graph of a town's file. Its custom fields are compiled by themselves: meshes would take seconds.
 
     Raises:
-        TownError: MuJoCo cannot read it, or a lane is malformed.
+        TownError: it is no XML, MuJoCo cannot read it, or a lane is malformed.
     """
+    read_numbers(path)
     try:
         whole, custom = mujoco.MjSpec.from_file(str(path)), mujoco.MjSpec()
         for numeric in whole.numerics:
