@@ -13,6 +13,10 @@ import numpy as np
 from gear.values.errors import TownError
 from gear.values.geometry import Array
 from gear.world.polyline import Polyline
+from gear.world.scene_spec import FARTHEST_M
+
+LEAST_SIDE_M = 1.0
+"""Of the area that a town covers: maps are drawn to its scale."""
 
 _KINDS = ("lane", "sidewalk", "crosswalk", "parking", "town")
 """How the names of custom fields begin that are read."""
@@ -142,6 +146,12 @@ class LaneGraph:
             raise TownError(path, "has no lanes (numeric custom fields named lane.…)")
         if len(bounds) != 4 or bounds[0] >= bounds[2] or bounds[1] >= bounds[3]:
             raise TownError(path, "town.bounds must be xmin ymin xmax ymax")
+        _check_near("town.bounds", np.array(bounds), path)
+        if min(bounds[2] - bounds[0], bounds[3] - bounds[1]) < LEAST_SIDE_M:
+            raise TownError(path, f"town.bounds must be at least {LEAST_SIDE_M:g} m wide both ways; it is in metres")
+        for name in texts:
+            if name.partition(".")[0] == "lane" and name not in lanes:
+                raise TownError(path, f"has a text for {name}, but no numeric of that name")
         _check_links(lanes, path)
         previous: dict[str, tuple[str, ...]] = dict.fromkeys(lanes, ())
         for lane in lanes.values():
@@ -178,6 +188,16 @@ def _texts(model: mujoco.MjModel) -> dict[str, str]:
     return found
 
 
+def _check_near(name: str, places_m: Array, path: Path) -> None:
+    if np.abs(places_m).max() > FARTHEST_M:
+        farthest_m = float(places_m.flat[np.abs(places_m).argmax()])
+        raise TownError(
+            path,
+            f"{name} reaches {farthest_m:g} m, and nothing may lie beyond {FARTHEST_M:g} m along any axis; are those"
+            " metres, and is the town about its origin?",
+        )
+
+
 def _line(name: str, numbers: Array, leading: int, path: Path) -> tuple[tuple[float, ...], Polyline]:
     head, rest = numbers[:leading], numbers[leading:]
     if len(rest) < 6 or len(rest) % 3:
@@ -185,6 +205,7 @@ def _line(name: str, numbers: Array, leading: int, path: Path) -> tuple[tuple[fl
     if any(value <= 0 for value in head):
         raise TownError(path, f"{name} must have a width and a speed above 0, got {' '.join(f'{v:g}' for v in head)}")
     points = rest.reshape(-1, 3)
+    _check_near(name, points, path)
     gaps_m = np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1)
     if gaps_m.min() < 1e-4:
         raise TownError(path, f"{name} has two points in one place (point {int(np.argmin(gaps_m)) + 1})")
@@ -217,6 +238,7 @@ def _bays(name: str, numbers: Array, path: Path) -> list[ParkingBay]:
     if len(numbers) < 6 or (len(numbers) - 2) % 4 or min(numbers[:2]) <= 0:
         raise TownError(path, f"{name} must be length and width above 0, then x y z yaw_deg of each bay")
     length_m, width_m = float(numbers[0]), float(numbers[1])
+    _check_near(name, numbers[2:].reshape(-1, 4)[:, :3], path)
     return [
         ParkingBay(
             name=f"{name}_{index}",

@@ -12,14 +12,18 @@ Range = tuple[float, float]
 CountRange = tuple[int, int]
 
 
-def _check_range(name: str, value: Range | None, *, least: float = -10_000.0) -> None:
+FARTHEST_M = 10_000.0
+"""From the origin or the first board: the 32-bit numbers of models and renderers are a millimetre coarse there."""
+
+
+def _check_range(name: str, value: Range | None, *, least: float = -FARTHEST_M) -> None:
     if value is None:
         return
     low, high = value
     if low > high:
         raise FieldError(name, f"the first number must not exceed the second, got {low:g} and {high:g}")
-    if low < least or high > 10_000:
-        raise FieldError(name, f"must lie within {least:g} and 10000, got {low:g} to {high:g}")
+    if low < least or high > FARTHEST_M:
+        raise FieldError(name, f"must lie within {least:g} and {FARTHEST_M:g}, got {low:g} to {high:g}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,6 +41,9 @@ class BoardSpec:
     asset: str = "billboard"
 
     def __post_init__(self) -> None:
+        if max(map(abs, self.position_m)) > FARTHEST_M:
+            told = ", ".join(f"{value:g}" for value in self.position_m)
+            raise FieldError("position_m", f"must lie within {FARTHEST_M:g} m of the town's origin, got {told}")
         if not -360 <= self.facing_deg <= 360:
             raise FieldError("facing_deg", f"must be -360 to 360 degrees, got {self.facing_deg:g}")
         if not self.asset:

@@ -61,6 +61,13 @@ def test_the_tiny_town_reads() -> None:
             "5.0 m from",
         ),
         (GOOD + '<numeric name="parking.p" data="5 2  1 1 0"/>', "parking.p must be length and width"),
+        (
+            '<numeric name="lane.a" data="3 10  0 0 0  1e9 0 0"/>',
+            r"lane.a reaches 1e\+09 m.* 10000 m .*are those metres",
+        ),
+        (GOOD + '<numeric name="sidewalk.a" data="3  0 -5e6 0  9 0 0"/>', r"sidewalk.a reaches -5e\+06 m"),
+        (GOOD + '<numeric name="parking.p" data="5 2  1 2e4 0 90"/>', "parking.p reaches 20000 m"),
+        (GOOD + '<text name="lane.A" data="next=lane.a"/>', "a text for lane.A, but no numeric of that name"),
     ],
 )
 def test_errors_name_the_lane(custom: str, told: str) -> None:
@@ -72,6 +79,16 @@ def test_bounds_are_needed() -> None:
     with pytest.raises(TownError, match=r"town\.bounds"):
         LaneGraph.from_model(
             mujoco.MjModel.from_xml_string(f"<mujoco><custom>{GOOD}</custom></mujoco>"), Path("town.xml")
+        )
+
+
+@pytest.mark.parametrize(("bounds", "told"), [("0 0 1e-9 9", "at least 1 m wide"), ("0 0 9 1e9", "reaches 1e")])
+def test_bounds_are_those_of_a_town(bounds: str, told: str) -> None:
+    """A map of it would take all memory."""
+    custom = f'{GOOD}<numeric name="town.bounds" data="{bounds}"/>'
+    with pytest.raises(TownError, match=rf"town\.bounds.*{told}"):
+        LaneGraph.from_model(
+            mujoco.MjModel.from_xml_string(f"<mujoco><custom>{custom}</custom></mujoco>"), Path("town.xml")
         )
 
 

@@ -44,6 +44,7 @@ EGO = EgoLimits(ahead_m=(5.0, 10.0), lateral_m=(-1.0, 1.0))
         (lambda: TruckSpec(gap_m=(0.0, 2.0)), "gap_m"),
         (lambda: VehicleLimits(count=(0, 1), parked_share=1.5), "parked_share"),
         (lambda: BoardSpec(position_m=(0.0, 0.0, 0.0), facing_deg=1000.0), "facing_deg"),
+        (lambda: BoardSpec(position_m=(0.0, -2e4, 0.0), facing_deg=0.0), "position_m"),
     ],
 )
 def test_nonsense_is_refused(make: object, field: str) -> None:
