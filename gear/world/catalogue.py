@@ -24,6 +24,9 @@ MASS_KG = {"person": 75.0, "bicycle": 95.0, "motorcycle": 300.0}
 VEHICLE_MASS_KG = 1500.0
 """Only their inertia's shape matters for how things come to rest."""
 
+ACTOR_SIDE_M = (0.1, 100.0)
+"""Least and most of an actor's longest side: what is beyond was drawn in other units."""
+
 COUNTABLE = frozenset(label.code for label in LABELS if label.coco_id is not None and not label.is_instance)
 """Labels of the town's things that are counted one by one, each in a body of its own."""
 
@@ -90,7 +93,8 @@ def actor_types(
     """Every asset of the pool by name, measured on its first instance.
 
     Raises:
-        TownError: an asset has nothing visible, something without bounds, or does not stand at its origin.
+        TownError: an asset has nothing visible, something without bounds, a size that no road user has, or does not
+            stand at its origin.
     """
     types: dict[str, ActorType] = {}
     for slot in slots:
@@ -102,6 +106,9 @@ def actor_types(
         if not geoms:
             raise TownError(facts.path, "has no visible geom")
         shape = _shape(model, data, body_id, geoms, classes, facts.path)
+        longest_m = float(shape.box_size_m.max())
+        if not ACTOR_SIDE_M[0] <= longest_m <= ACTOR_SIDE_M[1]:
+            raise TownError(facts.path, f"its longest side is {longest_m:.3g} m; MJCF is in metres, and so is gear")
         extent_m = np.abs(shape.box_centre_m) + shape.box_size_m / 2
         bottom_m = float(shape.box_centre_m[2] - shape.box_size_m[2] / 2)
         if abs(bottom_m) > 0.1:

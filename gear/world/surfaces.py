@@ -19,6 +19,8 @@ from gear.world.shapes import geom_triangles
 from gear.world.upright import what_is_wrong
 
 FLATNESS_M = 0.01
+FACE_SIDE_M = (0.1, 100.0)
+"""Least and most of a face's sides: smaller shows no patch, larger was meant in other units."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -68,7 +70,8 @@ def find_faces(model: mujoco.MjModel, data: mujoco.MjData, names: Sequence[FaceN
     """Measures the faces of a compiled model; actors stand at their own origins in `data`.
 
     Raises:
-        TownError: a face is not flat in its `surface` frame, or would not show a patch upright and whole there.
+        TownError: a face is not flat in its `surface` frame, has no size of a board's, or would not show a patch
+            upright and whole there.
     """
     return tuple(_face(model, data, number, name, path) for number, name in enumerate(names))
 
@@ -92,6 +95,11 @@ def _face(model: mujoco.MjModel, data: mujoco.MjData, number: int, name: FaceNam
             f"{name.asset}: the face must be flat (no thicker than {FLATNESS_M * 100:g} cm), with the site `surface` in"
             " its middle, z into the board",
         )
+    width_m, height_m = float(high[0] - low[0]), float(high[1] - low[1])
+    if not all(FACE_SIDE_M[0] <= side_m <= FACE_SIDE_M[1] for side_m in (width_m, height_m)):
+        least_m, most_m = FACE_SIDE_M
+        problem = f"is {width_m:.3g} m x {height_m:.3g} m, and its sides must be {least_m:g} to {most_m:g} m"
+        raise TownError(path, f"{name.asset}: the face {problem}")
     world_from_geom = RigidTransform.from_parts(
         "world", "geom", data.geom_xmat[geom_id].reshape(3, 3), data.geom_xpos[geom_id]
     )
@@ -108,8 +116,8 @@ def _face(model: mujoco.MjModel, data: mujoco.MjData, number: int, name: FaceNam
         is_carried=name.is_carried,
         geom_id=geom_id,
         parent_from_surface=owner_from_surface if name.is_carried else world_from_surface,
-        width_m=float(high[0] - low[0]),
-        height_m=float(high[1] - low[1]),
+        width_m=width_m,
+        height_m=height_m,
         neutral=_neutral(model, name.neutral_material),
     )
 

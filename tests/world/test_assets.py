@@ -160,6 +160,8 @@ def test_the_pool_is_enough_for_the_largest_crowd() -> None:
         ('face="0 2 1 0 3 2"', 'face="0 1 2 0 2 3"', "face the other way"),
         ('type="mesh" mesh="face"', 'type="plane" size="3.7 1.85 1" pos="0 0 2.6"', "a plane, which has no finite"),
         ('type="mesh" mesh="face"', 'type="ellipsoid" size="0.001 3.7 1.85" pos="0 0 2.6"', "a mesh or a box"),
+        ('type="mesh" mesh="face"', 'type="box" size="1e-3 1e-6 1e-6" pos="0 0 2.6"', "face is 2e-06 m x 2e-06 m"),
+        ('type="mesh" mesh="face"', 'type="box" size="1e-3 370 185" pos="0 0 2.6"', "740 m x 370 m, and its sides"),
     ],
 )
 def test_a_board_must_keep_the_conventions(tmp_path: Path, old: str, new: str, told: str) -> None:
@@ -187,6 +189,7 @@ def test_a_board_must_keep_the_conventions(tmp_path: Path, old: str, new: str, t
             "car_saloon.xml: has no geom of class collision",
         ),
         ('class="car.glass" material="glass"', 'class="car.glass" type="plane"', "'car_saloon_0_cabin' is a plane"),
+        ('size="2.25 0.9 0.35"', 'size="225 90 0.35"', "car_saloon.xml: its longest side is 450 m; MJCF is in metres"),
     ],
 )
 def test_a_vehicle_must_keep_the_conventions(tmp_path: Path, old: str, new: str, told: str) -> None:
