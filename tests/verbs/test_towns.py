@@ -102,6 +102,15 @@ def test_an_unlabelled_geom_stops_the_map(tmp_path: Path) -> None:
         ground_layer.Relief.of(path)
 
 
+def test_a_height_field_stops_the_map(tmp_path: Path) -> None:
+    field = '<hfield name="h" nrow="4" ncol="4" size="9 9 1 1"/><material name="steel"'
+    path = edited_town(tmp_path, '<material name="steel"', field)
+    hill = '<geom name="hill" class="terrain" type="hfield" hfield="h"/><geom name="lamp_post"'
+    path.write_text(path.read_text(encoding="utf-8").replace('<geom name="lamp_post"', hill), encoding="utf-8")
+    with pytest.raises(TownError, match=f"{path.name}: geom 'hill' is a hfield, which has no finite surface; make it"):
+        town_map.draw_map(read_town(path), ground_layer.Relief.of(path))
+
+
 def pixel(picture: UInt8Image, x_m: float, y_m: float) -> tuple[int, ...]:
     """Of the tiny town's map; its bounds are 160 m x 120 m about the origin."""
     scale = town_map.LONG_SIDE_PX / 160

@@ -46,11 +46,13 @@ class Relief:
     """A compiled town, as far as a map needs it.
 
     Attributes:
+        path: its file.
         model: compiled from its file alone.
         data: with its geoms in place.
         classes: labels of what is seen.
     """
 
+    path: Path
     model: mujoco.MjModel
     data: mujoco.MjData
     classes: GeomClasses
@@ -69,16 +71,23 @@ class Relief:
             raise TownError(path, f"MuJoCo cannot compile it: {' '.join(str(error).split())}") from error
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
-        return Relief(model=model, data=data, classes=classify(spec, path))
+        return Relief(path=path, model=model, data=data, classes=classify(spec, path))
 
     def corners_m(self, geom: int) -> Array:
-        """(N, 3, 3) triangles of a geom in the world; a plane reaches as far as it is rendered."""
+        """(N, 3, 3) triangles of a geom in the world; a plane reaches as far as it is rendered.
+
+        Raises:
+            TownError: it is a height field, or something else without triangles.
+        """
         if self.model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE:
             half = np.where(self.model.geom_size[geom, :2] > 0, self.model.geom_size[geom, :2], 1e4)
             square = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * [*half, 0.0]
             local = square[[[0, 1, 2], [0, 2, 3]]]
         else:
-            vertices, faces = geom_triangles(self.model, geom)
+            try:
+                vertices, faces = geom_triangles(self.model, geom)
+            except ValueError as error:
+                raise TownError(self.path, f"{error}; make it of meshes or primitives") from error
             local = vertices[faces]
         return np.asarray(local @ self.data.geom_xmat[geom].reshape(3, 3).T + self.data.geom_xpos[geom])
 
