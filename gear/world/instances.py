@@ -138,6 +138,9 @@ class AssetParts:
     def _model(self, path: Path) -> mjcf.RootElement:
         """The asset's file, attached when first asked for."""
         if path not in self._models:
+            for other in self._models:
+                if other.stem == path.stem:
+                    raise TownError(path, f"has the name of {other}, which is in the same world; rename one of them")
             split = split_asset(path)
             model = load_mjcf(path, split.text, split.places)
             if split.text is not None:

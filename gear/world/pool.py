@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from gear.values.errors import TownError
 from gear.world.assets import ActorFacts, AssetLibrary
 from gear.world.scene_spec import SceneSpec
 
@@ -19,7 +20,11 @@ def plan_pool(scene: SceneSpec, library: AssetLibrary) -> list[tuple[ActorFacts,
 
     Raises:
         UnknownNameError: the town's vehicles hold no ego car.
+        TownError: a vehicle is named like a pedestrian.
     """
+    for name in library.vehicles.keys() & library.pedestrians.keys():
+        problem = f"has the name of {library.pedestrians[name].path}, so records could not tell them apart; rename one"
+        raise TownError(library.vehicles[name].path, problem)
     library.path("vehicle", EGO_ASSET)
     pool = [(library.vehicles[EGO_ASSET], 1)]
     if scene.npc_vehicles.count[1]:

@@ -22,7 +22,7 @@ UNNAMED = "unnamed_"
 _PLAIN = ("geom", "body")
 _PLAIN_DEFAULTS = ("default", "geom", "mesh")
 _REFERENCES = frozenset({"material", "mesh", "hfield", "fluidshape"})
-_PLAIN_STEM = re.compile(r"[\w.-]+")
+_PLAIN_STEM = re.compile(r"[\w.-]+", re.ASCII)
 _WORLD = "<worldbody>"
 
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -131,6 +132,22 @@ def test_a_folder_of_ones_own_must_hold_the_ego_car(tmp_path: Path) -> None:
     actor(tmp_path / "vehicles", '<text name="actor.kind" data="car"/>')
     with pytest.raises(UnknownNameError, match=r"no vehicle named 'car_saloon'.*thing.*takes the place of gear"):
         plan_pool(SceneSpec(), AssetLibrary.for_town(tmp_path / "towns" / "t.xml"))
+
+
+def test_a_vehicle_is_not_named_like_a_pedestrian(tmp_path: Path) -> None:
+    """Records name assets, and a person would drive as one of them."""
+    shutil.copytree(TINY_TOWN.parents[1], tmp_path, dirs_exist_ok=True)
+    shutil.copy(tmp_path / "vehicles" / "van_small.xml", tmp_path / "vehicles" / "adult_walk.xml")
+    with pytest.raises(TownError, match=r"vehicles/adult_walk.xml: has the name of .*pedestrians/adult_walk.xml"):
+        plan_pool(SceneSpec(), AssetLibrary.for_town(tmp_path / "towns" / "tiny.xml"))
+
+
+@pytest.mark.parametrize("name", ["kübelwagen", "two words", "a&b"])
+def test_an_asset_may_have_any_letters_in_its_name(tmp_path: Path, name: str) -> None:
+    shutil.copytree(TINY_TOWN.parents[1], tmp_path, dirs_exist_ok=True)
+    (tmp_path / "vehicles" / "van_small.xml").rename(tmp_path / "vehicles" / f"{name}.xml")
+    town, scene = tmp_path / "towns" / "tiny.xml", tiny_scenes().scenes["board"]
+    assert name in World.build(town=town, scene_name="board", scene=scene, weather=CLEAR).types
 
 
 def test_the_pool_is_enough_for_the_largest_crowd() -> None:

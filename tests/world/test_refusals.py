@@ -109,3 +109,10 @@ def test_a_face_of_a_material_that_is_not_there_is_told(tmp_path: Path) -> None:
 def test_a_number_that_is_none_is_told(tmp_path: Path, file: str, old: str, new: str, told: str) -> None:
     """MuJoCo compiles it, and what has it is missing from the pictures."""
     assert told in refusal(tmp_path, file, old, new)
+
+
+def test_two_files_of_one_name_in_a_world_are_told(tmp_path: Path) -> None:
+    (tmp_path / "vehicles").mkdir()
+    shutil.copy(DATA / "mjcf" / CAR, tmp_path / "vehicles" / "billboard.xml")
+    told = refusal(tmp_path, "vehicles/billboard.xml", '"car_saloon"', '"billboard"')
+    assert f"has the name of {tmp_path / BOARD}" in told
