@@ -131,6 +131,21 @@ def test_the_map_shows_things_where_they_are(tiny_map: UInt8Image) -> None:
     assert min(pixel(tiny_map, 22, 0.57)) > max(pixel(tiny_map, 19, 0.57))
 
 
+def test_what_closes_cracks_from_below_hides_nothing(tmp_path: Path, tiny_map: UInt8Image) -> None:
+    """As wide as the town, it would be paved ground above the terrain; a square that is only low is none. Hills may
+    reach further."""
+    classes = '<default class="pole"/>'
+    path = edited_town(tmp_path, classes, f'{classes}<default class="ground"/>')
+    text, post = path.read_text(encoding="utf-8"), '<geom name="lamp_post"'
+    under = '<geom name="under" class="ground" material="asphalt" size="90 70 0.1" pos="0 0 -9"/>'
+    square = '<geom name="square" class="ground" material="asphalt" size="9 9 0.1" pos="-60 40 -0.5"/>'
+    path.write_text(text.replace(post, under + post), encoding="utf-8")
+    assert np.array_equal(town_map.draw_map(read_town(path, TINY_SCENES), ground_layer.Relief.of(path)), tiny_map)
+    path.write_text(text.replace(post, square + post), encoding="utf-8")
+    paved = ground_layer.COVERS[1][2]
+    assert pixel(town_map.draw_map(read_town(path), ground_layer.Relief.of(path)), -60, 40) == paved
+
+
 def test_the_map_shows_boards_and_limits(tiny: Town) -> None:
     relief = ground_layer.Relief.of(TINY_TOWN)
     with_board = town_map.draw_map(only(tiny, "board"), relief)

@@ -18,6 +18,9 @@ from gear.world.classes import FIRST_HIDDEN_GROUP, GeomClasses, classify
 from gear.world.models import GROUND_PREFIX
 from gear.world.shapes import geom_triangles
 
+Bounds = tuple[float, float, float, float]
+"""xmin, ymin, xmax, ymax."""
+
 COVERS: tuple[tuple[str, tuple[str, ...], Colour], ...] = (
     ("terrain", ("terrain",), (219, 229, 205)),
     ("paved ground", ("ground",), (233, 227, 214)),
@@ -132,11 +135,14 @@ def obstacles(relief: Relief) -> list[Obstacle]:
     return found
 
 
-def draw_ground(canvas: Canvas, relief: Relief) -> None:
-    """Draws ground covers, plants, fences and buildings."""
+def draw_ground(canvas: Canvas, relief: Relief, bounds_m: Bounds) -> None:
+    """Draws ground covers, plants, fences and buildings of a town with those bounds."""
+    hidden = _underground(relief, bounds_m)
     for _, labels, colour in COVERS:
         mask = canvas.mask()
         for geom in _labelled(relief, labels):
+            if geom == hidden:
+                continue
             canvas.fill_triangles(mask, _from_above(relief.corners_m(geom)))
         canvas.blend(mask, colour)
     plants = canvas.mask()
@@ -153,6 +159,20 @@ def draw_ground(canvas: Canvas, relief: Relief) -> None:
     canvas.blend(canvas.shift_down_right(buildings, 0.8 * canvas.px_per_m), SHADOW, 0.25)
     canvas.blend(buildings, BUILDING)
     canvas.outline(buildings, BUILDING_EDGE, 0.8)
+
+
+def _underground(relief: Relief, bounds_m: Bounds) -> int | None:
+    """What closes cracks from below: the ground that lies deeper than everything else, under all of the town."""
+    geoms = [geom for _, labels, _ in COVERS for geom in _labelled(relief, labels)]
+    if len(geoms) < 2:
+        return None
+    corners = [relief.corners_m(geom).reshape(-1, 3) for geom in geoms]
+    tops_m = [float(points[:, 2].max()) for points in corners]
+    lowest, second = np.argsort(tops_m)[:2]
+    low, high = corners[lowest].min(axis=0)[:2], corners[lowest].max(axis=0)[:2]
+    is_under = tops_m[lowest] < tops_m[second]
+    is_wide = (low <= bounds_m[:2]).all() and (high >= bounds_m[2:]).all()
+    return geoms[lowest] if is_under and is_wide and geoms[lowest] in _labelled(relief, ("ground",)) else None
 
 
 def _labelled(relief: Relief, names: tuple[str, ...]) -> list[int]:

@@ -48,7 +48,7 @@ def draw_map(town: Town, relief: ground_layer.Relief) -> UInt8Image:
         origin_px=(MARGIN_PX - xmin * px_per_m, top_px + ymax * px_per_m),
         box_px=(MARGIN_PX, top_px, MARGIN_PX + width_px, top_px + height_px),
     )
-    ground_layer.draw_ground(canvas, relief)
+    ground_layer.draw_ground(canvas, relief, town.lanes.bounds_m)
     traffic_layer.draw_traffic(canvas, town.lanes)
     colours = scene_colours(scenes)
     for name, colour in colours.items():
