@@ -80,6 +80,7 @@ class AssetParts:
 
     def __init__(self, root: mjcf.RootElement) -> None:
         self._root = root
+        self._turns = _turns_of(root)
         self._models: dict[Path, mjcf.RootElement] = {}
         self._textures: dict[tuple[str, ...], Any] = {}
         self._defaults: dict[str, str] = {}
@@ -143,6 +144,9 @@ class AssetParts:
                     raise TownError(path, f"has the name of {other}, which is in the same world; rename one of them")
             split = split_asset(path)
             model = load_mjcf(path, split.text, split.places)
+            if _turns_of(model) != self._turns:
+                told = "turns geoms by {} and the town by {}; write both with the same compiler setting"
+                raise TownError(path, told.format(_turns_of(model), self._turns))
             if split.text is not None:
                 self._defaults[model.model] = split.defaults
             try:
@@ -192,6 +196,12 @@ class AssetParts:
                 layer_attributes["texture"] = texture
             own.add(layer.tag, **layer_attributes)
         return own
+
+
+def _turns_of(model: mjcf.RootElement) -> str:
+    """How a file writes its angles. One setting holds for the whole world, so that of one file, which another only
+    lacks, would turn the other's geoms as well."""
+    return f"angle={model.compiler.angle or 'degree'} eulerseq={model.compiler.eulerseq or 'xyz'}"
 
 
 def _attributes_outside(element: Any) -> dict[str, Any]:

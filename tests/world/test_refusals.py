@@ -111,6 +111,19 @@ def test_a_number_that_is_none_is_told(tmp_path: Path, file: str, old: str, new:
     assert told in refusal(tmp_path, file, old, new)
 
 
+@pytest.mark.parametrize(
+    ("file", "new", "told"),
+    [
+        (CAR, 'angle="radian"', "angle=radian eulerseq=xyz and the town by angle=degree eulerseq=xyz"),
+        (CAR, 'angle="degree" eulerseq="ZYX"', "angle=degree eulerseq=ZYX and the town by angle=degree eulerseq=xyz"),
+        (BOARD, 'eulerseq="zyx"', "angle=degree eulerseq=zyx and the town by angle=degree eulerseq=xyz"),
+    ],
+)
+def test_angles_are_written_one_way_in_a_world(tmp_path: Path, file: str, new: str, told: str) -> None:
+    """MuJoCo would read all of them as one file says, where the others say nothing."""
+    assert f"turns geoms by {told}" in refusal(tmp_path, file, 'angle="degree"', new)
+
+
 def test_two_files_of_one_name_in_a_world_are_told(tmp_path: Path) -> None:
     (tmp_path / "vehicles").mkdir()
     shutil.copy(DATA / "mjcf" / CAR, tmp_path / "vehicles" / "billboard.xml")
