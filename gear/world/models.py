@@ -173,6 +173,8 @@ def _compile(
         spec = mujoco.MjSpec.from_string(ET.tostring(tree, encoding="unicode"), assets=dict(assets))
         if composition.folder is not None:
             spec.meshdir = spec.texturedir = str(composition.folder)
+        # Either would make away with bodies and geoms that are looked for by name.
+        spec.compiler.discardvisual = spec.compiler.fusestatic = False
         return spec, spec.compile()
     except ValueError as error:
         raise refused(error, composition.files) from error

@@ -23,6 +23,9 @@ _PLAIN = ("geom", "body")
 _PLAIN_DEFAULTS = ("default", "geom", "mesh")
 _REFERENCES = frozenset({"material", "mesh", "hfield", "fluidshape"})
 _PLAIN_STEM = re.compile(r"[\w.-]+", re.ASCII)
+_MAIN = "main"
+"""MuJoCo's own name of the class of all defaults: in files that it has written."""
+
 _WORLD = "<worldbody>"
 
 
@@ -57,16 +60,19 @@ def split_town(path: Path) -> tuple[str | None, Statics]:
 
     Nothing is taken out of a town whose geoms and bodies are not all plain ones: such with joints, cameras or sites in
     them, geoms without a class of their own, or files that include others. dm_control reads such a file itself: the
-    text is None.
+    text is None, unless the class of all defaults has its usual name, which dm_control would make another class.
 
     Raises:
         TownError: it is no XML, or cannot be read.
     """
     root = read_numbers(path)
+    named = [default for default in root.findall("default") if default.get("class") == _MAIN]
+    for default in named:
+        del default.attrib["class"]
     worlds = root.findall("worldbody")
     taken = [child for world in worlds for child in world if child.tag in _PLAIN]
     if len(worlds) != 1 or next(root.iter("include"), None) is not None or not all(map(_is_plain, taken)):
-        return None, Statics()
+        return ET.tostring(root, encoding="unicode") if named else None, Statics()
     for child in taken:
         worlds[0].remove(child)
     geoms = [geom for child in taken for geom in child.iter("geom")]

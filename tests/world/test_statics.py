@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import shutil
 from pathlib import Path
 
 import mujoco
@@ -73,6 +74,31 @@ def test_a_town_with_anything_else_is_left_whole(thing: str, tmp_path: Path) -> 
     left, statics = split_town(town)
     assert left is None and statics == Statics()
     assert statics.put_into("<worldbody><light/></worldbody>") == "<worldbody><light/></worldbody>"
+
+
+@pytest.mark.parametrize(
+    "more", ["", '<body><geom class="building.plaster" size="1 1 1"/></body>'], ids=["plain", "whole"]
+)
+def test_defaults_may_have_the_name_that_mujoco_writes(more: str, tmp_path: Path) -> None:
+    shutil.copytree(TINY_TOWN.parents[1], tmp_path, dirs_exist_ok=True)
+    town = tmp_path / "towns" / "tiny.xml"
+    worlds = []
+    for start in ("<default>", '<default class="main">'):
+        text = TINY_TOWN.read_text().replace("<default>", start, 1).replace("<worldbody>", f"<worldbody>{more}", 1)
+        town.write_text(text)
+        worlds.append(compile_world(AssetLibrary.for_town(town), tiny_scenes().scenes["board"], CLEAR))
+    assert alike(worlds[0].model, worlds[1].model)
+
+
+@pytest.mark.parametrize("setting", ["fusestatic", "discardvisual"])
+def test_nothing_is_compiled_away(setting: str, tmp_path: Path) -> None:
+    shutil.copytree(TINY_TOWN.parents[1], tmp_path, dirs_exist_ok=True)
+    town = tmp_path / "towns" / "tiny.xml"
+    scene = tiny_scenes().scenes["board"]
+    plain = compile_world(AssetLibrary.for_town(town), scene, CLEAR)
+    town.write_text(TINY_TOWN.read_text().replace('angle="degree"', f'angle="degree" {setting}="true"', 1))
+    thinned = compile_world(AssetLibrary.for_town(town), scene, CLEAR)
+    assert alike(plain.model, thinned.model) and alike(plain.placement_model, thinned.placement_model)
 
 
 ASSET = """<mujoco model="cart">
