@@ -78,7 +78,9 @@ def text_of(path: Path) -> str:
     except OSError as error:
         raise ConfigError(path, 0, 0, "", f"cannot read it: {error.strerror}") from error
     except UnicodeDecodeError as error:
-        raise ConfigError(path, 0, 0, "", "is not UTF-8 text") from error
+        before = error.object[: error.start].decode("utf-8").split("\n")
+        problem = f"is not UTF-8 text (byte {error.object[error.start]:#04x}); save it as UTF-8"
+        raise ConfigError(path, len(before), len(before[-1]) + 1, "", problem) from error
 
 
 def parse_text(text: str, name: str) -> Node:

@@ -13,6 +13,9 @@ from gear.world.quiet_mjcf import mjcf
 from gear.world.refusals import one_line, refusal_of
 from gear.world.statics import UNNAMED, Place, split_asset
 
+_UNREAD = ("frame", "replicate", "attach")
+"""What MuJoCo knows in a body, and dm_control does not."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaceName:
@@ -54,7 +57,9 @@ def load_mjcf(path: Path, text: str | None = None, places: Mapping[str, Place] |
         if text is not None:
             load_mjcf(path)  # fails too, and its lines are those of the file
         if isinstance(error, KeyError):
-            what = f"{error.args[0]} is not known here; write bodies where it says frame, replicate or attach"
+            what = f"{error.args[0]} is not known here"
+            if what.endswith(tuple(f"'{tag}' is not known here" for tag in _UNREAD)):
+                what += "; write bodies where it says frame, replicate or attach"
         elif isinstance(error, (SyntaxError, RecursionError)):
             # The file itself is XML: it is one that it includes, which MuJoCo names.
             what = refusal_of(path) or one_line(error)

@@ -140,8 +140,8 @@ def test_brackets_without_end_are_one_line(tmp_path: Path) -> None:
 def test_a_file_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="cannot read it"):
         parse_file(tmp_path / "none.yml")
-    (tmp_path / "latin.yml").write_bytes(b"name: \xe9\n")
-    with pytest.raises(ConfigError, match="is not UTF-8"):
+    (tmp_path / "latin.yml").write_bytes(b"# caf\xc3\xa9\nname: \xe9\n")
+    with pytest.raises(ConfigError, match=r"latin.yml:2:7: is not UTF-8 text \(byte 0xe9\); save it as UTF-8"):
         parse_file(tmp_path / "latin.yml")
 
 
