@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
@@ -72,6 +73,14 @@ class EgoLimits:
             raise FieldError("max_incidence_deg", f"must lie between 0 and 90 degrees, got {self.max_incidence_deg:g}")
         if not 0 <= self.min_free <= 1:
             raise FieldError("min_free", f"is a share, 0 to 1, got {self.min_free:g}")
+
+
+ONE_PLACE_M, ONE_WAY_DEG = 0.05, 5.0
+"""Boards that stand and look closer together than this are one, written twice."""
+
+
+def _is_one_way(board: BoardSpec, other: BoardSpec) -> bool:
+    return abs((board.facing_deg - other.facing_deg + 180) % 360 - 180) < ONE_WAY_DEG
 
 
 MOST_NPCS = 1000
@@ -162,6 +171,10 @@ class SceneSpec:
             raise FieldError("ego", "a scene with boards needs the limits of the ego car (ahead_m, lateral_m)")
         if not self.boards and self.ego is not None:
             raise FieldError("ego", "limits of the ego car are in the frame of the first board, and there is none")
+        for number, board in enumerate(self.boards):
+            for earlier, other in enumerate(self.boards[:number]):
+                if math.dist(board.position_m, other.position_m) < ONE_PLACE_M and _is_one_way(board, other):
+                    raise FieldError("boards", f"{earlier} and {number} stand in one place; each would hide the other")
         for name in ("npc_vehicles", "pedestrians"):
             if not self.boards and getattr(self, name).needs_board:
                 raise FieldError(name, "ahead_m and lateral_m are in the frame of the first board; use radius_m")

@@ -36,6 +36,10 @@ EGO = EgoLimits(ahead_m=(5.0, 10.0), lateral_m=(-1.0, 1.0))
     [
         (lambda: SceneSpec(boards=(BOARD,)), "ego"),
         (lambda: SceneSpec(ego=EGO), "ego"),
+        (
+            lambda: SceneSpec(boards=(BOARD, BoardSpec(position_m=(0.0, 0.01, 0.0), facing_deg=359.0)), ego=EGO),
+            "boards",
+        ),
         (lambda: SceneSpec(boards=(BOARD,), ego=EGO, truck=TruckSpec()), "truck"),
         (lambda: SceneSpec(npc_vehicles=VehicleLimits(count=(1, 2), ahead_m=(0.0, 1.0))), "npc_vehicles"),
         (lambda: EgoLimits(ahead_m=(9.0, 5.0), lateral_m=(0.0, 1.0)), "ahead_m"),
@@ -51,6 +55,11 @@ def test_nonsense_is_refused(make: object, field: str) -> None:
     with pytest.raises(FieldError) as caught:
         make()  # type: ignore[operator]
     assert caught.value.field == field
+
+
+def test_boards_may_stand_back_to_back() -> None:
+    behind = BoardSpec(position_m=(-0.3, 0.0, 0.0), facing_deg=180.0)
+    assert SceneSpec(boards=(BOARD, behind), ego=EGO).boards == (BOARD, behind)
 
 
 def test_caps_lower_both_ends() -> None:
