@@ -18,12 +18,16 @@ T = TypeVar("T")
 TRUE_WORDS = ("true", "yes", "on")
 FALSE_WORDS = ("false", "no", "off")
 
+WHOLE = {"whole": True}
+"""Metadata of a field whose default is one thing: who gives some of its keys does not mean the default's others."""
+
 
 def read_node(kind: type[T], node: Node, key: str = "") -> T:
     """Reads `node` as a `kind`.
 
     A dataclass may name in `SHORTHAND` the field that a bare word fills: `weather: ClearNoon`. A field of type `Node`
-    is kept as it is, for whoever knows its type later.
+    is kept as it is, for whoever knows its type later. Where a field is a dataclass and only some of its keys are
+    given, the others are those of the field's own default; with `WHOLE` in its metadata, those of the class.
 
     Raises:
         ConfigError: a key is unknown, missing or repeated, a value has another type, or the class refuses it.
@@ -48,7 +52,7 @@ def _in_full(kind: Any, node: Node) -> Node:
     return node
 
 
-def _read(kind: Any, node: Node, key: str) -> Any:
+def _read(kind: Any, node: Node, key: str, default: Any = None) -> Any:
     if kind == Node:
         return node
     origin = get_origin(kind)
@@ -56,7 +60,7 @@ def _read(kind: Any, node: Node, key: str) -> Any:
         options = get_args(kind)
         if isinstance(node, Scalar) and node.is_null and type(None) in options:
             return None
-        return _read(next(option for option in options if option is not type(None)), node, key)
+        return _read(next(option for option in options if option is not type(None)), node, key, default)
     if origin is Literal:
         return _read_choice(get_args(kind), node, key)
     if origin is tuple:
@@ -66,7 +70,7 @@ def _read(kind: Any, node: Node, key: str) -> Any:
         item_kind = get_args(kind)[1]
         return {name: _read(item_kind, item, join(key, name)) for name, (_, item) in mapping.entries.items()}
     if dataclasses.is_dataclass(kind):
-        return _read_dataclass(kind, node, key)
+        return _read_dataclass(kind, node, key, default if type(default) is kind else None)
     return _read_scalar(kind, node, key)
 
 
@@ -83,18 +87,19 @@ def _expect_mapping(node: Node, key: str) -> Mapping:
     return node
 
 
-def _read_dataclass(kind: Any, node: Node, key: str) -> Any:
+def _read_dataclass(kind: Any, node: Node, key: str, default: Any) -> Any:
+    """What is not given is as in `default`, or as the class has it where that is None."""
     mapping = _expect_mapping(_in_full(kind, node), key)
     hints = type_hints(kind)
     fields = {field.name: field for field in dataclasses.fields(kind) if field.init}
-    given: dict[str, Any] = {}
+    given = {} if default is None else {name: getattr(default, name) for name in fields}
     places: dict[str, Place] = {}
     for name, (place, item) in mapping.entries.items():
         if name not in fields:
             close = difflib.get_close_matches(name, fields, n=1)
             hint = f"did you mean {close[0]!r}?" if close else f"there are: {', '.join(fields)}"
             raise place.error(join(key, name), f"unknown key ({hint})")
-        given[name] = _read(hints[name], item, join(key, name))
+        given[name] = _read(hints[name], item, join(key, name), _usual(fields[name], default))
         places[name] = item.place
     for name, field in fields.items():
         has_default = field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING
@@ -104,6 +109,17 @@ def _read_dataclass(kind: Any, node: Node, key: str) -> Any:
         return kind(**given)
     except FieldError as error:
         raise places.get(error.field, mapping.place).error(join(key, error.field), error.problem) from error
+
+
+def _usual(field: dataclasses.Field[Any], default: Any) -> Any:
+    """What a field holds where nothing is given: as in `default`, if there is one; None where keys begin anew."""
+    if WHOLE.items() <= field.metadata.items():
+        return None
+    if default is not None:
+        return getattr(default, field.name)
+    if field.default_factory is not dataclasses.MISSING:
+        return field.default_factory()
+    return None if field.default is dataclasses.MISSING else field.default
 
 
 def _read_tuple(kinds: tuple[Any, ...], node: Node, key: str) -> tuple[Any, ...]:

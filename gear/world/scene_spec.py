@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
+from gear.config.reader import WHOLE
 from gear.values.errors import FieldError
 from gear.values.scene import Vec3
 
@@ -161,8 +162,12 @@ class SceneSpec:
     boards: tuple[BoardSpec, ...] = ()
     truck: TruckSpec | None = None
     ego: EgoLimits | None = None
-    npc_vehicles: VehicleLimits = field(default_factory=lambda: VehicleLimits(count=(3, 7), radius_m=(0.0, 80.0)))
-    pedestrians: NpcLimits = field(default_factory=lambda: NpcLimits(count=(6, 20), radius_m=(0.0, 60.0)))
+    npc_vehicles: VehicleLimits = field(
+        default_factory=lambda: VehicleLimits(count=(3, 7), radius_m=(0.0, 80.0)), metadata=WHOLE
+    )
+    pedestrians: NpcLimits = field(
+        default_factory=lambda: NpcLimits(count=(6, 20), radius_m=(0.0, 60.0)), metadata=WHOLE
+    )
 
     def __post_init__(self) -> None:
         if self.boards and self.truck is not None:

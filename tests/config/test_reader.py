@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from gear.config.dump import to_plain, to_yaml
 from gear.config.nodes import parse_file, parse_text
 from gear.config.overrides import with_overrides
-from gear.config.reader import read_node
+from gear.config.reader import WHOLE, read_node
 from gear.values.errors import ConfigError, FieldError
 
 
@@ -162,3 +162,33 @@ words = st.text(st.characters(codec="ascii", categories=["L", "N", "P", "Z", "S"
 )
 def test_what_is_dumped_reads_back(run: Run) -> None:
     assert read(to_yaml(run)) == run
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rig:
+    near: Lens = field(default_factory=lambda: Lens(baseline_m=0.2, size_px=(640, 480)))
+    far: Lens | None = Lens(baseline_m=2.0)
+    spare: Lens | None = None
+    alone: Lens = field(default_factory=lambda: Lens(baseline_m=3.0), metadata=WHOLE)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Car:
+    rig: Rig = field(default_factory=lambda: Rig(near=Lens(baseline_m=0.7, size_px=(8, 8))))
+
+
+def test_keys_that_are_not_given_are_those_of_the_fields_own_default() -> None:
+    rig = read_node(Rig, with_overrides(parse_text("far: {size_px: [2, 1]}", "r.yaml"), ["near.baseline_m=0.3"]))
+    assert rig.near == Lens(baseline_m=0.3, size_px=(640, 480))
+    assert rig.far == Lens(baseline_m=2.0, size_px=(2, 1))
+    deep = read_node(
+        Car, with_overrides(parse_text("{}", "c.yaml"), ["rig.near.baseline_m=0.3", "rig.spare.baseline_m=9"])
+    )
+    assert deep.rig.near == Lens(baseline_m=0.3, size_px=(8, 8)) and deep.rig.spare == Lens(baseline_m=9)
+    assert deep.rig.far == Lens(baseline_m=2.0)
+
+
+def test_a_default_that_is_one_thing_lends_no_keys() -> None:
+    """As a scene's limits: who says where cars drive, ahead of a board, does not also mean the usual radius."""
+    rig = read_node(Rig, parse_text("alone: {size_px: [2, 1]}", "r.yaml"))
+    assert rig.alone == Lens(size_px=(2, 1))
