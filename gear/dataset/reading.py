@@ -11,7 +11,7 @@ from gear.contracts.tasks import Sample, SampleT, Sidecar, Task
 from gear.dataset.files import inside, read_bytes, sha256
 from gear.dataset.layout import manifest_path, sidecar_path
 from gear.dataset.plan import Plan
-from gear.dataset.sidecar import load_json, read_sidecar
+from gear.dataset.sidecar import load_json, no_sidecar, read_sidecar
 from gear.values.errors import DatasetError, FieldError
 from gear.values.serial import Json, from_json
 
@@ -47,8 +47,7 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
             return self.task.decode(self.root, sidecar, self.plan.info)
         except FieldError as error:  # facts are the task's own, which reads them with `from_json`
             path = self.root / sidecar_path(self.plan.info.split, index % len(self))
-            problem = f"is not a sidecar of this version of gear: facts.{error}"
-            raise DatasetError(path, problem) from error
+            raise no_sidecar(path, FieldError(f"facts.{error.field}", error.problem)) from error
 
     def __iter__(self) -> Iterator[SampleT]:
         return (self[i] for i in range(len(self)))

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
+import sys
 from pathlib import Path
 
 from gear.contracts.tasks import Auxiliary, Sidecar
 from gear.dataset.files import read_bytes
+from gear.dataset.plausible import check_numbers, check_sidecar
 from gear.values.errors import DatasetError, FieldError
 from gear.values.scene import SceneRecord
 from gear.values.serial import Json, from_json, to_json
@@ -22,21 +25,45 @@ def load_json(path: Path) -> Json:
     """Reads a JSON file of a dataset.
 
     Raises:
-        DatasetError: it is missing or not JSON.
+        DatasetError: it is missing or not JSON, or says what `dump_json` never does: numbers that are not finite, or
+            half characters, with which nothing that prints, draws or names files can do anything.
     """
     try:
-        return json.loads(read_bytes(path), parse_constant=_no_number)
+        data = read_bytes(path)
+        value = json.loads(data, parse_constant=_no_number, parse_float=_number, parse_int=_integer)
+        if b"\\ud" in data or b"\\uD" in data:
+            json.dumps(value, ensure_ascii=False).encode()
+        return value
     except (ValueError, RecursionError) as error:  # brackets in brackets, too
         raise DatasetError(path, f"is not JSON ({error}); delete it and run the same collection again") from error
 
 
 def _no_number(word: str) -> Json:
-    """`dump_json` never writes what Python's reader takes beyond JSON, and nothing that draws or measures expects it.
+    """What Python's reader takes beyond JSON.
 
     Raises:
         ValueError: always.
     """
     raise ValueError(f"{word} is no number of JSON")
+
+
+def _number(text: str) -> float:
+    """Raises:
+    ValueError: it is too large for one, and would be infinite.
+    """
+    value = float(text)
+    if math.isinf(value):
+        raise ValueError(f"{text[:20]} is too large a number")
+    return value
+
+
+def _integer(text: str) -> int:
+    """Raises:
+    ValueError: it is too large to be reckoned with beside fractions.
+    """
+    if len(text) > sys.float_info.max_10_exp:
+        raise ValueError(f"{text[:20]}… is too large a number")
+    return int(text)
 
 
 def sidecar_bytes(sidecar: Sidecar) -> bytes:
@@ -56,16 +83,30 @@ def read_sidecar(path: Path) -> Sidecar:
     """Reads a sidecar back.
 
     Raises:
-        DatasetError: it is missing, broken, or of another version of gear.
+        DatasetError: it is missing, broken, of another version of gear, or cannot be true.
     """
     data = load_json(path)
     try:
-        return Sidecar(
+        for part in ("record", "surfaces"):
+            check_numbers(data[part], part)
+        sidecar = Sidecar(
             record=from_json(SceneRecord, data["record"], "record"),
             surfaces=from_json(tuple[SurfaceTruth, ...], data["surfaces"], "surfaces"),
             facts=data["facts"],
             files=from_json(dict[str, str], data["files"], "files"),
             auxiliary=from_json(dict[str, Auxiliary], data.get("auxiliary", {}), "auxiliary"),
         )
+        check_sidecar(sidecar)
+        if path.stem.isdecimal() and int(path.stem) != sidecar.record.index:  # it would bear another one's pictures
+            raise FieldError("record.index", f"is {sidecar.record.index}, the file's name says {int(path.stem)}")
     except (KeyError, TypeError, FieldError) as error:
-        raise DatasetError(path, f"is not a sidecar of this version of gear: {error}") from error
+        raise no_sidecar(path, error) from error
+    return sidecar
+
+
+def no_sidecar(path: Path, error: Exception) -> DatasetError:
+    """What to say of one that cannot be read."""
+    said = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+    return DatasetError(
+        path, f"is not a sidecar of this version of gear ({said}); delete it and run the same collection again"
+    )

@@ -12,9 +12,9 @@ from gear.contracts.tasks import Auxiliary, Encoded, Sample, Sidecar, Task
 from gear.dataset.files import clear_scratch, explained, inside, sha256, sync_folder, write_whole
 from gear.dataset.layout import GEAR, begun_path, manifest_path, patch_path, plan_path, sidecar_path, split_folder
 from gear.dataset.plan import Plan, begin, read_plan
-from gear.dataset.sidecar import dump_json, load_json, read_sidecar, sidecar_bytes
+from gear.dataset.sidecar import dump_json, load_json, no_sidecar, read_sidecar, sidecar_bytes
 from gear.dataset.turns import at_work, is_at_work, turn
-from gear.values.errors import DatasetError
+from gear.values.errors import DatasetError, FieldError
 from gear.values.serial import Json
 
 
@@ -171,7 +171,7 @@ class Store:
             return
         sidecars = self.sidecars()
         indexes: dict[str, str] = {}
-        files = sorted(task.finalise(sidecars, self.plan.info).items())
+        files = sorted(self._indexes(task, sidecars).items())
         begun = inside(self.root, begun_path(self.split, "indexes"))
         if not inside(self.root, manifest_path(self.split)).exists():
             write_whole(self.root, begun_path(self.split, "indexes"), dump_json([relative for relative, _ in files]))
@@ -207,6 +207,31 @@ class Store:
             begun.parent.rmdir()
         clear_scratch(self.root)
         sync_folder(target.parent)
+
+    def _indexes(self, task: Task[Any, Any], sidecars: Sequence[Sidecar]) -> Mapping[str, bytes]:
+        """What the format has of a whole split.
+
+        Raises:
+            DatasetError: a sidecar, perhaps of a former run, does not say what the task must know.
+        """
+        views = {camera.name for camera in task.rig().cameras}
+        for sidecar in sidecars:
+            lacking = views - {camera.name for camera in sidecar.record.cameras}
+            if lacking:
+                raise self._no_sidecar(sidecar, FieldError("record.cameras", f"there is no {min(lacking)!r}"))
+        try:
+            return task.finalise(sidecars, self.plan.info)
+        except FieldError:  # facts are the task's own, which reads them with `from_json`
+            for sidecar in sidecars:
+                try:
+                    task.finalise([sidecar], self.plan.info)
+                except FieldError as error:
+                    problem = FieldError(f"facts.{error.field}", error.problem)
+                    raise self._no_sidecar(sidecar, problem) from error
+            raise
+
+    def _no_sidecar(self, sidecar: Sidecar, error: FieldError) -> DatasetError:
+        return no_sidecar(self.root / sidecar_path(self.split, sidecar.record.index), error)
 
 
 def _forget_empty(root: Path, plan: Plan) -> None:

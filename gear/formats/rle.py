@@ -9,6 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from pycocotools import mask as coco_mask
 
+from gear.values.run_lengths import run_lengths
+
 Mask = npt.NDArray[np.bool_]
 
 
@@ -37,31 +39,28 @@ def encode(mask: Mask) -> str:
     return encode_crop(mask[top : int(rows[-1]) + 1, left : int(columns[-1]) + 1], left, top, *mask.shape)
 
 
+def check(counts: str, height_px: int, width_px: int) -> None:
+    """Whether `decode` would make a mask of a compressed string, at a fraction of its cost.
+
+    Raises:
+        ValueError: it is no such string, or the runs do not fill a picture of this size.
+    """
+    _runs(counts, height_px, width_px)
+
+
 def decode(counts: str, height_px: int, width_px: int) -> Mask:
     """The (H, W) mask of a compressed string.
 
     Raises:
-        ValueError: the runs do not fill a picture of this size.
+        ValueError: it is no such string, or the runs do not fill a picture of this size.
     """
-    runs = _runs(counts)
-    if sum(runs) != height_px * width_px:
-        raise ValueError(f"run lengths fill {sum(runs)} pixels, not {height_px} x {width_px}")
+    runs = _runs(counts, height_px, width_px)
     values = np.repeat(np.arange(len(runs)) % 2 == 1, runs)
     return np.ascontiguousarray(values.reshape(width_px, height_px).T)
 
 
-def _runs(counts: str) -> list[int]:
-    """Lengths of the runs. Five bits a character, lowest first, the sixth says that more follow; from the third run on,
-    the difference to the run before the last is stored."""
-    runs: list[int] = []
-    value = shift = 0
-    for character in counts:
-        bits = ord(character) - 48
-        value |= (bits & 31) << shift
-        shift += 5
-        if not bits & 32:
-            if bits & 16:
-                value -= 1 << shift
-            runs.append(value + (runs[-2] if len(runs) > 2 else 0))
-            value = shift = 0
+def _runs(counts: str, height_px: int, width_px: int) -> npt.NDArray[np.int64]:
+    runs = run_lengths(counts)
+    if runs.sum() != height_px * width_px:
+        raise ValueError(f"run lengths fill {runs.sum()} pixels, not {height_px} x {width_px}")
     return runs

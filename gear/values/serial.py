@@ -14,6 +14,9 @@ Json = Any
 
 T = TypeVar("T")
 
+SHOWN = 60
+"""Characters of a wrong value that a message shows."""
+
 
 def to_json(value: Any) -> Json:
     """Dataclasses become dicts, tuples become lists, everything else must be JSON already."""
@@ -56,13 +59,13 @@ def _read(kind: Any, value: Json, where: str) -> Any:
         return _read(next(option for option in options if option is not type(None)), value, where)
     if origin is Literal:
         if value not in get_args(kind):
-            raise FieldError(where, f"expected one of {', '.join(map(str, get_args(kind)))}, got {value!r}")
+            raise FieldError(where, f"expected one of {', '.join(map(str, get_args(kind)))}, got {_shown(value)}")
         return value
     if origin is tuple:
         return _read_tuple(get_args(kind), value, where)
     if origin is dict:
         if not isinstance(value, dict):
-            raise FieldError(where, f"expected a mapping, got {value!r}")
+            raise FieldError(where, f"expected a mapping, got {_shown(value)}")
         item_kind = get_args(kind)[1]
         return {key: _read(item_kind, item, f"{where}.{key}") for key, item in value.items()}
     if dataclasses.is_dataclass(kind):
@@ -72,7 +75,7 @@ def _read(kind: Any, value: Json, where: str) -> Any:
 
 def _read_tuple(kinds: tuple[Any, ...], value: Json, where: str) -> tuple[Any, ...]:
     if not isinstance(value, list):
-        raise FieldError(where, f"expected a list, got {value!r}")
+        raise FieldError(where, f"expected a list, got {_shown(value)}")
     if len(kinds) == 2 and kinds[1] is Ellipsis:
         return tuple(_read(kinds[0], item, f"{where}[{i}]") for i, item in enumerate(value))
     if len(kinds) != len(value):
@@ -82,7 +85,7 @@ def _read_tuple(kinds: tuple[Any, ...], value: Json, where: str) -> tuple[Any, .
 
 def _read_dataclass(kind: Any, value: Json, where: str) -> Any:
     if not isinstance(value, dict):
-        raise FieldError(where, f"expected a mapping, got {value!r}")
+        raise FieldError(where, f"expected a mapping, got {_shown(value)}")
     hints = type_hints(kind)
     fields = {field.name: field for field in dataclasses.fields(kind)}
     for key in value:
@@ -94,14 +97,26 @@ def _read_dataclass(kind: Any, value: Json, where: str) -> Any:
         has_default = field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING
         if name not in given and not has_default:
             raise FieldError(f"{where}.{name}".lstrip("."), "missing")
-    return kind(**given)
+    try:
+        return kind(**given)
+    except FieldError as error:
+        raise FieldError(prefix + error.field, error.problem) from error
 
 
 def _read_scalar(kind: Any, value: Json, where: str) -> Any:
     if kind is float and isinstance(value, int) and not isinstance(value, bool):
-        return float(value)
+        try:
+            return float(value)
+        except OverflowError as error:
+            raise FieldError(where, f"is too large, {_shown(value)}") from error
     if kind in (int, float) and isinstance(value, bool):
-        raise FieldError(where, f"expected {kind.__name__}, got {value!r}")
+        raise FieldError(where, f"expected {kind.__name__}, got {_shown(value)}")
     if not isinstance(value, kind):
-        raise FieldError(where, f"expected {getattr(kind, '__name__', kind)}, got {value!r}")
+        raise FieldError(where, f"expected {getattr(kind, '__name__', kind)}, got {_shown(value)}")
     return value
+
+
+def _shown(value: Json) -> str:
+    """For a message of one line, however much there is."""
+    text = repr(value)
+    return text if len(text) <= SHOWN else f"{text[: SHOWN - 3]}..."

@@ -13,13 +13,15 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.contracts.tasks import Sample
+from gear.dataset.plausible import check_numbers
 from gear.formats.png import decode_plain, decode_rgb
 from gear.groundtruth.surfaces import observe_surfaces
 from gear.values.errors import DatasetError, FieldError
 from gear.values.frames import Frame, UInt8Image
 from gear.values.rig import CameraMount
 from gear.values.scene import SceneRecord, Vec3
-from gear.values.truth import SurfaceTruth
+from gear.values.serial import Json
+from gear.values.truth import BoxPx, SurfaceTruth
 
 REPAIR = "delete its sample's sidecar (gear/<split>/samples/<number>.json) and run the same collection again"
 """What to do about a file that is gone or damaged."""
@@ -142,21 +144,24 @@ def draw_polygon(picture: UInt8Image, points_px: Sequence[Sequence[float]], rgb:
     draw_segments(picture, list(zip(points_px, [*points_px[1:], points_px[0]], strict=True)), rgb)
 
 
+FAR_PX = 4 * 8192
+"""What is drawn ends so far outside at most: OpenCV reckons with 32 bits."""
+
+
 def draw_segments(
     picture: UInt8Image, segments_px: Iterable[tuple[Sequence[float], Sequence[float]]], rgb: tuple[int, int, int]
 ) -> None:
     """Straight lines between index pixels, in place; ends far outside are fine."""
-    limit = 4 * 8192
     for ends in segments_px:
-        (x0, y0), (x1, y1) = (np.round(np.clip(end, -limit, limit) * 16).astype(int).tolist() for end in ends)
+        (x0, y0), (x1, y1) = (np.round(np.clip(end, -FAR_PX, FAR_PX) * 16).astype(int).tolist() for end in ends)
         cv2.line(picture, (x0, y0), (x1, y1), rgb, 1, cv2.LINE_AA, 4)
 
 
 def draw_box(
     picture: UInt8Image, box: Sequence[float], rgb: tuple[int, int, int], text: str = "", *, dashed: bool = False
 ) -> None:
-    """A box in index pixels with a word on it, in place; dashed for what is to be ignored."""
-    left, top, right, bottom = (round(float(v)) for v in box)
+    """A box in index pixels with a word on it, in place; dashed for what is to be ignored; far outside is fine."""
+    left, top, right, bottom = (round(min(max(float(v), -FAR_PX), FAR_PX)) for v in box)
     if dashed:
         for x in range(left, right, 8):
             for y in (top, bottom):
@@ -183,3 +188,19 @@ def expect(facts: Any, *keys: str, place: Path) -> Mapping[str, Any]:
     if missing:
         raise DatasetError(place, f"its sidecars do not say {', '.join(missing)}; was it collected for another task?")
     return facts  # type: ignore[no-any-return]
+
+
+def check_objects(content: Json, boxes_px: Iterable[BoxPx]) -> None:
+    """Whether the objects that a sidecar's facts speak of can be true, as far as tasks have that in common.
+
+    Args:
+        content: them, as they are written.
+        boxes_px: of each, in the picture.
+
+    Raises:
+        FieldError: a number is absurd, or a box ends before it begins; says where.
+    """
+    check_numbers(content, "objects")
+    for place, (left, top, right, bottom) in enumerate(boxes_px):
+        if right < left or bottom < top:
+            raise FieldError(f"objects[{place}].box_px", "ends before it begins")

@@ -21,7 +21,17 @@ from gear.groundtruth.objects import observe_objects
 from gear.groundtruth.visibility import VisibilityLimits
 from gear.metrics.coco_ap import CocoEvaluator
 from gear.metrics.coco_reference import TallObjects
-from gear.plugins.tasks.common import CameraOptions, draw_box, draw_surfaces, expect, images_of, read_rgb, surfaces_of
+from gear.plugins.tasks.common import (
+    CameraOptions,
+    check_objects,
+    draw_box,
+    draw_surfaces,
+    expect,
+    images_of,
+    read_rgb,
+    surfaces_of,
+)
+from gear.values.errors import FieldError
 from gear.values.frames import Frame, UInt8Image
 from gear.values.labels import LABELS
 from gear.values.rig import Rig
@@ -240,7 +250,19 @@ def _name(index: int) -> str:
 
 def _objects(sidecar: Sidecar, root: Path) -> tuple[Object2d, ...]:
     facts = expect(sidecar.facts, "objects", place=root)
-    return from_json(tuple[Object2d, ...], facts["objects"], "objects")
+    objects = from_json(tuple[Object2d, ...], facts["objects"], "objects")
+    check_objects(facts["objects"], (thing.box_px for thing in objects))
+    camera = next((camera for camera in sidecar.record.cameras if camera.name == VIEW), None)
+    if camera is None:
+        raise FieldError("objects", f"are of camera {VIEW!r}, which the record has not")
+    for place, thing in enumerate(objects):
+        if thing.category_id not in coco.CATEGORY_NAMES:
+            raise FieldError(f"objects[{place}].category_id", f"{thing.category_id} is no category of COCO")
+        try:
+            rle.check(thing.rle, camera.height_px, camera.width_px)
+        except ValueError as error:
+            raise FieldError(f"objects[{place}].rle", str(error)) from error
+    return objects
 
 
 def _annotation(thing: Object2d, camera: CameraRecord) -> coco.Annotation:

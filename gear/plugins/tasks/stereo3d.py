@@ -35,6 +35,7 @@ from gear.metrics.kitti_ap import KittiEvaluator
 from gear.metrics.kitti_reference import NearCars
 from gear.plugins.tasks.common import (
     CameraOptions,
+    check_objects,
     draw_box,
     draw_segments,
     draw_surfaces,
@@ -52,6 +53,7 @@ from gear.values.serial import Json, from_json, to_json
 from gear.values.truth import BoxPx, ObjectTruth
 
 LEFT, RIGHT = "left", "right"
+LEAST_BASELINE_M, MOST_BASELINE_M = 0.01, 10.0
 COLOURS = {"Car": (60, 220, 60), "Van": (60, 200, 200), "Truck": (80, 140, 255), "Pedestrian": (255, 80, 80)}
 OTHER_COLOUR = (255, 200, 60)
 IGNORED_COLOUR = (170, 170, 170)
@@ -73,8 +75,9 @@ class Stereo3dConfig(CameraOptions):
 
     def __post_init__(self) -> None:
         CameraOptions.__post_init__(self)
-        if not 0.01 <= self.baseline_m <= 10:
-            raise FieldError("baseline_m", f"must be 0.01 to 10 m, got {self.baseline_m:g}")
+        if not LEAST_BASELINE_M <= self.baseline_m <= MOST_BASELINE_M:
+            limits = f"{LEAST_BASELINE_M:g} to {MOST_BASELINE_M:g} m"
+            raise FieldError("baseline_m", f"must be {limits}, got {self.baseline_m:g}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -207,6 +210,11 @@ class Stereo3dTask:
         """Reads both pictures; the objects, unrounded, are in the sidecar."""
         record, name = sidecar.record, _name(sidecar.record.index)
         facts = expect(sidecar.facts, "baseline_m", "objects", place=root)
+        baseline_m = from_json(float, facts["baseline_m"], "baseline_m")
+        if not LEAST_BASELINE_M <= baseline_m <= MOST_BASELINE_M:
+            raise FieldError("baseline_m", f"is {baseline_m:g} m")
+        objects = from_json(tuple[Object3d, ...], facts["objects"], "objects")
+        check_objects(facts["objects"], (thing.box_px for thing in objects))
         return Stereo3dSample(
             record=record,
             images={
@@ -214,10 +222,8 @@ class Stereo3dTask:
                 RIGHT: read_rgb(root, f"{info.split}/image_3/{name}.png", record, RIGHT),
             },
             surfaces=sidecar.surfaces,
-            calibration=Calibration(
-                intrinsics=record.camera(LEFT).intrinsics, baseline_m=from_json(float, facts["baseline_m"])
-            ),
-            objects=from_json(tuple[Object3d, ...], facts["objects"], "objects"),
+            calibration=Calibration(intrinsics=record.camera(LEFT).intrinsics, baseline_m=baseline_m),
+            objects=objects,
         )
 
     def as_prediction(self, sample: Stereo3dSample) -> tuple[KittiLabel, ...]:

@@ -1,0 +1,36 @@
+"""Run lengths as COCO's compressed strings say them: five bits a character, lowest first, the sixth says that more
+follow; from the third run on, the difference to the run before the last is stored."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+MOST_CHARACTERS = 7
+"""Of one run: 35 bits, more than any picture has pixels."""
+
+
+def run_lengths(counts: str) -> npt.NDArray[np.int64]:
+    """Lengths of the runs of a compressed string, in order; the first is of zeros.
+
+    Raises:
+        ValueError: it is no such string.
+    """
+    bits = np.frombuffer(counts.encode("ascii"), np.uint8).astype(np.int64) - ord("0")
+    if not bits.size:
+        return np.zeros(0, np.int64)
+    ends = np.flatnonzero(bits & 32 == 0)
+    characters = np.diff(ends, prepend=-1)
+    if bits.min() < 0 or bits.max() > 63 or not ends.size or ends[-1] != len(bits) - 1:
+        raise ValueError("is no string of run lengths")
+    if characters.max() > MOST_CHARACTERS:
+        raise ValueError("has a run that is longer than any picture")
+    begins = ends - characters + 1
+    shifts = 5 * (np.arange(len(bits)) - np.repeat(begins, characters))
+    values = np.add.reduceat((bits & 31) << shifts, begins)
+    values -= np.where(bits[ends] & 16, np.int64(1) << (5 * characters), 0)
+    values[1::2] = np.cumsum(values[1::2])
+    values[2::2] = np.cumsum(values[2::2])
+    if values.min() < 0:
+        raise ValueError("has a run that is shorter than nothing")
+    return values
