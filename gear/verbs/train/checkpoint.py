@@ -23,6 +23,9 @@ from gear.verbs.train.optimise import RunningMean
 
 FILE = "checkpoint.safetensors"
 
+BROKEN = (SafetensorError, OSError, KeyError, ValueError, RecursionError)
+"""What reading a file ends in that is no checkpoint."""
+
 
 @dataclass(slots=True)
 class Progress:
@@ -111,7 +114,7 @@ def load(
             texts = opened.metadata() or {}
             tensors = {key: opened.get_tensor(key) for key in opened.keys()}  # noqa: SIM118
         there, progress = json.loads(texts["plan"]), json.loads(texts["progress"])
-    except (SafetensorError, KeyError, ValueError, RecursionError) as error:
+    except BROKEN as error:
         raise _damaged(path, error) from error
     check_plan(root, there, plan)
     try:
@@ -122,6 +125,18 @@ def load(
     except (KeyError, ValueError, TypeError, RuntimeError) as error:
         raise _damaged(path, error) from error
     return taken_up, _below(tensors, "extra.")
+
+
+def begun_config(root: Path) -> Json:
+    """The config of the training that a folder holds; None where there is none, or no saying: `load` tells then."""
+    path = root / FILE
+    if not path.exists():
+        return None
+    try:
+        with safe_open(str(path), framework="pt") as opened:
+            return json.loads((opened.metadata() or {})["plan"])["config"]
+    except (*BROKEN, TypeError):
+        return None
 
 
 def _damaged(path: Path, error: Exception) -> DatasetError:

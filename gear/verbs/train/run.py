@@ -20,6 +20,7 @@ from gear.values.serial import Json
 from gear.verbs.evaluate.choice import Chosen, check_camera
 from gear.verbs.look import look_of
 from gear.verbs.train.adversary import Adversary
+from gear.verbs.train.checkpoint import begun_config
 from gear.verbs.train.config import TrainConfig, read_config
 from gear.verbs.train.curves import write_curves
 from gear.verbs.train.data import TRAINING, VALIDATION, Samples, all_of, keep_some, open_all, spread
@@ -27,7 +28,15 @@ from gear.verbs.train.feed import Cache, Feed
 from gear.verbs.train.loop import Parts, Training, Watch
 from gear.verbs.train.results import WEIGHTS, Origin, command_of, figures_of, keep_weights, known, write_history
 from gear.verbs.train.sizes import picture_scale, without_empty_margins
-from gear.verbs.train.starting import begin_with, build_network, check_options, picture_share, precision_of, with_scale
+from gear.verbs.train.starting import (
+    begin_with,
+    build_network,
+    check_options,
+    goes_on_alone,
+    picture_share,
+    precision_of,
+    with_scale,
+)
 
 GIGABYTE = 1e9
 CHANGE_NOTHING = ("workers", "cache_gb", "device")
@@ -140,8 +149,9 @@ def train(
             f"pictures are shown at {scale:g} of their size; --set picture_scale=1 shows them whole, and takes longer"
         )
     share = scale * picture_share(training, spec)
-    config = with_scale(found, without_empty_margins(config, training), share)
     root = Path(out)
+    begun = begun_config(root)
+    config = with_scale(found, without_empty_margins(config, training), share, begun)
     refuse_dataset(root, "train into a folder of its own")
     with explained(root):
         root.mkdir(parents=True, exist_ok=True)
@@ -159,7 +169,7 @@ def train(
         picture_share=share,
     )
     training_run = Training(
-        _parts(found, spec, origin, root, noted),
+        _parts(found, spec, origin, root, noted, begun),
         config,
         watch=watch,
         keep=lambda state, progress: keep_weights(root, state, origin, progress),
@@ -195,10 +205,12 @@ def trainable(found: Found, task: str) -> Any:
     return spec.recipe
 
 
-def _parts(found: Found, spec: TaskSpec[Any], origin: Origin, root: Path, noted: Callable[[str], None] | None) -> Parts:
+def _parts(
+    found: Found, spec: TaskSpec[Any], origin: Origin, root: Path, noted: Callable[[str], None] | None, begun: Json
+) -> Parts:
     config = origin.config
     model = build_network(found, config, precision=config.precision)
-    told = begin_with(found, model, config.init)
+    told = "" if goes_on_alone(found, config.init, begun) else begin_with(found, model, config.init)
     if told and noted is not None:
         noted(told)
     twin = build_network(found, config, precision="float32")

@@ -51,21 +51,52 @@ def picture_share(samples: Samples, spec: TaskSpec[Any]) -> float:
     return widths.pop() / usual if usual and len(widths) == 1 else 1.0
 
 
-def with_scale(found: Found, config: TrainConfig, share: float) -> TrainConfig:
+def with_scale(found: Found, config: TrainConfig, share: float, begun: Json = None) -> TrainConfig:
     """Lets a network that would run at a share of its pictures' size see small pictures as they are, and those of the
     task's own size at the share that the weights were trained for with which it begins.
 
     Its weights then say at which share of the task's own pictures they are to be used.
+
+    Args:
+        found: whose network it is.
+        config: of the training.
+        share: as of `picture_share`.
+        begun: config of the training that is taken up again, which knows what weights said that are gone since.
     """
     by_itself = getattr(found.spec.config(), SCALE, 1.0)
     is_given = isinstance(config.options, Mapping) and SCALE in config.options.entries
     if by_itself is not None or is_given:
         return config
-    scale = _scale_of_start(found, config.init) if share == 1 else 1
+    known = _given_scale(begun) if goes_on_alone(found, config.init, begun) else None
+    scale = (known or _scale_of_start(found, config.init)) if share == 1 else 1
     if scale is None:
         return config
     options = with_value(config.options, (SCALE,), Scalar(str(scale), False, Place("gear train")))
     return dataclasses.replace(config, options=options)
+
+
+def goes_on_alone(found: Found, init: str, begun: Json) -> bool:
+    """Whether a training that was begun with weights must do without them: they are gone, and its checkpoint has all
+    that the next step depends on.
+
+    Args:
+        found: whose network it is.
+        init: what it begins with.
+        begun: config of the training that is there, or None.
+    """
+    spec = found.spec
+    assert isinstance(spec, ModelSpec)
+    if not isinstance(begun, dict) or begun.get("init") != init or init in ("", NONE, *spec.starts):
+        return False
+    if init == SHIPPED:
+        return shipped(spec.name) is None
+    source = init.removeprefix(TRUNK)
+    return not Path(source).is_file() and (source == init or shipped(source) is None)
+
+
+def _given_scale(begun: Json) -> Json:
+    options = begun.get("options")
+    return options.get(SCALE) if isinstance(options, dict) else None
 
 
 def _scale_of_start(found: Found, init: str) -> Json:

@@ -331,6 +331,33 @@ def test_a_training_goes_on_at_the_share_that_its_first_weights_were_trained_for
     assert scale(str(first)) is scale("") is scale(f"trunk:{first}") is None
 
 
+@pytest.mark.parametrize("before", ["", "trunk:"])
+def test_what_was_begun_goes_on_when_the_file_that_it_began_with_is_gone(
+    street: Street, tmp_path: Path, install: Any, monkeypatch: pytest.MonkeyPatch, before: str
+) -> None:
+    """The checkpoint has all that the next step depends on, and the share that the file spoke of."""
+    monkeypatch.setattr(loop, "CHECKPOINT_EVERY_S", 0.0)
+    install(replace(tiny_segmenter, config=ScaledConfig, build=TinySegmenter))
+    monkeypatch.setattr("gear.verbs.train.run.picture_share", lambda *_: 1.0)
+    state = {key: value.clone() for key, value in TinySegmenter(ScaledConfig(seed=3)).module().state_dict().items()}
+    first = tmp_path / "first.safetensors"
+    write(first, state, {"options": json.dumps({"input_scale": 0.75})})
+    whole = quick(street, tmp_path / "whole", init=f"{before}{first}")
+
+    def stop(progress: Progress, share: float, figures: Any) -> None:
+        raise StopError
+
+    with pytest.raises(StopError):
+        quick(street, tmp_path / "parts", init=f"{before}{first}", watch=stop)
+    first.unlink()
+    parts = quick(street, tmp_path / "parts", init=f"{before}{first}")
+    assert parts.weights.read_bytes() == whole.weights.read_bytes()
+    with pytest.raises(GearError, match="there is no such"):
+        quick(street, tmp_path / "fresh", init=f"{before}{first}")
+    with pytest.raises(GearError, match="there is no such"):
+        quick(street, tmp_path / "parts", init=f"{before}{tmp_path / 'other.safetensors'}")
+
+
 @dataclass(frozen=True, kw_only=True)
 class CameraConfig(TinyConfig):
     """Knows its pictures' camera."""
