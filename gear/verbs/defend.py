@@ -25,10 +25,10 @@ from gear.formats.png import encode_labels
 from gear.opening import open_dataset
 from gear.plugins.build import NO_OPTIONS, blamed, build, find
 from gear.plugins.catalogue import Found
-from gear.values.errors import DatasetError, GearError, PluginError
+from gear.values.errors import DatasetError, FieldError, GearError, PluginError
 from gear.values.frames import UInt8Image
 from gear.values.rng import derive_rng
-from gear.values.serial import Json
+from gear.values.serial import Json, from_json
 
 Progress = Callable[[int, int], None]
 """Called with (samples finished, samples of the split)."""
@@ -116,7 +116,7 @@ def defend(
         if progress is not None:
             progress(finished, len(opened))
     if "score" in spec.outputs:
-        scores = [load_json(inside(root, _marker(name, i)))["score"] for i in range(len(opened))]
+        scores = [_score(inside(root, _marker(name, i))) for i in range(len(opened))]
         write_whole(root, f"{FOLDER}/{name}/scores.json", dump_json({"scores": scores}))
     clear_scratch(root)
     return DefendReport(root=root, split=name, samples=len(opened), made=len(missing))
@@ -153,7 +153,11 @@ def begin(root: Path, split: str, plan: Json) -> None:
     if not (is_begun and path.exists()):
         write_whole(root, relative, dump_json(plan))
         return
-    there = load_json(path)
+    try:
+        there = load_json(path)
+    except DatasetError as error:
+        problem = f"{error.problem.partition(';')[0]}; use another --out, or delete this folder"
+        raise DatasetError(path, problem) from error
     if there != plan:
         keys = there.keys() | plan.keys() if isinstance(there, dict) else {"plan"}
         differs = sorted(key for key in keys if not isinstance(there, dict) or there.get(key) != plan.get(key))
@@ -237,6 +241,21 @@ def picture_paths(dataset: Dataset[Any], sample: Any) -> list[str]:
     inverted = {name: np.subtract(255, picture, dtype=np.uint8) for name, picture in sample.images.items()}
     other = dataset.task.encode(dataclasses.replace(sample, images=inverted), info).files
     return [path for path, data in dataset.task.encode(sample, info).files.items() if other[path] != data]
+
+
+def _score(path: Path) -> float:
+    """What a marker of a sample says.
+
+    Raises:
+        DatasetError: nothing, because it is damaged.
+    """
+    remedy = "delete it and run the same command again"
+    try:
+        return from_json(float, load_json(path)["score"], "score")
+    except DatasetError as error:
+        raise DatasetError(path, f"{error.problem.partition(';')[0]}; {remedy}") from error
+    except (KeyError, TypeError, FieldError) as error:
+        raise DatasetError(path, f"does not say a sample's score; {remedy}") from error
 
 
 def _marker(split: str, index: int) -> str:

@@ -140,13 +140,17 @@ def _begin(root: Path, facts: Json) -> None:
     clear_scratch(root)
     path = inside(root, "plan.json")
     plain = to_plain(facts)
-    there = load_json(path) if path.exists() else None
+    try:
+        there = load_json(path) if path.exists() else None
+    except DatasetError as error:
+        problem = f"{error.problem.partition(';')[0]}; use another --out, or delete this folder"
+        raise DatasetError(path, problem) from error
     is_ours = isinstance(there, dict) and there.keys() == plain.keys()
     is_empty = next(root.glob("*/samples/*.json"), None) is None
     if there is None or (is_ours and is_empty):
         write_whole(root, "plan.json", dump_json(plain))
     elif there != plain:
-        what = ", ".join(differences(there, plain)[:3])
+        what = ", ".join(differences(there, plain)[:3]) or "its plan.json has other keys"
         raise DatasetError(root, f"holds an evaluation of something else ({what}); use another --out")
 
 

@@ -15,10 +15,10 @@ from gear.dataset.reading import Dataset
 from gear.dataset.sidecar import dump_json, load_json
 from gear.plugins.catalogue import Found, one_line
 from gear.plugins.manager import DISTRIBUTION
-from gear.values.errors import DatasetError, GearError
-from gear.values.serial import Json
+from gear.values.errors import DatasetError, FieldError, GearError
+from gear.values.serial import Json, from_json
 from gear.verbs.evaluate.choice import OUTSIDE_PATCH
-from gear.verbs.evaluate.patch_area import mask_figures, patch_masks, widened
+from gear.verbs.evaluate.patch_area import MASK_FIGURES, mask_figures, patch_masks, widened
 from gear.verbs.evaluate.player import Answer, accusation
 from gear.verbs.evaluate.spread import AnyEvaluator
 
@@ -27,8 +27,11 @@ TASK = "task"
 
 PREDICTIONS = "predictions"
 
-KEPT = {"facts", "sha256", "model_s", "defense_s", "score", "mask"}
-"""Keys of a note that are read again."""
+KEPT: Any = {
+    "facts": Any, "sha256": dict[str, str], "model_s": float, "defense_s": float, "score": float | None,
+    "mask": dict[str, float | None] | None,
+}  # fmt: skip
+"""What of a note is read again."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -131,20 +134,17 @@ class Scorer:
         sample = self._dataset[index]
         folder = inside(self._root, f"{self._folder}/{PREDICTIONS}")
         try:
-            there = load_json(path)
-            if not isinstance(there, dict) or not there.keys() >= KEPT:
-                raise DatasetError(path, "is no note of a sample")
-            for name, digest in dict(there["sha256"]).items():
+            there = _read_note(path)
+            for name, digest in there["sha256"].items():
                 if sha256(read_bytes(inside(folder, name))) != digest:
                     raise DatasetError(inside(folder, name), "is not what was written")
             with explained(path):
                 prediction = self._keeper.decode_prediction(folder, sample, there["facts"], self._dataset.plan.info)
+            figures, parts = self._measure(sample, prediction)  # which it could when it was written
         except DatasetError as error:
             return DatasetError(error.path, error.problem.partition(";")[0])
         except (ValueError, KeyError, TypeError) as error:
             return DatasetError(path, f"cannot be read again ({one_line(error)})")
-        with self._blamed(index):
-            figures, parts = self._measure(sample, prediction)
         return Note(
             index=index,
             figures=figures,
@@ -191,6 +191,22 @@ class Scorer:
                 said = f"what {self._model.spec.name} says of sample {index}"
                 raise GearError(f"{said} cannot be measured ({one_line(error)}); see to its weights") from error
             raise
+
+
+def _read_note(path: Path) -> dict[str, Any]:
+    """Raises:
+    DatasetError: it is none that gear wrote.
+    """
+    there = load_json(path)
+    if not isinstance(there, dict) or not there.keys() >= KEPT.keys():
+        raise DatasetError(path, "is no note of a sample")
+    try:
+        note: dict[str, Any] = {name: from_json(kind, there[name], name) for name, kind in KEPT.items()}
+    except FieldError as error:
+        raise DatasetError(path, f"is no note of a sample ({error})") from error
+    if note["mask"] is not None and note["mask"].keys() != set(MASK_FIGURES):
+        raise DatasetError(path, "is no note of a sample (mask: has other figures)")
+    return note
 
 
 def without_nan(figures: Mapping[str, float]) -> dict[str, float | None]:

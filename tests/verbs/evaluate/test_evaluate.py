@@ -150,6 +150,52 @@ def test_a_shortened_result_is_not_taken_for_fewer_detections(
     assert timeless(out) == whole
 
 
+ABSURD = {"detections": [{"category_id": -1, "box_px": [0.0, 0.0, 1.0, 1.0], "score": 1.0}]}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"mask": [[]]},
+        {"mask": {"mask_area": 0.5}},
+        {"defense_s": None},
+        {"model_s": "1"},
+        {"score": []},
+        {"sha256": {"a.png": 1}},
+        {"sha256": {"../../plan.json": "00"}},
+        {"facts": ABSURD},
+    ],
+)
+def test_a_note_that_says_something_else_is_damage(
+    tmp_path: Path, small: Small, install: Install, change: dict[str, Any]
+) -> None:
+    data = small("detect2d")
+    install(model_spec(lambda _: Oracle([data]), "detect2d"))
+    out = tmp_path / "out"
+    evaluate(data, model="odd", out=out, resamples=0)
+    whole = timeless(out)
+    (note,) = out.glob("*/samples/000001.json")
+    note.write_text(json.dumps(json.loads(note.read_text()) | change))
+    again = evaluate(data, model="odd", out=out, resamples=0)
+    assert again.rows[0].made == 1 and len(again.rows[0].damaged) == 1
+    assert timeless(out) == whole
+
+
+def test_an_evaluation_whose_plan_is_damaged_is_one_line(tmp_path: Path, small: Small, install: Install) -> None:
+    data = small("depth")
+    install(model_spec(lambda _: Oracle([data]), "depth"))
+    evaluate(data, model="odd", out=tmp_path, resamples=0)
+    plan = tmp_path / "plan.json"
+    whole = json.loads(plan.read_text())
+    for text, problem in (
+        ("{", "plan.json: is not JSON .*; use another --out, or delete this folder$"),
+        (json.dumps({key: whole[key] for key in whole if key != "defense"}), r"else \(its plan.json has other keys\)"),
+    ):
+        plan.write_text(text)
+        with pytest.raises(DatasetError, match=problem):
+            evaluate(data, model="odd", out=tmp_path, resamples=0)
+
+
 @pytest.mark.parametrize("facts", [{}, None, [{"score": 1}]])
 def test_facts_that_are_not_the_tasks_are_damage(tmp_path: Path, small: Small, install: Install, facts: Any) -> None:
     data = small("detect2d")
