@@ -25,17 +25,27 @@ def load_json(path: Path) -> Json:
     """Reads a JSON file of a dataset.
 
     Raises:
-        DatasetError: it is missing or not JSON, or says what `dump_json` never does: numbers that are not finite, or
-            half characters, with which nothing that prints, draws or names files can do anything.
+        DatasetError: it is missing or not JSON, as `parse_json` has it.
     """
+    data = read_bytes(path)
     try:
-        data = read_bytes(path)
-        value = json.loads(data, parse_constant=_no_number, parse_float=_number, parse_int=_integer)
-        if b"\\ud" in data or b"\\uD" in data:
-            json.dumps(value, ensure_ascii=False).encode()
-        return value
+        return parse_json(data)
     except (ValueError, RecursionError) as error:  # brackets in brackets, too
         raise DatasetError(path, f"is not JSON ({error}); delete it and run the same collection again") from error
+
+
+def parse_json(data: bytes | str) -> Json:
+    """What JSON says.
+
+    Raises:
+        ValueError, RecursionError: it is none, or says what `dump_json` never does: numbers that are not finite, or
+            half characters, with which nothing that prints, draws or names files can do anything.
+    """
+    value = json.loads(data, parse_constant=_no_number, parse_float=_number, parse_int=_integer)
+    text = data if isinstance(data, str) else data.decode("latin-1")
+    if "\\ud" in text or "\\uD" in text:
+        json.dumps(value, ensure_ascii=False).encode()
+    return value
 
 
 def _no_number(word: str) -> Json:

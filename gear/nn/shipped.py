@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import importlib.metadata
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,6 +11,7 @@ from pathlib import Path
 
 from safetensors import SafetensorError, safe_open
 
+from gear.dataset.sidecar import parse_json
 from gear.nn.options import NONE, SHIPPED
 from gear.values.errors import GearError
 from gear.values.serial import Json
@@ -159,7 +159,7 @@ def shipped_folders() -> tuple[Path, ...]:
 
 def _read(text: str) -> Json:
     try:
-        return json.loads(text)
+        return parse_json(text)
     except (ValueError, RecursionError):
         return text
 

@@ -113,3 +113,11 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path, content: bytes | None, p
         path.write_bytes(content)
     with pytest.raises(GearError, match=problem):
         shipped.inspect(path)
+
+
+@pytest.mark.parametrize("text", ['{"miou": NaN}', '{"miou": 1e999}', r'{"miou": "\udc80"}', "[" * 100_000])
+def test_metadata_that_are_no_json_stay_texts(tmp_path: Path, text: str) -> None:
+    """`gear weights show --json` and `gear models --json` print JSON whatever a file says of itself."""
+    path = tmp_path / "a.safetensors"
+    write(path, {"a": torch.zeros(1)}, {"metrics": text})
+    assert shipped.inspect(path).facts()["metrics"] == text
