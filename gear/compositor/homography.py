@@ -65,7 +65,7 @@ class HomographyCompositor(Pasting):
         self._demand(sizes, len(record.surfaces))
         camera = record.camera(view)
         height, width = picture.shape[:2]
-        truths = [next(t for t in sample.surfaces if t.name == s.name and t.camera == view) for s in record.surfaces]
+        truths = [self._truth(sample, s.name, view) for s in record.surfaces]
         units = [unit_from_image(t, s, camera) for t, s in zip(truths, record.surfaces, strict=True)]
 
         def samples_at(unit: Array, rows: Any, columns: Any) -> Samples:

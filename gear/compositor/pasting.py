@@ -14,9 +14,11 @@ from torch import Tensor
 
 from gear.compositor.cache import Cache
 from gear.compositor.sparse import SparseMatrix, stacked_product
+from gear.dataset.layout import sidecar_path
 from gear.dataset.reading import Dataset
 from gear.values.errors import DatasetError
 from gear.values.frames import UInt8Image
+from gear.values.truth import SurfaceTruth
 
 Sizes = tuple[tuple[int, int], ...]
 """Height and width of each patch."""
@@ -102,6 +104,19 @@ class Pasting:
             composed = rounded(composed)
         pasted: Tensor = _Paste.apply(composed, where[:, None] + channels, pictures)  # type: ignore[no-untyped-call]
         return pasted
+
+    def _truth(self, sample: Any, name: str, view: str) -> SurfaceTruth:
+        """What was measured of a surface in a view.
+
+        Raises:
+            DatasetError: nothing.
+        """
+        for truth in sample.surfaces:
+            if truth.name == name and truth.camera == view:
+                return truth  # type: ignore[no-any-return]
+        info, index = self.dataset.plan.info, sample.record.index
+        problem = f"does not say where {name} is in view {view!r}; delete it and run the same collection again"
+        raise DatasetError(self.dataset.root / sidecar_path(info.split, index), problem)
 
     @abstractmethod
     def _load(self, index: int, view: str, sizes: Sizes) -> Prepared:

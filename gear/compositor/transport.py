@@ -119,7 +119,7 @@ class TransportCompositor(Pasting):
         spread = sparse.csr_matrix((np.ones(lit.size, np.float32), (lit, np.arange(lit.size))), (len(gain), lit.size))
         if not lit.size:
             return SparseMatrix.of(sparse.csr_matrix((len(gain), pyramid.size), dtype=np.float32), self.device)
-        truth = next(t for t in sample.surfaces if t.name == surface.name and t.camera == view)
+        truth = self._truth(sample, surface.name, view)
         samples = take_samples(
             Scan.of(self._renderer, self.dataset.plan.content["quality"], self._effects),
             unit_from_image(truth, surface, camera),

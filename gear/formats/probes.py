@@ -17,14 +17,16 @@ from typing import Any
 import cv2
 import numpy as np
 
-from gear.camera.response import Response
+from gear.camera.response import Encoding, Response
 from gear.contracts.tasks import Auxiliary, Sidecar
 from gear.dataset.files import inside, read_bytes
-from gear.dataset.layout import auxiliary_path
+from gear.dataset.layout import auxiliary_path, sidecar_path
 from gear.dataset.reading import Dataset
+from gear.dataset.sidecar import no_sidecar
 from gear.formats.png import decode_plain
-from gear.values.errors import DatasetError
+from gear.values.errors import DatasetError, FieldError
 from gear.values.frames import UInt16Image
+from gear.values.serial import from_json
 
 AuxiliaryFiles = Mapping[str, tuple[Auxiliary, bytes]]
 """What is written beside a sample, by name."""
@@ -113,11 +115,35 @@ def probes_of(dataset: Dataset[Any], index: int, view: str) -> tuple[Probe, ...]
     return tuple(found)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Setting:
+    """A `Response`, as it is written."""
+
+    exposure: float
+    contrast: float
+    encoding: Encoding
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Facts:
+    """What a sidecar says of a probe's file."""
+
+    left_px: int
+    top_px: int
+    response: _Setting
+
+
 def _read(dataset: Dataset[Any], sidecar: Sidecar, view: str, surface: str) -> Probe:
-    pictures, facts = [], {}
+    pictures, facts = [], []
+    place = dataset.root / sidecar_path(dataset.plan.info.split, sidecar.record.index)
     for shade in _SHADES:
-        file = sidecar.auxiliary[f"probe/{view}/{surface}/{shade}"]
-        path, facts = inside(dataset.root, file.path), file.facts
+        name = f"probe/{view}/{surface}/{shade}"
+        try:
+            file = sidecar.auxiliary[name]
+            facts.append(from_json(_Facts, file.facts, f"auxiliary.{name}"))
+        except (KeyError, FieldError) as error:
+            raise no_sidecar(place, error) from error
+        path = inside(dataset.root, file.path)
         damaged = DatasetError(path, "is no probe; delete the sample's sidecar and run the same collection again")
         try:
             picture = decode_plain(read_bytes(path))
@@ -127,14 +153,25 @@ def _read(dataset: Dataset[Any], sidecar: Sidecar, view: str, surface: str) -> P
             raise damaged
         pictures.append(np.ascontiguousarray(picture[..., ::-1], dtype=np.uint16))
     black, white = pictures
+    there = facts[-1]
+    height, width = black.shape[:2]
+    camera = next(camera for camera in sidecar.record.cameras if camera.name == view)
+    fits = 0 <= there.left_px <= camera.width_px - width and 0 <= there.top_px <= camera.height_px - height
+    where = f"auxiliary.probe/{view}/{surface}"
+    if facts[0] != there or white.shape != black.shape or not fits:
+        raise no_sidecar(place, FieldError(where, "the probe does not lie in the picture"))
+    try:
+        response = Response(**{name: getattr(there.response, name) for name in _RESPONSE})
+    except ValueError as error:
+        raise no_sidecar(place, FieldError(where, str(error))) from error
     return Probe(
         surface=surface,
         view=view,
-        left_px=int(facts["left_px"]),
-        top_px=int(facts["top_px"]),
+        left_px=there.left_px,
+        top_px=there.top_px,
         black=black,
         white=white,
-        response=Response(**{name: facts["response"][name] for name in _RESPONSE}),
+        response=response,
     )
 
 

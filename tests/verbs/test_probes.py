@@ -89,3 +89,45 @@ def test_a_scene_without_surfaces_has_no_probes(tmp_path: Path, collect_small: C
     collect_small("depth", tmp_path, scene="no_billboard", probes=True)
     dataset: Any = gear.open_dataset(tmp_path)
     assert probes_of(dataset, 0, "left") == ()
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        (lambda file: file["facts"].pop("left_px"), "facts|left_px: missing"),
+        (lambda file: file["facts"].update(left_px=-1), "does not lie in the picture"),
+        (lambda file: file["facts"].update(top_px=10**6), "does not lie in the picture"),
+        (lambda file: file["facts"]["response"].update(contrast=9), "contrast must be 0.5 to 2"),
+        (lambda file: file["facts"].update(response=[]), "response: expected a mapping"),
+        (lambda file: file.update(facts=None), "expected a mapping, got None"),
+    ],
+)
+def test_a_sidecar_that_says_something_else_of_a_probe_is_one_line(
+    tmp_path: Path, collect_small: Collect, change: Callable[[Any], object], problem: str
+) -> None:
+    collect_small("depth", tmp_path, samples=1, probes=True)
+    path = tmp_path / "gear/debug/samples/000000.json"
+    content = json.loads(path.read_text())
+    for file in content["auxiliary"].values():
+        change(file)
+    path.write_text(json.dumps(content))
+    with pytest.raises(
+        DatasetError, match=rf"000000.json: .*({problem}).*; delete it and run the same collection again$"
+    ):
+        probes_of(gear.open_dataset(tmp_path), 0, "left")
+
+
+@pytest.mark.parametrize("compositor", ["transport", "homography"])
+def test_a_sidecar_without_a_surfaces_measures_is_one_line(
+    tmp_path: Path, collect_small: Collect, compositor: str
+) -> None:
+    import torch
+
+    from gear.compositor.opening import open_compositor
+
+    collect_small("depth", tmp_path, samples=1, probes=True)
+    path = tmp_path / "gear/debug/samples/000000.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"surfaces": []}))
+    dataset = gear.open_dataset(tmp_path)
+    with pytest.raises(DatasetError, match=r"000000\.json: does not say where surface_0 is in view 'left'; delete it"):
+        open_compositor(compositor, dataset).compose([torch.zeros(3, 4, 8)], [0], "left")
