@@ -71,10 +71,30 @@ def test_notes_that_somebody_changed_are_one_line(small: Small, install: Install
     notes = json.loads(path.read_text())
     changed: list[Any] = [{key: value for key, value in notes.items() if key != gone} for gone in folder.TOLD]
     changed += [notes | {key: [None]} for key in folder.TOLD] + [notes | {"masking": {}}, notes | {"patches": None}]
+    (digest,) = notes["patches"].values()
+    changed += [notes | {"patches": {"../patches/patch_0": digest}}]
     for text in (*map(json.dumps, changed), "[" * 200_000):
         path.write_text(text)
         with pytest.raises(DatasetError, match=r"attack\.json: is gone, damaged"):
             attack(data, model="tiny_segmenter", out=out, steps=2, settings=SMALL)
+    path.write_text(json.dumps(notes))
+    exact = np.zeros((4, 8, 3), np.float32)
+    for arrays in ({}, {"patch_1": exact}, {"patch_0": exact[0]}, {"patch_0": exact.astype(np.float64)}):
+        (out / "patch.safetensors").write_bytes(to_bytes(arrays))
+        with pytest.raises(DatasetError, match=r"patch\.safetensors: is gone, damaged"):
+            attack(data, model="tiny_segmenter", out=out, steps=2, settings=SMALL)
+
+
+@pytest.mark.parametrize(
+    "notes",
+    ["[]", "{", "[" * 100_000, '{"key": 1}', {"done": "two"}, {"curves": [1]}, {"judged": [[1]]}, {"seconds": None}],
+)
+def test_a_checkpoint_that_says_something_else_is_one_line(tmp_path: Path, notes: Any) -> None:
+    whole = {"key": "k", "done": 2, "queries_left": None, "curves": {"a": [1.0]}, "judged": [], "seconds": 1.0}
+    text = notes if isinstance(notes, str) else json.dumps(whole | notes)
+    (tmp_path / CHECKPOINT).write_bytes(to_bytes({"state/a": np.zeros(1, np.float32)}, {"notes": text}))
+    with pytest.raises(DatasetError, match=r"checkpoint\.safetensors: is damaged \(.*\); delete it to start afresh$"):
+        Recorder(root=tmp_path, key="k", steps=4).resume()
 
 
 def test_a_patch_folder_is_whole(small: Small, install: Install, tmp_path: Path) -> None:

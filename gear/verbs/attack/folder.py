@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import json
+import re
 import shutil
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load as from_bytes
 
@@ -24,6 +26,10 @@ VERIFY = "verify"
 """Folder of the rendered check, in that of the patches."""
 
 NOTES = "attack.json"
+
+EXACT = "patch.safetensors"
+
+NAME = re.compile(r"patch_\d+")
 
 AGAIN = "is gone, damaged or of other patches; --force makes them again"
 
@@ -68,11 +74,13 @@ def read_patches(root: Path) -> tuple[Patch, ...]:
     Raises:
         DatasetError: they are gone or damaged.
     """
-    path = root / "patch.safetensors"
+    path = root / EXACT
     try:
         arrays = from_bytes(path.read_bytes())
     except (OSError, SafetensorError) as error:
         raise DatasetError(path, AGAIN) from error
+    if any(array.ndim != 3 or array.shape[2] != 3 or array.dtype != np.float32 for array in arrays.values()):
+        raise DatasetError(path, AGAIN)
     return tuple(Patch(name=name, rgb=arrays[name]) for name in sorted(arrays, key=surface_of))
 
 
@@ -109,5 +117,9 @@ def _check_whole(root: Path, notes: Json) -> None:
         raise DatasetError(root / NOTES, AGAIN) from error
     for name, digest in notes["patches"].items():
         path = root / f"{name}.png"
+        if not NAME.fullmatch(name):  # it may lead anywhere
+            raise DatasetError(root / NOTES, AGAIN)
         if not path.is_file() or sha256(read_patch(path).tobytes()) != digest:
             raise DatasetError(path, AGAIN)
+    if {patch.name for patch in read_patches(root)} != notes["patches"].keys():
+        raise DatasetError(root / EXACT, AGAIN)

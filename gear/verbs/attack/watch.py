@@ -16,10 +16,18 @@ from safetensors.numpy import save as to_bytes
 
 from gear.contracts.attacks import Patch, State, surface_of
 from gear.dataset.files import write_whole
+from gear.plugins.catalogue import one_line
 from gear.values.errors import DatasetError
+from gear.values.serial import from_json
 
 CHECKPOINT = "checkpoint.safetensors"
 SECONDS_BETWEEN = 20.0
+NOTED: Any = {
+    "key": str, "done": int, "queries_left": float | None, "curves": dict[str, tuple[float, ...]],
+    "judged": tuple[tuple[int, float], ...], "seconds": float,
+}  # fmt: skip
+"""What a checkpoint's notes say; its arrays are the attack's own."""
+
 Judge = Callable[[tuple[Patch, ...]], float]
 Told = Callable[[int, int], None]
 
@@ -78,8 +86,10 @@ class Recorder:
             with safe_open(str(path), framework="numpy") as opened:
                 notes = json.loads((opened.metadata() or {})["notes"])
                 arrays = {name: opened.get_tensor(name) for name in opened.keys()}  # noqa: SIM118
-        except (SafetensorError, KeyError, ValueError) as error:
-            raise DatasetError(path, "is damaged; remove it to start afresh") from error
+            for name, kind in NOTED.items():
+                from_json(kind, notes.get(name), name)
+        except (SafetensorError, OSError, KeyError, AttributeError, ValueError, RecursionError) as error:
+            raise DatasetError(path, f"is damaged ({one_line(error)}); delete it to start afresh") from error
         if notes["key"] != self.key:
             raise DatasetError(
                 self.root, "holds an unfinished attack with other settings; use another --out or --force"
@@ -89,7 +99,7 @@ class Recorder:
         kept = sorted((name for name in arrays if name.startswith("best/")), key=surface_of)
         if kept:
             self.best = tuple(Patch(name=name.removeprefix("best/"), rgb=arrays[name]) for name in kept)
-        self.tell(int(notes["done"]), notes.get("queries_left"))
+        self.tell(notes["done"], notes.get("queries_left"))
         return {name.removeprefix("state/"): arrays[name] for name in arrays if name.startswith("state/")}
 
     def step(
