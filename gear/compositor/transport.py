@@ -25,11 +25,11 @@ from gear.compositor.pyramid import pyramid_of
 from gear.compositor.sampling import Scan, take_samples, unit_from_image
 from gear.compositor.sparse import SparseMatrix
 from gear.compositor.warp import warp_matrix
+from gear.contracts.rendering import Quality
 from gear.formats import rle
 from gear.formats.probes import Probe, probes_of
 from gear.values.frames import LINEAR_FULL_SCALE
 from gear.values.optics import CameraEffects
-from gear.values.serial import from_json
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,7 +121,7 @@ class TransportCompositor(Pasting):
             return SparseMatrix.of(sparse.csr_matrix((len(gain), pyramid.size), dtype=np.float32), self.device)
         truth = self._truth(sample, surface.name, view)
         samples = take_samples(
-            Scan.of(self._renderer, self.dataset.plan.content["quality"], self._effects),
+            Scan.of(self._renderer, self._quality, self._effects),
             unit_from_image(truth, surface, camera),
             (pixels[0][lit], pixels[1][lit]),
             rle.decode(truth.mask_rle, camera.height_px, camera.width_px),
@@ -134,8 +134,14 @@ class TransportCompositor(Pasting):
         return torch.from_numpy(counts / np.float32(LINEAR_FULL_SCALE)).to(self.device)
 
     @property
+    def _quality(self) -> Quality:
+        kind: Any = Quality
+        quality: Quality = self.dataset.content(kind, "quality")
+        return quality
+
+    @property
     def _effects(self) -> CameraEffects:
-        return from_json(CameraEffects, self.dataset.plan.content["camera"], "camera")
+        return self.dataset.content(CameraEffects, "camera")
 
 
 def _crop(probe: Probe) -> Any:

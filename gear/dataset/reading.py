@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, overload
+from typing import Any, Generic, TypeVar, overload
 
 from gear.contracts.tasks import Sample, SampleT, Sidecar, Task
 from gear.dataset.files import inside, read_bytes, sha256
-from gear.dataset.layout import manifest_path, sidecar_path
+from gear.dataset.layout import manifest_path, plan_path, sidecar_path
 from gear.dataset.plan import Plan
 from gear.dataset.sidecar import load_json, no_sidecar, read_sidecar
 from gear.values.errors import DatasetError, FieldError
 from gear.values.serial import Json, from_json
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +76,22 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
             path = self.root / manifest_path(self.plan.info.split)
             raise DatasetError(path, f"says no name of a {what}; delete it and run the same collection again")
         return name
+
+    def content(self, kind: type[T], *keys: str) -> T:
+        """What its plan says of its content, by key, and key in key.
+
+        Raises:
+            DatasetError: nothing of that kind: the plan was damaged, or edited.
+        """
+        value, name = self.plan.content, ".".join(("content", *keys))
+        try:
+            for key in keys:
+                value = value[key]
+            return from_json(kind, value, name)
+        except (KeyError, TypeError, FieldError) as error:
+            path = self.root / plan_path(self.plan.info.split)
+            problem = str(error) if isinstance(error, FieldError) else f"{name}: missing"
+            raise DatasetError(path, f"is not of this version of gear ({problem}); collect the split again") from error
 
     def verify(self) -> list[str]:
         """Files that are missing or differ from the manifest's hashes, by relative path."""

@@ -32,6 +32,9 @@ SKY_FACE_PX = 8
 
 HASH_LENGTH = 16
 
+PLANNED = (("town",), ("assets",), ("renderer", "name"), ("versions", "mujoco"))
+"""What `look_of` reads in the content of plans, by key, and key in key: names and hashes."""
+
 RAMP = (0.01, 0.05, 0.2, 0.5, 0.8)
 
 

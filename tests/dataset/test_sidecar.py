@@ -189,3 +189,13 @@ def test_what_gear_never_writes_is_no_json(tmp_path: Path, text: str) -> None:
 def test_whole_characters_beyond_the_basic_plane_are_read(tmp_path: Path) -> None:
     (tmp_path / "a.json").write_text(r'["\ud83d\ude97"]')
     assert load_json(tmp_path / "a.json") == ["🚗"]
+
+
+def test_a_plan_that_does_not_say_what_is_asked_is_one_line(made: Callable[[str], Path]) -> None:
+    dataset = open_dataset(made("depth"))
+    assert dataset.content(str, "scene") == "billboard01"
+    for kind, keys in ((int, ("scene",)), (int, ("frames",)), (str, ("scene", "name"))):
+        with pytest.raises(
+            DatasetError, match=r"plan\.json: is not of this version of gear \(content\..*; collect the"
+        ):
+            dataset.content(kind, *keys)

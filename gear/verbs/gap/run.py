@@ -129,7 +129,7 @@ def gap(
         split=clean.plan.info.split,
         patch=pairs.second.plan.patch["label"],
         renderer=clean.named("renderer"),
-        quality=str(clean.plan.content["quality"]),
+        quality=clean.content(str, "quality"),
         samples=tuple(found),
         effect={} if effect is None else effect.result(),
         sample_effects=() if effect is None else tuple(effect.samples),

@@ -50,13 +50,12 @@ def collect_twin(
         PatchError: the patch cannot be used.
         DatasetError: with these files and versions the same scenes cannot be made again.
     """
-    content = clean.plan.content
     if not isinstance(clean.manifest.get("config"), dict):
         raise DatasetError(clean.root, "has a manifest without the config that it was collected with; give --twin DIR")
     config: dict[str, Any] = {
         **clean.manifest["config"],
-        "town": str(town or content["town"]),
-        "samples": clean.plan.samples // content["frames"],
+        "town": str(town or clean.content(str, "town")),
+        "samples": clean.plan.samples // max(clean.content(int, "frames"), 1),
         "patch": str(patch),
         "root": str(root),
         "probes": False,

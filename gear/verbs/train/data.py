@@ -157,5 +157,5 @@ def _streets(datasets: Sequence[Dataset[Any]]) -> list[int]:
 
 def _sequence(samples: Samples, place: tuple[int, int], streets: Sequence[int]) -> tuple[int, int]:
     """Which drive a sample is of; most are one picture long."""
-    frames = int(samples.datasets[place[0]].plan.content["frames"])
+    frames = max(samples.datasets[place[0]].content(int, "frames"), 1)
     return streets[place[0]], place[1] // frames

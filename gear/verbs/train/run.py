@@ -18,7 +18,7 @@ from gear.plugins.catalogue import Found
 from gear.values.errors import GearError
 from gear.values.serial import Json
 from gear.verbs.evaluate.choice import Chosen, check_camera
-from gear.verbs.look import look_of
+from gear.verbs.look import PLANNED, look_of
 from gear.verbs.train.adversary import Adversary
 from gear.verbs.train.checkpoint import begun_config
 from gear.verbs.train.config import TrainConfig, read_config
@@ -139,6 +139,8 @@ def train(
     assert isinstance(spec, TaskSpec)
     for dataset in (*training.datasets, *validation.datasets):
         check_camera(Chosen(found=found, options=config.options), dataset, "--set options.")
+        for keys in PLANNED:
+            dataset.content(str, *keys)
     scale = picture_scale(found, config, training)
     if noted is not None and config.precision == "auto" and precision_of(found, config) == "bfloat16":
         noted("steps run in bfloat16, in which this device is quicker; --precision float32 keeps them whole")
