@@ -295,3 +295,14 @@ def test_a_patch_is_made_measured_taken_up_again_and_installed(
         "weights_sha256": results["model"]["weights_sha256"], "samples": 4, "seed": 42_003, "outside": found["outside"],
     }, "by the same weights the same"  # fmt: skip
     assert json.loads((target / "effect.json").read_text()) == again
+
+
+def test_figures_that_are_none_are_told_before_anything_is_measured(tmp_path: Path) -> None:
+    plan = PatchPlan(task="semseg", model="tiny_segmenter", town=str(TINY_TOWN), scene="board", number=3, steps=3)
+    path = tmp_path / "patches" / plan.name / EFFECT
+    path.parent.mkdir(parents=True)
+    path.write_text("[]")
+    ran: list[Any] = []
+    with pytest.raises(GearError, match=r"effect\.json: does not hold the figures of a patch; make the patch again"):
+        measure_again(plan, tmp_path / "run", in_this_process(ran), ran.append, tmp_path / "patches")
+    assert not ran

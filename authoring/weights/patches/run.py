@@ -17,7 +17,7 @@ from gear.dataset.sidecar import dump_json, load_json
 from gear.nn.options import SHIPPED
 from gear.nn.shipped import resolve
 from gear.plugins.build import find
-from gear.values.errors import GearError
+from gear.values.errors import DatasetError, GearError
 from gear.values.serial import Json, to_json
 
 EFFECT, MINUTES = "effect.json", "minutes.json"
@@ -55,7 +55,7 @@ def make_patch(plan: PatchPlan, root: Path, gear: Gear, told: Told) -> Json:
     recipe = {"plan": to_json(plan), "weights_sha256": weights_hash(plan)}
     if (root / EFFECT).is_file():
         there = load_json(root / EFFECT)
-        if there["recipe"] == recipe:
+        if isinstance(there, dict) and there.get("recipe") == recipe and "effect" in there:
             return there["effect"]
     for step in plan.commands(root):
         begun = time.monotonic()
@@ -74,10 +74,12 @@ def measure_again(plan: PatchPlan, root: Path, gear: Gear, told: Told, patches: 
     """Measures an installed patch against the weights that are shipped now; its `effect.json` says so as `again`.
 
     Raises:
-        GearError: a command failed, or the patch is not installed.
+        GearError: a command failed, or the patch is not installed or its figures are damaged.
     """
     path = patches / plan.name / EFFECT
     effect = load_json(path)
+    if not isinstance(effect, dict):  # told now, not after minutes of measuring
+        raise DatasetError(path, "does not hold the figures of a patch; make the patch again with --install")
     for step in plan.commands_again(root):
         gear(step.arguments)
         told(step.name)
