@@ -2,9 +2,12 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from gear.groundtruth.boxes import Box3d, box_in_camera, project_box
-from gear.testing.synthetic import synthetic_frame
+from gear.groundtruth.raster import clip_near
+from gear.testing.synthetic import UNIT_FACES, synthetic_frame
 from gear.testing.things import CAR, Thing
 from gear.values.geometry import Intrinsics
 from gear.values.rig import CameraMount, Rig
@@ -56,3 +59,32 @@ def test_boxes_through_the_camera_plane_are_cut_there() -> None:
 def test_boxes_behind_are_nowhere() -> None:
     behind = Box3d(height_m=1.5, width_m=1.8, length_m=4.2, bottom_m=(0.0, 1.65, -8.0), rotation_y_rad=0.0)
     assert project_box(behind.corners_m, PINHOLE) is None
+
+
+@given(
+    st.floats(-4, 4),
+    st.floats(-3, 3.5),
+    st.floats(-math.pi, math.pi),
+    st.sampled_from([(4.2, 1.8, 1.5), (0.6, 0.6, 1.8)]),
+)
+@settings(max_examples=100, deadline=None)
+def test_boxes_cut_by_the_near_plane_are_what_is_left_of_their_faces(
+    x_m: float, z_m: float, rotation_y_rad: float, size_m: tuple[float, float, float]
+) -> None:
+    length_m, width_m, height_m = size_m
+    box = Box3d(
+        height_m=height_m, width_m=width_m, length_m=length_m, bottom_m=(x_m, 1.65, z_m), rotation_y_rad=rotation_y_rad
+    )
+    left = clip_near(box.corners_m[UNIT_FACES]).reshape(-1, 3)
+    found = project_box(box.corners_m, PINHOLE)
+    if not len(left):
+        assert found is None
+        return
+    pixels = PINHOLE.project(left)
+    assert found == pytest.approx((*pixels.min(axis=0), *pixels.max(axis=0)), rel=1e-6, abs=1e-6)
+
+
+def test_alpha_stays_within_half_a_turn() -> None:
+    """-3 rad seen along a ray 0.79 rad to the right is a turn further round, 2.5 rad."""
+    box = Box3d(height_m=1, width_m=1, length_m=1, bottom_m=(10.0, 1.0, 10.0), rotation_y_rad=-3.0)
+    assert box.alpha_rad == pytest.approx(2 * math.pi - 3.0 - math.pi / 4)
