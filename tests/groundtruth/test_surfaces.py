@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from gear.formats import rle
+from gear.groundtruth.raster import clip_near
 from gear.groundtruth.surfaces import observe_surfaces
 from gear.testing.synthetic import behind_lens, synthetic_frame
 from gear.testing.things import CAR, Part, Thing, board
+from gear.values.geometry import Intrinsics
 from gear.values.optics import Lens
 from gear.values.rig import CameraMount, Rig
 from gear.values.truth import SurfaceTruth
@@ -72,6 +74,19 @@ def test_a_board_behind_has_no_corners() -> None:
     assert truth.corners_px is None and truth.image_from_unit is None
     assert truth.visible_px == 0 and truth.visible_fraction == 0.0
     assert truth.incidence_deg > 90
+
+
+@pytest.mark.parametrize("yaw_rad", [1.3, math.pi / 2, 1.8])
+def test_of_a_board_beside_the_camera_the_share_is_of_what_the_near_plane_leaves(yaw_rad: float) -> None:
+    beside = Thing(parts=board(0.0).parts, position_m=(3.0, 2.0, 0.0), yaw_rad=yaw_rad)
+    truth, face = observe([beside])
+    assert truth.corners_px is None and truth.visible_px == face.sum() > 1000
+    camera_from_surface = np.array(truth.camera_from_surface).reshape(4, 4)
+    halves = np.array([[-3.7, -1.85, 0, 1], [3.7, -1.85, 0, 1], [3.7, 1.85, 0, 1], [-3.7, 1.85, 0, 1]])
+    corners_m = (halves @ camera_from_surface.T)[:, :3]
+    pixels = Intrinsics(612, 306, 306.0).project(clip_near(corners_m[[[0, 1, 2], [0, 2, 3]]]))
+    area_px2 = sum(abs(np.linalg.det([b - a, c - a])) / 2 for a, b, c in pixels)
+    assert truth.visible_fraction == pytest.approx(truth.visible_px / area_px2, rel=5e-3)
 
 
 def test_a_surface_rides_on_its_actor() -> None:
