@@ -1,8 +1,14 @@
+from dataclasses import replace
+
 import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from gear.groundtruth.labelmaps import coarsen, instance_map, label_map
 from gear.testing.synthetic import synthetic_frame
-from gear.testing.things import CAR, PERSON, TRAFFIC_LIGHT, Thing
+from gear.testing.things import CAR, PERSON, TRAFFIC_LIGHT, Part, Thing
+from gear.values.frames import GeomTable
+from gear.values.labels import LABEL_BY_NAME
 from gear.values.rig import CameraMount, Rig
 
 RIG = Rig(cameras=(CameraMount(name="left", width_px=320, height_px=160),))
@@ -23,6 +29,47 @@ def test_instances_are_numbered_by_class() -> None:
     assert of_geom == [{7}, {26000}, {24000}, {26001}, {19}]
     assert set(np.unique(instances[ids == -1])) == {23}
     np.testing.assert_array_equal(np.unique(label_map(instances)), [7, 19, 23, 24, 26])
+
+
+def test_an_object_of_many_geoms_is_one_instance_and_the_ego_car_is_none() -> None:
+    roof = Part(label="car", centre_m=(0.0, 0.0, 1.7), size_m=(2.0, 1.6, 0.4))
+    things = [
+        Thing(parts=CAR, position_m=(12.0, 3.0, 0.0), object_id=1, role="ego"),
+        Thing(parts=(*CAR, roof), position_m=(12.0, 0.0, 0.0), object_id=2, role="npc"),
+        Thing(parts=(*CAR, roof), position_m=(12.0, -3.0, 0.0), object_id=3, role="npc"),
+    ]
+    frame, _ = synthetic_frame(RIG, things)
+    ids = frame.views["left"].geom_id
+    instances = instance_map(ids, frame.geoms, frame.objects)
+    assert [set(np.unique(instances[ids == geom])) for geom in range(1, 6)] == [
+        {1}, {26000}, {26000}, {26001}, {26001}
+    ]  # fmt: skip
+
+
+def test_after_a_thousand_instances_of_a_class_the_rest_have_the_class_alone() -> None:
+    """The thousand and first would be the first of the next class."""
+    car = LABEL_BY_NAME["car"].code
+    geoms = GeomTable(
+        label_code=np.full(1002, car, np.uint8),
+        object_id=np.arange(1002, dtype=np.int32),
+        surface_index=np.full(1002, -1, np.int16),
+    )
+    frame, _ = synthetic_frame(RIG, [Thing(parts=CAR, position_m=(12.0, 0.0, 0.0), object_id=2, role="npc")])
+    objects = {number: replace(frame.objects[2], id=number) for number in range(1002)}
+    instances = instance_map(np.arange(1002, dtype=np.int32)[None], geoms, objects)
+    assert instances[0].tolist() == [*range(26000, 27000), 26, 26]
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([1, 3, 5, 9]), st.integers(1, 6))
+@settings(max_examples=40, deadline=None)
+def test_coarse_maps_hold_what_fills_most_of_each_window(seed: int, window_px: int, labels: int) -> None:
+    instances = np.random.default_rng(seed).integers(0, labels, (9, 13)).astype(np.uint16)
+    expected, reach = instances.copy(), window_px // 2
+    for (y, x), own in np.ndenumerate(instances):
+        around = instances[max(0, y - reach) : y + reach + 1, max(0, x - reach) : x + reach + 1]
+        values, counts = np.unique(around, return_counts=True)
+        expected[y, x] = values[np.argmax(2 * counts + (values == own))]
+    np.testing.assert_array_equal(coarsen(instances, window_px), expected)
 
 
 def test_coarse_maps_keep_borders_and_lose_specks() -> None:
