@@ -40,6 +40,32 @@ def test_each_limit_holds(changes: dict[str, Any], distance_m: float) -> None:
     assert not VisibilityLimits().labels(truth(**changes), distance_m)
 
 
+@pytest.mark.parametrize(
+    ("changes", "distance_m"),
+    [
+        ({}, 200.0),
+        ({"visible_box": (10.0, 10.0, 40.0, 40.0)}, 50.0),
+        ({"visible_px": 100, "amodal_in_image_px": 400}, 50.0),
+        ({"visible_px": 201, "amodal_in_image_px": 2000, "amodal_px": 9000}, 50.0),
+    ],
+)
+def test_what_just_reaches_a_limit_is_labelled(changes: dict[str, Any], distance_m: float) -> None:
+    """900 px², 100 visible pixels, a tenth of what lies in the picture, whatever lies outside, and 200 m."""
+    assert VisibilityLimits().labels(truth(**changes), distance_m)
+
+
+def test_the_share_that_is_too_little_is_of_the_part_in_the_picture() -> None:
+    barely = truth(visible_px=199, amodal_in_image_px=2000, amodal_px=2000)
+    assert not VisibilityLimits().labels(barely, 50.0)
+
+
+def test_limits_may_let_everything_through() -> None:
+    limits = VisibilityLimits(
+        max_distance_m=0.5, min_box_area_px2=0.0, min_visible_fraction=0.0, min_visible_px=0, min_pixels_px=1
+    )
+    assert limits.labels(truth(visible_px=1, visible_box=(3.0, 3.0, 4.0, 4.0)), 0.5)
+
+
 def test_three_pixels_are_not_mentioned() -> None:
     assert not VisibilityLimits().mentions(truth(visible_px=3))
     assert VisibilityLimits().mentions(truth(visible_px=4))
