@@ -66,6 +66,23 @@ def test_merged_pictures_may_share_their_numbers() -> None:
     second.update(picture(0, CAR), [])
     first.merge(second)
     assert first.result()["ap"] == pytest.approx(0.5, abs=0.01)
+    third = evaluator()
+    third.update(picture(0, CAR), [found(0.9)])
+    first.merge(third)
+    assert first.result()["ap"] == pytest.approx(2 / 3, abs=0.01), "what the other one found has come along"
+
+
+def test_categories_have_their_figures_over_all_sizes_and_a_hundred_detections() -> None:
+    small = (3, (150.0, 150.0, 20.0, 20.0), False)
+    alarms = [found(0.9 - i / 1000, (10 * i, 180, 10 * i + 8, 188), category_id=1) for i in range(11)]
+    metric = evaluator()
+    metric.update(
+        picture(0, CAR, small, (1, (150, 100, 30, 60), False)),
+        [found(0.9), found(0.8, (150, 150, 170, 170)), *alarms, found(0.1, (150, 100, 180, 160), category_id=1)],
+    )
+    result = metric.result()
+    assert result["ap_car"] == pytest.approx(1.0)
+    assert result["ap_person"] == pytest.approx(1 / 12), "the twelfth detection is the first right one"
 
 
 def test_bad_detections_are_refused() -> None:
