@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from gear.formats.png import encode_labels
-from gear.metrics.semantic import AVERAGE_INSTANCE_PX, SemanticEvaluator
+from gear.metrics.semantic import AVERAGE_INSTANCE_PX, PIECE_PX, PresentClasses, SemanticEvaluator
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,14 @@ def labelled(seed: int) -> Labelled:
     for number in range(4):
         x, y = int(rng.integers(10, 190)), int(rng.integers(60, 110))
         cv2.ellipse(
-            picture, (x, y), (int(rng.integers(4, 30)), 9), 0, 0, 360, int(rng.choice([24, 26, 33])) * 1000 + number, -1
+            picture,
+            (x, y),
+            (int(rng.integers(4, 30)), 9),
+            0,
+            0,
+            360,
+            int(rng.choice([24, 26, 29, 33])) * 1000 + number,
+            -1,
         )
     return Labelled(picture)
 
@@ -109,6 +116,34 @@ def test_agrees_with_the_official_tool(tmp_path: Path, monkeypatch: pytest.Monke
     for name, value in official["classScores"].items():
         if value == value and f"iou_{name.replace(' ', '_')}" in result:
             assert result[f"iou_{name.replace(' ', '_')}"] == pytest.approx(value, abs=1e-9)
+
+
+def test_average_sizes_are_the_official_ones() -> None:
+    tool = importlib.import_module("cityscapesscripts.evaluation.evalPixelLevelSemanticLabeling")
+    assert tool.args.avgClassSize == AVERAGE_INSTANCE_PX
+
+
+@pytest.mark.parametrize("kind", [SemanticEvaluator, PresentClasses])
+def test_merged_pictures_count_as_if_one_had_seen_them_all(kind: type[SemanticEvaluator]) -> None:
+    whole, first, second = kind(), kind(), kind()
+    for seed, part in enumerate((first, first, second, second)):
+        for evaluator in (whole, part):
+            evaluator.update(labelled(seed), spoilt(labelled(seed), seed))
+    first.merge(second)
+    assert first.result() == pytest.approx(whole.result(), nan_ok=True)
+
+
+def test_large_pictures_are_counted_whole() -> None:
+    """They are taken in pieces."""
+    rng = np.random.default_rng(2)
+    truth = rng.integers(7, 14, (3, PIECE_PX // 2 + 77)).astype(np.uint16)
+    prediction = rng.integers(7, 14, truth.shape).astype(np.uint8)
+    evaluator = SemanticEvaluator()
+    evaluator.update(Labelled(truth), prediction)
+    for label, train_id_name in ((7, "road"), (11, "building"), (13, "fence")):
+        both = (truth == label) & (prediction == label)
+        either = ((truth == label) | (prediction == label)) & np.isin(truth, [7, 8, 11, 12, 13])
+        assert evaluator.result()[f"iou_{train_id_name}"] == pytest.approx(both.sum() / either.sum(), abs=1e-12)
 
 
 def test_wrong_predictions_are_refused() -> None:
