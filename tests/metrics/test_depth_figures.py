@@ -93,6 +93,34 @@ def test_crops_look_at_their_part() -> None:
     assert DepthEvaluator().update(Deep(truth), prediction)["eigen_rmse_m"] == pytest.approx(10 * math.sqrt(0.4))
 
 
+@pytest.mark.parametrize(
+    ("crop", "inside"), [("garg", (153, 371, 44, 1197)), ("eigen", (124, 342, 44, 1197)), ("none", (0, 375, 0, 1242))]
+)
+def test_crops_are_the_published_ones(
+    crop: Literal["none", "garg", "eigen"], inside: tuple[int, int, int, int]
+) -> None:
+    """Of KITTI's pictures of 375 x 1242: first and past the last row and column."""
+    top, bottom, left, right = inside
+    truth = np.full((375, 1242), 10.0, dtype=np.float32)
+    prediction = np.full_like(truth, 20.0)
+    prediction[top:bottom, left:right] = 10.0
+    assert DepthEvaluator(crop=crop).update(Deep(truth), prediction)["eigen_rmse_m"] == 0.0
+    for row, column in ((top, left), (bottom - 1, right - 1)):
+        one_off = prediction.copy()
+        one_off[row, column] = 20.0
+        assert DepthEvaluator(crop=crop).update(Deep(truth), one_off)["eigen_rmse_m"] > 0.0
+
+
+def test_merged_pictures_count_as_if_one_had_seen_them_all() -> None:
+    whole, first, second = DepthEvaluator(), DepthEvaluator(), DepthEvaluator()
+    truth = np.full((4, 4), 10.0, dtype=np.float32)
+    for off, part in ((1.0, first), (2.0, second), (4.0, second)):
+        for evaluator in (whole, part):
+            evaluator.update(Deep(truth), truth + np.float32(off))
+    first.merge(second)
+    assert first.result() == whole.result() and first.result()["mae_m"] == pytest.approx(7 / 3)
+
+
 def test_figures_are_means_over_pictures() -> None:
     evaluator = DepthEvaluator()
     for wrong in (0.0, 3.0):
