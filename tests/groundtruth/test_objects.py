@@ -1,3 +1,4 @@
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -5,7 +6,7 @@ import pytest
 
 from gear.groundtruth.objects import observe_objects
 from gear.testing.synthetic import behind_lens, synthetic_frame
-from gear.testing.things import CAR, CYCLIST, TRUCK, Thing, board, street
+from gear.testing.things import CAR, CYCLIST, PERSON, TRUCK, Thing, board, street
 from gear.values.frames import Frame
 from gear.values.labels import LABEL_BY_NAME
 from gear.values.optics import Lens
@@ -64,6 +65,31 @@ def test_what_leaves_the_picture_is_counted_outside_it() -> None:
     assert cut.amodal_in_image_px == cut.visible_px
     shifted = [v - d for v, d in zip(whole.amodal_box, (612, 185, 612, 185), strict=True)]
     assert list(cut.amodal_box) == pytest.approx(shifted, abs=1)
+
+
+@pytest.mark.parametrize(("ahead_m", "left_m"), [(6.0, 3.9), (6.0, -4.4), (4.0, 0.4)])
+def test_small_things_that_leave_the_picture_are_counted_to_the_pixel(ahead_m: float, left_m: float) -> None:
+    """On the left, on the right and at the bottom: up to 512 pixels a side nothing is sampled coarser."""
+    person = [thing(PERSON, ahead_m, left_m)]
+    (cut,) = observe(synthetic_frame(RIG, person)[0])
+    (whole,) = observe(synthetic_frame(WIDE, person)[0])
+    assert 0.05 < cut.truncated_fraction < 0.95 and whole.truncated_fraction == 0
+    assert (cut.amodal_px, cut.amodal_in_image_px) == (whole.amodal_px, cut.visible_px)
+
+
+def test_pixels_that_the_triangles_just_miss_are_part_of_the_object() -> None:
+    """A renderer rounds on its own: what it shows is there, at the silhouette's border or where no silhouette is."""
+    frame, _ = synthetic_frame(RIG, [thing(CAR, 12.0, 1.0), thing(CAR, -20.0, 0.0, 0.0, 3)])
+    view = frame.views["left"]
+    (plain,) = observe(frame)
+    left, top, right, bottom = (int(v) for v in plain.visible_box)
+    ids = view.geom_id.copy()
+    ids[top + 3, left - 1], ids[5, 7] = 1, 2
+    seen, behind = observe(replace(frame, views={"left": replace(view, geom_id=ids)}))
+    assert seen.visible_box == seen.amodal_box == (left - 1, top, right, bottom)
+    assert seen.visible_px == seen.amodal_px == plain.visible_px + 1 and seen.occluded_fraction == 0
+    assert behind.visible_box == behind.amodal_box == (7, 5, 8, 6)
+    assert (behind.visible_px, behind.amodal_px, behind.amodal_in_image_px) == (1, 1, 1)
 
 
 def test_a_truck_through_the_image_plane_stays_finite() -> None:

@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gear.groundtruth import raster
 from gear.groundtruth.raster import NEAR_M, bounds, clip_near, fill, project_mesh
 from gear.values.geometry import Intrinsics
 
@@ -52,6 +53,30 @@ def test_many_triangles_are_the_union() -> None:
     triangles = rng.uniform(-10, 50, (200, 1, 2)) + rng.uniform(-6, 6, (200, 3, 2))
     expected = np.any([fill(t[None], WINDOW) for t in triangles], axis=0)
     np.testing.assert_array_equal(fill(triangles, WINDOW), expected)
+
+
+@pytest.mark.parametrize("portion", [1, 7, 100])
+def test_triangles_may_be_filled_in_portions(portion: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(5)
+    triangles = rng.uniform(-10, 50, (60, 1, 2)) + rng.uniform(-9, 9, (60, 3, 2))
+    whole = fill(triangles, WINDOW)
+    monkeypatch.setattr(raster, "SPANS_AT_ONCE", portion)
+    np.testing.assert_array_equal(fill(triangles, WINDOW), whole)
+
+
+@pytest.mark.parametrize("step", [3, 5])
+def test_coarse_samples_are_those_in_the_middle_of_their_squares(step: int) -> None:
+    triangles = np.random.default_rng(6).uniform(-10, 50, (4, 3, 2))
+    window = (-15, -10, -15 + 14 * step, -10 + 12 * step)
+    fine = fill(triangles, window)
+    np.testing.assert_array_equal(fill(triangles, window, step), fine[step // 2 :: step, step // 2 :: step])
+
+
+def test_bounds_are_the_smallest_window_that_holds_all_covered_pixels() -> None:
+    corners = np.array([[1.2, -2.1], [5.7, -2.1], [5.7, 4.0], [1.2, 4.0]])
+    window = bounds(corners[[[0, 1, 2], [0, 2, 3]]])
+    assert window == (2, -2, 6, 4)
+    assert fill(corners[[[0, 1, 2], [0, 2, 3]]], window).all()
 
 
 def test_windows_may_lie_anywhere() -> None:
