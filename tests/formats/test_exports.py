@@ -79,6 +79,27 @@ def test_small_pictures_are_not_cropped(tmp_path: Path) -> None:
 def test_a_driving_split_is_a_drive_a_sequence(tmp_path: Path) -> None:
     val = collected(tmp_path, depth, {"width_px": 408, "height_px": 124})
     a, b = val.records
-    driving = replace(val, records=(replace(a, sequence=0, frame=0), replace(b, sequence=0, frame=1)))
+    driving = replace(val, records=(replace(a, sequence=4, frame=0), replace(b, sequence=4, frame=1)))
     names = export("kitti-depth", [driving], tmp_path)
     assert "val/2022_01_01_drive_0001_sync/proj_depth/groundtruth/image_02/0000000001.png" in names
+    driving = replace(val, records=(replace(a, sequence=4, frame=1), replace(b, sequence=7, frame=0)))
+    names = export("kitti-depth", [driving], tmp_path)
+    assert "val/2022_01_01_drive_0001_sync/proj_depth/groundtruth/image_02/0000000001.png" in names
+    assert "val/2022_01_01_drive_0002_sync/proj_depth/groundtruth/image_02/0000000000.png" in names
+
+
+def test_single_pictures_are_one_drive_whatever_their_sequence_and_train_has_a_pool_of_its_own(tmp_path: Path) -> None:
+    val = collected(tmp_path, depth, {"width_px": 408, "height_px": 124})
+    a, b = val.records
+    for folder in ("leftImg8bit", "gtFine"):
+        (tmp_path / folder / "train").mkdir()
+        for path in (tmp_path / folder / "val").glob("rgb_*.png"):
+            (tmp_path / folder / "train" / path.name).write_bytes(path.read_bytes())
+    train = replace(val, info=replace(INFO, split="train"))
+    single = replace(val, records=(replace(a, sequence=0), replace(b, sequence=1)))
+    names = [name for name in export("kitti-depth", [single, train], tmp_path) if "groundtruth" in name]
+    assert names == [
+        f"{pool}/2022_01_01_drive_{drive}_sync/proj_depth/groundtruth/image_02/{frame:010d}.png"
+        for pool, drive in (("val", "0001"), ("train", "0002"))
+        for frame in (0, 1)
+    ]

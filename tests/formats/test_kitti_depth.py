@@ -42,6 +42,11 @@ def test_metres_come_back(depth_m: np.ndarray) -> None:
     np.testing.assert_array_equal(from_metres_file(stored), depth_m)
 
 
+def test_a_file_of_metres_holds_nought_for_what_is_not_finite() -> None:
+    depth_m = np.array([np.nan, np.inf, -np.inf, 2.5], dtype=np.float32)
+    np.testing.assert_array_equal(to_metres_file(depth_m), [0, 0, 0, 2.5])
+
+
 def test_list_lines() -> None:
     text = file_list([("a/0.png", "b/0.tiff"), ("a/1.png", "b/1.tiff")])
     assert text == b"/a/0.png /b/0.tiff\n/a/1.png /b/1.tiff"
