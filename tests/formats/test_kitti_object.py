@@ -1,5 +1,6 @@
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -60,6 +61,12 @@ def test_lines_have_the_benchmarks_form(label: KittiLabel) -> None:
     assert "-0.00" not in fields
 
 
+def test_no_field_is_a_negative_nought() -> None:
+    """The devkit reads it; a comparison of files does not."""
+    label = replace(parse_label("Car" + " 0" * 14), alpha_rad=-0.004, location_m=(-0.001, -0.006, 0.0))
+    assert format_label(label) == "Car 0.00 0 0.00 0.00 0.00 0.00 0.00 0.00 0.00 0.00 0.00 -0.01 0.00 0.00"
+
+
 def test_dont_care_is_the_benchmarks_own_line() -> None:
     line = format_label(dont_care((503.89, 169.71, 590.61, 190.13)))
     assert line == "DontCare -1 -1 -10 503.89 169.71 590.61 190.13 -1 -1 -1 -1000 -1000 -1000 -10"
@@ -113,7 +120,9 @@ def test_the_chain_from_the_scanner_ends_in_the_picture() -> None:
 
 def test_boxes_are_clipped_to_index_pixels() -> None:
     assert clip_box((-5.0, -6.0, 1300.0, 400.0), PINHOLE) == (0.0, 0.0, 1223.0, 369.0)
-    assert clip_box((-50.0, 10.0, -5.0, 20.0), PINHOLE) is None
+    assert clip_box((5.0, 6.0, 7.0, 9.0), PINHOLE) == (5.0, 6.0, 7.0, 9.0)
+    for outside in ((-50.0, 10.0, -5.0, 20.0), (1224.0, 10.0, 1300.0, 20.0), (5.0, -9.0, 9.0, -1.0), (5, 370, 9, 400)):
+        assert clip_box(outside, PINHOLE) is None
 
 
 def test_truncation_is_the_share_of_the_box_outside() -> None:
@@ -121,6 +130,8 @@ def test_truncation_is_the_share_of_the_box_outside() -> None:
     clipped = clip_box(box, PINHOLE)
     assert clipped is not None
     assert truncation(box, clipped) == pytest.approx(0.5)
+    assert truncation((-100.0, -300.0, 100.0, 100.0), (0.0, 0.0, 100.0, 100.0)) == pytest.approx(7 / 8)
+    assert truncation((3.0, 4.0, 3.0, 9.0), (3.0, 4.0, 3.0, 9.0)) == 0.0, "a box without an area lies nowhere else"
 
 
 @pytest.mark.parametrize(("occluded", "level"), [(0.0, 0), (0.2, 0), (0.21, 1), (0.5, 1), (0.51, 2), (0.99, 2)])
