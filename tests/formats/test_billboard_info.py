@@ -5,6 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from gear.formats.billboard_info import billboard_info, world_from_board, xyzrpy
 from gear.groundtruth.surfaces import observe_surfaces
@@ -97,6 +100,7 @@ def test_the_patch_is_named(label: str, is_patched: bool, kind: str) -> None:
     _, record = synthetic_frame(RIG, [board(20.0)])
     info = billboard_info([record], task="ss", patch_label=label, reference="left")
     assert info["info"]["is_patched"] is is_patched and info["info"]["patch_type"] == kind
+    assert info["info"]["patch_folder"] == (label if is_patched else None)
     assert info["camera_params"] == pytest.approx({"height": 370, "width": 1224, "fov": math.pi / 2, "focal": 612.0})
     assert info["patch_mask_corners"] == {}
 
@@ -110,7 +114,26 @@ def test_a_tilted_camera_is_marked() -> None:
     assert pose[4] == pytest.approx(math.radians(3.0)), "pitch is positive downwards in a frame with z up"
 
 
-def test_angles_come_back() -> None:
-    rotation = RigidTransform.from_yaw("world", "x", (0, 0, 0), 0.4).rotation
-    x, y, z, roll, pitch, yaw = xyzrpy(RigidTransform.from_parts("world", "x", rotation, (1, 2, 3)))
-    assert (x, y, z, roll, pitch, yaw) == pytest.approx((1, 2, 3, 0, 0, 0.4), abs=1e-7)
+def test_one_tilted_record_marks_the_split() -> None:
+    level, tilted = (
+        synthetic_frame(Rig(cameras=(CameraMount(name="left", width_px=320, height_px=160, pitch_deg=p),)), [])[1]
+        for p in (0.0, 3.0)
+    )
+    for records in ([level, tilted], [tilted, level]):
+        info = billboard_info(records, task="ss", patch_label="none", reference="left")
+        assert info["info"]["level"] is False
+        assert [entry["id"] for entry in info["camera_billboard_positions"]] == [0, 1]
+
+
+def test_a_split_without_records_is_empty() -> None:
+    info = billboard_info([], task="ss", patch_label="none", reference="left")
+    assert info["info"]["num_billboards"] == 0 and info["info"]["level"] is True
+    assert info["camera_params"] == {} and info["camera_billboard_positions"] == []
+
+
+@given(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5), st.floats(-3.1, 3.1))
+def test_angles_come_back(roll_rad: float, pitch_rad: float, yaw_rad: float) -> None:
+    """As Rz(yaw) Ry(pitch) Rx(roll)."""
+    rotation = Rotation.from_euler("ZYX", [yaw_rad, pitch_rad, roll_rad]).as_matrix()
+    found = xyzrpy(RigidTransform.from_parts("world", "x", rotation, (1, 2, 3)))
+    assert found == pytest.approx((1, 2, 3, roll_rad, pitch_rad, yaw_rad), abs=1e-6)
