@@ -1,8 +1,9 @@
 import json
+from dataclasses import replace
 
 import pytest
 
-from gear.formats.coco import CATEGORIES, CATEGORY_NAMES, Annotation, Picture, dataset_json
+from gear.formats.coco import CATEGORIES, CATEGORY_NAMES, Annotation, Detection, Picture, dataset_json, results_json
 from gear.formats.jsontext import dump
 from gear.values.labels import LABELS
 
@@ -25,11 +26,26 @@ def test_gears_labels_point_at_categories() -> None:
 
 def test_annotations_are_numbered_from_one_through_all_pictures() -> None:
     item = Annotation(category_id=3, box_xywh=(0, 0, 2, 2), area_px=4, rle="", is_crowd=False, extras={})
-    pictures = [Picture(id=i, file_name=f"{i}.png", height_px=4, width_px=4, annotations=(item,) * 2) for i in range(3)]
+    pictures = [Picture(id=i, file_name=f"{i}.png", height_px=4, width_px=6, annotations=(item,) * 2) for i in range(3)]
     content = dataset_json(pictures, description="", created="2022-01-01")
     assert [a["id"] for a in content["annotations"]] == [1, 2, 3, 4, 5, 6]
     assert [a["image_id"] for a in content["annotations"]] == [0, 0, 1, 1, 2, 2]
     assert content["info"]["year"] == 2022
+    assert [(one["id"], one["height"], one["width"]) for one in content["images"]] == [(0, 4, 6), (1, 4, 6), (2, 4, 6)]
+    assert all(one["segmentation"]["size"] == [4, 6] for one in content["annotations"])
+
+
+def test_crowds_are_marked_and_boxes_are_corner_and_size() -> None:
+    item = Annotation(category_id=3, box_xywh=(1, 2, 5, 3), area_px=11, rle="abc", is_crowd=True, extras={"k": 1})
+    shown = Picture(id=7, file_name="a.png", height_px=8, width_px=9, annotations=(item, replace(item, is_crowd=False)))
+    crowd, single = dataset_json([shown], description="", created="2022-01-01")["annotations"]
+    assert crowd == {
+        "id": 1, "image_id": 7, "category_id": 3, "bbox": [1, 2, 5, 3], "area": 11, "iscrowd": 1, "gear": {"k": 1},
+        "segmentation": {"size": [8, 9], "counts": "abc"},
+    }  # fmt: skip
+    assert single["iscrowd"] == 0
+    (line,) = results_json(7, [Detection(category_id=3, box_px=(1.0, 2.0, 6.0, 5.0), score=0.5)])
+    assert line == {"image_id": 7, "category_id": 3, "bbox": [1, 2, 5, 3], "score": 0.5}
 
 
 def test_json_text_is_steady() -> None:
