@@ -66,6 +66,21 @@ def test_upright_boxes() -> None:
     np.testing.assert_allclose(share_of_first(b, a), [[0.5], [0], [1]])
 
 
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=30, deadline=None)
+def test_upright_boxes_overlap_as_polygons_do(seed: int) -> None:
+    low, size = (
+        np.random.default_rng(seed).uniform((0, 0, 1, 1), (60, 20, 90, 40), (9, 4)).reshape(9, 2, 2).swapaxes(0, 1)
+    )
+    a, b = np.split(np.concatenate([low, low + size], axis=1), [4])
+    for i, one in enumerate(a):
+        for j, two in enumerate(b):
+            first, second = shapely.box(*one), shapely.box(*two)
+            shared = first.intersection(second).area
+            assert iou_2d(a, b)[i, j] == pytest.approx(shared / first.union(second).area, abs=1e-9)
+            assert share_of_first(a, b)[i, j] == pytest.approx(shared / first.area, abs=1e-9)
+
+
 def test_nothing_overlaps_nothing() -> None:
     none = np.zeros((0, 7))
     assert iou_ground_and_space(none, boxes(1, 3))[0].shape == (0, 3)
