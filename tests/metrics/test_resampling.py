@@ -188,6 +188,8 @@ def test_near_cars_ignore_what_is_far() -> None:
     assert single([car(20), car(30)], [car(20, score=0.9), car(30, 1.5, score=0.6)]) == (0.5, 1), "seen from above"
     assert single([car(20)], [car(20, score=0.4)]) == (0, 0), "not sure enough"
     assert np.isnan(single([car(50)], [])[0])
+    partly, largely = (replace(car(30), occluded=level) for level in (1, 2))
+    assert single([car(20), partly, largely], [car(20, score=0.9)]) == (0.5, 0), "of moderate difficulty"
 
 
 @dataclass(frozen=True)
