@@ -63,6 +63,14 @@ def test_a_symmetric_pinhole_has_its_axis_between_the_middle_pixels() -> None:
     assert np.allclose(camera.project([0.0, 0.0, 3.0]), [611.5, 184.5])
 
 
+def test_the_matrix_is_the_projection_and_fields_of_view_end_at_the_pictures_edges() -> None:
+    camera = Intrinsics(1224, 370, 500.0)
+    x, y, w = camera.matrix @ [0.7, -0.4, 5.0]
+    assert np.allclose([x / w, y / w], camera.project([0.7, -0.4, 5.0]))
+    right, bottom = math.tan(camera.hfov_rad / 2), math.tan(camera.vfov_rad / 2)
+    assert np.allclose(camera.project([right, bottom, 1.0]), [1223.5, 369.5])
+
+
 @given(angle)
 def test_wrapping_keeps_the_direction(angle_rad: float) -> None:
     wrapped = wrap_angle_rad(angle_rad)
