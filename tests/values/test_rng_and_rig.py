@@ -4,9 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from gear.values.errors import FieldError
-from gear.values.geometry import RigidTransform
+from gear.values.geometry import CAMERA_FROM_ACTOR_AXES, RigidTransform
 from gear.values.rig import CameraMount, Rig
 from gear.values.rng import derive_rng
 
@@ -43,6 +46,31 @@ def test_a_camera_looks_where_its_mount_says() -> None:
     assert np.allclose(mount.ego_from_camera.rotation @ [0, 0, 1], [0, 1, 0], atol=1e-9)
     down = CameraMount(name="down", width_px=64, height_px=32, pitch_deg=30.0)
     assert (down.ego_from_camera.rotation @ [0, 0, 1])[2] == pytest.approx(-0.5)
+
+
+@given(st.floats(-179, 179), st.floats(-80, 80), st.floats(-179, 179))
+def test_a_mount_is_turned_by_yaw_then_pitch_then_roll(yaw_deg: float, pitch_deg: float, roll_deg: float) -> None:
+    mount = CameraMount(name="a", width_px=64, height_px=32, yaw_deg=yaw_deg, pitch_deg=pitch_deg, roll_deg=roll_deg)
+    ego_from_flu = Rotation.from_euler("ZYX", [yaw_deg, pitch_deg, roll_deg], degrees=True).as_matrix()
+    assert np.allclose(mount.ego_from_camera.rotation, ego_from_flu @ CAMERA_FROM_ACTOR_AXES.T, atol=1e-9)
+    assert mount.ego_from_camera.translation_m.tolist() == [1.5, 0.0, 1.65]
+
+
+def test_a_mount_turns_to_the_left_down_and_to_the_right() -> None:
+    def looks(**angles: float) -> tuple[np.ndarray, np.ndarray]:
+        rotation = CameraMount(name="a", width_px=64, height_px=32, **angles).ego_from_camera.rotation
+        return rotation @ [0, 0, 1], rotation @ [1, 0, 0]
+
+    assert looks(yaw_deg=10)[0][1] > 0, "ahead is to the left"
+    assert looks(pitch_deg=10)[0][2] < 0, "ahead is lower"
+    assert looks(roll_deg=10)[1][2] < 0, "the picture's right is lower"
+
+
+def test_the_field_of_view_is_that_of_the_pictures_width() -> None:
+    assert CameraMount(name="a", width_px=64, height_px=32).intrinsics.focal_px == pytest.approx(32)
+    assert CameraMount(name="a", width_px=64, height_px=32, hfov_deg=60).intrinsics.hfov_rad == pytest.approx(
+        math.pi / 3
+    )
 
 
 def test_an_absurd_camera_is_refused() -> None:
