@@ -114,6 +114,23 @@ def test_a_side_without_weight_or_pixels_is_no_term() -> None:
     assert set(SemsegObjective().terms(Says({"logits": all_right}), VIEWS, [roads], [0])) == {"correct"}
 
 
+def test_a_patch_is_judged_by_the_pixels_that_were_right_without_it() -> None:
+    """Roads are right without it; some of them and some of the cars are taken for each other with it."""
+    sample, logits = segmented()
+    clean = torch.zeros(1, 19, *SHAPE)
+    clean[:, 0] = 1.0
+    network = Says({"logits": logits}, {"logits": clean})
+    road = (cost(2.0, is_right=True) + cost(3.0, is_right=False)) / 2
+    car = (cost(2.0, is_right=False) + cost(3.0, is_right=True)) / 2
+    harm = SemsegObjective(gamma=0.7).harm(network, VIEWS, [sample], [0])
+    assert float(harm) == pytest.approx(0.7 * road + 0.3 * car)
+    moving = SemsegObjective()
+    terms = moving.terms(network, VIEWS, [sample], [0]).values()
+    assert float(moving.harm(network, VIEWS, [sample], [0])) == pytest.approx(
+        sum(float(t.weight * t.value) for t in terms)
+    )
+
+
 @pytest.mark.parametrize(
     ("attacked", "values"),
     [(None, ((2.0, False), (2.0, False), (3.0, True), (3.0, True))), (CAR, ((2.0, False), (3.0, True)))],
