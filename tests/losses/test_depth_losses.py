@@ -60,6 +60,7 @@ def test_a_wrong_scale_costs_what_the_balance_says() -> None:
     for balance in (0.0, 0.5, 0.85):
         expected = math.log(2) * math.sqrt(1 - balance)
         assert float(silog(2 * truth, truth, balance=balance)) == pytest.approx(expected, rel=1e-4)
+    assert float(silog(2 * truth, truth)) == pytest.approx(math.log(2) * math.sqrt(0.5), rel=1e-4), "GLPDepth's"
     assert float(silog(2 * truth, truth, balance=1.0)) == pytest.approx(0, abs=2e-3)
     assert float(adabins_silog(2 * truth, truth)) == pytest.approx(10 * math.log(2) * math.sqrt(0.15), rel=1e-4)
     assert float(log_l1(truth / 2, truth)) == pytest.approx(math.log(2), rel=1e-5)
