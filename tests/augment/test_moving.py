@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gear.augment.geometry import Window, cut_map, draw_window
+from gear.augment.geometry import Window, cut_map, cut_picture, draw_window
 from gear.augment.registry import geometry_of
 from gear.formats import rle
 from gear.plugins.build import build_task
@@ -169,6 +169,23 @@ def test_windows_are_drawn_inside_or_around(scale: float, centred: bool) -> None
         for start, length, whole in ((drawn.left_px, drawn.width_px, 192), (drawn.top_px, drawn.height_px, 96)):
             assert 0 <= start <= whole - length if length <= whole else whole - length <= start <= 0
             assert not centred or 2 * start + length == whole
+
+
+@pytest.mark.parametrize(("out_px", "lefts"), [(190, {0, 1, 2}), (194, {-2, -1, 0}), (192, {0})])
+def test_windows_are_drawn_at_every_place_that_there_is(out_px: int, lefts: set[int]) -> None:
+    drawn = [draw_window((96, 192), (96, out_px), 1.0, derive_rng(0, "window", number)) for number in range(60)]
+    assert {one.left_px for one in drawn} == lefts and {one.top_px for one in drawn} == {0}
+
+
+def test_pictures_are_averaged_where_they_shrink_and_exact_where_they_do_not() -> None:
+    picture = np.random.default_rng(1).integers(0, 256, (24, 48, 3)).astype(np.uint8)
+    small = cut_picture(picture, window(4, 8, 40, 16, (10, 4))).astype(float)
+    blocks = picture[8:24, 4:44].astype(float).reshape(4, 4, 10, 4, 3).mean(axis=(1, 3))
+    assert np.abs(small - blocks).max() <= 0.5 + 1e-6
+    assert np.array_equal(cut_picture(picture, window(4, 8, 40, 16)), picture[8:24, 4:44])
+    beyond = cut_picture(picture, window(-2, -1, 52, 26))
+    assert np.array_equal(beyond[1:25, 2:50], picture)
+    assert (beyond[0] == 114).all() and (beyond[:, 50:] == 114).all() and (beyond[-1, :, 0] == 114).all()
 
 
 @pytest.mark.parametrize("scale", [0.75, 0.93, 1.21, 1.5])
