@@ -66,16 +66,17 @@ def _cut(thing: Object2d, window: Window, height: int, width: int) -> Object2d |
         return None
     left, top, right, bottom = int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
     area = int(mask.sum())
-    amodal = cut_box(thing.amodal_box_px, window)
-    in_picture = _overlap(thing.amodal_box_px, height, width) * window.scale_x * window.scale_y
-    shown = min(1.0, _overlap(amodal, out_height, out_width) / in_picture) if in_picture > 0 else 0.0
+    # Padding shows nothing, neither of what lies outside the picture.
+    in_picture = _inside(thing.amodal_box_px, height, width)
+    pictured = _area(in_picture) * window.scale_x * window.scale_y
+    shown = min(1.0, _overlap(cut_box(in_picture, window), out_height, out_width) / pictured) if pictured > 0 else 0.0
     kept = min(1.0, area / (thing.area_px * window.scale_x * window.scale_y))
     visible, inside = thing.visible_fraction * kept, (1 - thing.truncated_fraction) * shown
     return replace(
         thing,
         is_ignored=thing.is_ignored or kept < LEAST_KEPT or min(right - left, bottom - top) < LEAST_SIDE_PX,
         box_px=(float(left), float(top), float(right), float(bottom)),
-        amodal_box_px=amodal,
+        amodal_box_px=cut_box(thing.amodal_box_px, window),
         area_px=area,
         rle=rle.encode_crop(mask[top:bottom, left:right], left, top, out_height, out_width),
         visible_fraction=visible,
@@ -86,8 +87,18 @@ def _cut(thing: Object2d, window: Window, height: int, width: int) -> Object2d |
 
 def _overlap(box_px: BoxPx, height: int, width: int) -> float:
     """Area of a box inside a picture."""
+    return _area(_inside(box_px, height, width))
+
+
+def _inside(box_px: BoxPx, height: int, width: int) -> BoxPx:
+    """A box cut at a picture's borders; of one that lies outside nothing is left, or less."""
     left, top, right, bottom = box_px
-    return max(0.0, min(right, width) - max(left, 0.0)) * max(0.0, min(bottom, height) - max(top, 0.0))
+    return (max(left, 0.0), max(top, 0.0), min(right, width), min(bottom, height))
+
+
+def _area(box_px: BoxPx) -> float:
+    left, top, right, bottom = box_px
+    return max(0.0, right - left) * max(0.0, bottom - top)
 
 
 GEOMETRY: Geometry[Detect2dSample] = Geometry(flip=flip, cut=cut)

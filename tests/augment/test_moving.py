@@ -80,6 +80,8 @@ def test_boxes_and_masks_of_a_mirror_lie_on_the_same_things() -> None:
         assert np.array_equal(mask[:, ::-1], rle.decode(thing.rle, HEIGHT, WIDTH))
         columns = np.flatnonzero(mask.any(axis=0))
         assert (other.box_px[0], other.box_px[2]) == (columns[0], columns[-1] + 1)
+        for before, after in ((thing.box_px, other.box_px), (thing.amodal_box_px, other.amodal_box_px)):
+            assert after == (WIDTH - before[2], before[1], WIDTH - before[0], before[3])
 
 
 @pytest.mark.parametrize("shape", [(0, 0, 192, 96), (40, 10, 100, 60), (-20, -10, 232, 116), (64, 40, 64, 32)])
@@ -95,11 +97,42 @@ def test_boxes_in_a_window_are_those_of_their_masks(shape: tuple[int, int, int, 
         rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
         assert thing.box_px == (columns[0], rows[0], columns[-1] + 1, rows[-1] + 1)
         kept = thing.area_px / before.area_px
-        assert thing.is_ignored or kept >= 0.3
+        side_px = min(columns[-1] + 1 - columns[0], rows[-1] + 1 - rows[0])
+        assert thing.is_ignored == (before.is_ignored or kept < 0.3 or side_px < 4)
         assert thing.visible_fraction == pytest.approx(before.visible_fraction * kept)
     left_out = by_id.keys() - {(thing.object_id, thing.label) for thing in result.objects}
     for key in left_out:
         assert not cut_map(rle.decode(by_id[key].rle, HEIGHT, WIDTH).astype(np.uint8), part, 0).any()
+
+
+@pytest.mark.parametrize(
+    ("shape", "shown"),
+    [
+        ((0, 0, 192, 96), 1.0),
+        ((-40, -20, 272, 136), 1.0),
+        ((10, 0, 100, 96), 0.5),
+        ((-40, 0, 272, 45), 0.5),
+        ((-40, 45, 272, 51), 0.5),
+    ],
+)
+def test_what_leaves_a_window_is_truncated_and_padding_shows_nothing(
+    shape: tuple[int, int, int, int], shown: float
+) -> None:
+    """A third of its box lies to the left of the picture, 20 x 30 pixels in it, half of which are covered."""
+    sample = sample_of("detect2d")
+    mask = np.zeros((HEIGHT, WIDTH), np.bool_)
+    mask[30:60:2, :20] = True
+    thing = dataclasses.replace(
+        sample.objects[0], box_px=(0.0, 30.0, 20.0, 59.0), amodal_box_px=(-10.0, 30.0, 20.0, 60.0),
+        area_px=int(mask.sum()), rle=rle.encode(mask), visible_fraction=1 / 3, occluded_fraction=0.5,
+        truncated_fraction=1 / 3,
+    )  # fmt: skip
+    (result,) = moved(dataclasses.replace(sample, objects=(thing,)), window(*shape)).objects
+    assert result.truncated_fraction == pytest.approx(1 - 2 / 3 * shown)
+    assert result.visible_fraction == pytest.approx(shown / 3, abs=0.03)
+    assert result.occluded_fraction == pytest.approx(0.5, abs=0.04)
+    left, top = shape[:2]
+    assert result.amodal_box_px == (-10.0 - left, 30.0 - top, 20.0 - left, 60.0 - top)
 
 
 def test_labels_stay_labels_and_nothing_is_known_beyond_the_picture() -> None:
