@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
+import pytest
 import torch
 
 from gear.attacking.regularisers import non_printability, palette_srgb, smoothness
+from gear.camera.response import decode_srgb
 
 
 def test_smoothness_is_a_sum_of_squares() -> None:
@@ -24,6 +27,23 @@ def test_the_palette_is_that_of_a_press() -> None:
     assert red[0] > 190 and red[1:].max() < 70
     assert black.max() < 80, "three inks on each other are nearly black"
     assert palette_srgb().min() >= 0 and palette_srgb().max() <= 1
+
+
+@pytest.mark.parametrize(
+    ("number", "lab"),
+    [(0, (95, 0, -2)), (6, (48, 74, -3)), (8, (47, 68, 48)), (26, (23, 0, 0))],
+)
+def test_solids_have_the_standards_colours(number: int, lab: tuple[float, float, float]) -> None:
+    """Paper, magenta, red and black of ISO 12647-2. OpenCV's Lab is under another white, hence a few units."""
+    found = cv2.cvtColor(palette_srgb()[None].numpy(), cv2.COLOR_RGB2Lab)[0, number]
+    np.testing.assert_allclose(found, lab, atol=5)
+
+
+def test_half_a_cover_is_half_the_light() -> None:
+    light = decode_srgb(palette_srgb().numpy())
+    for half, solid in ((3, 6), (1, 2)):
+        inside = (light[[half, solid]] > 0.001).all(axis=0)
+        np.testing.assert_allclose(light[half, inside], (light[0] + light[solid])[inside] / 2, atol=1e-3)
 
 
 def test_what_can_be_printed_costs_nothing() -> None:
