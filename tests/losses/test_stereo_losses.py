@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -206,6 +207,45 @@ def test_surfaces_are_where_the_rays_meet_the_boxes() -> None:
     both = centre_targets([Pair(objects=(nearer, Thing(box=box, occluded_fraction=0.9)))], KINDS, GRID)
     seen = both.surface_px[0][torch.isfinite(both.surface_px[0])]
     assert torch.allclose(seen, torch.tensor(128 * 0.5 / (6.0 - 2.1)), rtol=1e-5)
+
+
+def test_surfaces_are_the_lower_half_of_boxes_less_the_feet() -> None:
+    thing = replace(car(0.0, 6.0), occluded_fraction=0.0)
+    left, top, right, bottom = thing.box_px
+    grid = Grid(height=48, width=128, cell_px=(2.0, 2.0))
+    rows, columns = np.nonzero(np.isfinite(centre_targets([Pair(objects=(thing,))], KINDS, grid).surface_px[0].numpy()))
+    middles_px = grid.middles_px(rows, columns)
+    low, high = middles_px.min(axis=0), middles_px.max(axis=0)
+    # To two cells: those beside the border have it, too, and rays may miss the box there.
+    assert (low[1], high[1]) == pytest.approx(((top + bottom) / 2, bottom - 0.1 * (bottom - top)), abs=4)
+    assert low[0] >= left - 4 and high[0] <= right + 4
+
+
+@pytest.mark.parametrize("change", [{"is_ignored": True}, {"occluded_fraction": 0.31}])
+def test_what_is_hidden_or_ignored_is_no_surface(change: dict[str, Any]) -> None:
+    seen = replace(car(), occluded_fraction=0.3)
+    assert torch.isfinite(centre_targets([Pair(objects=(seen,))], KINDS, GRID).surface_px).any()
+    hidden = replace(seen, **change)
+    assert not torch.isfinite(centre_targets([Pair(objects=(hidden,))], KINDS, GRID).surface_px).any()
+
+
+def test_bumps_are_as_wide_as_boxes_in_cells_that_need_not_be_square() -> None:
+    grid = Grid(height=24, width=32, cell_px=(8.0, 4.0))
+    for thing in (car(0.0, 6.0), car(1.0, 30.0)):
+        left, top, right, bottom = thing.box_px
+        (heat,) = centre_targets([Pair(objects=(thing,))], KINDS, grid).heat[:, 0]
+        row, column = divmod(int(heat.argmax()), 32)
+        middle = (left + right + 1) / 2, (top + bottom + 1) / 2
+        assert (column, row) == (middle[0] // 8, middle[1] // 4)
+        wide, tall = max(0.09 * (right - left) / 8, 0.7), max(0.09 * (bottom - top) / 4, 0.7)
+        assert float(heat[row, column + 1]) == pytest.approx(math.exp(-((1 / wide) ** 2) / 2), rel=1e-4)
+        assert float(heat[row + 2, column]) == pytest.approx(math.exp(-((2 / tall) ** 2) / 2), rel=1e-4)
+
+
+def test_cells_and_pixels_lead_to_each_other() -> None:
+    grid = Grid(height=24, width=16, cell_px=(16.0, 4.0))
+    assert grid.middles_px(np.array([0, 5]), np.array([0, 3])).tolist() == [[7.5, 1.5], [55.5, 21.5]]
+    assert grid.cell_of(55.5, 21.5) == (3, 5) and grid.cell_of(-0.5, -0.5) == (-0.5, -0.5)
 
 
 def test_people_are_no_surfaces() -> None:
