@@ -192,6 +192,20 @@ def test_boxes_of_a_pair_end_where_its_picture_ends() -> None:
         assert two.truncated == pytest.approx(one.truncated)
 
 
+@pytest.mark.parametrize(("x_m", "z_m"), [(0.0, 3.2), (-4.0, 4.5), (4.0, 4.5)])
+def test_boxes_of_near_objects_end_at_every_side_of_the_picture(x_m: float, z_m: float) -> None:
+    sample = sample_of("stereo3d")
+    near = dataclasses.replace(sample.objects[0].box, bottom_m=(x_m, 1.65, z_m))
+    sample = dataclasses.replace(sample, objects=(dataclasses.replace(sample.objects[0], box=near, visible_px=100),))
+    (whole,) = moved(sample, window(0, 0, 192, 96)).objects
+    assert whole.box_px[3] == HEIGHT - 1 or 0.0 in whole.box_px or whole.box_px[2] == WIDTH - 1
+    (padded,) = moved(sample, window(-32, -16, 256, 128)).objects
+    assert np.allclose(np.add(whole.box_px, (32, 16, 32, 16)), padded.box_px)
+    assert padded.truncated == pytest.approx(whole.truncated) and 0.1 < whole.truncated < 0.9
+    (larger,) = moved(sample, window(0, 0, 192, 96, (384, 288))).objects
+    assert (padded.visible_px, larger.visible_px) == (100, 600)
+
+
 @pytest.mark.parametrize("scale", [0.5, 0.9, 1.0, 1.7])
 @pytest.mark.parametrize("centred", [False, True])
 def test_windows_are_drawn_inside_or_around(scale: float, centred: bool) -> None:
