@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from gear.augment.apply import Augmentation, Framing, augment, shrunk
+from gear.augment.depth import cut_depth
 from gear.augment.geometry import Geometry, flip_array
 from gear.augment.pictures import Colours, recolour
 from gear.augment.registry import geometry_of, register
@@ -70,6 +71,26 @@ def test_colours_leave_ground_truth_alone() -> None:
     result = augment(sample, replace(EVERYTHING, flip=0.0), Framing(), derive_rng(0, "a"))
     assert result.label_ids is sample.label_ids
     assert not np.array_equal(result.images["left"], sample.images["left"])
+
+
+def test_depth_is_pasted_as_grey_into_a_band_of_at_most_three_quarters_of_the_columns() -> None:
+    sample = sample_of("depth")
+    picture, width = np.full_like(sample.images["left"], 255), sample.depth_m.shape[1]
+    sample = replace(sample, images={"left": picture}, depth_m=np.minimum(sample.depth_m, 79.0))
+    sample.depth_m[3] = np.nan
+    wanted = np.rint(np.nan_to_num(sample.depth_m, nan=80.0) / 80 * 255)
+    starts, widths = set(), set()
+    for number in range(300):
+        painted = cut_depth(sample, derive_rng(0, "band", number)).images["left"]
+        changed = (painted != 255).any(axis=(0, 2))
+        columns = np.flatnonzero(changed)
+        band = slice(columns[0], columns[-1] + 1)
+        assert changed[band].all() and (painted[:, band] == wanted[:, band, None]).all()
+        assert len(columns) == 1 or len(columns) <= 0.75 * (width - columns[0])
+        starts.add(int(columns[0]))
+        widths.add(len(columns))
+    assert min(starts) == 0 and max(starts) >= width - 5
+    assert min(widths) == 1 and max(widths) > 0.6 * width
 
 
 def test_both_views_of_a_pair_get_the_same_colours() -> None:
