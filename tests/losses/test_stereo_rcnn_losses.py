@@ -165,6 +165,43 @@ def test_anchors_on_ignored_objects_learn_nothing() -> None:
     assert float(said["rpn_class"]) < 1e-4
 
 
+def test_anchors_that_leave_the_picture_learn_nothing() -> None:
+    cars = car_targets(Sample(objects=(car(),)), 1.0)
+    outside = torch.tensor([[-1.0, 9, 60, 60], [9.0, -1, 60, 60], [1160.0, 9, 1224, 60], [9.0, 300, 60, 370]])
+    logits = torch.tensor([[-9.0, 9.0]]).repeat(5, 1)  # a car everywhere
+    codes = torch.cat([encode(cars.left, cars.union), encode(cars.right, cars.union)[:, [0, 2]]], dim=1).expand(5, 6)
+    said = rpn_losses(logits, codes, torch.cat([cars.union, outside]), cars, SIZE, draws())
+    assert float(said["rpn_class"]) < 1e-4
+    inside = (outside - 1).clamp(min=0)
+    said = rpn_losses(logits, codes, torch.cat([cars.union, inside]), cars, SIZE, draws())
+    assert float(said["rpn_class"]) > 5, "a pixel farther in they are road"
+
+
+def test_the_best_anchor_of_a_car_is_wanted_however_little_it_overlaps() -> None:
+    cars = car_targets(Sample(objects=(car(),)), 1.0)
+    shift = 0.4 * (cars.union[:, 2] - cars.union[:, 0])
+    anchors = torch.cat([cars.union + torch.tensor([1.0, 0, 1, 0]) * shift, torch.tensor([[9.0, 9, 60, 60]])])
+    assert 0.3 < float(overlaps(anchors, cars.union)[0, 0]) < 0.7
+    codes = torch.cat([encode(cars.left, anchors[:1]), encode(cars.right, anchors[:1])[:, [0, 2]]], dim=1)
+    logits = torch.tensor([[-9.0, 9.0], [9.0, -9.0]])
+    said = rpn_losses(logits, codes.expand(2, 6), anchors, cars, SIZE, draws())
+    assert float(said["rpn_class"]) < 1e-4 and float(said["rpn_boxes"]) == pytest.approx(0, abs=1e-6)
+
+
+def test_a_box_that_leaves_the_car_in_one_picture_holds_none() -> None:
+    cars = car_targets(Sample(objects=(car(),)), 1.0)
+    aside = torch.tensor([300.0, 0, 300, 0])
+    for left, right in ((cars.left, cars.right + aside), (cars.left + aside, cars.right)):
+        pairs = sample_pairs(left, right, cars, draws())
+        assert len(pairs.owner) == 1 and torch.equal(pairs.left[:1], cars.left), "the car's own pair"
+
+
+def test_a_car_of_less_than_ten_rows_is_neither_car_nor_background() -> None:
+    for ahead_m, is_car in ((85.0, True), (100.0, False)):
+        targets = car_targets(Sample(objects=(car(0.0, ahead_m),)), 1.0)
+        assert (len(targets.left), len(targets.ignored)) == ((1, 0) if is_car else (0, 1))
+
+
 def test_pairs_hold_the_same_car_in_both_pictures() -> None:
     """The cars are among the proposals; a left box of one car with a right box of another holds none."""
     cars = car_targets(Sample(objects=(car(), car(-6.0, 14.0))), 1.0)
