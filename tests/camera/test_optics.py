@@ -135,6 +135,26 @@ def test_motion_blur_streams_from_the_middle_and_is_linear() -> None:
 
 
 @pytest.mark.parametrize(
+    ("velocity_mps", "column", "way_px"),
+    [((0.0, 8.0, 0.0), 30, 80 * 8 * 0.03 / 4), ((15.0, 0, 0), 130, 50.5 * 15 * 0.03 / 4), ((0.0, 0.0, 8.0), 30, 0.0)],
+)
+def test_a_column_is_smeared_over_the_way_that_it_goes(
+    velocity_mps: tuple[float, float, float], column: int, way_px: float
+) -> None:
+    """Focal length times velocity over depth to the side; ahead, as far as it lies from the middle times closeness."""
+    line = np.zeros((HEIGHT, WIDTH, 3), np.uint16)
+    line[:, column] = 900
+    depth = np.full((HEIGHT, WIDTH), 4.0, np.float32)
+    row = motion_blurred(line, depth, CAMERA, velocity_mps, 0.03)[48, :, 0].astype(float)
+    places = np.arange(WIDTH)
+    middle = (row * places).sum() / row.sum()
+    variance = (row * (places - middle) ** 2).sum() / row.sum()
+    assert middle == pytest.approx(column, abs=0.4)
+    # Of nine moments evenly over the way; reading between pixels adds a sixth of a pixel at most.
+    assert variance == pytest.approx((np.linspace(-0.5, 0.5, 9) * way_px).var(), abs=0.3)
+
+
+@pytest.mark.parametrize(
     ("make", "field"),
     [
         (lambda: CameraEffects(vignette=1.0), "vignette"),
