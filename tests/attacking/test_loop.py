@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,9 +13,10 @@ import torch
 from torch import Tensor
 
 from gear.attacking.appearance import vary
-from gear.attacking.loop import ARRAYS, Ascend, Problem, Seen, batch_of, climb, unit_gradients
-from gear.attacking.objectives import SemsegObjective, train_labels
-from gear.attacking.settings import Appearance, Settings
+from gear.attacking.loop import ARRAYS, Ascend, Problem, Seen, TextureOptimiser, batch_of, climb, unit_gradients
+from gear.attacking.objectives import SemsegObjective, Term, train_labels
+from gear.attacking.regularisers import smoothness
+from gear.attacking.settings import Appearance, Settings, TextureSettings
 from gear.contracts.attacks import Budget, Patch, State
 from gear.plugins.attacks.scene_specific import scene_specific
 from gear.testing.attack_contract import AttackContract
@@ -103,6 +106,71 @@ def test_what_was_felt_before_it_was_cut_off_counts() -> None:
     whole = Watching()
     climb(problem, ascend_at({0}), budget=Budget(steps=4), rng=derive_rng(3, "attack"), watch=whole)
     assert not difference(resumed.states[-1], whole.states[-1], "state")
+
+
+@pytest.mark.parametrize("rate", [0.05, (0.02, 0.05, 0.2)])
+def test_steps_are_adams_within_the_colour_cube(rate: Any) -> None:
+    """Kingma and Ba, ICLR 2015, algorithm 1, upwards."""
+    settings = TextureSettings(height_px=4, width_px=8, learning_rate=rate)
+    ours = TextureOptimiser(2, settings, derive_rng(0, "textures"), None)
+    rng, wanted = derive_rng(0, "ascents"), ours.textures.double().numpy()
+    first, second = np.zeros_like(wanted), np.zeros_like(wanted)
+    for step, share in enumerate((1.0, 0.7, 0.4, 0.1), start=1):
+        ascent = rng.normal(size=wanted.shape).astype(np.float32)
+        ours.step(torch.from_numpy(ascent), share)
+        first, second = 0.9 * first + 0.1 * ascent, 0.999 * second + 0.001 * ascent**2
+        way = (first / (1 - 0.9**step)) / (np.sqrt(second / (1 - 0.999**step)) + 1e-8)
+        wanted = (wanted + share * np.reshape(rate, (-1, 1, 1)) * way).clip(0, 1)
+        np.testing.assert_allclose(ours.textures.numpy(), wanted, atol=2e-5)
+    assert ours.done == 4 and wanted.min() == 0 and wanted.max() == 1
+
+
+@pytest.mark.parametrize("decay", [False, True])
+def test_the_rate_falls_with_a_cosine_where_it_is_to(decay: bool) -> None:
+    """Along a steady direction Adam goes a whole rate a step."""
+    contract = Contract()
+    dataset = contract.dataset()
+    settings = replace(SETTINGS, learning_rate=0.1, decay=decay)
+    problem = Problem(model=contract.model(), dataset=dataset, compositor=TinyCompositor(dataset), settings=settings)
+    black = TextureOptimiser(1, settings, derive_rng(0, "black"), None).state()
+    watch = Watching(start=black | {"textures": np.zeros_like(black["textures"])})
+    climb(
+        problem, lambda textures, _: (torch.ones_like(textures), {"gradient": 1.0}), budget=Budget(steps=5),
+        rng=derive_rng(0, "climb"), watch=watch,
+    )  # fmt: skip
+    shares = [0.5 * (1 + math.cos(math.pi * done / 5)) if decay else 1.0 for done in range(5)]
+    gone = [float(state["textures"].mean()) for state in watch.states]
+    assert gone == pytest.approx(np.cumsum(shares) * 0.1, abs=1e-5)
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Terms whose gradients are known: as long as they are said to be."""
+
+    slopes: Mapping[str, tuple[Tensor, float]]
+
+    def terms(self, model: Any, views: Mapping[str, Tensor], samples: Any, indexes: Any) -> Mapping[str, Term]:
+        return {n: Term(value=(views["left"] * slope).sum(), weight=w) for n, (slope, w) in self.slopes.items()}
+
+
+@pytest.mark.parametrize("per_term", [True, False])
+def test_every_term_has_a_say_of_its_weight_however_long_its_gradient(per_term: bool) -> None:
+    generator = torch.Generator().manual_seed(1)
+    long, short, textures = (torch.rand(1, 3, 12, 24, generator=generator) for _ in range(3))
+    long, textures = 1000 * long, textures.requires_grad_()
+    settings = replace(SETTINGS, per_term=per_term, smoothness=0.25, printability=0.0)
+    contract = Contract()
+    dataset = contract.dataset()
+    problem = Problem(model=contract.model(), dataset=dataset, compositor=TinyCompositor(dataset), settings=settings)
+    seen = Seen(views={"left": textures}, samples=[], indexes=[])
+    direction, figures = unit_gradients(problem, Slopes({"a": (long, 0.3), "b": (short, -0.7)}), settings)(
+        textures, seen
+    )
+    scales = (long.norm(), short.norm()) if per_term else (1.0, 1.0)
+    total = 0.3 * long / scales[0] - 0.7 * short / scales[1]
+    (penalty,) = torch.autograd.grad(smoothness(textures[0]), textures)
+    torch.testing.assert_close(direction, total / total.norm() - 0.25 * penalty / penalty.norm(), atol=1e-5, rtol=1e-4)
+    assert figures["gradient"] == pytest.approx(float(total.norm()), rel=1e-4)
 
 
 def test_a_state_of_another_size_is_refused() -> None:
