@@ -62,6 +62,26 @@ def test_torch_has_a_gradient_everywhere() -> None:
     assert torch.autograd.gradcheck(lambda x: torch_response.apply(Response(1.7, 1.2), x), (inside,))
 
 
+@pytest.mark.parametrize("response", [Response(1.7, 1.2), Response(0.4, 0.8), Response(encoding="none"), IDENTITY])
+def test_gradients_are_the_curves_slopes_in_the_dark_and_in_the_light(response: Response) -> None:
+    light = torch.tensor([1e-4, 8e-4, 0.004, 0.03, 0.5, 0.97], dtype=torch.float64, requires_grad=True)
+    assert torch.autograd.gradcheck(lambda x: torch_response.apply(response, x), (light,), eps=1e-7)
+
+
+def test_what_a_frame_would_clip_has_no_gradient() -> None:
+    light = torch.tensor([-0.1, 0.0, 0.5, 1.0, 1.2], dtype=torch.float64, requires_grad=True)
+    shown = torch_response.apply(Response(2.0), light)
+    shown.sum().backward()
+    assert light.grad is not None and (light.grad != 0).tolist() == [False, True, True, True, False]
+    assert shown.tolist()[::4] == pytest.approx([0.0, 1.0])
+
+
+def test_a_face_passes_gradients_of_its_own_slope() -> None:
+    face = torch.tensor([0.01, 0.03, 0.05, 0.4, 0.99], dtype=torch.float64, requires_grad=True)
+    assert torch.autograd.gradcheck(lambda x: torch_response.face_light("filament", x), (face,), eps=1e-7)
+    assert torch.autograd.gradcheck(lambda x: torch_response.face_light("classic", x), (face,))
+
+
 @pytest.mark.parametrize("name", ["filament", "classic"])
 def test_the_weight_of_a_face_has_a_twin(name: str) -> None:
     face = np.arange(256, dtype=np.uint8)
