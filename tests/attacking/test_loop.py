@@ -13,7 +13,17 @@ import torch
 from torch import Tensor
 
 from gear.attacking.appearance import vary
-from gear.attacking.loop import ARRAYS, Ascend, Problem, Seen, TextureOptimiser, batch_of, climb, unit_gradients
+from gear.attacking.loop import (
+    ARRAYS,
+    Ascend,
+    Problem,
+    Seen,
+    TextureOptimiser,
+    batch_of,
+    climb,
+    one_gradient,
+    unit_gradients,
+)
 from gear.attacking.objectives import SemsegObjective, Term, train_labels
 from gear.attacking.regularisers import smoothness
 from gear.attacking.settings import Appearance, Settings, TextureSettings
@@ -171,6 +181,38 @@ def test_every_term_has_a_say_of_its_weight_however_long_its_gradient(per_term: 
     (penalty,) = torch.autograd.grad(smoothness(textures[0]), textures)
     torch.testing.assert_close(direction, total / total.norm() - 0.25 * penalty / penalty.norm(), atol=1e-5, rtol=1e-4)
     assert figures["gradient"] == pytest.approx(float(total.norm()), rel=1e-4)
+
+
+def test_penalties_are_taken_along_but_are_no_gradient_of_the_objective() -> None:
+    slope, other = torch.rand(1, 3, 12, 24), torch.rand(1, 3, 12, 24)
+    textures = torch.rand(1, 3, 12, 24, requires_grad=True)
+    seen = Seen(views={}, samples=[], indexes=[])
+
+    def harm(patches: Tensor, _: Seen) -> dict[str, Tensor]:
+        return {"harm": (patches * slope).sum(), "more": 2 * (patches * slope).sum()}
+
+    def penalties(patches: Tensor) -> dict[str, Tensor]:
+        return {"penalty": -(patches * other).sum()}
+
+    direction, figures = one_gradient(harm, penalties)(textures, seen)
+    torch.testing.assert_close(direction, 3 * slope - other)
+    assert figures["gradient"] == pytest.approx(float((3 * slope).norm()), rel=1e-5)
+    assert set(figures) == {"harm", "more", "penalty", "gradient"}
+    torch.testing.assert_close(one_gradient(harm)(textures, seen)[0], 3 * slope)
+    direction, figures = one_gradient(lambda *_: {}, penalties)(textures, seen)
+    torch.testing.assert_close(direction, -other)
+    assert "gradient" not in figures
+
+
+def test_without_a_surface_there_is_nothing_to_attack() -> None:
+    dataset = Contract().dataset()
+    bare = [replace(sample, record=replace(sample.record, surfaces=()), surfaces=()) for sample in dataset]
+    for nothing in (bare, []):
+        problem = Problem(
+            model=Contract().model(), dataset=nothing, compositor=TinyCompositor(dataset), settings=SETTINGS
+        )
+        with pytest.raises(GearError, match="nothing to attack"):
+            problem.surfaces()
 
 
 def test_a_state_of_another_size_is_refused() -> None:
