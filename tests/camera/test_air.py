@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from gear.camera.air import SKY_DISTANCE_M, Air, Fog
 from gear.values.frames import LINEAR_FULL_SCALE
 from gear.values.geometry import CAMERA_FROM_ACTOR_AXES, RigidTransform
+from gear.values.rig import CameraMount, Rig
 from gear.values.scene import CameraRecord, Pose
 
 WIDTH, HEIGHT, FOCAL_PX = 64, 40, 40.0
@@ -75,6 +76,21 @@ def test_thinning_fog_adds_up_along_the_ray(thinning: float, height_m: float, de
     assert through[row, column, 0] == pytest.approx(math.exp(-tau), rel=4e-3, abs=1e-6)
 
 
+@pytest.mark.parametrize(("pitch_deg", "roll_deg"), [(20.0, 0.0), (-15.0, 0.0), (5.0, 30.0), (0.0, -90.0)])
+def test_rays_of_a_tilted_camera_climb_as_the_world_has_it(pitch_deg: float, roll_deg: float) -> None:
+    mount = CameraMount(name="c", width_px=WIDTH, height_px=HEIGHT, hfov_deg=2 * math.degrees(math.atan(0.8)),
+                        position_m=(0, 0, 40.0), yaw_deg=33.0, pitch_deg=pitch_deg, roll_deg=roll_deg)  # fmt: skip
+    ego = RigidTransform.from_yaw("world", "ego", (0, 0, 0), 0.0)
+    (tilted,) = Rig(cameras=(mount,)).place(ego)
+    through = air(fog_thinning_per_m=0.05).transmittance(wall(20.0), tilted)[..., 0]
+    for row, column in ((3, 5), (3, 60), (36, 5), (36, 60), (20, 32)):
+        point_m = tilted.intrinsics.unproject([column, row], 20.0)
+        end_m = tilted.world_from_camera_transform.apply(point_m)
+        heights_m = np.linspace(40.0, end_m[2], 20001)
+        tau = 0.02 * np.exp(-0.05 * heights_m).mean() * np.linalg.norm(point_m)
+        assert -math.log(through[row, column]) == pytest.approx(tau, rel=1e-3)
+
+
 def test_the_sky_sees_all_of_the_fog_above() -> None:
     sky = wall(np.nan)
     through = air(fog_thinning_per_m=0.05).transmittance(sky, camera())
@@ -128,6 +144,20 @@ def test_thick_fog_shows_the_light_of_its_direction() -> None:
     assert (east == 0).all()
     left = thick.veil(frame, wall(50.0), camera(yaw_deg=45))[HEIGHT // 2]
     assert left[:20].mean() > left[-20:].mean() + 50, "north lies to the left of north-east"
+
+
+def test_the_light_of_the_air_turns_with_the_azimuth_of_every_pixel() -> None:
+    azimuth_rad = np.arange(72) * 2 * np.pi / 72
+    ring = np.stack([0.5 + 0.4 * np.cos(azimuth_rad), 0.5 + 0.4 * np.sin(azimuth_rad), azimuth_rad * 0], axis=1)
+    seen = air(fog_per_m=5.0, ring=ring).veil(
+        np.zeros((HEIGHT, WIDTH, 3), np.uint16), wall(50.0), camera(yaw_deg=30.0)
+    )  # fmt: skip
+    x = (np.arange(WIDTH) - (WIDTH - 1) / 2) / FOCAL_PX
+    turned = math.radians(30) - np.arctan(x)
+    wanted = (0.5 + 0.4 * np.stack([np.cos(turned), np.sin(turned)], axis=1)) * LINEAR_FULL_SCALE
+    inner = slice(8, WIDTH - 8)  # it is worked out on a grid of 16 pixels
+    for row in (10, 20, 30):
+        np.testing.assert_allclose(seen[row, inner, :2], wanted[inner], atol=12)
 
 
 def test_clear_air_without_fog_changes_nothing() -> None:
