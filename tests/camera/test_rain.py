@@ -61,6 +61,17 @@ def test_streaks_stand_up_and_lean_when_the_car_passes_sideways() -> None:
     assert ratios[0] > 1.3 > 0.8 > ratios[1]
 
 
+def test_streaks_lean_against_the_way_that_the_car_goes() -> None:
+    """Passing to the left, drops come down to the right."""
+    depth = np.full(SIZE, 50, np.float32)
+    leans = []
+    for left_mps in (6.0, -6.0):
+        cover = Rain.of(80, 0, np.ones(3)).cover(depth, camera(), (0.0, left_mps, 0.0), derive_rng(7, "rain", 0))
+        down, right = np.gradient(cover)
+        leans.append(-(down * right).sum() / (right**2).sum())
+    assert leans[0] > 0.1 and leans[1] < -0.1
+
+
 def test_more_rain_covers_more_and_none_nothing() -> None:
     depth = np.full(SIZE, 50, np.float32)
     covers = [
@@ -101,12 +112,20 @@ def test_puddles_lie_on_open_ground_where_the_town_has_them() -> None:
     wet = (seen != white).any(axis=-1)
     assert 0.1 < wet[ground].mean() < 0.8 and not wet[~ground].any()
     assert np.array_equal(puddles(0.0).lay(white, depth, ground, camera()), white)
-    # A camera that has moved sees the same water elsewhere: the point (8, 0, 0) seen from 8 m and from 4 m.
-    near, far = (
-        puddles().lay(white, depth, ground, camera(x))[round(90 * 1.6 / (8 - x) + (SIZE[0] - 1) / 2), SIZE[1] // 2]
-        for x in (4.0, 0.0)
-    )
-    assert ((near < LINEAR_FULL_SCALE).any()) == ((far < LINEAR_FULL_SCALE).any())
+
+
+@pytest.mark.parametrize(("moved_m", "least_alike"), [(2.0, 0.9), (0.0, 1.0)])
+def test_a_camera_that_has_moved_sees_the_same_water_elsewhere(moved_m: float, least_alike: float) -> None:
+    depth, (_, white, _) = ground_depth(), frames()
+    x_m, y_m = (grid.reshape(-1) for grid in np.meshgrid(np.linspace(6, 9, 30), np.linspace(-2, 2, 9)))
+    seen = []
+    for at_m in (0.0, moved_m):
+        wet = (puddles().lay(white, depth, ~np.isnan(depth), camera(at_m)) != white).any(axis=-1)
+        row = np.rint(90 * 1.6 / (x_m - at_m) + (SIZE[0] - 1) / 2).astype(int)
+        column = np.rint(-90 * y_m / (x_m - at_m) + (SIZE[1] - 1) / 2).astype(int)
+        seen.append(wet[row, column])
+    assert 0.15 < seen[0].mean() < 0.85
+    assert (seen[0] == seen[1]).mean() >= least_alike
 
 
 def test_water_mirrors_more_at_a_flat_angle() -> None:
