@@ -117,12 +117,13 @@ class BruteForce:
 
 def label(kind: str, rng: np.random.Generator) -> KittiLabel:
     left, top = rng.uniform(0, 1000), rng.uniform(100, 200)
+    height = float(rng.choice([25.0, 40.0, rng.uniform(15, 120), rng.uniform(15, 120)]))
     return KittiLabel(
         type=kind,
-        truncated=float(rng.choice([0.0, 0.2, 0.4])),
+        truncated=float(rng.choice([0.0, 0.0, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6])),
         occluded=int(rng.integers(0, 3)),
         alpha_rad=float(rng.uniform(-3, 3)),
-        box_px=(left, top, left + rng.uniform(20, 120), top + rng.uniform(15, 120)),
+        box_px=(left, top, left + rng.uniform(20, 120), top + height),
         height_m=1.5,
         width_m=1.7,
         length_m=4.0,
@@ -132,7 +133,7 @@ def label(kind: str, rng: np.random.Generator) -> KittiLabel:
 
 
 def picture(seed: int) -> Picture:
-    """Labels of all sorts, and detections near them, twice, mistyped, tiny, made up, or in regions of no concern."""
+    """Labels of all sorts, one doubled, and detections near them, twice, mistyped, tiny, made up, or of no concern."""
     rng = np.random.default_rng(seed)
     kinds = ["Car", "Car", "Car", "Van", "Pedestrian", "Pedestrian", "Person_sitting", "Cyclist", "Truck"]
     labels = [label(kind, rng) for kind in kinds for _ in range(int(rng.integers(0, 3)))]
@@ -146,6 +147,8 @@ def picture(seed: int) -> Picture:
             found.append(replace(thing, type=kind, box_px=moved, location_m=place, score=float(rng.uniform(0, 1)),
                                  alpha_rad=thing.alpha_rad + float(rng.normal(0, 0.4))))  # fmt: skip
     found += [replace(label("Car", rng), score=float(rng.uniform(0, 1))) for _ in range(3)]
+    if labels:  # one detection may fit both, and finds one
+        labels.append(replace(labels[0], alpha_rad=labels[0].alpha_rad + 1))
     if found:
         left, top, right, bottom = found[-1].box_px
         labels.append(dont_care((left - 5, top - 5, right + 5, bottom + 5)))
