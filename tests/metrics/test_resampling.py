@@ -136,6 +136,7 @@ class Lines:
 def kitti_picture(index: int) -> tuple[Lines, tuple[KittiLabel, ...]]:
     rng = derive_rng(5, "kitti", index)
     labels = [car(float(z), float(x)) for z, x in rng.uniform((5, -10), (70, 10), (6, 2))]
+    labels[0] = replace(labels[0], type="Pedestrian")  # of two classes, the mean is over two
     found = [
         replace(
             label, location_m=tuple(np.array(label.location_m) + rng.normal(0, 0.35, 3)), score=float(rng.uniform())
