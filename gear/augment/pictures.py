@@ -83,7 +83,7 @@ def recolour(images: Mapping[str, UInt8Image], colours: Colours, rng: np.random.
             changed = cv2.GaussianBlur(changed, (0, 0), blur_px)
         if noise_levels:
             noise = rng.standard_normal(changed.shape, dtype=np.float32) * np.float32(noise_levels)
-            changed = np.clip(changed + noise, 0, 255).astype(np.uint8)
+            changed = np.clip(np.rint(changed + noise), 0, 255).astype(np.uint8)
         if erased is not None:
             changed = _erase(np.asarray(changed, dtype=np.uint8), erased, colours.erase_share, rng)
         if quality:

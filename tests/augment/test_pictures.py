@@ -74,6 +74,11 @@ def test_noise_is_as_strong_as_it_says() -> None:
     assert 0 <= min(noise) < 1 and 6.5 < max(noise) < 8.5
 
 
+def test_noise_makes_no_picture_darker() -> None:
+    means = [changed(np.full((60, 60, 3), 128), n, noise=1.0, noise_levels=8.0).mean() for n in range(30)]
+    assert np.mean(means) == pytest.approx(128, abs=0.05)
+
+
 def test_jpeg_keeps_colours_where_they_are() -> None:
     rows = np.array([[200, 40, 40], [40, 200, 40], [40, 40, 200]]).repeat(16, axis=0)[:, None].repeat(48, axis=1)
     assert np.abs(changed(rows, jpeg=1.0, jpeg_quality=95) - rows)[4::16].max() < 12
