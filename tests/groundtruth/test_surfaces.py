@@ -3,6 +3,7 @@ import math
 import numpy as np
 import pytest
 
+from gear.camera.optics import undistorted
 from gear.formats import rle
 from gear.groundtruth.raster import clip_near
 from gear.groundtruth.surfaces import observe_surfaces
@@ -113,3 +114,20 @@ def test_behind_a_lens_the_visible_share_is_of_the_bent_face(k1: float) -> None:
     assert clear.visible_fraction == pytest.approx(1.0, abs=0.02)
     assert covered.visible_px < 0.9 * clear.visible_px
     assert covered.visible_fraction == pytest.approx(covered.visible_px / clear.visible_px, abs=0.02)
+
+
+@pytest.mark.parametrize("k1", [-0.3, 0.3])
+def test_behind_a_lens_the_face_is_as_large_as_its_curved_edges_enclose(k1: float) -> None:
+    """Counted on a sixteenth of a pixel, each place led back through the lens and onto the face."""
+    car = Thing(parts=CAR, position_m=(9.0, 2.0, 0.0), object_id=2, role="npc")
+    frame, record = synthetic_frame(RIG, [board(13.0, 3.0), car])
+    frame, lens = behind_lens(frame, Lens(k1=k1)), Lens(k1=k1)
+    camera = frame.views["left"].camera
+    (truth,) = observe_surfaces(frame.views["left"], frame.geoms, record)
+    assert camera.lens is not None and truth.image_from_unit is not None and truth.visible_fraction < 0.95
+    x, y = np.meshgrid(np.arange(40, 400, 0.25) - 305.875, np.arange(30, 276, 0.25) - 152.875)
+    seen = undistorted(lens, np.stack([x, y], axis=-1) / camera.lens.focal_px) * camera.focal_px + [305.5, 152.5]
+    homography = np.linalg.inv(np.array(truth.image_from_unit).reshape(3, 3))
+    u, v, w = np.moveaxis(np.concatenate([seen, np.ones((*x.shape, 1))], axis=-1) @ homography.T, -1, 0)
+    area_px2 = ((u > 0) & (u < w) & (v > 0) & (v < w)).sum() / 16
+    assert truth.visible_px / truth.visible_fraction == pytest.approx(area_px2, rel=1e-3)
