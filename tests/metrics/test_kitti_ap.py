@@ -254,6 +254,7 @@ def test_a_detection_needs_a_score() -> None:
         {"height_m": math.nan},
         {"box_px": (0.0, math.nan, 40.0, 60.0)},
         {"box_px": (40.0, 20.0, 0.0, 60.0)},
+        {"box_px": (0.0, 60.0, 40.0, 20.0)},
     ],
 )
 def test_what_cannot_be_measured_is_refused_rather_than_taken_for_a_miss(change: dict[str, Any]) -> None:
