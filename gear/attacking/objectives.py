@@ -108,6 +108,11 @@ class SemsegObjective:
     attacked: int | None = None
     target: int | None = None
 
+    @property
+    def asks_for_clean(self) -> bool:
+        """Whether `harm` looks at the answer to the picture without the patch, too."""
+        return self.target is None and self.gamma != "dynamic"
+
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> Mapping[str, Term]:
@@ -130,9 +135,10 @@ class SemsegObjective:
         Those that the patch makes wrong change sides, and what is right still is what is harmed least: of it alone, the
         figure would fall as the attack succeeds, to 0 where nothing is right any more.
         """
-        if self.target is not None or self.gamma == "dynamic":
+        if not self.asks_for_clean:
             terms = weighted(self, model, views, samples, indexes)
             return torch.stack(terms).sum() if terms else torch.zeros(())
+        assert self.gamma != "dynamic"
         logits, labels, counts = self._answers(model, views, samples)
         view = next(iter(views))
         with torch.no_grad():

@@ -1,0 +1,70 @@
+"""What a question costs is how often the network is asked."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gear.attacking.objectives import DepthObjective, SemsegObjective
+from gear.attacking.queries import Oracle
+from gear.contracts.attacks import Budget
+from gear.plugins.attacks.scene_specific import scene_specific
+from gear.testing.attack_contract import AttackContract
+from gear.testing.tiny_compositor import TinyCompositor
+from gear.values.errors import GearError
+
+
+class OnSemseg(AttackContract):
+    spec = scene_specific
+
+
+class OnDepth(AttackContract):
+    spec = scene_specific
+    task = "depth"
+
+
+TEXTURES = np.full((1, 3, 4, 8), 0.5, np.float32)
+
+
+def oracle_of(contract: AttackContract, objective: Any, queries: int | None = 50) -> tuple[Any, Oracle]:
+    model, dataset = contract.model(), contract.dataset()
+    return model, Oracle(model, dataset, TinyCompositor(dataset), objective, Budget(steps=1, queries=queries))
+
+
+@pytest.mark.parametrize(
+    ("contract", "objective", "costs"),
+    [
+        (OnSemseg, SemsegObjective(), [1, 1, 1]),
+        (OnSemseg, SemsegObjective(target=7), [1, 1, 1]),
+        (OnSemseg, SemsegObjective(gamma=0.5), [2, 2, 2]),
+        (OnDepth, DepthObjective(), [2, 2, 1]),
+        (OnDepth, DepthObjective(direction="farther"), [2, 2, 1]),
+    ],
+)
+def test_every_pass_is_paid_for(contract: type[AttackContract], objective: Any, costs: list[int]) -> None:
+    model, oracle = oracle_of(contract(), objective)
+    for indexes, cost in zip(([0], [0, 1], [1, 0]), costs, strict=True):
+        before, passes = oracle.left, model.passes
+        assert oracle.cost(indexes) == cost
+        assert np.isfinite(oracle.harm(TEXTURES, indexes))
+        assert before - oracle.left == model.passes - passes == cost
+
+
+def test_what_cannot_be_paid_is_not_asked() -> None:
+    model, oracle = oracle_of(OnSemseg(), SemsegObjective(gamma=0.5), queries=3)
+    oracle.harm(TEXTURES, [0])
+    with pytest.raises(RuntimeError, match="no queries left"):
+        oracle.harm(TEXTURES, [0])
+    assert (oracle.left, model.passes) == (1, 2)
+    with pytest.raises(GearError, match="--queries"):
+        oracle_of(OnSemseg(), SemsegObjective(), queries=None)
+
+
+def test_what_was_spent_and_on_what_is_kept() -> None:
+    _, oracle = oracle_of(OnDepth(), DepthObjective())
+    oracle.harm(TEXTURES, [1])
+    _, again = oracle_of(OnDepth(), DepthObjective())
+    again.restore(oracle.state())
+    assert (again.left, again.cost([1]), again.cost([0])) == (48, 1, 2)
