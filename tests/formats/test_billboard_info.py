@@ -1,6 +1,7 @@
 """What `camera_billboard_info.json` makes the original loaders compute; their arithmetic is done again here."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from gear.testing.synthetic import synthetic_frame
 from gear.testing.things import Thing, board
 from gear.values.geometry import RigidTransform
 from gear.values.rig import CameraMount, Rig
+from gear.values.scene import Pose
 
 PATCH_PX, M_PER_PX, LEFT_M, TOP_M = (300, 150), 7.4 / 300, 3.6, 1.85
 RIG = Rig(
@@ -123,6 +125,28 @@ def test_one_tilted_record_marks_the_split() -> None:
         info = billboard_info(records, task="ss", patch_label="none", reference="left")
         assert info["info"]["level"] is False
         assert [entry["id"] for entry in info["camera_billboard_positions"]] == [0, 1]
+
+
+def test_a_tilted_board_is_marked() -> None:
+    _, record = synthetic_frame(RIG, [board(20.0)])
+    (surface,) = record.surfaces
+    placed = surface.parent_from_surface.transform("world", "surface")
+    lean = Rotation.from_euler("x", 2.0, degrees=True).as_matrix()
+    leaning = RigidTransform.from_parts("world", "surface", placed.rotation @ lean, placed.translation_m)
+    tilted = replace(surface, parent_from_surface=Pose.from_transform(leaning))
+    for surfaces, level in (((surface,), True), ((tilted,), False), ((surface, tilted), False)):
+        info = billboard_info([replace(record, surfaces=surfaces)], task="ss", patch_label="none", reference="left")
+        assert info["info"]["level"] is level
+
+
+def test_every_board_has_a_pose_of_its_own() -> None:
+    boards = [board(20.0, left_m, surface=number) for number, left_m in enumerate((9.0, 0.0, -9.0, -18.0))]
+    _, record = synthetic_frame(RIG, boards)
+    info = billboard_info([record], task="ss", patch_label="none", reference="left")
+    (entry,) = info["camera_billboard_positions"]
+    poses = [entry[f"billboard{name}_xyzrpy"][:2] for name in ("", "2", "3", "4")]
+    assert poses == [pytest.approx([20.0, left_m + 0.1]) for left_m in (9.0, 0.0, -9.0, -18.0)]
+    assert info["info"]["num_billboards"] == 4
 
 
 def test_a_split_without_records_is_empty() -> None:
