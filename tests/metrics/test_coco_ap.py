@@ -54,6 +54,13 @@ def test_the_mean_is_over_what_occurs() -> None:
     assert "ap_bus" not in result
 
 
+def test_a_pictures_own_figures_know_width_from_height() -> None:
+    """The upper half of a car that is 100 wide and 60 high, and its left half."""
+    upper, left = (found(0.9, box) for box in ((20, 20, 120, 51), (20, 20, 71, 80)))
+    for half in (upper, left):
+        assert evaluator().update(picture(0, CAR), [half]) == {"found_share": 1, "false_alarms": 0}
+
+
 def test_no_detections_is_nothing_found() -> None:
     metric = evaluator()
     metric.update(picture(0, CAR), [])
