@@ -1,0 +1,177 @@
+"""Z-Mask (Rossolini et al., AAAI 2023): what over-activates shallow and deep layers alike is a patch, and is covered.
+
+After the authors' code and supplement; what they leave open is an option of the plugin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+import torch
+from torch import Tensor
+
+from gear.contracts.defenses import DefenseResult
+from gear.contracts.models import Model
+from gear.guarding.feature_maps import feature_maps, spread
+from gear.guarding.mask_block import Example, MaskBlock, learn
+from gear.guarding.over_activation import ChannelStatistics, channel_statistics, heat, mean_of, on_grid
+from gear.guarding.twins import patch_area
+from gear.guarding.z_scores import alarm_level, sureness
+from gear.guarding.zmask_options import ZMaskConfig
+from gear.guarding.zmask_parts import Layers, Look, Views, layers_of, looks
+from gear.values.errors import GearError
+from gear.values.frames import UInt8Image
+
+COVERED_FROM = 0.5
+"""Of the mask, and of the score where `only_if_sure` asks for it."""
+
+MOSTLY = 0.5
+"""Share of a cell that the patch must take to be there."""
+
+FILL = np.array([124, 116, 104], np.uint8)
+"""ImageNet's mean: what is covered is 0 to a network that normalises by it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Learnt:
+    """What calibration gives.
+
+    Attributes:
+        layers: that are looked at.
+        statistics: of their channels.
+        block: makes masks of heat maps.
+        level: raw score that the share `false_alarms` of clean pictures exceeds.
+    """
+
+    layers: Layers
+    statistics: Mapping[str, ChannelStatistics]
+    block: MaskBlock
+    level: float
+
+
+class ZMask:
+    """The defense. Its statistics, and the mask that is learnt from them, are of the reference camera."""
+
+    def __init__(self, settings: ZMaskConfig) -> None:
+        self._settings = settings
+
+    def fit(
+        self, clean: Sequence[Views], patched: Sequence[Views], model: Model | None, rng: np.random.Generator
+    ) -> Learnt:
+        """Statistics from clean pictures, the fusion block from their twins with patches.
+
+        Raises:
+            GearError: there are no pictures, they are no twins, or no patch is seen in them.
+        """
+        assert model is not None
+        if not len(clean) or not len(patched):
+            raise GearError(
+                "Z-Mask learns from patches, too: give --calibration-patched DIR, the twin of --calibration with "
+                "patches (gear collect with the same seed and settings, and --patch random)"
+            )
+        if len(patched) != len(clean):
+            raise GearError(
+                f"the calibration data are no twins: {len(clean)} clean samples, and {len(patched)} with patches"
+            )
+        layers = layers_of(model, self._settings.shallow, self._settings.deep)
+        statistics = self._statistics(clean, model, layers)
+        examples = list(self._examples(clean, patched, model, layers, statistics))
+        if not examples:
+            raise GearError("no patch is seen in the patched calibration data: Z-Mask has nothing to learn from")
+        block = learn(examples, self._settings.steps, rng)
+        scores = [
+            block.score(*self._heats(model, looks(sample)[0], layers, statistics))
+            for sample in spread(clean, self._settings.learning_pictures)
+        ]
+        level = alarm_level(scores, self._settings.false_alarms)
+        return Learnt(layers=layers, statistics=statistics, block=block, level=level)
+
+    def apply(self, views: Views, model: Model | None, state: Learnt, rng: np.random.Generator) -> DefenseResult:
+        """Covers what over-activates the network; the score is that of the camera that shows most of it."""
+        assert model is not None
+        masks = {name: np.zeros(picture.shape[:2], np.float32) for name, picture in views.items()}
+        score = 0.0
+        for look in looks(views):
+            shallow, deep = self._heats(model, look, state.layers, state.statistics)
+            score = max(score, sureness(state.block.score(shallow, deep), state.level))
+            size = masks[look.camera].shape[::-1]
+            masks[look.camera] = cv2.resize(
+                state.block.mask(shallow, deep).numpy(), size, interpolation=cv2.INTER_NEAREST_EXACT
+            )
+        is_sure = score > COVERED_FROM or not self._settings.only_if_sure
+        cleaned = {name: _covered(picture, masks[name], is_sure) for name, picture in views.items()}
+        return DefenseResult(views=cleaned, mask=masks, score=score)
+
+    def forward(self, views: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        """Needs the model and what was learnt of it, which it is not given here.
+
+        Raises:
+            ValueError: always.
+        """
+        raise ValueError("Z-Mask declares no gradient")
+
+    def wrap(self, model: Model) -> Model:
+        """The model as it is."""
+        return model
+
+    def _statistics(self, clean: Sequence[Views], model: Model, layers: Layers) -> dict[str, ChannelStatistics]:
+        each: dict[str, list[ChannelStatistics]] = {name: [] for name in layers.all()}
+        for sample in spread(clean, self._settings.statistics_pictures):
+            for name, features in self._features(model, looks(sample)[0], layers):
+                each[name].append(channel_statistics(features))
+        return {name: mean_of(many) for name, many in each.items()}
+
+    def _examples(
+        self,
+        clean: Sequence[Views],
+        patched: Sequence[Views],
+        model: Model,
+        layers: Layers,
+        statistics: Mapping[str, ChannelStatistics],
+    ) -> Iterator[Example]:
+        """Heat maps of pictures in which a patch is seen, with where."""
+        for number in spread(range(len(patched)), self._settings.learning_pictures):
+            without, look = looks(clean[number])[0], looks(patched[number])[0]
+            area = patch_area(without.views[look.camera], look.views[look.camera], number)
+            if area.any():
+                shallow, deep = self._heats(model, look, layers, statistics)
+                share = cv2.resize(area.astype(np.float32), shallow.shape[::-1], interpolation=cv2.INTER_AREA)
+                truth = torch.from_numpy((share >= MOSTLY).astype(np.float32))
+                yield Example(shallow=shallow, deep=deep, truth=truth)
+
+    def _features(self, model: Model, look: Look, layers: Layers) -> Iterator[tuple[str, Tensor]]:
+        """Feature maps on the grid, whose cells are as square as those of 150 x 300 are in a picture of 2048 x 1024."""
+        height, width = look.views[look.camera].shape[:2]
+        grid = (self._settings.rows, max(1, round(self._settings.rows * width / height)))
+        for name, features in feature_maps(model, look.views, layers.all()).items():
+            yield name, on_grid(features, grid)
+
+    def _heats(
+        self, model: Model, look: Look, layers: Layers, statistics: Mapping[str, ChannelStatistics]
+    ) -> tuple[Tensor, Tensor]:
+        """The shallow and the deep heat map of the look's camera: cell by cell the largest of the layers'."""
+        settings = self._settings
+        shallow: list[Tensor] = []
+        deep: list[Tensor] = []
+        for name, features in self._features(model, look, layers):
+            z = statistics[name].z_scores(features)
+            for names, kernels, maps in (
+                (layers.shallow, settings.shallow_kernels, shallow),
+                (layers.deep, settings.deep_kernels, deep),
+            ):
+                if name in names:
+                    maps.append(heat(z, [(rows, 2 * rows) for rows in kernels]))
+        largest = [torch.stack(maps).amax(dim=0) for maps in (shallow, deep)]
+        first, second = (one.flip(1) if look.is_mirrored else one for one in largest)
+        return first, second
+
+
+def _covered(picture: UInt8Image, mask: npt.NDArray[np.float32], is_covered: bool) -> UInt8Image:
+    covered = picture.copy()
+    if is_covered:
+        covered[mask > COVERED_FROM] = FILL
+    return covered

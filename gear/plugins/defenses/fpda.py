@@ -1,0 +1,74 @@
+"""FPDA (Rossolini et al., IEEE TNNLS 2023): HyperNeuron on features that were averaged over channels first."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from gear.contracts.defenses import Defense
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.specs import DefenseSpec
+from gear.values.errors import FieldError
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+PEAK_CELLS = 3
+"""Side of the window that `peak` averages over."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FpdaConfig:
+    """Options. The published text says that features are compressed over channels and compared by Z-scores.
+
+    Attributes:
+        layer: feature map of the model to look at; empty takes the deepest.
+        compress: mean over channels, of the features or of their sizes.
+        aggregate: mean of the Z-scores' sizes, or the largest mean of a window of 3 x 3, for patches far away.
+        false_alarms: share of clean calibration pictures that shall score above 0.5.
+    """
+
+    layer: str = ""
+    compress: Literal["mean", "mean_abs"] = "mean"
+    aggregate: Literal["mean", "peak"] = "mean"
+    false_alarms: float = 0.05
+
+    def __post_init__(self) -> None:
+        if not 0 < self.false_alarms < 1:
+            raise FieldError("false_alarms", f"must be between 0 and 1, got {self.false_alarms:g}")
+
+
+def build(config: FpdaConfig) -> Defense:
+    """The detector."""
+    from torch.nn import functional
+
+    from gear.guarding.detector import Detector
+
+    def compress(features: Tensor) -> Tensor:
+        return (features if config.compress == "mean" else features.abs()).mean(dim=0)
+
+    def aggregate(z: Tensor) -> Tensor:
+        if config.aggregate == "mean":
+            return z.abs().mean()
+        window = tuple(min(PEAK_CELLS, side) for side in z.shape)
+        return functional.avg_pool2d(z.abs()[None, None], window, stride=1).amax()
+
+    return Detector(config.layer, compress, aggregate, config.false_alarms)
+
+
+spec = DefenseSpec(
+    name="fpda",
+    summary="FPDA: HyperNeuron on features averaged over channels (one of the paper's detectors).",
+    config=FpdaConfig,
+    build=build,
+    outputs=frozenset({"score"}),
+    gradient="differentiable",
+    needs_calibration=True,
+    needs_model=True,
+)
+
+
+@hookimpl
+def gear_defenses() -> list[DefenseSpec[FpdaConfig]]:
+    """This module's defense."""
+    return [spec]

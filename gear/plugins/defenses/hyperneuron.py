@@ -1,0 +1,71 @@
+"""HyperNeuron (Co et al., 2021): patches drive a network's neurons to values that they hardly ever have."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from gear.contracts.defenses import Defense
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.specs import DefenseSpec
+from gear.values.errors import FieldError
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+FAR = 3.0
+"""Deviations from which a neuron counts for `share`."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HyperNeuronConfig:
+    """Options. The published text says that the score comes from the Z-scores of all features of one layer, not how.
+
+    Attributes:
+        layer: feature map of the model to look at; empty takes the deepest.
+        statistics: what is usual is asked of each neuron (channel and place), or of each channel's mean in a picture.
+        aggregate: mean of the Z-scores' sizes, root of the mean of their squares, or share of sizes above 3.
+        false_alarms: share of clean calibration pictures that shall score above 0.5.
+    """
+
+    layer: str = ""
+    statistics: Literal["neuron", "channel"] = "neuron"
+    aggregate: Literal["mean", "rms", "share"] = "mean"
+    false_alarms: float = 0.05
+
+    def __post_init__(self) -> None:
+        if not 0 < self.false_alarms < 1:
+            raise FieldError("false_alarms", f"must be between 0 and 1, got {self.false_alarms:g}")
+
+
+def build(config: HyperNeuronConfig) -> Defense:
+    """The detector."""
+    from gear.guarding.detector import Detector
+
+    def compress(features: Tensor) -> Tensor:
+        return features if config.statistics == "neuron" else features.mean(dim=(1, 2))
+
+    def aggregate(z: Tensor) -> Tensor:
+        if config.aggregate == "rms":
+            return z.square().mean().sqrt()
+        return (z.abs() > FAR).double().mean() if config.aggregate == "share" else z.abs().mean()
+
+    return Detector(config.layer, compress, aggregate, config.false_alarms)
+
+
+spec = DefenseSpec(
+    name="hyperneuron",
+    summary="HyperNeuron: scores how unusual the deepest feature map is (one of the paper's detectors).",
+    config=HyperNeuronConfig,
+    build=build,
+    outputs=frozenset({"score"}),
+    gradient="differentiable",
+    needs_calibration=True,
+    needs_model=True,
+)
+
+
+@hookimpl
+def gear_defenses() -> list[DefenseSpec[HyperNeuronConfig]]:
+    """This module's defense."""
+    return [spec]

@@ -1,0 +1,33 @@
+"""Z-Mask (Rossolini et al., AAAI 2023): covers what over-activates a network's layers, and scores it."""
+
+from __future__ import annotations
+
+from gear.contracts.defenses import Defense
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.specs import DefenseSpec
+from gear.guarding.zmask_options import ZMaskConfig
+
+
+def build(config: ZMaskConfig) -> Defense:
+    """The defense."""
+    from gear.guarding.zmask import ZMask
+
+    return ZMask(config)
+
+
+spec = DefenseSpec(
+    name="zmask",
+    summary="Z-Mask: covers what over-activates shallow and deep layers (one of the paper's defenses).",
+    config=ZMaskConfig,
+    build=build,
+    outputs=frozenset({"images", "mask", "score"}),
+    gradient="none",
+    needs_calibration=True,
+    needs_model=True,
+)
+
+
+@hookimpl
+def gear_defenses() -> list[DefenseSpec[ZMaskConfig]]:
+    """This module's defense."""
+    return [spec]
