@@ -23,6 +23,7 @@ The folder holds patch_0.png, …, patch.safetensors, attack.json and figures/.
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the command's flags."""
+    from gear.cli.evaluate import add_calibration
     from gear.cli.gap import add_places
 
     parser.epilog = EXAMPLE
@@ -43,6 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_device(parser, "model_set")
     parser.add_argument("--defense", metavar="NAME", help="a defense that the attack knows of and looks through")
     parser.add_argument("--defense-set", metavar="KEY=VALUE", action="append", default=[], help="an option of it")
+    add_calibration(parser)
     parser.add_argument(
         "--val", action="append", default=[], metavar="DIR", help="dataset to judge patches on; the best are kept"
     )
@@ -76,7 +78,8 @@ def run(args: argparse.Namespace) -> int:
         raise GearError(
             "--town and --scenes are of the dataset that --verify names; add --verify DIR, or leave them out"
         )
-    with ProgressBar(unit="step" if args.queries is None else "query") as progress:
+    unit = "step" if args.queries is None else "query"
+    with ProgressBar(unit="picture") as learning, ProgressBar(unit=unit) as progress:
         report = attack(
             args.data,
             model=args.model,
@@ -88,6 +91,8 @@ def run(args: argparse.Namespace) -> int:
             model_settings=args.model_set,
             defense=args.defense,
             defense_settings=args.defense_set,
+            calibration=args.calibration,
+            calibration_patched=args.calibration_patched,
             val=args.val,
             every=args.every,
             patience=args.patience,
@@ -96,12 +101,13 @@ def run(args: argparse.Namespace) -> int:
             allow_tests=args.allow_test_data,
             force=args.force,
             progress=progress,
+            learning=learning,
             noted=lambda text: print(f"gear: note: {text}", file=sys.stderr),
         )
     if args.verify is None or not args.json:
         print(json.dumps(report.facts, indent=2) if args.json else report.summary())
     if args.verify is not None:
-        with ProgressBar() as progress:
+        with ProgressBar(unit="picture") as learning, ProgressBar() as progress:
             reports = verify(
                 args.out,
                 args.verify,
@@ -109,9 +115,12 @@ def run(args: argparse.Namespace) -> int:
                 settings=args.model_set,
                 defense=args.defense,
                 defense_settings=args.defense_set,
+                calibration=args.calibration,
+                calibration_patched=args.calibration_patched,
                 town=args.town,
                 scenes=args.scenes,
                 progress=progress,
+                learning=learning,
             )
         if args.json:
             verified = {name: found.as_json() for name, found in reports.items()}

@@ -11,6 +11,8 @@ EXAMPLE = """examples:
   gear evaluate --model ddrnet23_slim --data data/clean
   gear evaluate --model ddrnet23_slim --data data/none data/random data/patch --report outside_patch
   gear evaluate --model ddrnet23_slim --set weights=net.safetensors --defense jpeg --data data/clean
+  gear evaluate --model ddrnet23_slim --defense zmask --calibration data/val --calibration-patched data/val-patched \
+    --data data/none data/patch
 
 Predictions, results.json and table.txt lie under --out. Run it again to go on where it was stopped.
 """
@@ -38,8 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             dest=dest,
             help=f"an option of the {what}; repeatable",
         )
-    parser.add_argument("--calibration", metavar="DIR", help="dataset that the defense learns from")
-    parser.add_argument("--calibration-patched", metavar="DIR", help="the same with patches")
+    add_calibration(parser)
     parser.add_argument(
         "--report",
         metavar="NAME",
@@ -59,6 +60,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print results.json instead of the table")
 
 
+def add_calibration(parser: argparse.ArgumentParser) -> None:
+    """Adds the flags that say what a defense learns from."""
+    parser.add_argument("--calibration", metavar="DIR", help="dataset that the defense learns from")
+    parser.add_argument("--calibration-patched", metavar="DIR", help="the same with patches")
+
+
 def run(args: argparse.Namespace) -> int:
     """Evaluates and prints the table."""
     import json
@@ -68,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
     from gear.verbs.evaluate.run import evaluate
     from gear.verbs.evaluate.table import table
 
-    with ProgressBar() as progress:
+    with ProgressBar(unit="picture") as learning, ProgressBar() as progress:
         report = evaluate(
             args.data,
             model=args.model,
@@ -85,6 +92,7 @@ def run(args: argparse.Namespace) -> int:
             seed=args.seed,
             resamples=args.resamples,
             progress=progress,
+            learning=learning,
         )
     for row in report.rows:
         for problem in row.damaged:

@@ -21,6 +21,7 @@ The dataset must have been collected with --probes. With --patch the twin is ren
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the command's flags."""
     from gear.cli.collect import positive
+    from gear.cli.evaluate import add_calibration
 
     parser.epilog = EXAMPLE
     parser.add_argument("dataset", help="root of a dataset with probes")
@@ -34,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--defense", metavar="NAME", help="a defense plugin that the model stands behind")
     parser.add_argument("--defense-set", metavar="KEY=VALUE", action="append", default=[], help="an option of it")
+    add_calibration(parser)
     parser.add_argument("--compositor", action="append", dest="compositors", help="transport, homography (both)")
     parser.add_argument("--samples", type=positive, metavar="N", help="the first N samples only")
     parser.add_argument("--out", metavar="DIR", help="folder for gap.json and gap.txt")
@@ -54,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     from gear.verbs.gap.run import gap
 
     given = {} if args.compositors is None else {"compositors": tuple(args.compositors)}
-    with ProgressBar() as progress:
+    with ProgressBar(unit="picture") as learning, ProgressBar() as progress:
         report = gap(
             args.dataset,
             twin=args.twin,
@@ -64,11 +66,14 @@ def run(args: argparse.Namespace) -> int:
             settings=args.settings,
             defense=args.defense,
             defense_settings=args.defense_set,
+            calibration=args.calibration,
+            calibration_patched=args.calibration_patched,
             samples=args.samples,
             town=args.town,
             scenes=args.scenes,
             out=args.out,
             progress=progress,
+            learning=learning,
             noted=lambda text: print(f"gear: note: {text}", file=sys.stderr),
             **given,
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,8 +11,6 @@ from torch import Tensor
 from torch.nn import functional
 
 LEAST_DEVIATION = 1e-5
-CHANNELS_AT_ONCE = 32
-"""As many are pooled together, so that deep maps of many channels fit into memory."""
 
 Cells = tuple[int, int]
 
@@ -33,9 +32,10 @@ class ChannelStatistics:
         return (features - mean) / (deviation + LEAST_DEVIATION)
 
 
-def channel_statistics(features: Tensor) -> ChannelStatistics:
-    """Of one (C, rows, columns) map."""
-    return ChannelStatistics(mean=features.mean(dim=(1, 2)), deviation=features.std(dim=(1, 2)))
+def channel_statistics(features: Tensor, grid: Cells) -> ChannelStatistics:
+    """Of one (C, h, w) map, as it is on the grid."""
+    cells = on_grid(features, grid)
+    return ChannelStatistics(mean=cells.mean(dim=(1, 2)), deviation=cells.std(dim=(1, 2)))
 
 
 def mean_of(many: Sequence[ChannelStatistics]) -> ChannelStatistics:
@@ -51,35 +51,40 @@ def on_grid(features: Tensor, grid: Cells) -> Tensor:
     return functional.interpolate(features[None], size=grid, mode="nearest")[0]
 
 
-def heat(z: Tensor, kernels: Sequence[Cells]) -> Tensor:
-    """One layer's heat map.
+def pooled_sizes(z: Tensor, grid: Cells, kernel: Cells) -> Tensor:
+    """Mean over channels of the size of the Z-scores' mean in windows of the grid, stretched to the grid.
 
-    With H_k the mean over channels of the size of the Z-scores' mean in windows of k cells, H is that of the largest
-    windows, and then H / (1 + max H) H_k for one kernel after the other: where large windows see nothing, small ones
-    find nothing. Windows lie inside the map, and their means are stretched to its size, as published.
+    Windows lie inside the grid, as published. Taking the nearest cell and the mean of a window are both linear, and the
+    same for rows as for columns: two products of matrices, whose cost does not grow with the window.
 
     Args:
-        z: (C, rows, columns).
-        kernels: rows and columns of the windows, large ones first.
+        z: (C, h, w), of any size.
+        grid: rows and columns.
+        kernel: rows and columns of the windows; larger ones than the grid are as large as the grid.
 
     Returns:
         (rows, columns), 0 or more.
     """
-    grid = (z.shape[1], z.shape[2])
-    sums = [torch.zeros(grid) for _ in kernels]
-    for channels in torch.split(z, CHANNELS_AT_ONCE):
-        integral = functional.pad(channels.double().cumsum(dim=1).cumsum(dim=2), (1, 0, 1, 0))
-        for place, kernel in enumerate(kernels):
-            sizes = _window_means(integral, kernel).abs().sum(dim=0).float()
-            sums[place] += on_grid(sizes[None], grid)[0]
-    result = sums[0] / len(z)
-    for total in sums[1:]:
-        result = result / (1 + result.amax()) * (total / len(z))
+    down, across = (_window_means(*sizes) for sizes in zip(z.shape[1:], grid, kernel, strict=True))
+    return on_grid((down @ z @ across.T).abs().mean(dim=0)[None], grid)[0]
+
+
+def refined(pooled: Sequence[Tensor]) -> Tensor:
+    """One layer's heat map from its pooled sizes, those of the largest windows first.
+
+    H is the first, and then H / (1 + max H) times one after the other: where large windows see nothing, small ones find
+    nothing.
+    """
+    result = pooled[0]
+    for one in pooled[1:]:
+        result = result / (1 + result.amax()) * one
     return result
 
 
-def _window_means(integral: Tensor, kernel: Cells) -> Tensor:
-    """Means of all windows, from sums over everything above and to the left: no dearer for large windows."""
-    rows, columns = (min(side, size - 1) for side, size in zip(kernel, integral.shape[1:], strict=True))
-    total = integral[:, rows:, columns:] - integral[:, :-rows, columns:] - integral[:, rows:, :-columns]
-    return (total + integral[:, :-rows, :-columns]) / (rows * columns)
+@functools.lru_cache(maxsize=64)
+def _window_means(cells: int, grid: int, kernel: int) -> Tensor:
+    """(windows, cells): from a line of cells to the means of windows of a grid on which each has the nearest one."""
+    nearest = functional.interpolate(torch.eye(cells)[None], size=grid, mode="nearest")[0].T
+    sums = functional.pad(nearest.double().cumsum(dim=0), (0, 0, 1, 0))
+    kernel = min(kernel, grid)
+    return ((sums[kernel:] - sums[:-kernel]) / kernel).float()

@@ -18,7 +18,14 @@ from gear.contracts.defenses import DefenseResult
 from gear.contracts.models import Model
 from gear.guarding.feature_maps import feature_maps, spread
 from gear.guarding.mask_block import Example, MaskBlock, learn
-from gear.guarding.over_activation import ChannelStatistics, channel_statistics, heat, mean_of, on_grid
+from gear.guarding.over_activation import (
+    Cells,
+    ChannelStatistics,
+    channel_statistics,
+    mean_of,
+    pooled_sizes,
+    refined,
+)
 from gear.guarding.twins import patch_area
 from gear.guarding.z_scores import alarm_level, sureness
 from gear.guarding.zmask_options import ZMaskConfig
@@ -121,8 +128,9 @@ class ZMask:
     def _statistics(self, clean: Sequence[Views], model: Model, layers: Layers) -> dict[str, ChannelStatistics]:
         each: dict[str, list[ChannelStatistics]] = {name: [] for name in layers.all()}
         for sample in spread(clean, self._settings.statistics_pictures):
-            for name, features in self._features(model, looks(sample)[0], layers):
-                each[name].append(channel_statistics(features))
+            look = looks(sample)[0]
+            for name, features in feature_maps(model, look.views, layers.all()).items():
+                each[name].append(channel_statistics(features, self._grid(look)))
         return {name: mean_of(many) for name, many in each.items()}
 
     def _examples(
@@ -143,31 +151,26 @@ class ZMask:
                 truth = torch.from_numpy((share >= MOSTLY).astype(np.float32))
                 yield Example(shallow=shallow, deep=deep, truth=truth)
 
-    def _features(self, model: Model, look: Look, layers: Layers) -> Iterator[tuple[str, Tensor]]:
-        """Feature maps on the grid, whose cells are as square as those of 150 x 300 are in a picture of 2048 x 1024."""
+    def _grid(self, look: Look) -> Cells:
+        """Its cells are as square as those of 150 x 300 are in a picture of 2048 x 1024."""
         height, width = look.views[look.camera].shape[:2]
-        grid = (self._settings.rows, max(1, round(self._settings.rows * width / height)))
-        for name, features in feature_maps(model, look.views, layers.all()).items():
-            yield name, on_grid(features, grid)
+        return self._settings.rows, max(1, round(self._settings.rows * width / height))
 
     def _heats(
         self, model: Model, look: Look, layers: Layers, statistics: Mapping[str, ChannelStatistics]
     ) -> tuple[Tensor, Tensor]:
         """The shallow and the deep heat map of the look's camera: cell by cell the largest of the layers'."""
-        settings = self._settings
-        shallow: list[Tensor] = []
-        deep: list[Tensor] = []
-        for name, features in self._features(model, look, layers):
+        shallow, deep = self._settings.shallow_kernels, self._settings.deep_kernels
+        heats: dict[str, list[Tensor]] = {"shallow": [], "deep": []}
+        for name, features in feature_maps(model, look.views, layers.all()).items():
             z = statistics[name].z_scores(features)
-            for names, kernels, maps in (
-                (layers.shallow, settings.shallow_kernels, shallow),
-                (layers.deep, settings.deep_kernels, deep),
-            ):
-                if name in names:
-                    maps.append(heat(z, [(rows, 2 * rows) for rows in kernels]))
-        largest = [torch.stack(maps).amax(dim=0) for maps in (shallow, deep)]
-        first, second = (one.flip(1) if look.is_mirrored else one for one in largest)
-        return first, second
+            pooled = {rows: pooled_sizes(z, self._grid(look), (rows, 2 * rows)) for rows in {*shallow, *deep}}
+            if name in layers.shallow:
+                heats["shallow"].append(refined([pooled[rows] for rows in shallow]))
+            if name in layers.deep:
+                heats["deep"].append(refined([pooled[rows] for rows in deep]))
+        first, second = (torch.stack(maps).amax(dim=0) for maps in heats.values())
+        return (first.flip(1), second.flip(1)) if look.is_mirrored else (first, second)
 
 
 def _covered(picture: UInt8Image, mask: npt.NDArray[np.float32], is_covered: bool) -> UInt8Image:

@@ -8,22 +8,44 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch.nn import functional
 
-from gear.guarding.over_activation import ChannelStatistics, channel_statistics, heat, mean_of, on_grid
+from gear.guarding.over_activation import (
+    ChannelStatistics,
+    channel_statistics,
+    mean_of,
+    on_grid,
+    pooled_sizes,
+    refined,
+)
 
 ROWS, COLUMNS = 30, 60
+
+
+GRID = (ROWS, COLUMNS)
+
+
+def heat(z: torch.Tensor, kernels: list[tuple[int, int]]) -> torch.Tensor:
+    return refined([pooled_sizes(z, GRID, kernel) for kernel in kernels])
 
 
 def noise(seed: int, channels: int = 5) -> torch.Tensor:
     return torch.randn(channels, ROWS, COLUMNS, generator=torch.Generator().manual_seed(seed))
 
 
-@given(st.integers(0, 1000), st.sampled_from([(1, 2), (3, 6), (8, 16), (30, 60), (12, 24)]))
-@settings(max_examples=20, deadline=None)
-def test_one_kernel_is_the_mean_size_of_pooled_scores(seed: int, kernel: tuple[int, int]) -> None:
-    z = noise(seed, channels=40)
-    pooled = functional.avg_pool2d(z[None], kernel, stride=1).abs()
-    expected = functional.interpolate(pooled, size=(ROWS, COLUMNS), mode="nearest")[0].mean(dim=0)
-    assert torch.allclose(heat(z, [kernel]), expected, atol=1e-5)
+@given(
+    st.integers(0, 1000),
+    st.sampled_from([(1, 2), (3, 6), (8, 16), (30, 60), (12, 24), (40, 80)]),
+    st.sampled_from([(30, 60), (7, 13), (45, 50), (1, 1)]),
+)
+@settings(max_examples=40, deadline=None)
+def test_pooled_sizes_are_those_of_torch_s_own_pooling(
+    seed: int, kernel: tuple[int, int], size: tuple[int, int]
+) -> None:
+    z = torch.randn(5, *size, generator=torch.Generator().manual_seed(seed))
+    on = functional.interpolate(z[None], size=GRID, mode="nearest")
+    inside = (min(kernel[0], ROWS), min(kernel[1], COLUMNS))
+    pooled = functional.avg_pool2d(on, inside, stride=1).abs()
+    expected = functional.interpolate(pooled, size=GRID, mode="nearest")[0].mean(dim=0)
+    assert torch.allclose(pooled_sizes(z, GRID, kernel), expected, atol=1e-5)
 
 
 def test_kernels_refine_one_another_as_published() -> None:
@@ -52,14 +74,14 @@ def test_a_square_of_large_scores_stands_out_where_it_is() -> None:
 
 def test_scores_are_of_each_channel_alone() -> None:
     features = torch.stack([5 + 2 * noise(1, 1)[0], -3 + 0.5 * noise(2, 1)[0]])
-    z = channel_statistics(features).z_scores(features)
+    z = channel_statistics(features, GRID).z_scores(features)
     assert z.mean(dim=(1, 2)).tolist() == pytest.approx([0, 0], abs=1e-4)
     assert z.std(dim=(1, 2)).tolist() == pytest.approx([1, 1], abs=1e-3)
 
 
 def test_pictures_are_averaged_not_pooled() -> None:
     """Two pictures that are each flat have no deviation, however far apart they are."""
-    each = [channel_statistics(torch.full((1, 4, 8), value)) for value in (0.0, 10.0)]
+    each = [channel_statistics(torch.full((1, 4, 8), value), GRID) for value in (0.0, 10.0)]
     both = mean_of(each)
     assert (float(both.mean), float(both.deviation)) == (5.0, 0.0)
 

@@ -21,7 +21,8 @@ from gear.plugins.catalogue import Found
 from gear.values.errors import DatasetError, GearError
 from gear.values.serial import Json
 from gear.verbs.attack.data import check_joined
-from gear.verbs.attack.models import check_attack, choose_defense, choose_models
+from gear.verbs.attack.models import FLAG, check_attack, choose_defense, choose_models
+from gear.verbs.evaluate.calibration import Calibration, Progress, opened_calibration
 from gear.verbs.evaluate.choice import Chosen
 from gear.verbs.train.data import open_all
 
@@ -43,6 +44,7 @@ class Job:
         task: of both.
         surfaces: of each sample: so many patches are made.
         models, defense: what is attacked, and what the attack looks through.
+        calibration: what the defense learns from.
         found, spec: the attack.
         options, config: of it, as given and as read.
         compositor: by name.
@@ -57,6 +59,7 @@ class Job:
     surfaces: int
     models: Sequence[Chosen]
     defense: Chosen | None
+    calibration: Calibration
     found: Found
     spec: AttackSpec[Any]
     options: Node
@@ -82,6 +85,7 @@ class Job:
             "models": [one.facts() for one in self.models],
             "weights_sha256": weights_sha256,
             "defense": None if self.defense is None else self.defense.facts(),
+            **({} if self.calibration.clean is None else {"calibration": self.calibration.facts()}),
             "task": self.task,
             "data": [_facts(dataset) for dataset in self.datasets],
             "validation": [_facts(dataset) for dataset in self.validation],
@@ -105,6 +109,9 @@ def resolve(
     model_settings: Iterable[str],
     defense: str | None,
     defense_settings: Iterable[str],
+    calibration: str | Path | None,
+    calibration_patched: str | Path | None,
+    learning: Progress | None,
     val: Paths,
     every: int,
     patience: int,
@@ -130,7 +137,15 @@ def resolve(
     config = read_node(found.spec.config, options, "")
     surfaces = len(datasets[0].sidecar(0).record.surfaces)
     spec = check_attack(found, models, task, surfaces, queries)
-    guard = choose_defense(defense, defense_settings, models, task, needs_gradients=spec.needs_gradients)
+    learnt = opened_calibration(calibration, calibration_patched, models, defense, flag=FLAG, told=learning)
+    guard = choose_defense(
+        defense,
+        defense_settings,
+        models,
+        task,
+        is_calibrated=learnt.clean is not None,
+        needs_gradients=spec.needs_gradients,
+    )
     if {scenes_of(one) for one in datasets} & {scenes_of(one) for one in validation}:
         raise GearError("--data and --val hold the same samples; give --val another split")
     if steps is None:
@@ -142,6 +157,7 @@ def resolve(
         surfaces=surfaces,
         models=models,
         defense=guard,
+        calibration=learnt,
         found=found,
         spec=spec,
         options=options,

@@ -16,6 +16,7 @@ from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
 from gear.values.rng import derive_rng
 from gear.verbs.defend import Guard
+from gear.verbs.evaluate.calibration import Calibration
 from gear.verbs.evaluate.choice import Chosen, check_defense, check_model, chosen_defense, chosen_model
 
 FLAG = "--model-set "
@@ -40,7 +41,13 @@ def choose_models(names: Sequence[str], settings: Iterable[str], datasets: Seque
 
 
 def choose_defense(
-    name: str | None, settings: Iterable[str], models: Sequence[Chosen], task: str, *, needs_gradients: bool
+    name: str | None,
+    settings: Iterable[str],
+    models: Sequence[Chosen],
+    task: str,
+    *,
+    is_calibrated: bool,
+    needs_gradients: bool,
 ) -> Chosen | None:
     """The defense that the attack knows of.
 
@@ -51,7 +58,7 @@ def choose_defense(
     if chosen is None:
         return None
     for model in models:
-        check_defense(chosen, model, task, is_calibrated=False)
+        check_defense(chosen, model, task, is_calibrated=is_calibrated)
     spec = chosen.found.spec
     assert isinstance(spec, DefenseSpec)
     if spec.gradient == "none" and needs_gradients:
@@ -90,19 +97,20 @@ def check_attack(
     return spec
 
 
-def build_model(models: Sequence[Chosen], defense: Chosen | None) -> Model:
-    """What `Attack.optimise` is given."""
+def build_model(models: Sequence[Chosen], defense: Chosen | None, calibration: Calibration, seed: int) -> Model:
+    """What `Attack.optimise` is given; a defense learns from the calibration data, for each model anew."""
     built: dict[str, Model] = {}
     for chosen in models:
         model: Model = build(chosen.found, chosen.options)
         if defense is not None:
             guard: Defense = build(defense.found, defense.options)
+            spec, guarded = defense.found.spec, chosen.found.spec
+            assert isinstance(spec, DefenseSpec) and isinstance(guarded, ModelSpec)
+            state = calibration.fit(defense, guard, model, guarded.views, seed)
             with blamed(defense.found, "wrap"):
                 wrapped = guard.wrap(model)
-            spec = defense.found.spec
-            assert isinstance(spec, DefenseSpec)
             if spec.gradient == "none":
-                model = Cleaned(wrapped, guard, model, _cleaning(defense.found, spec, guard, model))
+                model = Cleaned(wrapped, guard, model, _cleaning(defense.found, spec, guard, model, state))
             else:
                 model = Defended(wrapped, guard, model)
         built[chosen.found.spec.name] = model
@@ -110,8 +118,8 @@ def build_model(models: Sequence[Chosen], defense: Chosen | None) -> Model:
 
 
 def _cleaning(
-    found: Found, spec: DefenseSpec[Any], product: Defense, model: Model
+    found: Found, spec: DefenseSpec[Any], product: Defense, model: Model, state: Any
 ) -> Callable[[Mapping[str, UInt8Image]], Mapping[str, UInt8Image]]:
     """What a defense makes of a sample's pictures; what it draws, it draws alike each time it is asked."""
-    guard = Guard(found, product, model if spec.needs_model or spec.taps else None)
+    guard = Guard(found, product, model if spec.needs_model or spec.taps else None, state)
     return lambda views: guard.apply(views, derive_rng(0, "attack", spec.name), 0).views

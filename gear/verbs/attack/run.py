@@ -69,6 +69,8 @@ def attack(
     model_settings: Iterable[str] = (),
     defense: str | None = None,
     defense_settings: Iterable[str] = (),
+    calibration: str | Path | None = None,
+    calibration_patched: str | Path | None = None,
     val: Paths = (),
     every: int = 25,
     patience: int = 0,
@@ -77,6 +79,7 @@ def attack(
     allow_tests: bool = False,
     force: bool = False,
     progress: Progress | None = None,
+    learning: Progress | None = None,
     noted: Callable[[str], None] | None = None,
 ) -> AttackReport:
     """Makes patches for the surfaces of a scene; takes up again what was begun.
@@ -95,6 +98,8 @@ def attack(
         model_settings: for the models' options.
         defense: that the attack looks through.
         defense_settings: for its options.
+        calibration: dataset from which the defense learns.
+        calibration_patched: the same with patches.
         val: datasets on whose samples patches are judged; the best are kept.
         every: steps between two looks at them.
         patience: looks without a better one until the attack ends; 0 for never.
@@ -103,6 +108,7 @@ def attack(
         allow_tests: whether `test` splits may be optimised on.
         force: start afresh where something else is.
         progress: told after every step.
+        learning: told after every calibration sample that the defense reads for the first time.
         noted: told, before anything is made, of a model that sees these pictures at another size than it learnt from.
 
     Raises:
@@ -118,6 +124,9 @@ def attack(
         model_settings=model_settings,
         defense=defense,
         defense_settings=defense_settings,
+        calibration=calibration,
+        calibration_patched=calibration_patched,
+        learning=learning,
         val=val,
         every=every,
         patience=patience,
@@ -126,7 +135,8 @@ def attack(
         allow_tests=allow_tests,
     )
     _note_sizes(job, noted)
-    product, network, root = build(job.found, job.options), build_model(job.models, job.defense), Path(out)
+    product, root = build(job.found, job.options), Path(out)
+    network = build_model(job.models, job.defense, job.calibration, job.seed)
     plan = job.plan(weights_digest(network), product)
     there = begin(root, plan, force=force)
     if there is not None:

@@ -47,10 +47,13 @@ def verify(
     settings: Iterable[str] = (),
     defense: str | None = None,
     defense_settings: Iterable[str] = (),
+    calibration: str | Path | None = None,
+    calibration_patched: str | Path | None = None,
     samples: int | None = None,
     town: str | Path | None = None,
     scenes: str | Path | None = None,
     progress: Callable[[int, int], None] | None = None,
+    learning: Callable[[int, int], None] | None = None,
 ) -> dict[str, GapReport]:
     """Renders a patch folder on a held-out dataset, and compares pictures and effect, digital and rendered.
 
@@ -65,9 +68,12 @@ def verify(
         settings: `KEY=VALUE` texts for their options.
         defense: a defense plugin that they stand behind.
         defense_settings: for its options.
+        calibration: dataset from which the defense learns.
+        calibration_patched: the same with patches.
         samples: its first so many samples; all unless given.
         town, scenes: files of its town and of that one's scene library, where they are none of gear's own.
         progress: told after every sample.
+        learning: told after every calibration sample that the defense reads for the first time.
 
     Returns:
         Reports by model.
@@ -94,10 +100,13 @@ def verify(
             settings=texts,
             defense=defense,
             defense_settings=defense_texts,
+            calibration=calibration,
+            calibration_patched=calibration_patched,
             samples=samples,
             town=town,
             scenes=scenes,
             out=place / model.replace("/", "-"),
             progress=progress,
+            learning=learning,
         )
     return reports

@@ -22,13 +22,11 @@ from gear.plugins.build import blamed, build
 from gear.plugins.catalogue import Found
 from gear.plugins.manager import DISTRIBUTION
 from gear.values.errors import PluginError
-from gear.values.frames import UInt8Image
 from gear.values.rng import derive_rng
 from gear.verbs.defend import Guard
+from gear.verbs.evaluate.calibration import NOTHING, Calibration, Views
 from gear.verbs.evaluate.choice import Chosen
 from gear.verbs.evaluate.lanes import lanes_of
-
-Views = Mapping[str, UInt8Image]
 
 SMALL_PX, MOST_TOGETHER = 1_400_000, 4
 """More pixels at a time make no network of ours quicker on a CPU, and several slower."""
@@ -66,8 +64,7 @@ class Player:
         model: Chosen,
         defense: Chosen | None = None,
         *,
-        clean: Dataset[Any] | None = None,
-        patched: Dataset[Any] | None = None,
+        calibration: Calibration = NOTHING,
         seed: int = 0,
     ) -> None:
         """Builds, fits and wraps.
@@ -85,25 +82,19 @@ class Player:
         self._guard_name = ""
         if defense is not None:
             self._guard_name = defense.found.spec.name
-            self._guard, self.model = self._guarded(defense, bare, clean, patched)
+            self._guard, self.model = self._guarded(defense, bare, calibration)
         many = getattr(self.model, "predict_many", None)
         self._many = many if callable(many) else None
         self._is_ours = model.found.owner.package == DISTRIBUTION and defense is None
         self.lanes = lanes_of(bare) if self._is_ours else 1
         self._at_work, self._counting = 0, threading.Lock()
 
-    def _guarded(
-        self, defense: Chosen, bare: Model, clean: Dataset[Any] | None, patched: Dataset[Any] | None
-    ) -> tuple[Guard, Model]:
+    def _guarded(self, defense: Chosen, bare: Model, calibration: Calibration) -> tuple[Guard, Model]:
         found = defense.found
         spec = found.spec
         assert isinstance(spec, DefenseSpec)
         product = build(found, defense.options)
-        state = None
-        if clean is not None:
-            sides = [CalibrationViews(one, self._views) if one is not None else () for one in (clean, patched)]
-            with blamed(found, "fit"):
-                state = product.fit(sides[0], sides[1], bare, derive_rng(self._seed, "calibrate", spec.name))
+        state = calibration.fit(defense, product, bare, self._views, self._seed)
         with blamed(found, "wrap"):
             wrapped: Model = product.wrap(bare)
         return Guard(found, product, bare if spec.needs_model or spec.taps else None, state), wrapped
@@ -171,22 +162,6 @@ class Player:
         if len(answers) != len(shown):
             raise accusation(self._found, stage, f"predict_many gave {len(answers)} answers to {len(shown)} samples")
         return answers
-
-
-class CalibrationViews(Sequence[Views]):
-    """The pictures of a dataset, read when they are looked at."""
-
-    def __init__(self, dataset: Dataset[Any], names: Sequence[str]) -> None:
-        self._dataset, self._names = dataset, tuple(names)
-
-    def __len__(self) -> int:
-        return len(self._dataset)
-
-    def __getitem__(self, index: Any) -> Any:
-        if isinstance(index, slice):
-            return [self[i] for i in range(*index.indices(len(self)))]
-        images = self._dataset[index].images
-        return {name: images[name] for name in self._names}
 
 
 def accusation(found: Found, stage: str, problem: str) -> PluginError:

@@ -13,12 +13,11 @@ from gear.dataset.files import clear_scratch, explained, inside, write_whole
 from gear.dataset.plan import differences
 from gear.dataset.sidecar import dump_json, load_json
 from gear.dataset.store import refuse_dataset
-from gear.opening import open_dataset
 from gear.values.errors import DatasetError, GearError
 from gear.values.serial import Json
+from gear.verbs.evaluate.calibration import opened_calibration
 from gear.verbs.evaluate.choice import (
     check_defense,
-    check_model,
     chosen_defense,
     chosen_model,
 )
@@ -52,6 +51,7 @@ def evaluate(
     seed: int = 0,
     resamples: int = 1000,
     progress: Progress | None = None,
+    learning: Progress | None = None,
 ) -> EvaluateReport:
     """Runs a model, with or without a defense, over datasets of its task; takes up again what was begun.
 
@@ -77,6 +77,7 @@ def evaluate(
         seed: of the defense's draws and of the bootstrap.
         resamples: of the bootstrap; 0 for no intervals.
         progress: told after every sample.
+        learning: told after every calibration sample that the defense reads for the first time.
 
     Raises:
         GearError: anything that the user can put right; its text is one line.
@@ -89,23 +90,18 @@ def evaluate(
     guard = chosen_defense(defense, defense_settings)
     datasets = opened([data] if isinstance(data, (str, Path)) else data, split, chosen, reports)
     task, names = datasets[0].plan.task["name"], row_names(datasets)
-    learnt = [open_dataset(one) if one is not None else None for one in (calibration, calibration_patched)]
-    for one in learnt:
-        if one is not None:
-            check_model(chosen, one)
-    if guard is None and (calibration is not None or calibration_patched is not None):
-        raise GearError("defenses learn from calibration data, but there is no defense: name one with --defense")
+    learnt = opened_calibration(calibration, calibration_patched, [chosen], defense, told=learning)
     if guard is not None:
-        check_defense(guard, chosen, task, is_calibrated=learnt[0] is not None)
+        check_defense(guard, chosen, task, is_calibrated=learnt.clean is not None)
     usual = Path("evaluations", task, model.replace("/", "-") + f"+{defense}" * bool(defense))
     root = usual if out is None else Path(out)
     refuse_dataset(root, "write the evaluation into a folder of its own")
-    player = Player(chosen, guard, clean=learnt[0], patched=learnt[1], seed=seed)
+    player = Player(chosen, guard, calibration=learnt, seed=seed)
     facts = {
         "task": datasets[0].plan.task,
         "model": chosen.facts() | {"weights_sha256": player.weights_sha256},
         "defense": None if guard is None else guard.facts(),
-        "calibration": [None if one is None else one.plan.content_key for one in learnt],
+        "calibration": learnt.facts(),
         "seed": seed,
     }
     _begin(root, facts)
@@ -119,7 +115,7 @@ def evaluate(
         rows.append(
             Measured(name=name, dataset=dataset, scorer=scorer, notes=row.notes, made=row.made, damaged=row.damaged)
         )
-    said = [note for dataset in datasets for note in (size_note(chosen, dataset), drive_note(dataset))]
+    said = [note for one in datasets for note in (size_note(chosen, one), drive_note(one), learnt.note(one))]
     notes = [note for note in said if note]
     more = {"reports": list(reports), "resamples": resamples, "versions": _versions(player), "notes": notes}
     found = EvaluateReport(

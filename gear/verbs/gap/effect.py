@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Evaluator
 from gear.dataset.reading import Dataset
 from gear.plugins.build import find, name_of_task
+from gear.verbs.evaluate.calibration import Progress, opened_calibration
 from gear.verbs.evaluate.choice import check_defense, check_model, chosen_defense, chosen_model
 from gear.verbs.evaluate.player import Player
 from gear.verbs.evaluate.shown_size import size_note
@@ -63,8 +65,10 @@ class Effect:
         *,
         defense: str | None = None,
         defense_settings: Iterable[str] = (),
+        calibration: tuple[str | Path | None, str | Path | None] = (None, None),
+        learning: Progress | None = None,
     ) -> Effect:
-        """For a model plugin, behind a defense plugin that need not learn first, if one is named.
+        """For a model plugin, behind a defense plugin if one is named, which learns from `calibration`.
 
         Raises:
             UnknownNameError: there is no such model or defense.
@@ -75,13 +79,14 @@ class Effect:
         check_model(chosen, dataset)
         task = dataset.plan.task["name"]
         guard = chosen_defense(defense, defense_settings)
+        learnt = opened_calibration(*calibration, [chosen], defense, told=learning)
         if guard is not None:
-            check_defense(guard, chosen, task, is_calibrated=False)
+            check_defense(guard, chosen, task, is_calibrated=learnt.clean is not None)
         spec = find("task", name_of_task(dataset.plan.task)).spec
         assert isinstance(spec, TaskSpec)
         names = (CLEAN, *compositors, RENDERED)
         return Effect(
-            player=Player(chosen, guard),
+            player=Player(chosen, guard, calibration=learnt),
             evaluators={name: dataset.task.evaluator() for name in names},
             figure=spec.figure.rpartition(".")[2],
             note=size_note(chosen, dataset),

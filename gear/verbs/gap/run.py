@@ -47,12 +47,15 @@ def gap(
     settings: Iterable[str] = (),
     defense: str | None = None,
     defense_settings: Iterable[str] = (),
+    calibration: str | Path | None = None,
+    calibration_patched: str | Path | None = None,
     compositors: Sequence[str] = ("transport", "homography"),
     samples: int | None = None,
     town: str | Path | None = None,
     scenes: str | Path | None = None,
     out: str | Path | None = None,
     progress: Progress | None = None,
+    learning: Progress | None = None,
     noted: Callable[[str], None] | None = None,
 ) -> GapReport:
     """Holds digital patches against rendered ones.
@@ -64,13 +67,16 @@ def gap(
         split: of the dataset; may be left out where there is only one.
         model: a model plugin for the task's metric; none for pictures alone.
         settings: `KEY=VALUE` texts for the model's options.
-        defense: a defense plugin that the model stands behind; one that need not learn first.
+        defense: a defense plugin that the model stands behind.
         defense_settings: for its options.
+        calibration: dataset from which the defense learns.
+        calibration_patched: the same with patches.
         compositors: names of compositors.
         samples: so many of the split's first samples; all unless given.
         town, scenes: with `patch`, files of the town and of its scene library, where they are none of gear's own.
         out: folder for `gap.json` and `gap.txt`; needed with `patch`.
         progress: told after every sample.
+        learning: told after every calibration sample that the defense reads for the first time.
         noted: told, before anything is rendered, of a model that sees these pictures at another size than it learnt
             from.
 
@@ -89,7 +95,8 @@ def gap(
     if patch is not None and out is None:
         raise DatasetError(clean.root, "a twin has to be rendered: say where to with --out DIR")
     settings, defense_settings = tuple(settings), tuple(defense_settings)
-    if model is None and (defense is not None or defense_settings):
+    learns_from = (calibration, calibration_patched)
+    if model is None and (defense is not None or defense_settings or any(learns_from)):
         raise DatasetError(clean.root, "a defense guards a model: name one with --model")
     if model is None and settings:
         raise DatasetError(clean.root, "options are given for a model: name it with --model")
@@ -104,7 +111,16 @@ def gap(
     effect = (
         None
         if model is None
-        else Effect.of(model, settings, clean, tuple(compositors), defense=defense, defense_settings=defense_settings)
+        else Effect.of(
+            model,
+            settings,
+            clean,
+            tuple(compositors),
+            defense=defense,
+            defense_settings=defense_settings,
+            calibration=learns_from,
+            learning=learning,
+        )
     )
     if noted is not None and effect is not None and effect.note is not None:
         noted(effect.note)

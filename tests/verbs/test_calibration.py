@@ -1,0 +1,110 @@
+"""Defenses that learn first, in `gear evaluate`, `gear attack` and `gear gap`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import gear
+from gear.contracts.defenses import DefenseResult
+from gear.contracts.specs import DefenseSpec
+from gear.testing.tiny_networks import tiny_segmenter
+from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
+from gear.values.errors import GearError
+from gear.verbs.attack.run import attack
+from gear.verbs.evaluate.run import evaluate
+
+Small = Callable[..., Path]
+Install = Callable[..., None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Nothing:
+    """No options."""
+
+
+class Learner:
+    """Makes bright pixels black from a level on that it has learnt: the mean of the clean pictures."""
+
+    def __init__(self, config: Nothing) -> None:
+        self.fits: list[tuple[int, int]] = []
+
+    def fit(self, clean: Any, patched: Any, model: Any, rng: np.random.Generator) -> float:
+        self.fits.append((len(clean), len(patched)))
+        return float(np.mean([views["left"].mean() for views in clean]))
+
+    def apply(self, views: Any, model: Any, state: float, rng: np.random.Generator) -> DefenseResult:
+        assert "stem" in model.taps()
+        cleaned = {name: np.where(one > state, 0, one).astype(np.uint8) for name, one in views.items()}
+        return DefenseResult(views=cleaned, score=0.0)
+
+    def forward(self, views: Any) -> Any:
+        raise ValueError("has no gradient")
+
+    def wrap(self, model: Any) -> Any:
+        return model
+
+
+@pytest.fixture
+def learner(install: Install) -> list[Learner]:
+    """Those that were built."""
+    built: list[Learner] = []
+
+    def build(config: Nothing) -> Learner:
+        built.append(Learner(config))
+        return built[-1]
+
+    outputs = frozenset({"images", "score"})
+    spec: DefenseSpec[Any] = DefenseSpec(
+        name="learner", summary="Learns.", config=Nothing, build=build, outputs=outputs,  # type: ignore[arg-type]
+        needs_calibration=True, needs_model=True, taps=("stem",),
+    )  # fmt: skip
+    install(spec, tiny_segmenter)
+    return built
+
+
+def test_an_attack_looks_through_what_has_learnt(small: Small, learner: list[Learner], tmp_path: Path) -> None:
+    asked: dict[str, Any] = {
+        "model": "tiny_segmenter", "attack": "square", "queries": 12, "settings": ["height_px=12", "width_px=24"],
+    }  # fmt: skip
+    with pytest.raises(GearError, match="give --calibration DIR"):
+        attack(small(), out=tmp_path / "no", defense="learner", **asked)
+    with pytest.raises(GearError, match="is the twin of clean pictures"):
+        attack(small(), out=tmp_path / "no", defense="learner", calibration_patched=small(split="val"), **asked)
+    assert not learner and not (tmp_path / "no").exists()
+    plain = attack(small(), out=tmp_path / "plain", **asked)
+    aware = attack(small(), out=tmp_path / "aware", defense="learner", calibration=small(split="val"), **asked)
+    assert learner[0].fits == [(2, 0)]
+    assert aware.facts["calibration"] == [gear.open_dataset(small(split="val")).plan.content_key, None]
+    assert "calibration" not in plain.facts
+    assert not np.array_equal(plain.patches[0].rgb, aware.patches[0].rgb)
+
+
+def test_a_gap_stands_behind_what_has_learnt(small: Small, learner: list[Learner], tmp_path: Path) -> None:
+    asked: dict[str, Any] = {
+        "patch": "random", "out": tmp_path / "gap", "model": "tiny_segmenter", "defense": "learner", "samples": 1,
+        "compositors": ("transport",), "town": TINY_TOWN, "scenes": TINY_SCENES,
+    }  # fmt: skip
+    with pytest.raises(GearError, match="give --calibration DIR"):
+        gear.gap(small(), **asked)
+    report = gear.gap(small(), calibration=small(split="val"), calibration_patched=small(split="val"), **asked)
+    assert learner[0].fits == [(2, 2)] and report.defense == "learner"
+    with pytest.raises(GearError, match="a defense guards a model"):
+        gear.gap(small(), twin=tmp_path / "gap/twin", calibration=small(split="val"))
+
+
+def test_learning_from_what_is_measured_is_noted(small: Small, learner: list[Learner], tmp_path: Path) -> None:
+    asked: dict[str, Any] = {"model": "tiny_segmenter", "defense": "learner", "resamples": 0}
+    read: list[tuple[int, int]] = []
+    same = evaluate(
+        small(), calibration=small(), out=tmp_path / "same", learning=lambda *done: read.append(done), **asked
+    )
+    assert read == [(1, 2), (2, 2)]
+    assert any("learnt from scenes that it is measured on" in note for note in same.facts["notes"])
+    other = evaluate(small(), calibration=small(split="val"), out=tmp_path / "other", **asked)
+    assert not any("learnt" in note for note in other.facts["notes"])
