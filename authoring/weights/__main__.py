@@ -25,7 +25,14 @@ from pathlib import Path
 
 from authoring.weights import renew, ship
 from authoring.weights.patches import command as patches
-from authoring.weights.plan import HELD_OUT_SAMPLES, TRAINING_OPTIONS, Collection, held_out, training
+from authoring.weights.plan import (
+    FIRST_HELD_OUT_SEED,
+    HELD_OUT_SAMPLES,
+    TRAINING_OPTIONS,
+    Collection,
+    held_out,
+    training,
+)
 from gear.values.errors import GearError
 
 TRAINING_SAMPLES = 1000
@@ -46,6 +53,13 @@ def main() -> int:
         collections.add_argument(
             "--samples", type=int, help=f"in all, about ({TRAINING_SAMPLES} of training, {HELD_OUT_SAMPLES} held out)"
         )
+        if part == "held-out":
+            collections.add_argument(
+                "--first-seed",
+                type=int,
+                default=FIRST_HELD_OUT_SEED,
+                help=f"of the first collection ({FIRST_HELD_OUT_SEED}); another one checks the figures on new pictures",
+            )
         collections.add_argument("--jobs", type=int, default=2, help="collections at a time (2)")
         collections.add_argument("--list", action="store_true", help="print the commands and do nothing")
         collections.set_defaults(run=run)
@@ -71,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
     if args.part == "training":
         plan = training(args.task, args.samples or TRAINING_SAMPLES)
     else:
-        plan = held_out(args.task, args.samples or HELD_OUT_SAMPLES)
+        plan = held_out(args.task, args.samples or HELD_OUT_SAMPLES, first_seed=args.first_seed)
     root: Path = args.out / args.part / args.task
     if args.list:
         for collection in plan:

@@ -130,7 +130,7 @@ def training(task: str, samples: int) -> list[Collection]:
     return result
 
 
-def held_out(task: str, samples: int = HELD_OUT_SAMPLES) -> list[Collection]:
+def held_out(task: str, samples: int = HELD_OUT_SAMPLES, *, first_seed: int = FIRST_HELD_OUT_SEED) -> list[Collection]:
     """What the weights are measured on, at the task's own size: both scenes, in a known weather and in the other."""
     pairs = [(place, weather) for place in HELD_OUT_SCENES for weather in ("ClearNoon", HELD_OUT_WEATHER)]
     return [
@@ -141,7 +141,7 @@ def held_out(task: str, samples: int = HELD_OUT_SAMPLES) -> list[Collection]:
             weather=weather,
             split="test",
             patch="none",
-            seed=FIRST_HELD_OUT_SEED + number,
+            seed=first_seed + number,
             samples=max(1, round(samples / len(pairs))),
             settings=(),
         )
