@@ -1,7 +1,12 @@
-"""Polylines in the plane: the centre lines of which streets, kerbs and lanes are made."""
+"""Polylines in the plane: the centre lines of which streets, kerbs and lanes are made.
+
+Angles go through the C library: NumPy's own functions differ in the last digit between processors with and without
+AVX-512, which decides on which side of a bend a mark falls that lies at it.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -31,8 +36,8 @@ def filleted(corners: Sequence[tuple[float, float]], radii_m: Sequence[float]) -
 def _arc(before: Array, corner: Array, after: Array, radius_m: float) -> Array:
     incoming = (corner - before) / np.linalg.norm(corner - before)
     outgoing = (after - corner) / np.linalg.norm(after - corner)
-    turn = float(np.arctan2(_cross(incoming, outgoing), incoming @ outgoing))
-    tangent = radius_m * np.tan(abs(turn) / 2)
+    turn = math.atan2(_cross(incoming, outgoing), incoming @ outgoing)
+    tangent = radius_m * math.tan(abs(turn) / 2)
     room = min(np.linalg.norm(corner - before), np.linalg.norm(after - corner))
     if tangent > room:
         raise ValueError(f"a fillet of {radius_m} m at {corner.tolist()} needs {tangent:.1f} m of {room:.1f} m")
@@ -42,7 +47,7 @@ def _arc(before: Array, corner: Array, after: Array, radius_m: float) -> Array:
     centre = start + side * radius_m * np.array([-incoming[1], incoming[0]])
     angles = np.linspace(0, turn, steps + 1)
     spoke = start - centre
-    cos, sin = np.cos(angles), np.sin(angles)
+    cos, sin = (np.array([f(angle) for angle in angles]) for f in (math.cos, math.sin))
     arc: Array = centre + np.stack([spoke[0] * cos - spoke[1] * sin, spoke[0] * sin + spoke[1] * cos], 1)
     return arc
 
@@ -98,7 +103,7 @@ def densified(line: Array, step_m: float) -> Array:
 
 def blend(start: Array, heading: Array, end: Array, end_heading: Array) -> Array:
     """A smooth curve (N, 2) that leaves `start` along `heading` and reaches `end` along `end_heading`."""
-    turn = float(np.arctan2(_cross(heading, end_heading), heading @ end_heading))
+    turn = math.atan2(_cross(heading, end_heading), heading @ end_heading)
     chord = float(np.linalg.norm(end - start))
     reach = chord / 3
     if abs(turn) > np.radians(12):
@@ -106,7 +111,7 @@ def blend(start: Array, heading: Array, end: Array, end_heading: Array) -> Array
         first = _cross(end - start, end_heading) / _cross(heading, end_heading)
         second = _cross(end - start, heading) / _cross(heading, end_heading)
         if first > 0 and second > 0:
-            arm = 4 / 3 * np.tan(abs(turn) / 4) / np.tan(abs(turn) / 2)
+            arm = 4 / 3 * math.tan(abs(turn) / 4) / math.tan(abs(turn) / 2)
             return _bezier(start, start + heading * first * arm, end - end_heading * second * arm, end, turn)
         reach = chord / 2
     return _bezier(start, start + heading * reach, end - end_heading * reach, end, turn)
