@@ -11,6 +11,8 @@ from torch import Tensor
 from torch.nn import functional
 
 LEAST_DEVIATION = 1e-5
+CHANNELS_AT_ONCE = 64
+"""As many are pooled together: deep maps of many channels would take gigabytes."""
 
 Cells = tuple[int, int]
 
@@ -33,9 +35,12 @@ class ChannelStatistics:
 
 
 def channel_statistics(features: Tensor, grid: Cells) -> ChannelStatistics:
-    """Of one (C, h, w) map, as it is on the grid."""
-    cells = on_grid(features, grid)
-    return ChannelStatistics(mean=cells.mean(dim=(1, 2)), deviation=cells.std(dim=(1, 2)))
+    """Of one (C, h, w) map, as it is on the grid: every cell counts as often as it is the nearest one there."""
+    down, across = (_nearest(*sizes).sum(dim=0) for sizes in zip(features.shape[1:], grid, strict=True))
+    times, count = down[:, None] * across, grid[0] * grid[1]
+    mean = (features * times).sum(dim=(1, 2)) / count
+    squares = ((features - mean[:, None, None]).square() * times).sum(dim=(1, 2))
+    return ChannelStatistics(mean=mean, deviation=(squares / max(count - 1, 1)).sqrt())
 
 
 def mean_of(many: Sequence[ChannelStatistics]) -> ChannelStatistics:
@@ -66,7 +71,10 @@ def pooled_sizes(z: Tensor, grid: Cells, kernel: Cells) -> Tensor:
         (rows, columns), 0 or more.
     """
     down, across = (_window_means(*sizes) for sizes in zip(z.shape[1:], grid, kernel, strict=True))
-    return on_grid((down @ z @ across.T).abs().mean(dim=0)[None], grid)[0]
+    sizes = torch.zeros(len(down), len(across))
+    for channels in torch.split(z, CHANNELS_AT_ONCE):
+        sizes += (down @ channels @ across.T).abs().sum(dim=0)
+    return on_grid(sizes[None] / len(z), grid)[0]
 
 
 def refined(pooled: Sequence[Tensor]) -> Tensor:
@@ -81,10 +89,14 @@ def refined(pooled: Sequence[Tensor]) -> Tensor:
     return result
 
 
+def _nearest(cells: int, grid: int) -> Tensor:
+    """(grid, cells): 1 where a place of the grid takes its value from a cell."""
+    return functional.interpolate(torch.eye(cells)[None], size=grid, mode="nearest")[0].T
+
+
 @functools.lru_cache(maxsize=64)
 def _window_means(cells: int, grid: int, kernel: int) -> Tensor:
     """(windows, cells): from a line of cells to the means of windows of a grid on which each has the nearest one."""
-    nearest = functional.interpolate(torch.eye(cells)[None], size=grid, mode="nearest")[0].T
-    sums = functional.pad(nearest.double().cumsum(dim=0), (0, 0, 1, 0))
+    sums = functional.pad(_nearest(cells, grid).double().cumsum(dim=0), (0, 0, 1, 0))
     kernel = min(kernel, grid)
     return ((sums[kernel:] - sums[:-kernel]) / kernel).float()

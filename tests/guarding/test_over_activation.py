@@ -79,6 +79,19 @@ def test_scores_are_of_each_channel_alone() -> None:
     assert z.std(dim=(1, 2)).tolist() == pytest.approx([1, 1], abs=1e-3)
 
 
+def test_statistics_are_those_of_the_grid() -> None:
+    features = torch.randn(3, 7, 13, generator=torch.Generator().manual_seed(4)) + 2
+    cells, learnt = on_grid(features, GRID), channel_statistics(features, GRID)
+    assert torch.allclose(learnt.mean, cells.mean(dim=(1, 2)), atol=1e-5)
+    assert torch.allclose(learnt.deviation, cells.std(dim=(1, 2)), atol=1e-5)
+
+
+def test_channels_are_pooled_in_portions_to_the_same_end() -> None:
+    z = noise(2, channels=150)
+    alone = torch.stack([pooled_sizes(one[None], GRID, (4, 8)) for one in z]).mean(dim=0)
+    assert torch.allclose(pooled_sizes(z, GRID, (4, 8)), alone, atol=1e-5)
+
+
 def test_pictures_are_averaged_not_pooled() -> None:
     """Two pictures that are each flat have no deviation, however far apart they are."""
     each = [channel_statistics(torch.full((1, 4, 8), value), GRID) for value in (0.0, 10.0)]
