@@ -49,7 +49,7 @@ def feature_maps(model: Model, views: Mapping[str, UInt8Image], names: Iterable[
 
     handles = [taps[name].register_forward_hook(keep(name)) for name in wanted]
     try:
-        with torch.inference_mode():
+        with torch.no_grad():
             model.forward({name: _as_batch(picture) for name, picture in views.items()})
     finally:
         for handle in handles:
@@ -57,7 +57,7 @@ def feature_maps(model: Model, views: Mapping[str, UInt8Image], names: Iterable[
     for name in wanted:
         if name not in seen or seen[name].ndim != 3:
             raise GearError(f"the model's tap {name!r} gives no feature map of (B, C, H, W)")
-    return {name: seen[name].clone() for name in wanted}
+    return {name: seen[name] for name in wanted}
 
 
 def deepest(model: Model, views: Mapping[str, UInt8Image]) -> str:

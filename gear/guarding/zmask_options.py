@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from gear.guarding.options import AlarmConfig
 from gear.values.errors import FieldError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ZMaskConfig:
+class ZMaskConfig(AlarmConfig):
     """Options, with the values of the authors' demonstration (BiSeNet, pictures of 2048 x 1024).
 
     Attributes:
@@ -19,7 +20,6 @@ class ZMaskConfig:
         statistics_pictures: clean pictures of which what is usual is learnt, at most.
         learning_pictures: pictures with patches from which the mask is learnt, at most.
         steps: of the training on these; 250 passes over 100 pictures, 15 a step, were published.
-        false_alarms: share of clean calibration pictures that shall score above 0.5.
         only_if_sure: whether to leave alone what scores less than 0.5.
     """
 
@@ -31,10 +31,10 @@ class ZMaskConfig:
     statistics_pictures: int = 500
     learning_pictures: int = 50
     steps: int = 1750
-    false_alarms: float = 0.05
     only_if_sure: bool = False
 
     def __post_init__(self) -> None:
+        AlarmConfig.__post_init__(self)
         for name in ("rows", "statistics_pictures", "learning_pictures", "steps"):
             if getattr(self, name) < 1:
                 raise FieldError(name, f"must be at least 1, got {getattr(self, name)}")
@@ -42,5 +42,3 @@ class ZMaskConfig:
             kernels = getattr(self, name)
             if not kernels or min(kernels) < 1 or max(kernels) > self.rows:
                 raise FieldError(name, f"must be one or more numbers from 1 to rows ({self.rows}), got {list(kernels)}")
-        if not 0 < self.false_alarms < 1:
-            raise FieldError("false_alarms", f"must be between 0 and 1, got {self.false_alarms:g}")

@@ -10,7 +10,7 @@ from typing import Any
 from gear.values.errors import TownError
 from gear.world.faces import FACE_SIZE_PX
 from gear.world.quiet_mjcf import mjcf
-from gear.world.refusals import one_line, refusal_of
+from gear.world.refusals import refusal_of, without_breaks
 from gear.world.statics import UNNAMED, Place, split_asset
 
 _UNREAD = ("frame", "replicate", "attach")
@@ -62,9 +62,9 @@ def load_mjcf(path: Path, text: str | None = None, places: Mapping[str, Place] |
                 what += "; write bodies where it says frame, replicate or attach"
         elif isinstance(error, (SyntaxError, RecursionError)):
             # The file itself is XML: it is one that it includes, which MuJoCo names.
-            what = refusal_of(path) or one_line(error)
+            what = refusal_of(path) or without_breaks(error)
         else:
-            what = one_line(error)
+            what = without_breaks(error)
         raise TownError(path, f"cannot be read as MJCF: {what}") from error
     root.model = path.stem
     # Writing an element without a name makes dm_control count all elements before it: quadratic in their number.

@@ -16,7 +16,7 @@ from gear.values.errors import TownError
 _LINE = re.compile(r",? line \d+\b")
 
 
-def one_line(error: BaseException) -> str:
+def without_breaks(error: BaseException) -> str:
     """What an error says, without line breaks."""
     return " ".join(str(error).split())
 
@@ -26,7 +26,7 @@ def refusal_of(path: Path) -> str:
     try:
         mujoco.MjSpec.from_file(str(path)).compile()
     except ValueError as error:
-        return one_line(error)
+        return without_breaks(error)
     return ""
 
 
@@ -41,4 +41,4 @@ def refused(error: ValueError, files: Sequence[Path]) -> TownError:
         if said := refusal_of(path):
             return TownError(path, f"MuJoCo cannot compile it: {said}")
     # The lines are those of a text that nobody has.
-    return TownError(files[0], f"MuJoCo cannot compile it: {_LINE.sub('', one_line(error))}")
+    return TownError(files[0], f"MuJoCo cannot compile it: {_LINE.sub('', without_breaks(error))}")

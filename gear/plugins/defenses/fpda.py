@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 from gear.contracts.defenses import Defense
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import DefenseSpec
-from gear.values.errors import FieldError
+from gear.guarding.options import DetectorConfig
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -18,24 +18,16 @@ PEAK_CELLS = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FpdaConfig:
+class FpdaConfig(DetectorConfig):
     """Options. The published text says that features are compressed over channels and compared by Z-scores.
 
     Attributes:
-        layer: feature map of the model to look at; empty takes the deepest.
         compress: mean over channels, of the features or of their sizes.
         aggregate: mean of the Z-scores' sizes, or the largest mean of a window of 3 x 3, for patches far away.
-        false_alarms: share of clean calibration pictures that shall score above 0.5.
     """
 
-    layer: str = ""
     compress: Literal["mean", "mean_abs"] = "mean"
     aggregate: Literal["mean", "peak"] = "mean"
-    false_alarms: float = 0.05
-
-    def __post_init__(self) -> None:
-        if not 0 < self.false_alarms < 1:
-            raise FieldError("false_alarms", f"must be between 0 and 1, got {self.false_alarms:g}")
 
 
 def build(config: FpdaConfig) -> Defense:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 from gear.contracts.defenses import Defense
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import DefenseSpec
-from gear.values.errors import FieldError
+from gear.guarding.options import DetectorConfig
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -18,24 +18,16 @@ FAR = 3.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class HyperNeuronConfig:
+class HyperNeuronConfig(DetectorConfig):
     """Options. The published text says that the score comes from the Z-scores of all features of one layer, not how.
 
     Attributes:
-        layer: feature map of the model to look at; empty takes the deepest.
         statistics: what is usual is asked of each neuron (channel and place), or of each channel's mean in a picture.
         aggregate: mean of the Z-scores' sizes, root of the mean of their squares, or share of sizes above 3.
-        false_alarms: share of clean calibration pictures that shall score above 0.5.
     """
 
-    layer: str = ""
     statistics: Literal["neuron", "channel"] = "neuron"
     aggregate: Literal["mean", "rms", "share"] = "mean"
-    false_alarms: float = 0.05
-
-    def __post_init__(self) -> None:
-        if not 0 < self.false_alarms < 1:
-            raise FieldError("false_alarms", f"must be between 0 and 1, got {self.false_alarms:g}")
 
 
 def build(config: HyperNeuronConfig) -> Defense:

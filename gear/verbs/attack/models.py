@@ -98,7 +98,8 @@ def check_attack(
 
 
 def build_model(models: Sequence[Chosen], defense: Chosen | None, calibration: Calibration, seed: int) -> Model:
-    """What `Attack.optimise` is given; a defense learns from the calibration data, for each model anew."""
+    """What `Attack.optimise` is given; a defense without gradients learns from the calibration data, for each model
+    anew."""
     built: dict[str, Model] = {}
     for chosen in models:
         model: Model = build(chosen.found, chosen.options)
@@ -106,10 +107,10 @@ def build_model(models: Sequence[Chosen], defense: Chosen | None, calibration: C
             guard: Defense = build(defense.found, defense.options)
             spec, guarded = defense.found.spec, chosen.found.spec
             assert isinstance(spec, DefenseSpec) and isinstance(guarded, ModelSpec)
-            state = calibration.fit(defense, guard, model, guarded.views, seed)
             with blamed(defense.found, "wrap"):
                 wrapped = guard.wrap(model)
-            if spec.gradient == "none":
+            if spec.gradient == "none":  # others clean in `forward`, which knows of nothing that was learnt
+                state = calibration.fit(defense, guard, model, guarded.views, seed)
                 model = Cleaned(wrapped, guard, model, _cleaning(defense.found, spec, guard, model, state))
             else:
                 model = Defended(wrapped, guard, model)

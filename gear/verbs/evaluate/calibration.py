@@ -119,5 +119,5 @@ class CalibrationViews(Sequence[Views]):
         if isinstance(index, slice):
             return [self[i] for i in range(*index.indices(len(self)))]
         images = self._dataset[index].images
-        self._took(index)
+        self._took(index % len(self))
         return {name: images[name] for name in self._names}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -16,6 +17,7 @@ from gear.values.labels import LABEL_BY_NAME
 from gear.verbs.towns.canvas import Canvas, Colour
 from gear.world.classes import FIRST_HIDDEN_GROUP, GeomClasses, classify
 from gear.world.models import GROUND_PREFIX
+from gear.world.refusals import without_breaks
 from gear.world.shapes import geom_triangles
 
 Bounds = tuple[float, float, float, float]
@@ -71,7 +73,7 @@ class Relief:
             spec = mujoco.MjSpec.from_file(str(path))
             model = spec.compile()
         except ValueError as error:
-            raise TownError(path, f"MuJoCo cannot compile it: {' '.join(str(error).split())}") from error
+            raise TownError(path, f"MuJoCo cannot compile it: {without_breaks(error)}") from error
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
         return Relief(path=path, model=model, data=data, classes=classify(spec, path))
@@ -137,13 +139,13 @@ def obstacles(relief: Relief) -> list[Obstacle]:
 
 def draw_ground(canvas: Canvas, relief: Relief, bounds_m: Bounds) -> None:
     """Draws ground covers, plants, fences and buildings of a town with those bounds."""
-    hidden = _underground(relief, bounds_m)
+    corners_m = {geom: relief.corners_m(geom) for _, labels, _ in COVERS for geom in _labelled(relief, labels)}
+    hidden = _underground(corners_m, _labelled(relief, ("ground",)), bounds_m)
     for _, labels, colour in COVERS:
         mask = canvas.mask()
         for geom in _labelled(relief, labels):
-            if geom == hidden:
-                continue
-            canvas.fill_triangles(mask, _from_above(relief.corners_m(geom)))
+            if geom != hidden:
+                canvas.fill_triangles(mask, _from_above(corners_m[geom]))
         canvas.blend(mask, colour)
     plants = canvas.mask()
     for geom in _labelled(relief, ("vegetation",)):
@@ -161,18 +163,16 @@ def draw_ground(canvas: Canvas, relief: Relief, bounds_m: Bounds) -> None:
     canvas.outline(buildings, BUILDING_EDGE, 0.8)
 
 
-def _underground(relief: Relief, bounds_m: Bounds) -> int | None:
-    """What closes cracks from below: the ground that lies deeper than everything else, under all of the town."""
-    geoms = [geom for _, labels, _ in COVERS for geom in _labelled(relief, labels)]
-    if len(geoms) < 2:
+def _underground(corners_m: Mapping[int, Array], ground: Sequence[int], bounds_m: Bounds) -> int | None:
+    """What closes cracks from below: the ground that lies deeper than every other cover, under all of the town."""
+    if len(corners_m) < 2:
         return None
-    corners = [relief.corners_m(geom).reshape(-1, 3) for geom in geoms]
-    tops_m = [float(points[:, 2].max()) for points in corners]
-    lowest, second = np.argsort(tops_m)[:2]
-    low, high = corners[lowest].min(axis=0)[:2], corners[lowest].max(axis=0)[:2]
+    tops_m = {geom: float(corners[..., 2].max()) for geom, corners in corners_m.items()}
+    lowest, second = sorted(tops_m, key=lambda geom: tops_m[geom])[:2]
+    points = corners_m[lowest].reshape(-1, 3)[:, :2]
     is_under = tops_m[lowest] < tops_m[second]
-    is_wide = (low <= bounds_m[:2]).all() and (high >= bounds_m[2:]).all()
-    return geoms[lowest] if is_under and is_wide and geoms[lowest] in _labelled(relief, ("ground",)) else None
+    is_wide = (points.min(axis=0) <= bounds_m[:2]).all() and (points.max(axis=0) >= bounds_m[2:]).all()
+    return lowest if is_under and is_wide and lowest in ground else None
 
 
 def _labelled(relief: Relief, names: tuple[str, ...]) -> list[int]:
