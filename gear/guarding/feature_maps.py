@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-import numpy as np
 import torch
 from torch import Tensor, nn
 
 from gear.contracts.models import Model
+from gear.nn.network import as_batch
 from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
 
@@ -50,7 +50,7 @@ def feature_maps(model: Model, views: Mapping[str, UInt8Image], names: Iterable[
     handles = [taps[name].register_forward_hook(keep(name)) for name in wanted]
     try:
         with torch.no_grad():
-            model.forward({name: _as_batch(picture) for name, picture in views.items()})
+            model.forward(as_batch([views], tuple(views)))
     finally:
         for handle in handles:
             handle.remove()
@@ -79,7 +79,3 @@ def spread(items: Sequence[Any], most: int) -> Iterator[Any]:
     """At most so many of them, evenly spaced from the first on; read one at a time."""
     count = min(most, len(items))
     return (items[index * len(items) // count] for index in range(count))
-
-
-def _as_batch(picture: UInt8Image) -> Tensor:
-    return torch.from_numpy(np.ascontiguousarray(picture.transpose(2, 0, 1)))[None].float() / 255

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -172,14 +173,25 @@ NUMBERS = (int, float, np.floating, np.integer)
 class Guard:
     """A third party's defense, whose failures say whose they are."""
 
-    def __init__(self, found: Found, defense: Defense, model: Model | None = None, state: Any = None) -> None:
+    def __init__(
+        self,
+        found: Found,
+        defense: Defense,
+        model: Model | None = None,
+        learn: Callable[[], Any] = lambda: None,
+    ) -> None:
         """Args:
         found: whose it is.
         defense: the thing itself.
         model: what it guards, for a defense that looks into it.
-        state: what its `fit` gave.
+        learn: gives what its `fit` makes of calibration data; called once, before the first sample.
         """
-        self._found, self._defense, self._model, self._state = found, defense, model, state
+        self._found, self._defense, self._model, self._learn = found, defense, model, learn
+
+    @functools.cached_property
+    def state(self) -> Any:
+        """What the defense has learnt. Learning takes minutes, and what is finished needs none of it."""
+        return self._learn()
 
     def apply(self, views: Mapping[str, UInt8Image], rng: np.random.Generator, index: int) -> DefenseResult:
         """Cleans one sample.
@@ -190,7 +202,7 @@ class Guard:
         for picture in views.values():
             picture.setflags(write=False)
         with blamed(self._found, f"apply on sample {index}"):
-            result = self._defense.apply(views, self._model, self._state, rng)
+            result = self._defense.apply(views, self._model, self.state, rng)
         problem = self._problem(result, views)
         if problem:
             raise self._error(index, problem)

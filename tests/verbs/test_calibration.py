@@ -105,6 +105,8 @@ def test_learning_from_what_is_measured_is_noted(small: Small, learner: list[Lea
         small(), calibration=small(), out=tmp_path / "same", learning=lambda *done: read.append(done), **asked
     )
     assert read == [(1, 2), (2, 2)]
+    assert evaluate(small(), calibration=small(), out=tmp_path / "same", **asked).facts == same.facts
+    assert [len(one.fits) for one in learner] == [1, 0], "what is finished needs no learning"
     assert any("learnt from scenes that it is measured on" in note for note in same.facts["notes"])
     other = evaluate(small(), calibration=small(split="val"), out=tmp_path / "other", **asked)
     assert not any("learnt" in note for note in other.facts["notes"])

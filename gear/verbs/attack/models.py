@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from gear.attacking.group import Cleaned, Defended, Group
@@ -110,8 +111,8 @@ def build_model(models: Sequence[Chosen], defense: Chosen | None, calibration: C
             with blamed(defense.found, "wrap"):
                 wrapped = guard.wrap(model)
             if spec.gradient == "none":  # others clean in `forward`, which knows of nothing that was learnt
-                state = calibration.fit(defense, guard, model, guarded.views, seed)
-                model = Cleaned(wrapped, guard, model, _cleaning(defense.found, spec, guard, model, state))
+                learn = partial(calibration.fit, defense, guard, model, guarded.views, seed)
+                model = Cleaned(wrapped, guard, model, _cleaning(defense.found, spec, guard, model, learn))
             else:
                 model = Defended(wrapped, guard, model)
         built[chosen.found.spec.name] = model
@@ -119,8 +120,8 @@ def build_model(models: Sequence[Chosen], defense: Chosen | None, calibration: C
 
 
 def _cleaning(
-    found: Found, spec: DefenseSpec[Any], product: Defense, model: Model, state: Any
+    found: Found, spec: DefenseSpec[Any], product: Defense, model: Model, learn: Callable[[], Any]
 ) -> Callable[[Mapping[str, UInt8Image]], Mapping[str, UInt8Image]]:
     """What a defense makes of a sample's pictures; what it draws, it draws alike each time it is asked."""
-    guard = Guard(found, product, model if spec.needs_model or spec.taps else None, state)
+    guard = Guard(found, product, model if spec.needs_model or spec.taps else None, learn)
     return lambda views: guard.apply(views, derive_rng(0, "attack", spec.name), 0).views

@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -67,7 +68,7 @@ class Player:
         calibration: Calibration = NOTHING,
         seed: int = 0,
     ) -> None:
-        """Builds, fits and wraps.
+        """Builds and wraps; a defense learns before the first sample.
 
         Raises:
             GearError: options or weights do not fit, or a third party's code fails.
@@ -94,10 +95,10 @@ class Player:
         spec = found.spec
         assert isinstance(spec, DefenseSpec)
         product = build(found, defense.options)
-        state = calibration.fit(defense, product, bare, self._views, self._seed)
         with blamed(found, "wrap"):
             wrapped: Model = product.wrap(bare)
-        return Guard(found, product, bare if spec.needs_model or spec.taps else None, state), wrapped
+        learn = partial(calibration.fit, defense, product, bare, self._views, self._seed)
+        return Guard(found, product, bare if spec.needs_model or spec.taps else None, learn), wrapped
 
     def usual_batch(self, dataset: Dataset[Any]) -> int:
         """How many of a dataset's samples go through one of gear's own models together unless somebody says: as many
@@ -115,6 +116,8 @@ class Player:
         Raises:
             PluginError: a third party's model or defense fails.
         """
+        if self._guard is not None:
+            _ = self._guard.state  # learns now, not on the first sample's time
         results: list[DefenseResult | None] = []
         spent: list[float] = []
         shown: list[Views] = []
