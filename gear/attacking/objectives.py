@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -19,12 +19,13 @@ from torch import Tensor
 from torch.nn import functional
 
 from gear.attacking.borrowed import frozen
+from gear.attacking.clean import CleanAnswers
 from gear.attacking.group import members_of
 from gear.contracts.models import Model
 from gear.formats import rle
 from gear.formats.cityscapes import IGNORED_TRAIN_ID, LABELS
+from gear.nn.network import as_batch
 from gear.values.errors import GearError
-from gear.values.frames import UInt8Image
 
 TRAIN_IDS = torch.tensor([label.train_id for label in LABELS if label.id >= 0])
 TRAIN_CLASSES = 19
@@ -49,7 +50,9 @@ class Objective(Protocol):
     """Terms of a batch.
 
     An objective whose weighted terms do not add up to a number that grows with the harm has a method `harm` of the same
-    arguments beside it, which gives that number (see `counted`).
+    arguments beside it, which gives that number (see `counted`). One whose `harm` asks for the answer to a sample's
+    clean picture, once a sample, says so by a true attribute `asks_for_clean`: attacks that are counted in queries pay
+    for it.
     """
 
     def terms(
@@ -107,10 +110,11 @@ class SemsegObjective:
     gamma: float | Literal["dynamic"] = "dynamic"
     attacked: int | None = None
     target: int | None = None
+    _right: CleanAnswers = field(default_factory=CleanAnswers, init=False, repr=False, compare=False)
 
     @property
     def asks_for_clean(self) -> bool:
-        """Whether `harm` looks at the answer to the picture without the patch, too."""
+        """Whether `harm` looks at the answer to the picture without the patch, too; once a sample."""
         return self.target is None and self.gamma != "dynamic"
 
     def terms(
@@ -140,10 +144,12 @@ class SemsegObjective:
             return torch.stack(terms).sum() if terms else torch.zeros(())
         assert self.gamma != "dynamic"
         logits, labels, counts = self._answers(model, views, samples)
-        view = next(iter(views))
-        with torch.no_grad():
-            clean = _said(model, {view: torch.cat([_as_batch(sample.images[view]) for sample in samples])}, "logits")
-            right = counts & _is_right(clean.to(logits.device), labels)
+
+        def rightly_said(sample: Any) -> Tensor:
+            clean = _said(model, as_batch([sample.images], list(views)), "logits")
+            return _is_right(clean, train_labels([sample], clean.shape[1]).to(clean.device))[0]
+
+        right = counts & self._right.of(model, samples, indexes, rightly_said).to(logits.device)
         loss = functional.cross_entropy(logits, labels, ignore_index=IGNORED_TRAIN_ID, reduction="none")
         return self.gamma * _mean(loss, right) + (1 - self.gamma) * _mean(loss, counts & ~right)
 
@@ -174,11 +180,13 @@ class DepthObjective:
         direction: `any` error, or only `farther` or `nearer` than the clean answer: log-depth is pushed that way.
     """
 
+    asks_for_clean = True
+
     def __init__(
         self, *, gamma: float = 0.8, split_m: float = 0.5, direction: Literal["any", "farther", "nearer"] = "any"
     ) -> None:
         self._gamma, self._split_m, self._direction = gamma, split_m, direction
-        self._clean: dict[tuple[int, int], Tensor] = {}
+        self._clean = CleanAnswers()
 
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
@@ -206,24 +214,18 @@ class DepthObjective:
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> tuple[Tensor, Tensor, Tensor]:
         """(B, H, W) metres with the patch and without it, and where no patch is seen."""
-        view = next(iter(views))
-        clean = torch.stack(
-            [self._answer(model, sample, index, view) for sample, index in zip(samples, indexes, strict=True)]
-        )
+
+        def said(sample: Any) -> Tensor:
+            return _said(model, as_batch([sample.images], list(views)), "depth_m")[0]
+
+        clean = self._clean.of(model, samples, indexes, said)
         depth_m = _said(model, views, "depth_m")
-        return depth_m, clean.to(depth_m.device, depth_m.dtype), outside(samples, view, depth_m.device)
+        return depth_m, clean.to(depth_m.device, depth_m.dtype), outside(samples, next(iter(views)), depth_m.device)
 
     def _pushed(self, depth_m: Tensor, clean: Tensor, free: Tensor) -> Tensor:
         sign = 1.0 if self._direction == "farther" else -1.0
         change = depth_m.clamp_min(1e-3).log() - clean.clamp_min(1e-3).log()
         return sign * _mean(change, free)
-
-    def _answer(self, model: Model, sample: Any, index: int, view: str) -> Tensor:
-        key = (id(model), index)
-        if key not in self._clean:
-            with torch.no_grad():
-                self._clean[key] = _said(model, {view: _as_batch(sample.images[view])}, "depth_m")[0].cpu()
-        return self._clean[key]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -279,7 +281,7 @@ def weighted(
 
 def loss_names(model: Model, sample: Any) -> list[str]:
     """What a model calls its losses, of a group all members', in the order that they come in."""
-    views = {name: _as_batch(picture) for name, picture in sample.images.items()}
+    views = as_batch([sample.images], list(sample.images))
     with torch.no_grad(), frozen(model):
         found = [name for member in members_of(model).values() for name in member.forward(views, [sample])]
     return list(dict.fromkeys(found))
@@ -325,11 +327,6 @@ def _said(model: Model, views: Mapping[str, Tensor], name: str) -> Tensor:
             f"an attack works on the output {name!r}, and the network gives {given} (docs/write-a-model.md)"
         )
     return outputs[name]
-
-
-def _as_batch(picture: UInt8Image) -> Tensor:
-    """(1, 3, H, W) in 0..1 of a stored picture."""
-    return torch.from_numpy(picture.copy()).permute(2, 0, 1)[None].float() / 255
 
 
 @functools.lru_cache(maxsize=64)

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import torch
 
 from gear.attacking.group import members_of
-from gear.attacking.objectives import DepthObjective, Objective, SemsegObjective, counted
+from gear.attacking.objectives import Objective, counted
 from gear.contracts.attacks import Budget, Compositor, Patch, State
 from gear.contracts.models import Model
 from gear.values.errors import GearError
@@ -22,8 +22,8 @@ Textures = npt.NDArray[np.float32]
 class Oracle:
     """Answers how much harm textures do; a question about a batch costs one query a model.
 
-    Objectives that compare with the answer to the clean picture cost more: in depth one for every sample not seen
-    before, in segmentation, where it is asked for anew, one for every question.
+    Objectives that compare with the answer to the clean picture (`asks_for_clean`) cost one more for every sample not
+    seen before.
 
     Attributes:
         left: queries that may still be asked.
@@ -48,11 +48,8 @@ class Oracle:
 
     def cost(self, indexes: Sequence[int]) -> int:
         """Queries of one question about these samples."""
-        clean = 0
-        if isinstance(self._objective, DepthObjective):
-            clean = len(set(indexes) - self._seen)
-        elif isinstance(self._objective, SemsegObjective):
-            clean = int(self._objective.asks_for_clean)
+        asks = getattr(self._objective, "asks_for_clean", False)
+        clean = len(set(indexes) - self._seen) if asks else 0
         return len(members_of(self._model)) * (1 + clean)
 
     def harm(self, textures: Textures, indexes: Sequence[int]) -> float:

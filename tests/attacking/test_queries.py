@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gear.attacking.objectives import DepthObjective, SemsegObjective
+from gear.attacking.objectives import DepthObjective, SemsegObjective, Term
 from gear.attacking.queries import Oracle
 from gear.contracts.attacks import Budget
 from gear.plugins.attacks.scene_specific import scene_specific
@@ -38,7 +38,7 @@ def oracle_of(contract: AttackContract, objective: Any, queries: int | None = 50
     [
         (OnSemseg, SemsegObjective(), [1, 1, 1]),
         (OnSemseg, SemsegObjective(target=7), [1, 1, 1]),
-        (OnSemseg, SemsegObjective(gamma=0.5), [2, 2, 2]),
+        (OnSemseg, SemsegObjective(gamma=0.5), [2, 2, 1]),
         (OnDepth, DepthObjective(), [2, 2, 1]),
         (OnDepth, DepthObjective(direction="farther"), [2, 2, 1]),
     ],
@@ -52,11 +52,24 @@ def test_every_pass_is_paid_for(contract: type[AttackContract], objective: Any, 
         assert before - oracle.left == model.passes - passes == cost
 
 
+class HalfOfIt:
+    """Somebody else's objective, which does not say whether it asks for clean answers."""
+
+    def terms(self, model: Any, views: Any, samples: Any, indexes: Any) -> dict[str, Term]:
+        return {"half": Term(value=model.forward(views)["logits"].mean() / 2)}
+
+
+def test_objectives_of_others_ask_for_nothing_but_the_question() -> None:
+    model, oracle = oracle_of(OnSemseg(), HalfOfIt())
+    oracle.harm(TEXTURES, [0, 1])
+    assert (oracle.left, model.passes) == (49, 1)
+
+
 def test_what_cannot_be_paid_is_not_asked() -> None:
     model, oracle = oracle_of(OnSemseg(), SemsegObjective(gamma=0.5), queries=3)
     oracle.harm(TEXTURES, [0])
     with pytest.raises(RuntimeError, match="no queries left"):
-        oracle.harm(TEXTURES, [0])
+        oracle.harm(TEXTURES, [1])
     assert (oracle.left, model.passes) == (1, 2)
     with pytest.raises(GearError, match="--queries"):
         oracle_of(OnSemseg(), SemsegObjective(), queries=None)
