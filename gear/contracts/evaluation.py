@@ -79,6 +79,19 @@ class Resampled(Protocol):
 
 
 @runtime_checkable
+class Additive(Protocol):
+    """An evaluator whose figures follow from sums over pictures: merging is adding."""
+
+    def totals(self) -> Mapping[str, npt.NDArray[Any]]:
+        """The sums, by names and with shapes that are always the same."""
+        ...
+
+    def figures(self, totals: Mapping[str, npt.NDArray[Any]]) -> Spread:
+        """What `result` would say of sums with an axis of length R in front: (R,) each, NaN where nothing counts."""
+        ...
+
+
+@runtime_checkable
 class Limited(Protocol):
     """An evaluator some of whose figures stay below 1 on few samples, however good the predictions are."""
 

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, TypeVar
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
+from gear.contracts.evaluation import Draws, Spread
 from gear.formats.kitti_depth import MAX_PNG_DEPTH_M
 from gear.values.frames import FloatImage
 from gear.values.geometry import Array
+
+T = TypeVar("T")
 
 Crop = Literal["none", "garg", "eigen"]
 
@@ -107,10 +110,18 @@ class DepthEvaluator:
         (squared error over squared depth); `eigen_d1` to `eigen_d3`, `eigen_abs_rel`, `eigen_sq_rel` (over depth),
         `eigen_rmse_m`, `eigen_rmse_log`, `eigen_log10`, `eigen_silog`.
         """
-        names = (*_devkit(_Sums()), *_eigen(_Sums()))
-        known = {name: [v for v in self.figures.get(name, []) if v == v] for name in names}
+        known = {name: [v for v in self.figures.get(name, []) if v == v] for name in self._names()}
         # Sorted, so that the order in which pictures came does not reach the last digit.
         return {name: float(np.mean(np.sort(values))) if values else float("nan") for name, values in known.items()}
+
+    def resampled(self, draws: Draws) -> Spread:
+        """Means over the drawn pictures; of single ones in the order that they came in."""
+        values = {name: np.array(self.figures.get(name, []), np.float64) for name in self._names()}
+        return {name: _known_means(one[draws]) for name, one in values.items() if len(one)}
+
+    @staticmethod
+    def _names() -> tuple[str, ...]:
+        return (*_devkit(_Sums()), *_eigen(_Sums()))
 
 
 class NearDepth(DepthEvaluator):
@@ -132,8 +143,19 @@ class NearDepth(DepthEvaluator):
         """`d1`, `rmse_m`, `d2`, `d3`, `abs_rel`, `sq_rel`, `rmse_log`, `log10`, `silog`: means over pictures."""
         return _renamed(super().result())
 
+    def resampled(self, draws: Draws) -> Spread:
+        """As `result`."""
+        return _renamed(super().resampled(draws))
 
-def _renamed(figures: Mapping[str, float]) -> dict[str, float]:
+
+def _known_means(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """(R,) of (R, N); NaN where nothing is known."""
+    known = ~np.isnan(values)
+    count = known.sum(axis=1)
+    return np.asarray(np.where(known, values, 0).sum(axis=1) / np.where(count, count, np.nan), np.float64)
+
+
+def _renamed(figures: Mapping[str, T]) -> dict[str, T]:
     """Eigen's figures without their prefix."""
     prefix = "eigen_"
     plain = {name.removeprefix(prefix): value for name, value in figures.items() if name.startswith(prefix)}

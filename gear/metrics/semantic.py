@@ -35,6 +35,9 @@ COUNT = len(LABELS)
 
 PIECE_PX = 1 << 17
 
+Values = npt.NDArray[np.float64]
+"""One figure, or as many as there are draws."""
+
 
 class SegmentedSample(Protocol):
     """What the metric looks at."""
@@ -73,11 +76,7 @@ class SemanticEvaluator:
         confusion = _confusion(sample.label_ids.reshape(-1), prediction.reshape(-1))
         self.confusion += confusion
         self._weigh(sample.instance_ids, prediction)
-        return {"miou": _mean(self._classes(confusion).values())}
-
-    def _classes(self, confusion: npt.NDArray[np.int64]) -> dict[str, float]:
-        """IoU by name of the classes that the mean is over, of one picture or of all."""
-        return _class_iou(confusion)
+        return {"miou": float(_mean(self._classes(confusion)))}
 
     def _weigh(self, instances: npt.NDArray[np.uint16], prediction: npt.NDArray[np.uint8]) -> None:
         chosen = instances >= INSTANCE_FACTOR
@@ -111,47 +110,34 @@ class SemanticEvaluator:
 
     def result(self) -> Mapping[str, float]:
         """`miou`, `iiou`, `category_miou`, `category_iiou`, `pixel_accuracy`, and `iou_<class>`; shares, 0..1."""
-        classes = self._classes(self.confusion)
+        return {name: float(value) for name, value in self.figures(self.totals()).items()}
+
+    def totals(self) -> Mapping[str, npt.NDArray[Any]]:
+        """The counts, (COUNT, COUNT) of pixels and (COUNT,) of weighted ones."""
+        return {
+            "confusion": self.confusion,
+            "tp": self.weighted_tp,
+            "fn": self.weighted_fn,
+            "category_tp": self.weighted_category_tp,
+            "category_fn": self.weighted_category_fn,
+        }
+
+    def figures(self, totals: Mapping[str, npt.NDArray[Any]]) -> dict[str, Values]:
+        """As `result`, of counts with any axes in front."""
+        confusion = totals["confusion"]
+        classes = self._classes(confusion)
         figures = {
-            "miou": _mean(classes.values()),
-            "iiou": _mean(self._instance_iou().values()),
-            "category_miou": _mean(self._category_iou().values()),
-            "category_iiou": _mean(self._category_instance_iou().values()),
-            "pixel_accuracy": self._accuracy(),
+            "miou": _mean(classes),
+            "iiou": _mean(_instance_iou(confusion, totals["tp"], totals["fn"])),
+            "category_miou": _mean(_category_iou(confusion)),
+            "category_iiou": _mean(_category_instance_iou(confusion, totals["category_tp"], totals["category_fn"])),
+            "pixel_accuracy": _accuracy(confusion),
         }
         return figures | {f"iou_{name.replace(' ', '_')}": value for name, value in classes.items()}
 
-    def _accuracy(self) -> float:
-        counted = [label.id for label in EVALUATED]
-        total = self.confusion[counted].sum()
-        return float(sum(self.confusion[i, i] for i in counted) / total) if total else float("nan")
-
-    def _instance_iou(self) -> dict[str, float]:
-        figures = {}
-        for label in EVALUATED:
-            if label.has_instances:
-                tp, fn = self.weighted_tp[label.id], self.weighted_fn[label.id]
-                figures[label.name] = _share(tp, tp + fn + _false_positives(self.confusion, [label.id]))
-        return figures
-
-    def _category_iou(self) -> dict[str, float]:
-        figures = {}
-        for category in CATEGORIES:
-            ids = _ids(category)
-            tp = float(self.confusion[np.ix_(ids, ids)].sum())
-            fn = float(self.confusion[ids].sum()) - tp
-            figures[category] = _share(tp, tp + fn + _false_positives(self.confusion, ids))
-        return figures
-
-    def _category_instance_iou(self) -> dict[str, float]:
-        figures = {}
-        for category in CATEGORIES:
-            # Here, unlike elsewhere, the benchmark's script takes a caravan or a trailer for a vehicle that was found.
-            ids = _ids(category, LABELS)
-            if all(LABELS[i].has_instances for i in ids):
-                tp, fn = self.weighted_category_tp[ids].sum(), self.weighted_category_fn[ids].sum()
-                figures[category] = _share(tp, tp + fn + _false_positives(self.confusion, ids))
-        return figures
+    def _classes(self, confusion: npt.NDArray[Any]) -> dict[str, Values]:
+        """IoU by name of the classes that the mean is over, of one picture or of all."""
+        return _class_iou(confusion)
 
 
 class PresentClasses(SemanticEvaluator):
@@ -161,15 +147,16 @@ class PresentClasses(SemanticEvaluator):
     that they belong to, and the class itself is NaN: absent.
     """
 
-    def result(self) -> Mapping[str, float]:
+    def figures(self, totals: Mapping[str, npt.NDArray[Any]]) -> dict[str, Values]:
         """`miou` and `iou_<class>`; shares, 0..1, NaN for what does not occur."""
-        classes = self._classes(self.confusion)
-        return {"miou": _mean(classes.values())} | {f"iou_{n.replace(' ', '_')}": iou for n, iou in classes.items()}
+        classes = self._classes(totals["confusion"])
+        return {"miou": _mean(classes)} | {f"iou_{name.replace(' ', '_')}": iou for name, iou in classes.items()}
 
-    def _classes(self, confusion: npt.NDArray[np.int64]) -> dict[str, float]:
+    def _classes(self, confusion: npt.NDArray[Any]) -> dict[str, Values]:
         """NaN for what does not occur."""
+        occurs = confusion.sum(axis=-1) > 0
         return {
-            label.name: iou if confusion[label.id].any() else float("nan")
+            label.name: np.where(occurs[..., label.id], iou, np.nan)
             for label, iou in zip(EVALUATED, _class_iou(confusion).values(), strict=True)
             if label.name != "train"
         }
@@ -179,10 +166,14 @@ def _ids(category: str, among: Sequence[CityscapesLabel] = EVALUATED) -> list[in
     return [label.id for label in among if label.category == category]
 
 
-def _false_positives(confusion: npt.NDArray[np.int64], ids: list[int]) -> float:
+def _block(confusion: npt.NDArray[Any], rows: Sequence[int], columns: Sequence[int]) -> Values:
+    """(...,) pixels whose ground truth is one of `rows` and that are predicted as one of `columns`."""
+    return np.asarray(confusion[..., np.array(rows)[:, None], np.array(columns)].sum(axis=(-2, -1)), np.float64)
+
+
+def _false_positives(confusion: npt.NDArray[Any], ids: Sequence[int]) -> Values:
     """Pixels predicted as one of `ids` whose ground truth is evaluated and another."""
-    others = [label.id for label in EVALUATED if label.id not in ids]
-    return float(confusion[np.ix_(others, ids)].sum())
+    return _block(confusion, [label.id for label in EVALUATED if label.id not in ids], ids)
 
 
 def _confusion(truth: npt.NDArray[np.uint8], prediction: npt.NDArray[np.uint8]) -> npt.NDArray[np.int64]:
@@ -197,19 +188,54 @@ def _confusion(truth: npt.NDArray[np.uint8], prediction: npt.NDArray[np.uint8]) 
     return counts.reshape(COUNT, COUNT)
 
 
-def _class_iou(confusion: npt.NDArray[np.int64]) -> dict[str, float]:
+def _class_iou(confusion: npt.NDArray[Any]) -> dict[str, Values]:
+    return {label.name: _iou(confusion, [label.id]) for label in EVALUATED}
+
+
+def _category_iou(confusion: npt.NDArray[Any]) -> dict[str, Values]:
+    return {category: _iou(confusion, _ids(category)) for category in CATEGORIES}
+
+
+def _iou(confusion: npt.NDArray[Any], ids: Sequence[int]) -> Values:
+    tp = _block(confusion, ids, ids)
+    fn = _block(confusion, ids, range(COUNT)) - tp
+    return _quotient(tp, tp + fn + _false_positives(confusion, ids))
+
+
+def _instance_iou(confusion: npt.NDArray[Any], tp: Values, fn: Values) -> dict[str, Values]:
+    return {
+        label.name: _quotient(
+            tp[..., label.id], tp[..., label.id] + fn[..., label.id] + _false_positives(confusion, [label.id])
+        )
+        for label in EVALUATED
+        if label.has_instances
+    }
+
+
+def _category_instance_iou(confusion: npt.NDArray[Any], tp: Values, fn: Values) -> dict[str, Values]:
     figures = {}
-    for label in EVALUATED:
-        tp = float(confusion[label.id, label.id])
-        fn = float(confusion[label.id].sum()) - tp
-        figures[label.name] = _share(tp, tp + fn + _false_positives(confusion, [label.id]))
+    for category in CATEGORIES:
+        # Here, unlike elsewhere, the benchmark's script takes a caravan or a trailer for a vehicle that was found.
+        ids = _ids(category, LABELS)
+        if all(LABELS[i].has_instances for i in ids):
+            hit, missed = tp[..., ids].sum(axis=-1), fn[..., ids].sum(axis=-1)
+            figures[category] = _quotient(hit, hit + missed + _false_positives(confusion, ids))
     return figures
 
 
-def _share(part: float, whole: float) -> float:
-    return float(part / whole) if whole else float("nan")
+def _accuracy(confusion: npt.NDArray[Any]) -> Values:
+    counted = [label.id for label in EVALUATED]
+    right = np.diagonal(confusion, axis1=-2, axis2=-1)[..., counted].sum(axis=-1)
+    return _quotient(right, confusion[..., counted, :].sum(axis=(-2, -1)))
 
 
-def _mean(values: Any) -> float:
-    known = [value for value in values if value == value]
-    return float(np.mean(known)) if known else float("nan")
+def _quotient(part: npt.NDArray[Any], whole: npt.NDArray[Any]) -> Values:
+    """NaN where the whole is nothing."""
+    return np.asarray(np.divide(part, np.where(whole, whole, np.nan)), np.float64)
+
+
+def _mean(values: Mapping[str, Values]) -> Values:
+    """Over those that are known; NaN where none is."""
+    every = np.stack(list(values.values()))
+    known = ~np.isnan(every)
+    return _quotient(np.where(known, every, 0).sum(axis=0), known.sum(axis=0))

@@ -15,8 +15,9 @@ from gear.metrics.coco_reference import TallObjects
 from gear.metrics.depth import DepthEvaluator, NearDepth
 from gear.metrics.kitti_ap import KittiEvaluator
 from gear.metrics.kitti_reference import NearCars
-from gear.metrics.semantic import PresentClasses
+from gear.metrics.semantic import PresentClasses, SemanticEvaluator
 from gear.values.rng import derive_rng
+from gear.verbs.evaluate.spread import draw, gather
 
 CATEGORIES = (1, 3, 6)
 
@@ -263,3 +264,39 @@ def test_a_single_picture_says_what_was_found_and_what_was_made_up() -> None:
     }  # fmt: skip
     empty = CocoEvaluator(same).update(replace(shown, annotations=()), ())
     assert np.isnan(empty["found_share"]) and empty["false_alarms"] == 0
+
+
+@pytest.mark.parametrize("metric", [SemanticEvaluator, PresentClasses])
+def test_sums_over_draws_are_what_merging_comes_to(metric: type[SemanticEvaluator]) -> None:
+    """Four pictures with few classes each: in many draws some class is not there at all."""
+    rng, parts = derive_rng(2, "sums"), []
+    for classes in ([7, 26, 24], [7, 8, 26], [8, 11, 33, 32], [23]):
+        truth = rng.choice(np.array(classes, np.uint8), (12, 16))
+        said = np.where(rng.random(truth.shape) < 0.7, truth, rng.choice([7, 8, 26, 31], truth.shape)).astype(np.uint8)
+        instances = np.where(truth >= 24, truth.astype(np.uint16) * 1000 + 3, truth).astype(np.uint16)
+        parts.append(metric())
+        parts[-1].update(Labels(truth, instances), said)
+    _same_as_merging(metric, parts)
+
+
+@pytest.mark.parametrize("metric", [DepthEvaluator, NearDepth])
+def test_means_over_draws_are_what_merging_comes_to(metric: type[DepthEvaluator]) -> None:
+    """One of the four pictures has no ground truth nearer than 80 m."""
+    rng, parts = derive_rng(2, "means"), []
+    for far in (0, 0, 100, 0):
+        truth = (far + rng.uniform(2, 60, (10, 12))).astype(np.float32)
+        parts.append(metric())
+        parts[-1].update(Depths(truth), (truth * rng.uniform(0.7, 1.4, truth.shape)).astype(np.float32))
+    _same_as_merging(metric, parts)
+
+
+def _same_as_merging(metric: Any, parts: list[Any]) -> None:
+    draws = np.concatenate([draw(len(parts), 30, 0), np.full((1, len(parts)), 2), np.full((1, len(parts)), 3)])
+    quick = gather(metric, parts, draws)
+    assert set(quick.spread) == set(quick.overall)
+    for number, drawn in enumerate(draws):
+        one = metric()
+        for index in drawn:
+            one.merge(parts[index])
+        for name, value in one.result().items():
+            assert quick.spread[name][number] == pytest.approx(value, nan_ok=True), (name, number)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,7 @@ class Measured:
         notes: of its samples, in order.
         made: how many of them were predicted now.
         damaged: what was kept of some of them and could not be read.
+        spreads: figures that were gathered before, by report and number of samples: resampling takes long.
     """
 
     name: str
@@ -39,6 +40,16 @@ class Measured:
     notes: list[Note]
     made: int
     damaged: tuple[DatasetError, ...]
+    spreads: dict[tuple[str, int], Figures] = field(default_factory=dict, repr=False)
+
+    def gathered(self, report: str, seed: int, resamples: int, count: int | None = None) -> Figures:
+        """One report over the first `count` samples, all unless given; the same seed and resamples each time."""
+        notes = self.notes[:count]
+        key = (report, len(notes))
+        if key not in self.spreads:
+            parts = [note.parts[report] for note in notes]
+            self.spreads[key] = gather(self.scorer.makers[report], parts, draw(len(notes), resamples, seed))
+        return self.spreads[key]
 
     @property
     def patch(self) -> str:
@@ -49,10 +60,7 @@ class Measured:
 def row_report(row: Measured, seed: int, resamples: int) -> RowReport:
     """Figures, intervals and costs of one dataset."""
     notes = row.notes
-    masks = [note.mask for note in notes if note.mask is not None]
     plan = row.dataset.plan
-    # Without a patch there is nothing to be found, only something to be covered by mistake.
-    keys = [key for key in (masks[0] if masks else {}) if key == "mask_area" or plan.info.patch_label != NONE]
     return RowReport(
         name=row.name,
         dataset=row.dataset.root,
@@ -68,11 +76,26 @@ def row_report(row: Measured, seed: int, resamples: int) -> RowReport:
         samples=len(notes),
         made=row.made,
         damaged=tuple(str(error) for error in row.damaged),
-        figures=_figures(row.scorer, notes, seed, resamples),
-        cost={key: float(np.mean([note.cost[key] for note in notes])) for key in ("model_s", "defense_s")},
-        defense={key: _known_mean([mask[key] for mask in masks]) for key in keys},
+        figures=figures_of(row, seed, resamples),
+        cost=mean_cost(notes),
+        defense=mask_means(notes, has_patch=plan.info.patch_label != NONE),
         per_sample=[{k: v for k, v in note.as_json().items() if k != "facts"} for note in notes],
     )
+
+
+def mean_cost(notes: Sequence[Note]) -> dict[str, float]:
+    """Seconds a sample: `model_s`, `defense_s`."""
+    return {key: float(np.mean([note.cost[key] for note in notes])) for key in ("model_s", "defense_s")}
+
+
+def mask_means(notes: Sequence[Note], *, has_patch: bool) -> dict[str, float]:
+    """Figures of the defense's masks, as far as there are any.
+
+    Without a patch there is nothing to be found, only something to be covered by mistake.
+    """
+    masks = [note.mask for note in notes if note.mask is not None]
+    keys = [key for key in (masks[0] if masks else {}) if key == "mask_area" or has_patch]
+    return {key: _known_mean([mask[key] for mask in masks]) for key in keys}
 
 
 def drive_note(dataset: Dataset[Any]) -> str | None:
@@ -95,25 +118,31 @@ def together(rows: Sequence[Measured], seed: int, resamples: int) -> Iterable[To
     for patch, members in labelled.items():
         first = members[0]
         if len(members) > 1 and all(row.dataset.plan.options == first.dataset.plan.options for row in members):
-            every = [note for row in members for note in row.notes]
+            one = as_one(patch, members)
             yield Together(
                 patch=patch,
                 rows=tuple(row.name for row in members),
-                samples=len(every),
-                figures=_figures(first.scorer, every, seed, resamples),
+                samples=len(one.notes),
+                figures=figures_of(one, seed, resamples),
             )
 
 
-def _figures(scorer: Scorer, notes: Sequence[Note], seed: int, resamples: int) -> dict[str, dict[str, Estimate]]:
-    draws = draw(len(notes), resamples, seed)
+def figures_of(row: Measured, seed: int, resamples: int) -> dict[str, dict[str, Estimate]]:
+    """Figures over all samples, with their intervals."""
     figures = {}
-    for report, fresh in scorer.makers.items():
-        one = gather(fresh, [note.parts[report] for note in notes], draws)
+    for report in row.scorer.makers:
+        one = row.gathered(report, seed, resamples)
         figures[report] = {
             name: Estimate(value=value, interval=one.interval(name), ceiling=one.ceilings.get(name, 1.0))
             for name, value in one.overall.items()
         }
     return figures
+
+
+def as_one(name: str, members: Sequence[Measured]) -> Measured:
+    """Several datasets as if they were one of this name; what is not a sample's is the first one's."""
+    notes = [note for row in members for note in row.notes]
+    return replace(members[0], name=name, notes=notes, spreads={})
 
 
 def compared(rows: Sequence[Measured], seed: int, resamples: int) -> Iterable[Difference]:
@@ -122,24 +151,23 @@ def compared(rows: Sequence[Measured], seed: int, resamples: int) -> Iterable[Di
         for control in CONTROLS[: CONTROLS.index(row.patch) if row.patch in CONTROLS else len(CONTROLS)]:
             for other in rows:
                 if other.patch == control and other.dataset.plan.twin_key == row.dataset.plan.twin_key:
-                    yield _difference(row, other, seed, resamples)
+                    yield difference(row, other, seed, resamples)
 
 
-def _difference(row: Measured, other: Measured, seed: int, resamples: int) -> Difference:
+def difference(row: Measured, other: Measured, seed: int, resamples: int) -> Difference:
+    """What samples of one become in their twins, as far as both have them."""
     count = min(len(row.notes), len(other.notes))
     here, there = row.notes[:count], other.notes[:count]
-    draws = draw(count, resamples, seed)
     return Difference(
         row=row.name,
         against=other.name,
         figures={
             report: _paired(
-                gather(fresh, [note.parts[report] for note in here], draws),
-                gather(fresh, [note.parts[report] for note in there], draws),
+                row.gathered(report, seed, resamples, count), other.gathered(report, seed, resamples, count)
             )
-            for report, fresh in row.scorer.makers.items()
+            for report in row.scorer.makers
         },
-        auroc=_auroc(here, there, draws),
+        auroc=_auroc(here, there, draw(count, resamples, seed)),
         paired={report: _tested(here, there, report, seed) for report in row.scorer.makers},
     )
 

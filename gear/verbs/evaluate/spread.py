@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gear.contracts.evaluation import Draws, Limited, Resampled
+from gear.contracts.evaluation import Additive, Draws, Limited, Resampled
 from gear.contracts.tasks import Evaluator
 from gear.values.rng import derive_rng
 
@@ -69,6 +69,8 @@ def gather(fresh: Callable[[], AnyEvaluator], parts: Sequence[AnyEvaluator], dra
         return Figures(overall=overall, spread={}, ceilings=ceilings)
     if isinstance(whole, Resampled):
         return Figures(overall=overall, spread=dict(whole.resampled(draws)), ceilings=ceilings)
+    if isinstance(whole, Additive):
+        return Figures(overall=overall, spread=dict(whole.figures(_added(parts, draws))), ceilings=ceilings)
     rows = []
     for drawn in draws:
         one = fresh()
@@ -77,6 +79,16 @@ def gather(fresh: Callable[[], AnyEvaluator], parts: Sequence[AnyEvaluator], dra
         rows.append(one.result())
     spread = {name: np.array([row.get(name, np.nan) for row in rows]) for name in overall}
     return Figures(overall=overall, spread=spread, ceilings=ceilings)
+
+
+def _added(parts: Sequence[Any], draws: Draws) -> dict[str, npt.NDArray[Any]]:
+    """The sums over each draw: how often it has a picture, times the picture's own."""
+    often = np.zeros((len(draws), len(parts)))
+    np.add.at(often, (np.arange(len(draws))[:, None], draws), 1)
+    every = [part.totals() for part in parts]
+    # Whole numbers stay exact in float64 up to 2**53, which is more pixels than anybody has.
+    stacked = {name: np.stack([one[name] for one in every]).astype(np.float64) for name in every[0]}
+    return {name: np.tensordot(often, sums, 1) for name, sums in stacked.items()}
 
 
 def bounds(values: Values) -> tuple[float, float] | None:

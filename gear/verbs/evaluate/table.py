@@ -21,10 +21,10 @@ def table(report: EvaluateReport) -> str:
         lines.append(_row(row, columns))
         lines += [_difference(one, report, columns) for one in report.differences if one.row == row.name]
     for pooled in report.together:
-        figures = [_estimate(pooled.figures.get(name, {}).get(figure)) for name, figure in columns]
+        figures = [shown(pooled.figures.get(name, {}).get(figure)) for name, figure in columns]
         lines.append([f"all with patch {pooled.patch}", str(pooled.samples), *figures, "", "", "", ""])
     used = [i for i, title in enumerate(head) if title in ("", "samples") or any(line[i] for line in lines)]
-    text = _aligned([[line[i] for i in used] for line in [head, *lines]])
+    text = aligned([[line[i] for i in used] for line in [head, *lines]])
     guarded = report.facts["defense"]
     title = f"{report.facts['task']['name']}: {report.facts['model']['name']}"
     title += f" guarded by {guarded['name']}" if guarded else ""
@@ -36,8 +36,8 @@ def _columns(report: EvaluateReport) -> list[tuple[str, str]]:
     seen: dict[tuple[str, str], None] = {}
     for row in report.rows:
         for name, figures in row.figures.items():
-            shown = list(figures)[: COLUMNS if name == TASK else FURTHER]
-            seen |= dict.fromkeys((name, figure) for figure in shown)
+            listed = list(figures)[: COLUMNS if name == TASK else FURTHER]
+            seen |= dict.fromkeys((name, figure) for figure in listed)
     return list(seen)
 
 
@@ -46,16 +46,16 @@ def _title(report: str, figure: str) -> str:
 
 
 def _row(row: RowReport, columns: Iterable[tuple[str, str]]) -> list[str]:
-    figures = [_estimate(row.figures.get(report, {}).get(name)) for report, name in columns]
+    figures = [shown(row.figures.get(report, {}).get(name)) for report, name in columns]
     defended = f"{row.cost['defense_s']:.3f}" if row.cost["defense_s"] else ""
-    mask = _number(row.defense.get("mask_iou")) if "mask_iou" in row.defense else ""
+    mask = number(row.defense.get("mask_iou")) if "mask_iou" in row.defense else ""
     return [row.name, str(row.samples), *figures, f"{row.cost['model_s']:.3f}", defended, mask, ""]
 
 
 def _difference(one: Difference, report: EvaluateReport, columns: Iterable[tuple[str, str]]) -> list[str]:
     against = next(row for row in report.rows if row.name == one.against)
-    figures = [_estimate(one.figures.get(name, {}).get(figure), is_signed=True) for name, figure in columns]
-    return [f"  minus {against.patch}", "", *figures, "", "", "", _estimate(one.auroc)]
+    figures = [shown(one.figures.get(name, {}).get(figure), is_signed=True) for name, figure in columns]
+    return [f"  minus {against.patch}", "", *figures, "", "", "", shown(one.auroc)]
 
 
 def _paired(report: EvaluateReport) -> list[str]:
@@ -64,7 +64,7 @@ def _paired(report: EvaluateReport) -> list[str]:
     for one in report.differences:
         against = next(row for row in report.rows if row.name == one.against)
         tests = [
-            f"{_title(name, figure)} {_number(test.mean, is_signed=True)} (p {test.p:.2g}, {test.pairs} pairs)"
+            f"{_title(name, figure)} {number(test.mean, is_signed=True)} (p {test.p:.2g}, {test.pairs} pairs)"
             for name, figures in one.paired.items()
             for figure, test in list(figures.items())[: COLUMNS if name == TASK else FURTHER]
             if test.pairs
@@ -73,14 +73,16 @@ def _paired(report: EvaluateReport) -> list[str]:
     return ["mean change of a sample (p: how often chance alone changes as much)", *lines] if lines else []
 
 
-def _estimate(one: Estimate | None, *, is_signed: bool = False) -> str:
+def shown(one: Estimate | None, *, is_signed: bool = False) -> str:
+    """A figure with its interval; empty where there is none."""
     if one is None:
         return ""
-    text = _number(one.value, is_signed=is_signed)
-    return text if one.interval is None else f"{text} [{_number(one.interval[0])}, {_number(one.interval[1])}]"
+    text = number(one.value, is_signed=is_signed)
+    return text if one.interval is None else f"{text} [{number(one.interval[0])}, {number(one.interval[1])}]"
 
 
-def _number(value: float | None, *, is_signed: bool = False) -> str:
+def number(value: float | None, *, is_signed: bool = False) -> str:
+    """Three decimals, one of large numbers; `-` where nothing was measured."""
     if value is None or value != value:
         return "-"
     sign = "+" if is_signed else ""
@@ -94,7 +96,7 @@ def _limited(report: EvaluateReport, columns: Iterable[tuple[str, str]]) -> list
     lines = []
     for name, figures in rows:
         known = [(column, figures.get(column[0], {}).get(column[1])) for column in columns]
-        low = [f"{_title(*column)} {_number(one.ceiling)}" for column, one in known if one and one.ceiling < 1]
+        low = [f"{_title(*column)} {number(one.ceiling)}" for column, one in known if one and one.ceiling < 1]
         lines += [f"perfect predictions would come to {', '.join(low)} in {name}"] if low else []
     return lines
 
@@ -122,6 +124,7 @@ def _families(missing: Sequence[str], every: Iterable[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(short))
 
 
-def _aligned(cells: Sequence[Sequence[str]]) -> list[str]:
+def aligned(cells: Sequence[Sequence[str]]) -> list[str]:
+    """Lines whose columns stand below each other."""
     widths = [max(len(line[i]) for line in cells) for i in range(len(cells[0]))]
     return ["  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in cells]

@@ -1,0 +1,1 @@
+"""`gear bench`: patches, networks and defenses compared over scenes, as one run."""

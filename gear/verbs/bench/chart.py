@@ -1,0 +1,72 @@
+"""A task's figure as bars: one group a network and defense, one bar a kind of patch."""
+
+from __future__ import annotations
+
+import io
+from typing import Literal
+
+from gear.verbs.bench.plan import ADAPTIVE, PATCH, RANDOM
+from gear.verbs.bench.report import Result, TaskResult
+from gear.verbs.evaluate.compare import NONE
+from gear.verbs.evaluate.report import Estimate
+
+COLOURS = {NONE: "#2f7d4f", RANDOM: "#8b95a1", PATCH: "#b3402a", ADAPTIVE: "#7a2d8c"}
+FURTHER = ("#c98a2b", "#1f5fa8", "#5c6b7a", "#9a5b3c", "#3c8c8c", "#a05c8a", "#6b7a2b")
+"""Of patches that were made against other networks."""
+
+BAR_IN, GAP_IN, EDGE_IN, WIDTH_IN = 0.16, 0.14, 0.9, 8.0
+
+
+def chart(task: TaskResult, form: Literal["svg", "pdf", "png"]) -> bytes:
+    """Draws it; bars carry their 95 % interval. The same results give the same bytes."""
+    import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    results = [one for one in task.results if _bars(task, one)]
+    height = EDGE_IN + sum(GAP_IN + BAR_IN * len(_bars(task, one)) for one in results)
+    figure = Figure(figsize=(WIDTH_IN, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    axis = figure.subplots()
+    ticks, colours, y_in = [], _colours(task), 0.0
+    for one in results:
+        begun = y_in
+        for patch, value in _bars(task, one):
+            low, high = value.interval or (value.value, value.value)
+            whisker = [[max(0.0, value.value - low)], [max(0.0, high - value.value)]]
+            axis.barh(y_in, value.value, BAR_IN * 0.92, color=colours[patch], label=patch)
+            axis.errorbar(value.value, y_in, xerr=whisker, color="0.15", lw=0.8, capsize=1.5)
+            y_in += BAR_IN
+        ticks.append(((begun + y_in - BAR_IN) / 2, one.model if one.defense is None else f"  + {one.defense}"))
+        y_in += GAP_IN
+    axis.set_yticks([at for at, _ in ticks], [name for _, name in ticks], fontsize=8)
+    axis.invert_yaxis()
+    assert task.figure is not None
+    better = "less" if task.figure.less_is_better else "more"
+    axis.set_xlabel(f"{task.figure.title} ({better} is better)", fontsize=8)
+    axis.tick_params(axis="x", labelsize=8)
+    axis.grid(axis="x", alpha=0.3)
+    axis.set_axisbelow(True)
+    for side in ("top", "right"):
+        axis.spines[side].set_visible(False)
+    handles, names = axis.get_legend_handles_labels()
+    known = dict(zip(names, handles, strict=True))
+    figure.legend(known.values(), known, loc="outside upper center", ncols=4, frameon=False, fontsize=8)
+    data = io.BytesIO()
+    with mpl.rc_context({"svg.hashsalt": "gear", "svg.fonttype": "path"}):
+        figure.savefig(data, format=form, dpi=120, metadata=_UNDATED[form])
+    return data.getvalue()
+
+
+_UNDATED = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {"Software": None}}
+
+
+def _bars(task: TaskResult, one: Result) -> list[tuple[str, Estimate]]:
+    values = [(pool.name, task.value(pool)) for pool in one.evaluation.pools]
+    return [(name, value) for name, value in values if value is not None and value.value == value.value]
+
+
+def _colours(task: TaskResult) -> dict[str, str]:
+    names = dict.fromkeys(name for one in task.results for name, _ in _bars(task, one))
+    others = [name for name in names if name not in COLOURS]
+    return {**COLOURS, **{name: FURTHER[i % len(FURTHER)] for i, name in enumerate(others)}}

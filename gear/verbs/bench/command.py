@@ -1,0 +1,49 @@
+"""A step as the command line that does the same."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator
+from typing import Any
+
+from gear.verbs.bench.plan import Step, Verb
+
+FLAGS: dict[str, str] = {
+    "settings": "set",
+    "model_settings": "model-set",
+    "defense_settings": "defense-set",
+    "calibration_patched": "calibration-patched",
+    "reports": "report",
+}
+"""Flags that are not called like the argument."""
+
+ONCE: dict[Verb, tuple[str, ...]] = {"evaluate": ("data",)}
+"""Arguments whose values follow one flag; of others each has its own."""
+
+ONLY_IN_PYTHON = ("pools",)
+
+
+def command(step: Step) -> str:
+    """For a POSIX shell."""
+    return shlex.join(["gear", step.verb, *_words(step)])
+
+
+def _words(step: Step) -> Iterator[str]:
+    for name, value in step.arguments.items():
+        if name in ONLY_IN_PYTHON:
+            continue
+        flag = f"--{FLAGS.get(name, name)}"
+        if value is True:
+            yield flag
+        elif isinstance(value, (list, tuple)):
+            yield from _several(flag, value, follows=name in ONCE.get(step.verb, ()))
+        else:
+            yield from (flag, str(value))
+
+
+def _several(flag: str, values: list[Any] | tuple[Any, ...], *, follows: bool) -> Iterator[str]:
+    if follows:
+        yield from (flag, *map(str, values))
+    else:
+        for value in values:
+            yield from (flag, str(value))

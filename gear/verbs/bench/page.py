@@ -1,0 +1,138 @@
+"""The report as one HTML page that needs nothing else: tables, bars, patches and what they look like in the world."""
+
+from __future__ import annotations
+
+import base64
+import html
+from collections.abc import Iterable, Sequence
+
+import cv2
+import numpy as np
+
+from gear.formats.png import decode_rgb
+from gear.opening import open_dataset
+from gear.values.frames import UInt8Image
+from gear.verbs.bench.chart import chart
+from gear.verbs.bench.contestants import Contest
+from gear.verbs.bench.places import Scene
+from gear.verbs.bench.plan import Plan, Weather
+from gear.verbs.bench.report import BenchReport, TaskResult
+from gear.verbs.bench.table import columns, legend, title
+from gear.verbs.evaluate.compare import NONE
+
+PICTURE_PX, PATCH_PX, QUALITY = 560, 220, 82
+"""Widths that pictures are shown at, and their JPEG quality."""
+
+STYLE = """
+body { font: 15px/1.5 system-ui, "Segoe UI", Roboto, "Noto Sans", sans-serif; color: #1b2027; background: #fff;
+  max-width: 76rem; margin: 2rem auto; padding: 0 1.25rem; }
+h1 { font-size: 1.5rem; margin: 0 0 .25rem; } h2 { font-size: 1.15rem; margin: 2.5rem 0 .5rem; }
+h3 { font-size: .95rem; margin: 1.5rem 0 .5rem; } p { margin: .25rem 0; } .dim { color: #5b6672; }
+.wide { overflow-x: auto; } table { border-collapse: collapse; font-size: .85rem; font-variant-numeric: tabular-nums; }
+th, td { text-align: left; padding: .25rem .7rem; white-space: nowrap; } th { border-bottom: 2px solid #1b2027; }
+tr.first td { border-top: 1px solid #c5ccd4; } img { max-width: 100%; height: auto; }
+.row { display: flex; flex-wrap: wrap; gap: .75rem; align-items: flex-start; } figure { margin: 0; }
+figcaption { font-size: .8rem; color: #5b6672; } .row img { border: 1px solid #c5ccd4; display: block; }
+"""
+
+
+def page(report: BenchReport, plan: Plan) -> str:
+    """All of it. Names from configs are escaped; nothing in it runs."""
+    facts = report.facts
+    counts = plan.config.samples
+    where = f"{len(facts['scenes'])} scene{'s' * (len(facts['scenes']) > 1)}, {', '.join(facts['weathers'])}"
+    parts = [
+        f"<p>{_safe(where)}; {counts.measure} pictures of each scene and weather for every kind of patch. Patches: "
+        f"{_safe(plan.config.attack.plugin)} on {counts.attack} other pictures.</p>",
+        f'<p class="dim">{_safe(legend())}.</p>',
+        *(f'<p class="dim">Note: {_safe(note)}</p>' for note in facts["notes"]),
+    ]
+    for task, contest in zip(report.tasks, plan.contests, strict=True):
+        parts += [f"<h2>{_safe(title(task))}</h2>", _table(task)]
+        if task.figure is not None:
+            drawn = base64.b64encode(chart(task, "svg")).decode()
+            name = _safe(f"bars of {task.figure.title} by network, defense and patch")
+            parts.append(f'<p><img alt="{name}" src="data:image/svg+xml;base64,{drawn}"></p>')
+        parts += [_scenes(task), *_pictures(plan, contest)]
+    policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+    return (
+        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>gear bench</title>\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
+        f'<meta name="viewport" content="width=device-width"><style>{STYLE}</style></head>\n'
+        f"<body><h1>gear bench</h1>\n" + "\n".join(parts) + "\n</body></html>\n"
+    )
+
+
+def _table(task: TaskResult) -> str:
+    rows, before = [], ("", "")
+    titles, *every = columns(task)
+    for cells in every:
+        who = (cells[0], cells[1])
+        shown = cells if who != before else ["", "", *cells[2:]]
+        rows.append((who != before, shown))
+        before = who
+    return _rows(titles, rows)
+
+
+def _scenes(task: TaskResult) -> str:
+    """The figure scene by scene, kinds of patches as columns."""
+    kinds = list(dict.fromkeys(at.patch for one in task.results for at in one.scenes))
+    rows = []
+    for one in task.results:
+        places = dict.fromkeys((at.scene, at.weather) for at in one.scenes)
+        for number, (scene, weather) in enumerate(places):
+            here = {at.patch: at.value.value for at in one.scenes if (at.scene, at.weather) == (scene, weather)}
+            values = [f"{here[kind]:.3f}" if here.get(kind, np.nan) == here.get(kind, np.nan) else "" for kind in kinds]
+            name = [one.model, one.defense or "-"] if number == 0 else ["", ""]
+            rows.append((number == 0, [*name, scene, weather, *values]))
+    return f"<h3>Scene by scene</h3>{_rows(['network', 'defense', 'scene', 'weather', *kinds], rows)}" if rows else ""
+
+
+def _rows(titles: Sequence[str], rows: Iterable[tuple[bool, Sequence[str]]]) -> str:
+    top = "".join(f"<th>{_safe(cell)}</th>" for cell in titles)
+    body = "\n".join(
+        f"<tr{' class=first' * is_first}>" + "".join(f"<td>{_safe(cell)}</td>" for cell in cells) + "</tr>"
+        for is_first, cells in rows
+    )
+    return f'<div class="wide"><table><thead><tr>{top}</tr></thead><tbody>\n{body}\n</tbody></table></div>'
+
+
+def _pictures(plan: Plan, contest: Contest) -> Iterable[str]:
+    """Each scene without a patch and with each network's, in the picture that shows the most of it."""
+    for scene, weather in plan.places():
+        clean = open_dataset(plan.pictures(contest, scene, weather, NONE))
+        seen = [sum(one.visible_px for one in clean.sidecar(i).surfaces) for i in range(len(clean))]
+        number = int(np.argmax(seen))
+        figures = [_shown(plan, contest, scene, weather, NONE, number, "without a patch")]
+        for model in contest.models:
+            caption = f"with the patch against {model.label}"
+            figures.append(_shown(plan, contest, scene, weather, model.label, number, caption))
+            figures += [
+                _figure(decode_rgb(path.read_bytes()), f"{path.stem} against {model.label}", PATCH_PX)
+                for path in sorted(plan.patch(contest, scene, model.label).glob("patch_*.png"))
+            ]
+        yield f'<h3>{_safe(f"{scene.label}, {weather.label}")}</h3><div class="row">{"".join(figures)}</div>'
+
+
+def _shown(plan: Plan, contest: Contest, scene: Scene, weather: Weather, patch: str, number: int, caption: str) -> str:
+    images = open_dataset(plan.pictures(contest, scene, weather, patch))[number].images
+    return _figure(next(iter(images.values())), caption, PICTURE_PX)
+
+
+def _figure(pixels: UInt8Image, caption: str, width_px: int) -> str:
+    height, width = pixels.shape[:2]
+    size = (width_px, max(1, round(height * width_px / width)))
+    way = cv2.INTER_AREA if width > width_px else cv2.INTER_NEAREST
+    small = cv2.resize(pixels, size, interpolation=way)[..., ::-1]
+    done, data = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+    if not done:
+        raise ValueError(f"cannot encode a picture of shape {pixels.shape}")
+    encoded = base64.b64encode(data.tobytes()).decode()
+    return (
+        f'<figure><img width="{size[0]}" height="{size[1]}" alt="{_safe(caption)}" '
+        f'src="data:image/jpeg;base64,{encoded}"><figcaption>{_safe(caption)}</figcaption></figure>'
+    )
+
+
+def _safe(text: str) -> str:
+    return html.escape(text, quote=True)

@@ -1,0 +1,296 @@
+"""What a bench does: calls of gear's other verbs, in their order, and what its tables are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from gear.config.collection import WeatherConfig
+from gear.config.dump import to_plain
+from gear.contracts.evaluation import Maskable, Reports
+from gear.contracts.specs import AttackSpec
+from gear.plugins.build import build, find
+from gear.values.rng import derive_rng
+from gear.verbs.bench.config import BenchConfig, settings_of
+from gear.verbs.bench.contestants import Contest, Entrant
+from gear.verbs.bench.places import Scene
+from gear.verbs.evaluate.choice import OUTSIDE_PATCH
+from gear.verbs.evaluate.compare import NONE
+
+RANDOM, PATCH, ADAPTIVE = "random", "patch", "adaptive patch"
+"""Kinds of patches beside none: one against the network itself, and one made through the defense before it."""
+
+SPLITS = {"attack": "train", "choose": "val", "measure": "test", "calibrate": "finetuning"}
+"""Of the pictures for each purpose."""
+
+Verb = Literal["collect", "attack", "evaluate"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Step:
+    """One call of a verb; each takes up what it began, and is quick where it is done.
+
+    Attributes:
+        verb: function of `gear`.
+        title: one line for people.
+        arguments: its keyword arguments.
+    """
+
+    verb: Verb
+    title: str
+    arguments: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Match:
+    """One network, alone or behind a defense, over all scenes.
+
+    Attributes:
+        contest: of its task.
+        model, defense: who plays.
+        out: folder of the evaluation.
+        pools: roots of datasets, by kind of patch.
+    """
+
+    contest: Contest
+    model: Entrant
+    defense: Entrant | None
+    out: Path
+    pools: dict[str, list[Path]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Weather:
+    """A weather with a name for folders."""
+
+    label: str
+    settings: tuple[str, ...]
+
+
+class Plan:
+    """Every step of a bench.
+
+    Args:
+        config: of the bench.
+        scenes: that are measured in.
+        calibration: that defenses learn in, if one must.
+        contests: what meets what.
+        attack: that makes the patches.
+        root: folder of everything.
+        workers: processes of each collection.
+    """
+
+    def __init__(
+        self,
+        config: BenchConfig,
+        *,
+        scenes: tuple[Scene, ...],
+        calibration: Scene | None,
+        contests: tuple[Contest, ...],
+        attack: AttackSpec[Any],
+        root: Path,
+        workers: int = 1,
+    ) -> None:
+        self.config, self.contests, self.scenes = config, contests, scenes
+        self.weathers = tuple(weathers(config.weathers))
+        self._calibration, self._attack, self._root, self._workers = calibration, attack, root, workers
+
+    def steps(self) -> Iterator[Step]:
+        """In an order in which each finds what it needs."""
+        for contest in self.contests:
+            for scene in self.scenes:
+                yield from self._pictures(contest, scene)
+            for scene in self.scenes:
+                for model in contest.models:
+                    yield from self._patch(contest, scene, model)
+            learning = [defense for defense in contest.defenses if defense.learns]
+            if self._calibration is not None and learning:
+                yield from self._lessons(contest, self._calibration)
+            for match in self.matches(contest):
+                yield self._evaluation(match)
+
+    def matches(self, contest: Contest) -> Iterator[Match]:
+        """Every network of a task, alone and behind each defense."""
+        for model in contest.models:
+            for defense in contest.guards:
+                shown = {NONE: NONE, RANDOM: RANDOM, PATCH: model.label}
+                if defense is not None and self._is_adaptive(defense):
+                    shown[ADAPTIVE] = self._name(model, defense)
+                if defense is None and self.config.transfer:
+                    shown |= {f"{PATCH} of {one.label}": one.label for one in contest.models if one is not model}
+                yield Match(
+                    contest=contest,
+                    model=model,
+                    defense=defense,
+                    out=self._root / "evaluations" / contest.folder / self._name(model, defense),
+                    pools={
+                        kind: [self.pictures(contest, *place, patch) for place in self.places()]
+                        for kind, patch in shown.items()
+                    },
+                )
+
+    def places(self) -> list[tuple[Scene, Weather]]:
+        """Every scene in every weather, in the order of the pools."""
+        return [(scene, weather) for scene in self.scenes for weather in self.weathers]
+
+    def pictures(self, contest: Contest, scene: Scene, weather: Weather, patch: str) -> Path:
+        """Root of the pictures that networks are measured on, with one patch; a patch has its network's name."""
+        kind = patch if patch in (NONE, RANDOM) else f"patch-{patch}"
+        return self._place(contest, scene) / weather.label / kind
+
+    def patch(self, contest: Contest, scene: Scene, name: str) -> Path:
+        """The patch folder of a scene and a network, or of a network behind a defense."""
+        return self._root / "patches" / contest.folder / name / scene.label
+
+    def seed(self, purpose: str) -> int:
+        """Of the pictures for one purpose: no two purposes show the same scenes."""
+        return int(derive_rng(self.config.seed, "bench", purpose).integers(1 << 31))
+
+    def _place(self, contest: Contest, scene: Scene) -> Path:
+        return self._root / "data" / contest.folder / scene.label
+
+    def _is_adaptive(self, defense: Entrant) -> bool:
+        return self.config.adaptive and defense.is_looked_through(self._attack)
+
+    def _pictures(self, contest: Contest, scene: Scene) -> Iterator[Step]:
+        for weather in self.weathers:
+            yield from self._grounds(contest, scene, weather)
+            for patch in (NONE, RANDOM):
+                out = self.pictures(contest, scene, weather, patch)
+                yield self._collect(contest, scene, weather, "measure", out, patch=patch)
+
+    def _grounds(self, contest: Contest, scene: Scene, weather: Weather) -> Iterator[Step]:
+        """What a patch is made on, and what it is chosen on."""
+        for purpose in ("attack", "choose"):
+            yield self._collect(contest, scene, weather, purpose, self._ground(contest, scene, weather, purpose))
+
+    def _ground(self, contest: Contest, scene: Scene, weather: Weather, purpose: str) -> Path:
+        return self._place(contest, scene) / weather.label / purpose
+
+    def _patch(self, contest: Contest, scene: Scene, model: Entrant) -> Iterator[Step]:
+        """A network's patch, those through its defenses, and the pictures that show them."""
+        through: list[Entrant | None] = [None, *(one for one in contest.defenses if self._is_adaptive(one))]
+        for defense in through:
+            name = self._name(model, defense)
+            yield self._attacked(contest, scene, model, defense, self.weathers)
+            for weather in self.weathers:
+                out, patch = self.pictures(contest, scene, weather, name), self.patch(contest, scene, name)
+                yield self._collect(contest, scene, weather, "measure", out, patch=patch)
+
+    def _lessons(self, contest: Contest, scene: Scene) -> Iterator[Step]:
+        """What defenses learn from: clean pictures of another scene, and for each network its patch in them."""
+        weather = self.weathers[0]
+        yield from self._grounds(contest, scene, weather)
+        yield self._collect(contest, scene, weather, "calibrate", self._lesson(contest, NONE))
+        for model in contest.models:
+            yield self._attacked(contest, scene, model, None, (weather,))
+            out, patch = self._lesson(contest, model.label), self.patch(contest, scene, model.label)
+            yield self._collect(contest, scene, weather, "calibrate", out, patch=patch)
+
+    def _lesson(self, contest: Contest, patch: str) -> Path:
+        assert self._calibration is not None
+        kind = NONE if patch == NONE else f"patch-{patch}"
+        return self._place(contest, self._calibration) / self.weathers[0].label / f"calibrate-{kind}"
+
+    def _collect(
+        self, contest: Contest, scene: Scene, weather: Weather, purpose: str, out: Path, *, patch: str | Path = NONE
+    ) -> Step:
+        what = patch if isinstance(patch, str) else f"patch of {patch.parent.name}"
+        task = self.config.tasks[contest.name]
+        arguments = {
+            "task": contest.name,
+            "town": scene.town,
+            "scene": scene.name,
+            "split": SPLITS[purpose],
+            "seed": self.seed(purpose),
+            "samples": getattr(self.config.samples, purpose),
+            "patch": str(patch),
+            "out": str(out),
+            "probes": purpose in ("attack", "choose") and self.config.attack.compositor == "transport",
+            "settings": (
+                *settings_of(self.config.collect),
+                *settings_of(task.collect),
+                *weather.settings,
+                f"patch_seed={self.seed(RANDOM)}",
+            ),
+            "workers": self._workers,
+        }
+        return Step(
+            verb="collect",
+            title=f"collect {contest.name} {scene.label} {weather.label}: to {purpose}, {what}",
+            arguments={key: value for key, value in arguments.items() if value is not False},
+        )
+
+    def _attacked(
+        self, contest: Contest, scene: Scene, model: Entrant, defense: Entrant | None, shown: tuple[Weather, ...]
+    ) -> Step:
+        attack, name = self.config.attack, self._name(model, defense)
+        return Step(
+            verb="attack",
+            title=f"attack {name} in {scene.label}",
+            arguments={
+                "model": model.plugin,
+                "data": [str(self._ground(contest, scene, weather, "attack")) for weather in shown],
+                "val": [str(self._ground(contest, scene, weather, "choose")) for weather in shown],
+                "out": str(self.patch(contest, scene, name)),
+                "attack": attack.plugin,
+                **({"queries": attack.queries} if attack.queries else {"steps": attack.steps}),
+                "settings": tuple(settings_of(attack.set)),
+                "model_settings": model.settings,
+                **_guarded(defense),
+                "compositor": attack.compositor,
+                "seed": self.config.seed,
+            },
+        )
+
+    def _evaluation(self, match: Match) -> Step:
+        lessons = {}
+        if match.defense is not None and match.defense.learns:
+            lessons["calibration"] = str(self._lesson(match.contest, NONE))
+            lessons["calibration_patched"] = str(self._lesson(match.contest, match.model.label))
+        return Step(
+            verb="evaluate",
+            title=f"evaluate {self._name(match.model, match.defense)} in {match.contest.name}",
+            arguments={
+                "model": match.model.plugin,
+                "settings": match.model.settings,
+                **_guarded(match.defense),
+                **lessons,
+                "data": [str(root) for roots in match.pools.values() for root in roots],
+                "reports": reports_of(match.contest),
+                "out": str(match.out),
+                "seed": self.config.seed,
+                "pools": {name: [str(root) for root in roots] for name, roots in match.pools.items()},
+            },
+        )
+
+    @staticmethod
+    def _name(model: Entrant, defense: Entrant | None) -> str:
+        return model.label if defense is None else f"{model.label}+{defense.label}"
+
+
+def reports_of(contest: Contest) -> tuple[str, ...]:
+    """Reports that the tables read: the task's figure may be of one, and what a patch does beside itself is another."""
+    product = build(find("task", contest.name))
+    figure_report, dot, _ = contest.task.figure.partition(".")
+    wanted = [figure_report] if dot and isinstance(product, Reports) else []
+    return (*wanted, *([OUTSIDE_PATCH] if isinstance(product, Maskable) else []))
+
+
+def weathers(configs: tuple[WeatherConfig, ...]) -> Iterator[Weather]:
+    """Each with the settings of a collection, and a name that no other has."""
+    seen: set[str] = set()
+    for one in configs:
+        given = {name: value for name, value in to_plain(one).items() if value is not None}
+        label = one.preset if len(given) == 1 else f"{one.preset}-changed"
+        while label in seen:
+            label += "-again"
+        seen.add(label)
+        settings = [f"weather.{name}={value}" for name, value in given.items()]
+        yield Weather(label=label, settings=tuple(settings if len(given) > 1 else [f"weather={one.preset}"]))
+
+
+def _guarded(defense: Entrant | None) -> dict[str, Any]:
+    return {} if defense is None else {"defense": defense.plugin, "defense_settings": defense.settings}

@@ -1,0 +1,205 @@
+"""What a bench found, as values and JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from gear.values.serial import Json
+from gear.verbs.bench.plan import RANDOM
+from gear.verbs.evaluate.choice import OUTSIDE_PATCH
+from gear.verbs.evaluate.compare import NONE
+from gear.verbs.evaluate.report import Difference, Estimate, EvaluateReport, PairedTest, Pool
+from gear.verbs.evaluate.scoring import TASK
+
+FOUND_SHARE = "found_share"
+"""Figure of single samples of tasks whose own figure no single sample has."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Figure:
+    """The figure by which a task's networks are compared.
+
+    Attributes:
+        report: that it is of; `task` is the task's own evaluator.
+        name: of the figure.
+        less_is_better: whether it is an error.
+    """
+
+    report: str
+    name: str
+    less_is_better: bool = False
+
+    @classmethod
+    def of(cls, figure: str, *, less_is_better: bool) -> Figure:
+        """Reads `miou` or `reference.car_bev_moderate_r40`."""
+        report, dot, name = figure.rpartition(".")
+        return cls(report=report if dot else TASK, name=name, less_is_better=less_is_better)
+
+    @property
+    def title(self) -> str:
+        """As tables have it."""
+        return self.name if self.report == TASK else f"{self.report}.{self.name}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SceneFigure:
+    """The task's figure in one scene.
+
+    Attributes:
+        scene, weather: where.
+        patch: kind of patch that was shown.
+        samples: that it is of.
+        value: of the figure.
+    """
+
+    scene: str
+    weather: str
+    patch: str
+    samples: int
+    value: Estimate
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Result:
+    """One network, alone or behind a defense.
+
+    Attributes:
+        model, defense: their names in the config; None for no defense.
+        evaluation: all figures.
+        scenes: the task's figure scene by scene.
+    """
+
+    model: str
+    defense: str | None
+    evaluation: EvaluateReport
+    scenes: tuple[SceneFigure, ...]
+
+    def pool(self, patch: str) -> Pool:
+        """All scenes with one kind of patch.
+
+        Raises:
+            KeyError: it was not shown.
+        """
+        for pool in self.evaluation.pools:
+            if pool.name == patch:
+                return pool
+        raise KeyError(patch)
+
+    def against(self, pool: Pool) -> Difference | None:
+        """A patch's difference to a random one, the random one's to none."""
+        control = NONE if pool.name == RANDOM else RANDOM
+        return next((one for one in pool.differences if one.against == control), None)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class TaskResult:
+    """One task.
+
+    Attributes:
+        name: of the task.
+        figure: by which networks are compared; None where the task names none.
+        results: in the config's order.
+    """
+
+    name: str
+    figure: Figure | None
+    results: tuple[Result, ...]
+
+    def value(self, pool: Pool) -> Estimate | None:
+        """The task's figure over a pool."""
+        if self.figure is None:
+            return None
+        return pool.figures.get(self.figure.report, {}).get(self.figure.name)
+
+    def change(self, one: Difference | None) -> Estimate | None:
+        """Of the task's figure."""
+        if self.figure is None or one is None:
+            return None
+        return one.figures.get(self.figure.report, {}).get(self.figure.name)
+
+    def beside(self, one: Difference | None) -> tuple[str, PairedTest] | None:
+        """The test of what single samples lose, with the figure's name: outside the patch where the task can tell."""
+        if one is None:
+            return None
+        report = OUTSIDE_PATCH if OUTSIDE_PATCH in one.paired else TASK
+        tests = one.paired.get(report, {})
+        wanted = ("" if self.figure is None else self.figure.name, FOUND_SHARE, *tests)
+        name = next((name for name in wanted if name in tests), None)
+        return None if name is None else (name if report == TASK else f"{report}.{name}", tests[name])
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class BenchReport:
+    """A whole bench.
+
+    Attributes:
+        out: folder of bench.json, bench.csv, table.txt and report.html.
+        facts: config, samples, versions; JSON.
+        tasks: in the config's order.
+    """
+
+    out: Path
+    facts: Json
+    tasks: tuple[TaskResult, ...]
+
+    def as_json(self) -> Json:
+        """The content of bench.json."""
+        return {
+            "format": "gear-bench",
+            "version": 1,
+            **self.facts,
+            "tasks": {task.name: _task_json(task, self.out) for task in self.tasks},
+        }
+
+    def records(self) -> Iterator[Mapping[str, Json]]:
+        """The task's figure of every pool and every scene, one flat record each: the lines of bench.csv."""
+        for task in self.tasks:
+            for one in task.results:
+                who = {"task": task.name, "model": one.model, "defense": one.defense or ""}
+                figure = "" if task.figure is None else task.figure.title
+                for pool in one.evaluation.pools:
+                    value, samples = task.value(pool), pool.samples
+                    if value is not None:
+                        where = {"scene": "all", "weather": "all", "patch": pool.name, "samples": samples}
+                        yield {**who, **where, "figure": figure, **_bounds(value)}
+                for at in one.scenes:
+                    where = {"scene": at.scene, "weather": at.weather, "patch": at.patch, "samples": at.samples}
+                    yield {**who, **where, "figure": figure, **_bounds(at.value)}
+
+
+def _bounds(value: Estimate) -> Mapping[str, Json]:
+    low, high = value.interval or (None, None)
+    return {"value": value.value if value.value == value.value else None, "low": low, "high": high}
+
+
+def _task_json(task: TaskResult, out: Path) -> Json:
+    figure = task.figure
+    return {
+        "figure": None if figure is None else {"name": figure.title, "less_is_better": figure.less_is_better},
+        "results": [_result_json(task, one, out) for one in task.results],
+    }
+
+
+def _result_json(task: TaskResult, one: Result, out: Path) -> Json:
+    pools = {}
+    for pool in one.evaluation.pools:
+        against = one.against(pool)
+        value, change, beside = task.value(pool), task.change(against), task.beside(against)
+        pools[pool.name] = {
+            "samples": pool.samples,
+            "value": None if value is None else value.as_json(),
+            "against": None if against is None else against.against,
+            "change": None if change is None else change.as_json(),
+            "beside": None if beside is None else {"figure": beside[0], **beside[1].as_json()},
+            "auroc": None if against is None or against.auroc is None else against.auroc.as_json(),
+            "defense": dict(pool.as_json()["defense"]),
+            "cost": dict(pool.cost),
+        }
+    return {
+        "model": one.model,
+        "defense": one.defense,
+        "evaluation": one.evaluation.out.relative_to(out).as_posix(),
+        "patches": pools,
+    }

@@ -1,0 +1,201 @@
+"""`gear.bench`: pictures, patches, pictures with the patches, evaluations, one report."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, Protocol
+
+from gear.config.dump import to_plain, to_yaml
+from gear.config.load import find_config
+from gear.config.nodes import parse_file
+from gear.config.overrides import with_overrides
+from gear.config.reader import read_node
+from gear.contracts.specs import AttackSpec
+from gear.dataset.files import clear_scratch, explained, write_whole
+from gear.dataset.sidecar import dump_json
+from gear.dataset.store import refuse_dataset
+from gear.values.errors import GearError
+from gear.verbs.attack.run import attack
+from gear.verbs.bench.chart import chart
+from gear.verbs.bench.config import BenchConfig
+from gear.verbs.bench.contestants import contests, find_attack
+from gear.verbs.bench.page import page
+from gear.verbs.bench.places import calibration_scene, measured_scenes
+from gear.verbs.bench.plan import Match, Plan, Step, Verb
+from gear.verbs.bench.report import BenchReport, Figure, Result, SceneFigure, TaskResult
+from gear.verbs.bench.table import text
+from gear.verbs.collect.job import versions
+from gear.verbs.collect.run import collect
+from gear.verbs.evaluate.report import EvaluateReport
+from gear.verbs.evaluate.run import evaluate
+
+VERBS: dict[Verb, Callable[..., Any]] = {"collect": collect, "attack": attack, "evaluate": evaluate}
+
+TOLD: dict[Verb, tuple[str, ...]] = {
+    "collect": ("progress", "noted"),
+    "attack": ("progress", "learning", "noted"),
+    "evaluate": ("progress", "learning"),
+}
+"""What of a `Watch` each verb calls."""
+
+
+class Watch(Protocol):
+    """Who looks on."""
+
+    def began(self, step: Step, number: int, steps: int) -> None:
+        """Step `number` of so many begins; they count from 1."""
+
+    def progress(self, done: int, total: int) -> None:
+        """So many samples or steps of the attack are done."""
+
+    def learning(self, done: int, total: int) -> None:
+        """A defense has read so many calibration samples."""
+
+    def noted(self, line: str) -> None:
+        """Something that the user may not have meant."""
+
+
+class _Nobody:
+    def began(self, step: Step, number: int, steps: int) -> None: ...
+
+    def progress(self, done: int, total: int) -> None: ...
+
+    def learning(self, done: int, total: int) -> None: ...
+
+    def noted(self, line: str) -> None: ...
+
+
+def bench(
+    config: str | Path,
+    *,
+    out: str | Path,
+    settings: Iterable[str] = (),
+    device: str | None = None,
+    workers: int = 1,
+    watch: Watch | None = None,
+) -> BenchReport:
+    """Compares networks and defenses over scenes and patches, the whole way; takes up again what was begun.
+
+    Under `out` lie `report.html`, `table.txt`, `bench.csv` (one line a figure), `bench.json` and charts in `figures`;
+    `data`, `patches` and `evaluations`, as the other verbs write them; and `bench.yml`, the config with every default
+    filled in.
+
+    Args:
+        config: name (`gear bench quick`) or path of a bench config.
+        out: folder of everything.
+        settings: `KEY=VALUE` texts for any key of the config.
+        device: where networks run; what the config says goes first.
+        workers: processes of each collection; they change nothing but time.
+        watch: told what happens.
+
+    Raises:
+        GearError: anything that the user can put right; its text is one line.
+    """
+    plan = prepared(config, out=out, settings=settings, device=device, workers=workers)
+    root, watching = Path(out), watch or _Nobody()
+    with explained(root):
+        root.mkdir(parents=True, exist_ok=True)
+    write_whole(root, "bench.yml", to_yaml(plan.config).encode())
+    evaluations: dict[str, EvaluateReport] = {}
+    steps = list(plan.steps())
+    for number, step in enumerate(steps, 1):
+        watching.began(step, number, len(steps))
+        told = {name: getattr(watching, name) for name in TOLD[step.verb]}
+        try:
+            done = VERBS[step.verb](**step.arguments, **told)
+        except GearError as error:
+            raise GearError(f"{step.title}: {error}") from error
+        if isinstance(done, EvaluateReport):
+            evaluations[step.arguments["out"]] = done
+    report = _report(plan, root, evaluations)
+    lines = list(report.records())
+    written = io.StringIO()
+    table = csv.DictWriter(written, list(lines[0]) if lines else [], lineterminator="\n")
+    table.writeheader()
+    table.writerows(lines)
+    write_whole(root, "bench.csv", written.getvalue().encode())
+    write_whole(root, "bench.json", dump_json(report.as_json()))
+    write_whole(root, "table.txt", text(report).encode())
+    for task, contest in zip(report.tasks, plan.contests, strict=True):
+        if task.figure is not None:
+            write_whole(root, f"figures/{contest.folder}.pdf", chart(task, "pdf"))
+    write_whole(root, "report.html", page(report, plan).encode())
+    clear_scratch(root)
+    return report
+
+
+def prepared(
+    config: str | Path,
+    *,
+    out: str | Path,
+    settings: Iterable[str] = (),
+    device: str | None = None,
+    workers: int = 1,
+) -> Plan:
+    """Reads and checks a config; nothing is written.
+
+    Args: as `bench`.
+
+    Raises:
+        GearError: something in it is not there, does not suit, or cannot be read.
+    """
+    if workers < 1:
+        raise GearError(f"workers must be at least 1, got {workers}")
+    root = Path(out)
+    refuse_dataset(root, "write the bench into a folder of its own")
+    node = with_overrides(parse_file(find_config("bench", str(config))), settings, BenchConfig)
+    read = read_node(BenchConfig, node)
+    scenes = measured_scenes(read, node)
+    spec = find_attack(read, node).spec
+    assert isinstance(spec, AttackSpec)
+    return Plan(
+        read,
+        scenes=scenes,
+        calibration=calibration_scene(read, node, scenes),
+        contests=tuple(contests(read, node, device)),
+        attack=spec,
+        root=root,
+        workers=workers,
+    )
+
+
+def _report(plan: Plan, root: Path, evaluations: dict[str, EvaluateReport]) -> BenchReport:
+    tasks = []
+    for contest in plan.contests:
+        spec = contest.task
+        figure = Figure.of(spec.figure, less_is_better=spec.less_is_better) if spec.figure else None
+        results = [_result(match, figure, evaluations[str(match.out)], plan) for match in plan.matches(contest)]
+        tasks.append(TaskResult(name=contest.name, figure=figure, results=tuple(results)))
+    notes = [note for task in tasks for one in task.results for note in one.evaluation.facts.get("notes", [])]
+    facts = {
+        "config": to_plain(plan.config),
+        "scenes": [scene.label for scene in plan.scenes],
+        "weathers": [weather.label for weather in plan.weathers],
+        "versions": versions(),
+        "notes": list(dict.fromkeys(notes)),
+    }
+    return BenchReport(out=root, facts=facts, tasks=tuple(tasks))
+
+
+def _result(match: Match, figure: Figure | None, evaluation: EvaluateReport, plan: Plan) -> Result:
+    places = [(kind, *place) for kind in match.pools for place in plan.places()]
+    scenes = [
+        SceneFigure(
+            scene=scene.label,
+            weather=weather.label,
+            patch=kind,
+            samples=row.samples,
+            value=row.figures[figure.report][figure.name],
+        )
+        for (kind, scene, weather), row in zip(places, evaluation.rows, strict=True)
+        if figure is not None and figure.name in row.figures.get(figure.report, {})
+    ]
+    return Result(
+        model=match.model.label,
+        defense=None if match.defense is None else match.defense.label,
+        evaluation=evaluation,
+        scenes=tuple(scenes),
+    )

@@ -1,0 +1,72 @@
+"""The tables that a person reads: one a task, networks and defenses as blocks, kinds of patches as lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from gear.verbs.bench.report import BenchReport, Result, TaskResult
+from gear.verbs.evaluate.report import Pool
+from gear.verbs.evaluate.table import aligned, number, shown
+
+ALONE = "-"
+"""What stands where there is no defense."""
+
+
+def text(report: BenchReport) -> str:
+    """All tasks, then what the figures are of."""
+    parts = ["\n".join([title(task), *aligned(columns(task))]) for task in report.tasks]
+    return "\n\n".join([*parts, "\n".join([legend(), *report.facts["notes"]])]) + "\n"
+
+
+def title(task: TaskResult) -> str:
+    """Name, figure, and which way is better."""
+    if task.figure is None:
+        return task.name
+    return f"{task.name}: {task.figure.title} ({'less' if task.figure.less_is_better else 'more'} is better)"
+
+
+def legend() -> str:
+    """What the columns are, in a line."""
+    return (
+        "in brackets 95 % intervals; change: of patches to a random one, of that to none; beside: mean change of a "
+        "picture, outside the patch where the task can tell, and p, how often chance alone changes as much"
+    )
+
+
+def columns(task: TaskResult) -> list[list[str]]:
+    """The titles and all lines, without the columns in which nobody has anything."""
+    every = [head(task), *lines(task)]
+    used = [i for i, cells in enumerate(zip(*every, strict=True)) if any(cells[1:])]
+    return [[line[i] for i in used] for line in every]
+
+
+def head(task: TaskResult) -> list[str]:
+    """Titles of the columns."""
+    figure = "" if task.figure is None else task.figure.title
+    return ["network", "defense", "patch", figure, "change", "beside", "p", "AUROC", "mask IoU", "s/picture"]
+
+
+def lines(task: TaskResult) -> Iterator[list[str]]:
+    """One a network, defense and kind of patch."""
+    for one in task.results:
+        for pool in one.evaluation.pools:
+            yield line(task, one, pool)
+
+
+def line(task: TaskResult, one: Result, pool: Pool) -> list[str]:
+    """The cells of one line."""
+    against = one.against(pool)
+    beside = task.beside(against)
+    test = None if beside is None or not beside[1].pairs else beside[1]
+    return [
+        one.model,
+        one.defense or ALONE,
+        pool.name,
+        shown(task.value(pool)),
+        shown(task.change(against), is_signed=True),
+        "" if test is None else number(test.mean, is_signed=True),
+        "" if test is None else f"{test.p:.2g}",
+        shown(None if against is None else against.auroc),
+        number(pool.defense["mask_iou"]) if "mask_iou" in pool.defense else "",
+        f"{pool.cost['model_s'] + pool.cost['defense_s']:.3f}",
+    ]

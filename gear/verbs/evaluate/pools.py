@@ -1,0 +1,55 @@
+"""Several datasets counted as one, whose patches differ from scene to scene but are of one kind."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from gear.values.errors import GearError
+from gear.verbs.evaluate.compare import CONTROLS, Measured, as_one, difference, figures_of, mask_means, mean_cost
+from gear.verbs.evaluate.report import Pool
+
+Pools = Mapping[str, Sequence[str | Path]]
+"""Roots of datasets by the name of the pool."""
+
+
+def check_pools(pools: Pools, roots: Iterable[Path]) -> None:
+    """Whether pools hold what is evaluated, and some of it.
+
+    Raises:
+        GearError: one is empty, or names a dataset that is not among the data.
+    """
+    known = {root.resolve() for root in roots}
+    for name, members in pools.items():
+        if not members:
+            raise GearError(f"pool {name!r} holds no dataset")
+        for root in members:
+            if Path(root).resolve() not in known:
+                raise GearError(f"pool {name!r} holds {root}, which is not among the data")
+
+
+def pooled(rows: Sequence[Measured], pools: Pools, seed: int, resamples: int) -> Iterable[Pool]:
+    """Each pool, against those without a patch (`none`) and with a random one (`random`) that show the same scenes."""
+    by_root = {row.dataset.root.resolve(): row for row in rows}
+    found = {name: [by_root[Path(root).resolve()] for root in members] for name, members in pools.items()}
+    wholes = {name: as_one(name, members) for name, members in found.items()}
+    for name, members in found.items():
+        one = wholes[name]
+        others = [control for control in CONTROLS if control in found and control != name and name != CONTROLS[0]]
+        yield Pool(
+            name=name,
+            rows=tuple(row.name for row in members),
+            samples=len(one.notes),
+            figures=figures_of(one, seed, resamples),
+            cost=mean_cost(one.notes),
+            defense=mask_means(one.notes, has_patch=name != CONTROLS[0]),
+            differences=tuple(
+                difference(one, wholes[other], seed, resamples)
+                for other in others
+                if _keys(found[other]) == _keys(members)
+            ),
+        )
+
+
+def _keys(members: Sequence[Measured]) -> list[tuple[str, int]]:
+    return [(row.dataset.plan.twin_key, len(row.notes)) for row in members]

@@ -1,0 +1,136 @@
+"""`gear bench`: the whole way in a tiny town, with tiny networks."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import gear
+from gear.cli.main import main
+from gear.verbs.bench.plan import Step
+from gear.verbs.bench.report import BenchReport
+
+pytestmark = pytest.mark.usefixtures("plugins")
+
+KINDS = ["none", "random", "patch"]
+
+
+class Looks:
+    """Remembers what it is told."""
+
+    def __init__(self) -> None:
+        self.steps: list[str] = []
+        self.lessons = self.done = 0
+
+    def began(self, step: Step, number: int, steps: int) -> None:
+        self.steps.append(f"{number}/{steps} {step.verb}")
+
+    def progress(self, done: int, total: int) -> None:
+        self.done += 1
+
+    def learning(self, done: int, total: int) -> None:
+        self.lessons += 1
+
+    def noted(self, line: str) -> None:
+        raise AssertionError(line)
+
+
+def test_the_whole_way_and_again(tmp_path: Path, written: Callable[..., Path]) -> None:
+    config, out, looks = written(), tmp_path / "out", Looks()
+    report = gear.bench(config, out=out, watch=looks)
+    assert looks.steps[0] == "1/37 collect" and looks.steps[-1] == "37/37 evaluate"
+    assert looks.lessons and looks.done
+    (task,) = report.tasks
+    assert [(one.model, one.defense) for one in task.results] == [
+        (model, defense) for model in ("small", "second") for defense in (None, "blur", "fpda")
+    ]
+    small, blurred, unusual = task.results[:3]
+    assert [pool.name for pool in small.evaluation.pools] == [*KINDS, "patch of second"]
+    assert [pool.name for pool in blurred.evaluation.pools] == [*KINDS, "adaptive patch"]
+    assert [pool.name for pool in unusual.evaluation.pools] == KINDS
+    assert all(pool.samples == 4 for one in task.results for pool in one.evaluation.pools)
+    _check_figures(report)
+    _check_files(out, report)
+
+    before = {path: path.stat().st_mtime_ns for path in out.rglob("*.png")}
+    texts = [(out / name).read_bytes() for name in ("bench.json", "table.txt", "report.html", "figures/semseg.pdf")]
+    again = gear.bench(config, out=out)
+    assert all(row.made == 0 for one in again.tasks[0].results for row in one.evaluation.rows)
+    assert {path: path.stat().st_mtime_ns for path in out.rglob("*.png")} == before
+    assert [(out / n).read_bytes() for n in ("bench.json", "table.txt", "report.html", "figures/semseg.pdf")] == texts
+
+
+def _check_figures(report: BenchReport) -> None:
+    """A pool is its scenes' samples as one data set, and its difference that of the figures."""
+    (task,) = report.tasks
+    for one in task.results:
+        for pool in one.evaluation.pools:
+            rows = [row for row in one.evaluation.rows if row.name in pool.rows]
+            assert len(rows) == 2 and sum(row.samples for row in rows) == pool.samples
+            value, against = task.value(pool), one.against(pool)
+            assert value is not None
+            alone = [at.value.value for at in one.scenes if at.patch == pool.name]
+            assert [row.figures["task"]["miou"].value for row in rows] == alone
+            if pool.name == "none":
+                assert against is None
+                continue
+            assert against is not None and against.against == ("none" if pool.name == "random" else "random")
+            control, change = task.value(one.pool(against.against)), task.change(against)
+            assert control is not None and change is not None
+            assert change.value == pytest.approx(value.value - control.value)
+            found = task.beside(against)
+            assert found is not None and found[0] == "outside_patch.miou" and found[1].pairs == 4
+            assert (against.auroc is not None) == (one.defense == "fpda")
+
+
+def _check_files(out: Path, report: BenchReport) -> None:
+    assert sorted(path.name for path in out.iterdir()) == [
+        "bench.csv", "bench.json", "bench.yml", "data", "evaluations", "figures", "patches", "report.html", "table.txt",
+    ]  # fmt: skip
+    written: Any = json.loads((out / "bench.json").read_text())
+    assert written == json.loads(json.dumps(report.as_json()))
+    cell = written["tasks"]["semseg"]["results"][1]
+    assert (out / cell["evaluation"] / "results.json").is_file()
+    assert cell["patches"]["adaptive patch"]["against"] == "random"
+    with (out / "bench.csv").open() as file:
+        lines = list(csv.DictReader(file))
+    assert len(lines) == sum(3 * len(one.evaluation.pools) for one in report.tasks[0].results)
+    assert {line["scene"] for line in lines} == {"all", "tiny-board", "tiny-double"}
+    assert (out / "table.txt").read_text().startswith("semseg: miou (more is better)\n")
+    page = (out / "report.html").read_text()
+    assert page.count("<figure>") == 2 * (1 + 2) + 2 * (1 + 2)  # scenes with one and with two surfaces
+    assert "http" not in page.replace("http-equiv", "")
+
+
+def test_a_config_that_grows_keeps_what_is_there(tmp_path: Path, written: Callable[..., Path]) -> None:
+    few = [("      second: {plugin: other_segmenter, set: {width: 6}}\n", ""), ("      fpda: {}\n", "")]
+    small = [*few, ("transfer: true", "transfer: false"), ("adaptive: true", "adaptive: false")]
+    out = tmp_path / "out"
+    gear.bench(written(*small), out=out)
+    more = gear.bench(written(*small[1:3]), out=out, settings=["adaptive=false"])
+    made = {one.model: sum(row.made for row in one.evaluation.rows) for one in more.tasks[0].results}
+    assert made == {"small": 0, "second": 12}
+
+
+def test_the_command(tmp_path: Path, written: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
+    config = str(written(("      fpda: {}\n", "")))
+    only = ["--set", "transfer=false", "--set", "adaptive=false", "--device", "cpu"]
+    out = str(tmp_path / "a place")
+    assert main(["bench", config, "--out", out, *only, "--list"]) == 0
+    listed = capsys.readouterr().out.splitlines()
+    assert not Path(out).exists()
+    for line in listed:  # what is listed, the commands take
+        words = __import__("shlex").split(line)
+        assert words[0] == "gear" and main(words[1:]) == 0, line
+    made = capsys.readouterr()
+    assert main(["bench", config, "--out", out, *only, "--json"]) == 0
+    told = capsys.readouterr()
+    assert json.loads(told.out)["format"] == "gear-bench" and told.err == "" and made.out
+    assert main(["bench", config, "--out", out, *only, "--list", "--json"]) == 0
+    steps = json.loads(capsys.readouterr().out)
+    assert [step["verb"] for step in steps] == [line.split()[1] for line in listed]
