@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from gear.values.errors import GearError
     from gear.verbs.attack.report import AttackReport
     from gear.verbs.attack.run import attack
+    from gear.verbs.bench.report import BenchReport
+    from gear.verbs.bench.run import bench
     from gear.verbs.collect.run import CollectReport, collect
     from gear.verbs.defend import DefendReport, defend
     from gear.verbs.evaluate.report import EvaluateReport
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AttackReport",
+    "BenchReport",
     "CollectReport",
     "ConvertReport",
     "Dataset",
@@ -46,6 +49,7 @@ __all__ = [
     "ViewReport",
     "attack",
     "average_weights",
+    "bench",
     "collect",
     "convert_weights",
     "defend",
@@ -60,6 +64,7 @@ __all__ = [
 
 _HOME = {
     "AttackReport": "gear.verbs.attack.report",
+    "BenchReport": "gear.verbs.bench.report",
     "CollectReport": "gear.verbs.collect.run",
     "ConvertReport": "gear.verbs.weights.convert",
     "Dataset": "gear.opening",
@@ -72,6 +77,7 @@ _HOME = {
     "Twins": "gear.opening",
     "ViewReport": "gear.view.write",
     "attack": "gear.verbs.attack.run",
+    "bench": "gear.verbs.bench.run",
     "average_weights": "gear.verbs.weights.average",
     "collect": "gear.verbs.collect.run",
     "convert_weights": "gear.verbs.weights.convert",

@@ -23,6 +23,7 @@ COMMANDS: dict[str, str] = {
     "gap": "hold digital patches against the same patches rendered",
     "defend": "write a dataset's pictures as a defense cleans them",
     "evaluate": "run a model, with or without a defense, over datasets: metrics, predictions, twins compared",
+    "bench": "networks and defenses over scenes and patches, the whole way, with a report",
     "export": "write a dataset in another layout",
     "towns": "list towns and their scenes, or draw a map and a picture of every scene",
     "models": "list the installed networks: size, input, published weights, shipped weights and what is missing",

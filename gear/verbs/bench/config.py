@@ -11,7 +11,7 @@ import yaml
 
 from gear.config.collection import WeatherConfig
 from gear.config.dump import node_to_json
-from gear.config.nodes import MARKS, Items, Node, Place, Scalar
+from gear.config.nodes import MARKS, Node, Place, Scalar
 from gear.config.nodes import Mapping as MappingNode
 from gear.values.errors import FieldError
 
@@ -158,10 +158,10 @@ class BenchConfig:
 
 def settings_of(node: Node, above: str = "") -> Iterable[str]:
     """A tree of options as the `KEY=VALUE` texts that set them one by one."""
-    if isinstance(node, MappingNode):
+    if isinstance(node, MappingNode) and (node.entries or not above):
         for key, (_, below) in node.entries.items():
             yield from settings_of(below, f"{above}.{key}" if above else key)
-    elif isinstance(node, Items):
+    elif not isinstance(node, Scalar):
         flow = yaml.safe_dump(node_to_json(node), default_flow_style=True, allow_unicode=True, width=1 << 20)
         yield f"{above}={flow.strip()}"
     elif above:

@@ -144,6 +144,10 @@ class Plan:
         """The patch folder of a scene and a network, or of a network behind a defense."""
         return self._root / "patches" / contest.folder / name / scene.label
 
+    def picture_settings(self, contest: Contest) -> tuple[str, ...]:
+        """Of all of a task's collections."""
+        return (*settings_of(self.config.collect), *settings_of(self.config.tasks[contest.name].collect))
+
     def seed(self, purpose: str) -> int:
         """Of the pictures for one purpose: no two purposes show the same scenes."""
         return int(derive_rng(self.config.seed, "bench", purpose).integers(1 << 31))
@@ -198,7 +202,6 @@ class Plan:
         self, contest: Contest, scene: Scene, weather: Weather, purpose: str, out: Path, *, patch: str | Path = NONE
     ) -> Step:
         what = patch if isinstance(patch, str) else f"patch of {patch.parent.name}"
-        task = self.config.tasks[contest.name]
         arguments = {
             "task": contest.name,
             "town": scene.town,
@@ -210,8 +213,7 @@ class Plan:
             "out": str(out),
             "probes": purpose in ("attack", "choose") and self.config.attack.compositor == "transport",
             "settings": (
-                *settings_of(self.config.collect),
-                *settings_of(task.collect),
+                *self.picture_settings(contest),
                 *weather.settings,
                 f"patch_seed={self.seed(RANDOM)}",
             ),

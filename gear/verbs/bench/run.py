@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from gear.config.dump import to_plain, to_yaml
-from gear.config.load import find_config
-from gear.config.nodes import parse_file
+from gear.config.load import find_config, load_collection
+from gear.config.nodes import Node, parse_file
 from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
 from gear.contracts.specs import AttackSpec
@@ -23,11 +23,11 @@ from gear.verbs.bench.chart import chart
 from gear.verbs.bench.config import BenchConfig
 from gear.verbs.bench.contestants import contests, find_attack
 from gear.verbs.bench.page import page
-from gear.verbs.bench.places import calibration_scene, measured_scenes
+from gear.verbs.bench.places import calibration_scene, located, measured_scenes
 from gear.verbs.bench.plan import Match, Plan, Step, Verb
 from gear.verbs.bench.report import BenchReport, Figure, Result, SceneFigure, TaskResult
 from gear.verbs.bench.table import text
-from gear.verbs.collect.job import versions
+from gear.verbs.collect.job import find_weather, versions
 from gear.verbs.collect.run import collect
 from gear.verbs.evaluate.report import EvaluateReport
 from gear.verbs.evaluate.run import evaluate
@@ -151,7 +151,7 @@ def prepared(
     scenes = measured_scenes(read, node)
     spec = find_attack(read, node).spec
     assert isinstance(spec, AttackSpec)
-    return Plan(
+    plan = Plan(
         read,
         scenes=scenes,
         calibration=calibration_scene(read, node, scenes),
@@ -160,6 +160,25 @@ def prepared(
         root=root,
         workers=workers,
     )
+    _check_pictures(plan, node)
+    return plan
+
+
+def _check_pictures(plan: Plan, node: Node) -> None:
+    """Whether the collections' keys and the tasks' options can be read: the last of them may be a day away.
+
+    Raises:
+        ConfigError: one cannot; or there is no such weather.
+    """
+    for contest in plan.contests:
+        for weather in plan.weathers:
+            settings = (*plan.picture_settings(contest), *weather.settings)
+            try:
+                config = load_collection(None, {"task": contest.name}, settings)
+                read_node(contest.task.config, config.options, "options")
+                find_weather(config.weather)
+            except GearError as error:
+                raise located(node, error, "tasks", contest.name, "collect") from error
 
 
 def _report(plan: Plan, root: Path, evaluations: dict[str, EvaluateReport]) -> BenchReport:

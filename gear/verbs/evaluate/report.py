@@ -75,7 +75,7 @@ class RowReport:
             "samples": self.samples,
             "figures": figures_json(self.figures),
             "cost": dict(self.cost),
-            "defense": {name: value if value == value else None for name, value in self.defense.items()},
+            "defense": known_json(self.defense),
             "per_sample": self.per_sample,
         }
 
@@ -157,6 +157,41 @@ class Difference:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Pool:
+    """Several datasets counted as one, by whoever evaluates them.
+
+    Attributes:
+        name: of the pool.
+        rows: names of the datasets' rows.
+        samples: of all of them.
+        figures: over all samples.
+        cost: mean seconds a sample: `model_s`, `defense_s`.
+        defense: mean figures of the defense's mask; empty without one.
+        differences: to the pools `none` and `random`, where these show the same scenes; `row` and `against` name pools.
+    """
+
+    name: str
+    rows: tuple[str, ...]
+    samples: int
+    figures: Figures
+    cost: Mapping[str, float]
+    defense: Mapping[str, float]
+    differences: tuple[Difference, ...]
+
+    def as_json(self) -> Json:
+        """As written into results.json."""
+        return {
+            "name": self.name,
+            "rows": list(self.rows),
+            "samples": self.samples,
+            "figures": figures_json(self.figures),
+            "cost": dict(self.cost),
+            "defense": known_json(self.defense),
+            "differences": [one.as_json() for one in self.differences],
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class EvaluateReport:
     """A model, with or without a defense, over datasets.
 
@@ -166,6 +201,7 @@ class EvaluateReport:
         rows: the datasets, in the order given.
         together: datasets that differ in more than their patch, by the patch's label.
         differences: between twins.
+        pools: datasets that were to be counted as one.
     """
 
     out: Path
@@ -173,6 +209,7 @@ class EvaluateReport:
     rows: tuple[RowReport, ...]
     together: tuple[Together, ...]
     differences: tuple[Difference, ...]
+    pools: tuple[Pool, ...] = ()
 
     def as_json(self) -> Json:
         """The content of results.json."""
@@ -183,6 +220,7 @@ class EvaluateReport:
             "rows": [row.as_json() for row in self.rows],
             "together": [one.as_json() for one in self.together],
             "differences": [one.as_json() for one in self.differences],
+            **({"pools": [one.as_json() for one in self.pools]} if self.pools else {}),
         }
 
     def row(self, patch: str) -> RowReport:
@@ -200,3 +238,8 @@ class EvaluateReport:
 def figures_json(figures: Figures) -> Json:
     """By report, then by figure."""
     return {report: {name: one.as_json() for name, one in rows.items()} for report, rows in figures.items()}
+
+
+def known_json(figures: Mapping[str, float]) -> Json:
+    """null for NaN."""
+    return {name: value if value == value else None for name, value in figures.items()}

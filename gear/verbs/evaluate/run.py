@@ -24,6 +24,7 @@ from gear.verbs.evaluate.choice import (
 from gear.verbs.evaluate.compare import Measured, compared, drive_note, row_report, together
 from gear.verbs.evaluate.opened import opened, row_names
 from gear.verbs.evaluate.player import Player
+from gear.verbs.evaluate.pools import Pools, check_pools, pooled
 from gear.verbs.evaluate.report import EvaluateReport
 from gear.verbs.evaluate.row import evaluate_row
 from gear.verbs.evaluate.scoring import Scorer
@@ -50,6 +51,7 @@ def evaluate(
     workers: int = 2,
     seed: int = 0,
     resamples: int = 1000,
+    pools: Pools | None = None,
     progress: Progress | None = None,
     learning: Progress | None = None,
 ) -> EvaluateReport:
@@ -76,6 +78,8 @@ def evaluate(
         workers: threads that read, and threads that measure and write, beside the model.
         seed: of the defense's draws and of the bootstrap.
         resamples: of the bootstrap; 0 for no intervals.
+        pools: roots among the data that are counted as one dataset, by a name; those that show the same scenes as the
+            pools `none` and `random` are compared with these, sample by sample.
         progress: told after every sample.
         learning: told after every calibration sample that the defense reads for the first time.
 
@@ -89,6 +93,7 @@ def evaluate(
     chosen = chosen_model(model, settings)
     guard = chosen_defense(defense, defense_settings)
     datasets = opened([data] if isinstance(data, (str, Path)) else data, split, chosen, reports)
+    check_pools(pools or {}, [one.root for one in datasets])
     task, names = datasets[0].plan.task["name"], row_names(datasets)
     learnt = opened_calibration(calibration, calibration_patched, [chosen], defense, told=learning)
     if guard is not None:
@@ -124,6 +129,7 @@ def evaluate(
         rows=tuple(row_report(row, seed, resamples) for row in rows),
         together=tuple(together(rows, seed, resamples)),
         differences=tuple(compared(rows, seed, resamples)),
+        pools=tuple(pooled(rows, pools or {}, seed, resamples)),
     )
     _end(root, found)
     return found

@@ -32,6 +32,16 @@ collect:
 """
 
 
+FEW = (
+    ("      second: {plugin: other_segmenter, set: {width: 6}}\n", ""),
+    ("      fpda: {}\n", ""),
+    (f', "{TINY_SCENES}:double"', ""),
+    ("transfer: true", "transfer: false"),
+    ("adaptive: true", "adaptive: false"),
+)
+"""Changes that leave one network, one scene and one defense."""
+
+
 @pytest.fixture
 def plugins(monkeypatch: pytest.MonkeyPatch) -> None:
     put_package(monkeypatch, [tiny_segmenter, tiny_depth, other_segmenter])

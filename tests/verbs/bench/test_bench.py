@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,8 +13,10 @@ import pytest
 
 import gear
 from gear.cli.main import main
+from gear.values.errors import GearError
 from gear.verbs.bench.plan import Step
 from gear.verbs.bench.report import BenchReport
+from tests.verbs.bench.conftest import FEW
 
 pytestmark = pytest.mark.usefixtures("plugins")
 
@@ -108,29 +111,38 @@ def _check_files(out: Path, report: BenchReport) -> None:
 
 
 def test_a_config_that_grows_keeps_what_is_there(tmp_path: Path, written: Callable[..., Path]) -> None:
-    few = [("      second: {plugin: other_segmenter, set: {width: 6}}\n", ""), ("      fpda: {}\n", "")]
-    small = [*few, ("transfer: true", "transfer: false"), ("adaptive: true", "adaptive: false")]
     out = tmp_path / "out"
-    gear.bench(written(*small), out=out)
-    more = gear.bench(written(*small[1:3]), out=out, settings=["adaptive=false"])
+    gear.bench(written(*FEW), out=out)
+    more = gear.bench(written(*FEW[1:]), out=out)
     made = {one.model: sum(row.made for row in one.evaluation.rows) for one in more.tasks[0].results}
-    assert made == {"small": 0, "second": 12}
+    assert made == {"small": 0, "second": 6}
 
 
 def test_the_command(tmp_path: Path, written: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
-    config = str(written(("      fpda: {}\n", "")))
-    only = ["--set", "transfer=false", "--set", "adaptive=false", "--device", "cpu"]
-    out = str(tmp_path / "a place")
-    assert main(["bench", config, "--out", out, *only, "--list"]) == 0
+    config, out = str(written(*FEW)), str(tmp_path / "a place")
+    assert main(["bench", config, "--out", out, "--list"]) == 0
     listed = capsys.readouterr().out.splitlines()
     assert not Path(out).exists()
     for line in listed:  # what is listed, the commands take
-        words = __import__("shlex").split(line)
+        words = shlex.split(line)
         assert words[0] == "gear" and main(words[1:]) == 0, line
-    made = capsys.readouterr()
-    assert main(["bench", config, "--out", out, *only, "--json"]) == 0
+    capsys.readouterr()
+    assert main(["bench", config, "--out", out, "--json"]) == 0
     told = capsys.readouterr()
-    assert json.loads(told.out)["format"] == "gear-bench" and told.err == "" and made.out
-    assert main(["bench", config, "--out", out, *only, "--list", "--json"]) == 0
+    assert json.loads(told.out)["format"] == "gear-bench" and told.err == ""
+    report = gear.bench(config, out=out)
+    assert all(row.made == 0 for one in report.tasks[0].results for row in one.evaluation.rows)
+    assert main(["bench", config, "--out", out, "--list", "--json"]) == 0
     steps = json.loads(capsys.readouterr().out)
     assert [step["verb"] for step in steps] == [line.split()[1] for line in listed]
+
+
+def test_a_step_that_fails_says_which(tmp_path: Path, written: Callable[..., Path]) -> None:
+    out = tmp_path / "out"
+    config = written(*FEW, ("attack: 2", "attack: 1"))
+    other = out / "data/semseg/tiny-board/ClearNoon/attack/gear/train/plan.json"
+    other.parent.mkdir(parents=True)
+    other.write_text("{}")
+    with pytest.raises(GearError, match=r"collect semseg tiny-board ClearNoon: to attack.*plan\.json"):
+        gear.bench(config, out=out)
+    assert not (out / "bench.json").exists()
