@@ -87,12 +87,13 @@ def find_attack(config: BenchConfig, node: Node) -> Found:
         raise located(node, error, "attack", "plugin") from error
 
 
-def contests(config: BenchConfig, node: Node, device: str | None = None) -> Iterator[Contest]:
+def contests(config: BenchConfig, node: Node, *, surfaces: int, device: str | None = None) -> Iterator[Contest]:
     """What meets what, in every task.
 
     Args:
         config: of the bench.
         node: its file, for places in errors.
+        surfaces: most that a scene has.
         device: where networks run, as their option `device`; None leaves it to them.
 
     Raises:
@@ -109,7 +110,7 @@ def contests(config: BenchConfig, node: Node, device: str | None = None) -> Iter
         models = _entrants("model", bench.models, node, ("tasks", name, "models"), device)
         defenses = _entrants("defense", bench.defenses, node, ("tasks", name, "defenses"), None)
         one = Contest(name=name, task=task, models=models, defenses=defenses)
-        _check(one, attack, config, node)
+        _check(one, attack, config, node, surfaces)
         yield one
 
 
@@ -130,7 +131,7 @@ def _entrants(
     return tuple(found)
 
 
-def _check(one: Contest, attack: Found, config: BenchConfig, node: Node) -> None:
+def _check(one: Contest, attack: Found, config: BenchConfig, node: Node, surfaces: int) -> None:
     at = ("tasks", one.name)
     for model in one.models:
         spec = model.chosen.found.spec
@@ -138,8 +139,12 @@ def _check(one: Contest, attack: Found, config: BenchConfig, node: Node) -> None
         if one.task.name not in spec.tasks:
             problem = f"model {spec.name!r} does {', '.join(spec.tasks)}, not {one.task.name}"
             raise located(node, GearError(problem), *at, "models", model.label)
+        missing = [name for name in spec.views if name not in one.task.views]
+        if missing:
+            problem = f"model {spec.name!r} looks at {', '.join(missing)}, which {one.name} does not have"
+            raise located(node, GearError(problem), *at, "models", model.label)
         try:
-            check_attack(attack, [model.chosen], one.task.name, 1, config.attack.queries or None)
+            check_attack(attack, [model.chosen], one.task.name, surfaces, config.attack.queries or None)
         except GearError as error:
             raise located(node, error, "attack") from error
         for defense in one.defenses:

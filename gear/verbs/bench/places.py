@@ -20,10 +20,12 @@ class Scene:
     Attributes:
         town: its name, or its file.
         name: the scene's name in the town's own library, or a library's file and a name in it, `my.yml:corner`.
+        surfaces: how many patches it shows.
     """
 
     town: str
     name: str
+    surfaces: int
 
     @property
     def label(self) -> str:
@@ -74,18 +76,18 @@ def calibration_scene(config: BenchConfig, node: Node, measured: tuple[Scene, ..
 def _named(town: str, names: tuple[str, ...]) -> Iterator[Scene]:
     """Those scenes of a town; all of its own that show patches, where none is named."""
     own = None if all(":" in name for name in names) and names else scene_library(Path(town).stem).scenes
-    for name in names or [name for name, scene in (own or {}).items() if _shows_patches(scene)]:
+    for name in names or [name for name, scene in (own or {}).items() if _surfaces(scene)]:
         path, _, bare = name.rpartition(":")
         known = scene_library(path).scenes if path else own or {}
         if bare not in known:
             raise UnknownNameError(f"scene of {path or town}", bare, known)
-        if not _shows_patches(known[bare]):
+        if not _surfaces(known[bare]):
             raise GearError(f"scene {bare!r} has neither a board nor the truck, so no patch would be seen")
-        yield Scene(town=town, name=name)
+        yield Scene(town=town, name=name, surfaces=_surfaces(known[bare]))
 
 
-def _shows_patches(scene: SceneSpec) -> bool:
-    return bool(scene.boards) or scene.truck is not None
+def _surfaces(scene: SceneSpec) -> int:
+    return len(scene.boards) + (scene.truck is not None)
 
 
 def place_of(node: Node, *path: str) -> Place:

@@ -201,7 +201,7 @@ class Plan:
     def _collect(
         self, contest: Contest, scene: Scene, weather: Weather, purpose: str, out: Path, *, patch: str | Path = NONE
     ) -> Step:
-        what = patch if isinstance(patch, str) else f"patch of {patch.parent.name}"
+        shown = "" if patch == NONE else f", {patch if isinstance(patch, str) else patch.parent.name} patch"
         arguments = {
             "task": contest.name,
             "town": scene.town,
@@ -221,7 +221,7 @@ class Plan:
         }
         return Step(
             verb="collect",
-            title=f"collect {contest.name} {scene.label} {weather.label}: to {purpose}, {what}",
+            title=f"collect {contest.name} in {scene.label} {weather.label} to {purpose}{shown}",
             arguments={key: value for key, value in arguments.items() if value is not False},
         )
 
@@ -231,7 +231,7 @@ class Plan:
         attack, name = self.config.attack, self._name(model, defense)
         return Step(
             verb="attack",
-            title=f"attack {name} in {scene.label}",
+            title=f"attack {name} of {contest.name} in {scene.label}",
             arguments={
                 "model": model.plugin,
                 "data": [str(self._ground(contest, scene, weather, "attack")) for weather in shown],

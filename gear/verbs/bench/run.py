@@ -29,6 +29,7 @@ from gear.verbs.bench.report import BenchReport, Figure, Result, SceneFigure, Ta
 from gear.verbs.bench.table import text
 from gear.verbs.collect.job import find_weather, versions
 from gear.verbs.collect.run import collect
+from gear.verbs.evaluate.choice import check_optics
 from gear.verbs.evaluate.report import EvaluateReport
 from gear.verbs.evaluate.run import evaluate
 
@@ -155,7 +156,7 @@ def prepared(
         read,
         scenes=scenes,
         calibration=calibration_scene(read, node, scenes),
-        contests=tuple(contests(read, node, device)),
+        contests=tuple(contests(read, node, surfaces=max(scene.surfaces for scene in scenes), device=device)),
         attack=spec,
         root=root,
         workers=workers,
@@ -168,17 +169,23 @@ def _check_pictures(plan: Plan, node: Node) -> None:
     """Whether the collections' keys and the tasks' options can be read: the last of them may be a day away.
 
     Raises:
-        ConfigError: one cannot; or there is no such weather.
+        ConfigError: one cannot; there is no such weather; or a network reckons with another camera.
     """
     for contest in plan.contests:
         for weather in plan.weathers:
             settings = (*plan.picture_settings(contest), *weather.settings)
             try:
                 config = load_collection(None, {"task": contest.name}, settings)
-                read_node(contest.task.config, config.options, "options")
+                options = to_plain(read_node(contest.task.config, config.options, "options"))
                 find_weather(config.weather)
             except GearError as error:
                 raise located(node, error, "tasks", contest.name, "collect") from error
+        for model in contest.models:
+            at = ("tasks", contest.name, "models", model.label)
+            try:
+                check_optics(model.chosen, options, "pictures are collected", f"--set {'.'.join(at)}.set.")
+            except GearError as error:
+                raise located(node, error, *at) from error
 
 
 def _report(plan: Plan, root: Path, evaluations: dict[str, EvaluateReport]) -> BenchReport:

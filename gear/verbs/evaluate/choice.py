@@ -100,13 +100,22 @@ def check_camera(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> 
     Raises:
         GearError: it does not.
     """
+    check_optics(model, dataset.plan.options, f"{dataset.root} was collected", flag)
+
+
+def check_optics(model: Chosen, options: Json, collected: str, flag: str) -> None:
+    """As `check_camera`, of a task's options.
+
+    Raises:
+        GearError: the model reckons with another camera.
+    """
     config = read_node(model.found.spec.config, model.options, "")
     for name in CAMERA:
-        assumed, taken = getattr(config, name, None), dataset.plan.options.get(name)
+        assumed, taken = getattr(config, name, None), options.get(name)
         if assumed is not None and taken is not None and assumed != taken:
             raise GearError(
-                f"{dataset.root} was collected with {name} {taken:g}, but model {model.found.spec.name!r} reckons with "
-                f"{assumed:g}; say {flag}{name}={taken:g}"
+                f"{collected} with {name} {taken:g}, but model {model.found.spec.name!r} reckons with {assumed:g}; say "
+                f"{flag}{name}={taken:g}"
             )
 
 

@@ -143,6 +143,6 @@ def test_a_step_that_fails_says_which(tmp_path: Path, written: Callable[..., Pat
     other = out / "data/semseg/tiny-board/ClearNoon/attack/gear/train/plan.json"
     other.parent.mkdir(parents=True)
     other.write_text("{}")
-    with pytest.raises(GearError, match=r"collect semseg tiny-board ClearNoon: to attack.*plan\.json"):
+    with pytest.raises(GearError, match=r"collect semseg in tiny-board ClearNoon to attack.*plan\.json"):
         gear.bench(config, out=out)
     assert not (out / "bench.json").exists()

@@ -161,3 +161,22 @@ def test_towns_scenes_are_those_that_show_patches(tmp_path: Path, written: Writt
     plan = prepared(written(*FEW, (f'{TINY_TOWN}: ["{TINY_SCENES}:board"]', "town10: []")), out=tmp_path)
     names = [scene.name for scene in plan.scenes]
     assert "billboard01" in names and "truck" in names and "no_billboard" not in names and len(names) == 10
+
+
+def test_networks_that_reckon_with_another_camera_are_told_before_anything_is_rendered(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.undo()
+    tasks = "tasks: {stereo3d: {models: {stereo_centre: {}}, collect: {options: {hfov_deg: 60}}}}"
+    (tmp_path / "b.yml").write_text(f"{tasks}\nplaces: {{town10: [truck]}}\n")
+    key = "tasks.stereo3d.models.stereo_centre"
+    with pytest.raises(
+        GearError, match=rf"b\.yml:1:29: {key}: .*with hfov_deg 60, .*say --set {key}\.set\.hfov_deg=60"
+    ):
+        prepared(tmp_path / "b.yml", out=tmp_path / "out")
+    assert prepared(tmp_path / "b.yml", out=tmp_path / "out", settings=[f"{key}.set.hfov_deg=60"])
+
+
+def test_attacks_make_as_many_patches_as_scenes_show(written: Written, tmp_path: Path) -> None:
+    plan = prepared(written(), out=tmp_path)
+    assert [scene.surfaces for scene in plan.scenes] == [1, 2]
