@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import html
+import itertools
 from collections.abc import Iterable, Sequence
 
 import cv2
@@ -104,12 +105,12 @@ def _pictures(plan: Plan, contest: Contest) -> Iterable[str]:
         seen = [sum(one.visible_px for one in clean.sidecar(i).surfaces) for i in range(len(clean))]
         number = int(np.argmax(seen))
         figures = [_shown(plan, contest, scene, weather, NONE, number, "without a patch")]
-        for model in contest.models:
-            caption = f"with the patch against {model.label}"
-            figures.append(_shown(plan, contest, scene, weather, model.label, number, caption))
+        for model, defense in itertools.product(contest.models, plan.looked_through(contest)):
+            name = plan.name(model, defense)
+            figures.append(_shown(plan, contest, scene, weather, name, number, f"with the patch against {name}"))
             figures += [
-                _figure(decode_rgb(path.read_bytes()), f"{path.stem} against {model.label}", PATCH_PX)
-                for path in sorted(plan.patch(contest, scene, model.label).glob("patch_*.png"))
+                _figure(decode_rgb(path.read_bytes()), f"{path.stem} against {name}", PATCH_PX)
+                for path in sorted(plan.patch(contest, scene, name).glob("patch_*.png"))
             ]
         yield f'<h3>{_safe(f"{scene.label}, {weather.label}")}</h3><div class="row">{"".join(figures)}</div>'
 

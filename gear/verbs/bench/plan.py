@@ -117,14 +117,14 @@ class Plan:
             for defense in contest.guards:
                 shown = {NONE: NONE, RANDOM: RANDOM, PATCH: model.label}
                 if defense is not None and self._is_adaptive(defense):
-                    shown[ADAPTIVE] = self._name(model, defense)
+                    shown[ADAPTIVE] = self.name(model, defense)
                 if defense is None and self.config.transfer:
                     shown |= {f"{PATCH} of {one.label}": one.label for one in contest.models if one is not model}
                 yield Match(
                     contest=contest,
                     model=model,
                     defense=defense,
-                    out=self._root / "evaluations" / contest.folder / self._name(model, defense),
+                    out=self._root / "evaluations" / contest.folder / self.name(model, defense),
                     pools={
                         kind: [self.pictures(contest, *place, patch) for place in self.places()]
                         for kind, patch in shown.items()
@@ -143,6 +143,15 @@ class Plan:
     def patch(self, contest: Contest, scene: Scene, name: str) -> Path:
         """The patch folder of a scene and a network, or of a network behind a defense."""
         return self._root / "patches" / contest.folder / name / scene.label
+
+    def looked_through(self, contest: Contest) -> tuple[Entrant | None, ...]:
+        """What stands before a network while patches are made against it: nothing, and each such defense."""
+        return (None, *(defense for defense in contest.defenses if self._is_adaptive(defense)))
+
+    @staticmethod
+    def name(model: Entrant, defense: Entrant | None) -> str:
+        """Of the two together: of rows, folders and patches."""
+        return model.label if defense is None else f"{model.label}+{defense.label}"
 
     def picture_settings(self, contest: Contest) -> tuple[str, ...]:
         """Of all of a task's collections."""
@@ -175,9 +184,8 @@ class Plan:
 
     def _patch(self, contest: Contest, scene: Scene, model: Entrant) -> Iterator[Step]:
         """A network's patch, those through its defenses, and the pictures that show them."""
-        through: list[Entrant | None] = [None, *(one for one in contest.defenses if self._is_adaptive(one))]
-        for defense in through:
-            name = self._name(model, defense)
+        for defense in self.looked_through(contest):
+            name = self.name(model, defense)
             yield self._attacked(contest, scene, model, defense, self.weathers)
             for weather in self.weathers:
                 out, patch = self.pictures(contest, scene, weather, name), self.patch(contest, scene, name)
@@ -228,7 +236,7 @@ class Plan:
     def _attacked(
         self, contest: Contest, scene: Scene, model: Entrant, defense: Entrant | None, shown: tuple[Weather, ...]
     ) -> Step:
-        attack, name = self.config.attack, self._name(model, defense)
+        attack, name = self.config.attack, self.name(model, defense)
         return Step(
             verb="attack",
             title=f"attack {name} of {contest.name} in {scene.label}",
@@ -254,7 +262,7 @@ class Plan:
             lessons["calibration_patched"] = str(self._lesson(match.contest, match.model.label))
         return Step(
             verb="evaluate",
-            title=f"evaluate {self._name(match.model, match.defense)} in {match.contest.name}",
+            title=f"evaluate {self.name(match.model, match.defense)} in {match.contest.name}",
             arguments={
                 "model": match.model.plugin,
                 "settings": match.model.settings,
@@ -267,10 +275,6 @@ class Plan:
                 "pools": {name: [str(root) for root in roots] for name, roots in match.pools.items()},
             },
         )
-
-    @staticmethod
-    def _name(model: Entrant, defense: Entrant | None) -> str:
-        return model.label if defense is None else f"{model.label}+{defense.label}"
 
 
 def reports_of(contest: Contest) -> tuple[str, ...]:

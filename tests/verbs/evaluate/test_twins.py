@@ -11,7 +11,7 @@ import pytest
 
 import gear
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
-from gear.values.errors import DatasetError
+from gear.values.errors import DatasetError, GearError
 from gear.verbs.collect.run import collect
 from gear.verbs.evaluate.patch_area import patch_masks
 from gear.verbs.evaluate.run import evaluate
@@ -42,6 +42,40 @@ def test_twins_are_compared_and_the_patch_can_be_left_out(tmp_path: Path, small:
     assert {name: (test["miou"].mean, test["miou"].p) for name, test in difference.paired.items()} == {
         "task": (0, 1), "outside_patch": (0, 1),
     }  # fmt: skip
+
+
+def test_pools_are_datasets_that_count_as_one(tmp_path: Path, small: Small, install: Install) -> None:
+    """Two metres too far on the patched pictures, one on those with the random patch; two seeds of each."""
+    roots: dict[str, list[Path]] = {"none": [], "random": []}
+    for seed in (1, 2):
+        for patch, found in roots.items():
+            found.append(tmp_path / f"{patch}-{seed}")
+            collect(
+                "depth", town=TINY_TOWN, scene="board", split="debug", samples=2 * seed, seed=seed, renderer="classic",
+                quality="fast", patch=patch, out=found[-1],
+                settings=[f"scenes={TINY_SCENES}", *size_settings("depth")],
+            )  # fmt: skip
+    every = [*roots["none"], *roots["random"]]
+    patched = {hash(s.images["left"].tobytes()) for root in roots["random"] for s in gear.open_dataset(root)}
+    install(
+        model_spec(
+            lambda _: Oracle(every, lambda s, p: p + (1 + (hash(s.images["left"].tobytes()) in patched))), "depth"
+        )
+    )
+    pools = {"none": roots["none"], "random": roots["random"], "first": roots["random"][:1]}
+    report = evaluate(every, model="odd", out=tmp_path / "out", resamples=50, pools=pools)
+    none, random, first = report.pools
+    assert (none.name, none.samples, none.differences) == ("none", 6, ())
+    assert none.rows == tuple(row.name for row in report.rows[:2])
+    assert [one.figures["task"]["mae_m"].value for one in report.pools] == pytest.approx([1, 2, 2], rel=1e-5)
+    (change,) = random.differences
+    assert (change.row, change.against) == ("random", "none") and change.paired["task"]["mae_m"].pairs == 6
+    assert change.figures["task"]["mae_m"].value == pytest.approx(1, rel=1e-5)
+    assert first.differences == (), "it shows fewer scenes than the others"
+    assert json.loads((tmp_path / "out/results.json").read_text())["pools"][1] == random.as_json()
+    for wrong, said in (({"none": []}, "'none' holds no dataset"), ({"a": [tmp_path / "no"]}, "not among the data")):
+        with pytest.raises(GearError, match=said):
+            evaluate(every, model="odd", out=tmp_path / "wrong", pools=wrong)
 
 
 def test_datasets_of_one_label_have_a_row_together(tmp_path: Path, small: Small, install: Install) -> None:
