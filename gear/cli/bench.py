@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps(listed, indent=1) if args.json else "\n".join(map(command, steps)))
         return 0
     with _Bars() as watch:
-        report = bench(args.config, **given, watch=watch)
+        report = bench(args.config, **given, apart=True, watch=watch)
     print(json.dumps(report.as_json(), indent=1, allow_nan=False) if args.json else text(report), end="")
     return 0
 

@@ -80,6 +80,15 @@ def test_two_runs_and_two_workers_give_the_same_bytes(tmp_path: Path, collect_sm
     assert tree(tmp_path / "a") == tree(tmp_path / "b")
 
 
+def test_a_worker_apart_gives_the_same_bytes(
+    tmp_path: Path, collect_small: Collect, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    collect_small("depth", tmp_path / "a")
+    monkeypatch.setattr("gear.verbs.collect.run.open_session", lambda job: pytest.fail("rendered in this process"))
+    collect_small("depth", tmp_path / "b", apart=True)
+    assert tree(tmp_path / "a") == tree(tmp_path / "b")
+
+
 def test_twins_differ_where_the_patch_is_seen_and_nowhere_else(tmp_path: Path, collect_small: Collect) -> None:
     collect_small("semseg", tmp_path / "none", samples=3)
     collect_small("semseg", tmp_path / "random", samples=3, patch="random")

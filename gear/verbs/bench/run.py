@@ -76,6 +76,7 @@ def bench(
     settings: Iterable[str] = (),
     device: str | None = None,
     workers: int = 1,
+    apart: bool = False,
     watch: Watch | None = None,
 ) -> BenchReport:
     """Compares networks and defenses over scenes and patches, the whole way; takes up again what was begun.
@@ -90,6 +91,8 @@ def bench(
         settings: `KEY=VALUE` texts for any key of the config.
         device: where networks run; what the config says goes first.
         workers: processes of each collection; they change nothing but time.
+        apart: whether a single worker is a process of its own, too. Each collection in this one keeps some 20 MB, so
+            large benches should say yes; a script that does needs Python's usual `if __name__ == "__main__":`.
         watch: told what happens.
 
     Raises:
@@ -105,6 +108,8 @@ def bench(
     for number, step in enumerate(steps, 1):
         watching.began(step, number, len(steps))
         told = {name: getattr(watching, name) for name in TOLD[step.verb]}
+        if step.verb == "collect":
+            told["apart"] = apart
         try:
             done = VERBS[step.verb](**step.arguments, **told)
         except GearError as error:

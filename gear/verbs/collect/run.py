@@ -65,6 +65,7 @@ def collect(
     probes: bool | None = None,
     settings: Iterable[str] = (),
     workers: int = 1,
+    apart: bool = False,
     force: bool = False,
     progress: Progress | None = None,
     noted: Noted | None = None,
@@ -79,6 +80,7 @@ def collect(
         probes: also keep what compositors need; see `gear.formats.probes`.
         settings: further `KEY=VALUE` texts for any key of the config.
         workers: processes; they change nothing but time.
+        apart: whether a single worker is a process of its own, too, which gives all its memory back.
         force: replaces a split that was made with another configuration.
         progress: told after every sample.
         noted: told of patches that were made for another scene.
@@ -104,6 +106,7 @@ def collect(
     return collect_config(
         load_collection(None if config is None else str(config), flags, settings),
         workers=workers,
+        apart=apart,
         force=force,
         progress=progress,
         noted=noted,
@@ -114,6 +117,7 @@ def collect_config(
     config: CollectionConfig,
     *,
     workers: int = 1,
+    apart: bool = False,
     force: bool = False,
     progress: Progress | None = None,
     noted: Noted | None = None,
@@ -124,22 +128,24 @@ def collect_config(
     job = resolve(config)
     if noted is not None and job.note:
         noted(job.note)
-    return run_job(job, workers=workers, force=force, progress=progress)
+    return run_job(job, workers=workers, apart=apart, force=force, progress=progress)
 
 
-def run_job(job: Job, *, workers: int = 1, force: bool = False, progress: Progress | None = None) -> CollectReport:
+def run_job(
+    job: Job, *, workers: int = 1, apart: bool = False, force: bool = False, progress: Progress | None = None
+) -> CollectReport:
     """Collects what is missing of a resolved job and closes the split."""
     store = Store(job.root, job.plan)
     plugin = find("task", job.config.task)
     with store.begun(job.patch.files, force=force):
-        made = _collect_missing(job, store, workers, progress)
+        made = _collect_missing(job, store, workers, apart, progress)
         task = build(plugin, job.config.options)
         with blamed(plugin, "finalise"):
             store.close(task, manifest_facts(job))
     return CollectReport(root=job.root, split=job.plan.info.split, samples=job.plan.samples, made=made)
 
 
-def _collect_missing(job: Job, store: Store, workers: int, progress: Progress | None) -> int:
+def _collect_missing(job: Job, store: Store, workers: int, apart: bool, progress: Progress | None) -> int:
     """How many samples it made."""
     missing = store.missing()
     finished = job.plan.samples - len(missing)
@@ -152,7 +158,7 @@ def _collect_missing(job: Job, store: Store, workers: int, progress: Progress | 
 
     if progress is not None:
         progress(finished, job.plan.samples)
-    if missing and workers == 1:
+    if missing and workers == 1 and not apart:
         with open_session(job) as session:
             collect_samples(session, store, missing, done)
     elif missing:

@@ -16,6 +16,7 @@ from gear.cli.main import main
 from gear.values.errors import GearError
 from gear.verbs.bench.plan import Step
 from gear.verbs.bench.report import BenchReport
+from gear.verbs.bench.run import VERBS
 from tests.verbs.bench.conftest import FEW
 
 pytestmark = pytest.mark.usefixtures("plugins")
@@ -136,6 +137,23 @@ def test_the_command(tmp_path: Path, written: Callable[..., Path], capsys: pytes
     assert main(["bench", config, "--out", out, "--list", "--json"]) == 0
     steps = json.loads(capsys.readouterr().out)
     assert [step["verb"] for step in steps] == [line.split()[1] for line in listed]
+
+
+def test_the_command_collects_in_processes_of_their_own(
+    tmp_path: Path, written: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A day of collections in one process would fill the memory."""
+    told: list[bool] = []
+
+    def collected(**arguments: Any) -> None:
+        told.append(arguments["apart"])
+        raise GearError("far enough")
+
+    monkeypatch.setitem(VERBS, "collect", collected)
+    assert main(["bench", str(written(*FEW)), "--out", str(tmp_path / "out")]) == 2
+    with pytest.raises(GearError, match="far enough"):
+        gear.bench(written(*FEW), out=tmp_path / "out")
+    assert told == [True, False]
 
 
 def test_a_step_that_fails_says_which(tmp_path: Path, written: Callable[..., Path]) -> None:
