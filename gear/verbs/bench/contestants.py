@@ -87,12 +87,15 @@ def find_attack(config: BenchConfig, node: Node) -> Found:
         raise located(node, error, "attack", "plugin") from error
 
 
-def contests(config: BenchConfig, node: Node, *, surfaces: int, device: str | None = None) -> Iterator[Contest]:
+def contests(
+    config: BenchConfig, node: Node, *, attack: Found, surfaces: int, device: str | None = None
+) -> Iterator[Contest]:
     """What meets what, in every task.
 
     Args:
         config: of the bench.
         node: its file, for places in errors.
+        attack: that makes the patches.
         surfaces: most that a scene has.
         device: where networks run, as their option `device`; None leaves it to them.
 
@@ -100,7 +103,6 @@ def contests(config: BenchConfig, node: Node, *, surfaces: int, device: str | No
         ConfigError: a plugin is not there, an option is not known, a pair does not suit, or a defense must learn and
             there is no scene for that.
     """
-    attack = find_attack(config, node)
     for name, bench in config.tasks.items():
         try:
             task = find("task", name).spec

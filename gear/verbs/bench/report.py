@@ -10,11 +10,29 @@ from gear.values.serial import Json
 from gear.verbs.bench.plan import RANDOM
 from gear.verbs.evaluate.choice import OUTSIDE_PATCH
 from gear.verbs.evaluate.compare import NONE
-from gear.verbs.evaluate.report import Difference, Estimate, EvaluateReport, PairedTest, Pool
+from gear.verbs.evaluate.report import Difference, Estimate, EvaluateReport, Figures, PairedTest, Pool
 from gear.verbs.evaluate.scoring import TASK
+from gear.verbs.evaluate.table import figure_title
 
 FOUND_SHARE = "found_share"
 """Figure of single samples of tasks whose own figure no single sample has."""
+
+
+COLUMNS = (
+    "task",
+    "model",
+    "defense",
+    "scene",
+    "weather",
+    "patch",
+    "samples",
+    "figure",
+    "value",
+    "low",
+    "high",
+    "ceiling",
+)
+"""Of bench.csv."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,7 +58,11 @@ class Figure:
     @property
     def title(self) -> str:
         """As tables have it."""
-        return self.name if self.report == TASK else f"{self.report}.{self.name}"
+        return figure_title(self.report, self.name)
+
+    def among(self, figures: Figures) -> Estimate | None:
+        """Its value, where it was measured."""
+        return figures.get(self.report, {}).get(self.name)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,15 +131,11 @@ class TaskResult:
 
     def value(self, pool: Pool) -> Estimate | None:
         """The task's figure over a pool."""
-        if self.figure is None:
-            return None
-        return pool.figures.get(self.figure.report, {}).get(self.figure.name)
+        return None if self.figure is None else self.figure.among(pool.figures)
 
     def change(self, one: Difference | None) -> Estimate | None:
         """Of the task's figure."""
-        if self.figure is None or one is None:
-            return None
-        return one.figures.get(self.figure.report, {}).get(self.figure.name)
+        return None if self.figure is None or one is None else self.figure.among(one.figures)
 
     def beside(self, one: Difference | None) -> tuple[str, PairedTest] | None:
         """The test of what single samples lose, with the figure's name: outside the patch where the task can tell."""
@@ -127,7 +145,7 @@ class TaskResult:
         tests = one.paired.get(report, {})
         wanted = ("" if self.figure is None else self.figure.name, FOUND_SHARE, *tests)
         name = next((name for name in wanted if name in tests), None)
-        return None if name is None else (name if report == TASK else f"{report}.{name}", tests[name])
+        return None if name is None else (figure_title(report, name), tests[name])
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -163,15 +181,10 @@ class BenchReport:
                     value, samples = task.value(pool), pool.samples
                     if value is not None:
                         where = {"scene": "all", "weather": "all", "patch": pool.name, "samples": samples}
-                        yield {**who, **where, "figure": figure, **_bounds(value)}
+                        yield {**who, **where, "figure": figure, **value.as_json()}
                 for at in one.scenes:
                     where = {"scene": at.scene, "weather": at.weather, "patch": at.patch, "samples": at.samples}
-                    yield {**who, **where, "figure": figure, **_bounds(at.value)}
-
-
-def _bounds(value: Estimate) -> Mapping[str, Json]:
-    low, high = value.interval or (None, None)
-    return {"value": value.value if value.value == value.value else None, "low": low, "high": high}
+                    yield {**who, **where, "figure": figure, **at.value.as_json()}
 
 
 def _task_json(task: TaskResult, out: Path) -> Json:

@@ -25,7 +25,7 @@ from gear.verbs.bench.contestants import contests, find_attack
 from gear.verbs.bench.page import page
 from gear.verbs.bench.places import calibration_scene, located, measured_scenes
 from gear.verbs.bench.plan import Match, Plan, Step, Verb
-from gear.verbs.bench.report import BenchReport, Figure, Result, SceneFigure, TaskResult
+from gear.verbs.bench.report import COLUMNS, BenchReport, Figure, Result, SceneFigure, TaskResult
 from gear.verbs.bench.table import text
 from gear.verbs.collect.job import find_weather, versions
 from gear.verbs.collect.run import collect
@@ -89,7 +89,7 @@ def bench(
         config: name (`gear bench quick`) or path of a bench config.
         out: folder of everything.
         settings: `KEY=VALUE` texts for any key of the config.
-        device: where networks run; what the config says goes first.
+        device: where networks run, whatever the config says.
         workers: processes of each collection; they change nothing but time.
         apart: whether a single worker is a process of its own, too. Each collection in this one keeps some 20 MB, so
             large benches should say yes; a script that does needs Python's usual `if __name__ == "__main__":`.
@@ -116,12 +116,13 @@ def bench(
             raise GearError(f"{step.title}: {error}") from error
         if isinstance(done, EvaluateReport):
             evaluations[step.arguments["out"]] = done
+            for problem in (problem for row in done.rows for problem in row.damaged):
+                watching.noted(f"{problem}; the sample was predicted again")
     report = _report(plan, root, evaluations)
-    lines = list(report.records())
     written = io.StringIO()
-    table = csv.DictWriter(written, list(lines[0]) if lines else [], lineterminator="\n")
+    table = csv.DictWriter(written, COLUMNS, lineterminator="\n")
     table.writeheader()
-    table.writerows(lines)
+    table.writerows(report.records())
     write_whole(root, "bench.csv", written.getvalue().encode())
     write_whole(root, "bench.json", dump_json(report.as_json()))
     write_whole(root, "table.txt", text(report).encode())
@@ -155,14 +156,15 @@ def prepared(
     node = with_overrides(parse_file(find_config("bench", str(config))), settings, BenchConfig)
     read = read_node(BenchConfig, node)
     scenes = measured_scenes(read, node)
-    spec = find_attack(read, node).spec
-    assert isinstance(spec, AttackSpec)
+    attacker = find_attack(read, node)
+    assert isinstance(attacker.spec, AttackSpec)
+    surfaces = max(scene.surfaces for scene in scenes)
     plan = Plan(
         read,
         scenes=scenes,
         calibration=calibration_scene(read, node, scenes),
-        contests=tuple(contests(read, node, surfaces=max(scene.surfaces for scene in scenes), device=device)),
-        attack=spec,
+        contests=tuple(contests(read, node, attack=attacker, surfaces=surfaces, device=device)),
+        attack=attacker.spec,
         root=root,
         workers=workers,
     )
@@ -214,15 +216,9 @@ def _report(plan: Plan, root: Path, evaluations: dict[str, EvaluateReport]) -> B
 def _result(match: Match, figure: Figure | None, evaluation: EvaluateReport, plan: Plan) -> Result:
     places = [(kind, *place) for kind in match.pools for place in plan.places()]
     scenes = [
-        SceneFigure(
-            scene=scene.label,
-            weather=weather.label,
-            patch=kind,
-            samples=row.samples,
-            value=row.figures[figure.report][figure.name],
-        )
+        SceneFigure(scene=scene.label, weather=weather.label, patch=kind, samples=row.samples, value=value)
         for (kind, scene, weather), row in zip(places, evaluation.rows, strict=True)
-        if figure is not None and figure.name in row.figures.get(figure.report, {})
+        if figure is not None and (value := figure.among(row.figures)) is not None
     ]
     return Result(
         model=match.model.label,

@@ -15,7 +15,7 @@ COLUMNS, FURTHER = 4, 2
 def table(report: EvaluateReport) -> str:
     """Datasets as rows, each report's first figures as columns, twins' differences below the dataset."""
     columns = _columns(report)
-    head = ["", "samples", *(_title(*column) for column in columns), "model s", "defense s", "mask IoU", "AUROC"]
+    head = ["", "samples", *(figure_title(*column) for column in columns), "model s", "defense s", "mask IoU", "AUROC"]
     lines = []
     for row in report.rows:
         lines.append(_row(row, columns))
@@ -41,7 +41,8 @@ def _columns(report: EvaluateReport) -> list[tuple[str, str]]:
     return list(seen)
 
 
-def _title(report: str, figure: str) -> str:
+def figure_title(report: str, figure: str) -> str:
+    """Of a column: the figure's name, after that of its report where it is not the task's own."""
     return figure if report == TASK else f"{report}.{figure}"
 
 
@@ -64,7 +65,7 @@ def _paired(report: EvaluateReport) -> list[str]:
     for one in report.differences:
         against = next(row for row in report.rows if row.name == one.against)
         tests = [
-            f"{_title(name, figure)} {number(test.mean, is_signed=True)} (p {test.p:.2g}, {test.pairs} pairs)"
+            f"{figure_title(name, figure)} {number(test.mean, is_signed=True)} (p {test.p:.2g}, {test.pairs} pairs)"
             for name, figures in one.paired.items()
             for figure, test in list(figures.items())[: COLUMNS if name == TASK else FURTHER]
             if test.pairs
@@ -96,7 +97,7 @@ def _limited(report: EvaluateReport, columns: Iterable[tuple[str, str]]) -> list
     lines = []
     for name, figures in rows:
         known = [(column, figures.get(column[0], {}).get(column[1])) for column in columns]
-        low = [f"{_title(*column)} {number(one.ceiling)}" for column, one in known if one and one.ceiling < 1]
+        low = [f"{figure_title(*column)} {number(one.ceiling)}" for column, one in known if one and one.ceiling < 1]
         lines += [f"perfect predictions would come to {', '.join(low)} in {name}"] if low else []
     return lines
 
