@@ -21,7 +21,7 @@ from gear.camera import torch_response
 from gear.camera.response import IDENTITY, Response
 from gear.compositor.grain import Grain, grain_of
 from gear.compositor.pasting import Pasting, Prepared, Sizes, picture_of, products
-from gear.compositor.pyramid import pyramid_of
+from gear.compositor.pyramid import Pyramid, halving_of, pyramid_of
 from gear.compositor.sampling import Scan, take_samples, unit_from_image
 from gear.compositor.sparse import SparseMatrix
 from gear.compositor.warp import warp_matrix
@@ -65,7 +65,7 @@ class TransportCompositor(Pasting):
     def _columns(self, patches: Sequence[Tensor]) -> list[Tensor]:
         renderer = self._renderer
         return [
-            pyramid_of(int(p.shape[-2]), int(p.shape[-1])).spread(torch_response.face_light(renderer, p))
+            self._pyramid((int(p.shape[-2]), int(p.shape[-1]))).spread(torch_response.face_light(renderer, p))
             for p in patches
         ]
 
@@ -76,6 +76,12 @@ class TransportCompositor(Pasting):
             light = light + products([view.matrices[number] for view in inner], mine) * gain
         parts = light.split([len(view.black) for view in inner])  # type: ignore[no-untyped-call]
         return torch.cat([view.shown(part) for view, part in zip(inner, parts, strict=True)])
+
+    def _pyramid(self, size: tuple[int, int]) -> Pyramid:
+        """Of patches of (height, width), as the dataset's renderer made it."""
+        renderer = self._renderer
+        driver = str(self.dataset.manifest["renderer"].get("driver"))
+        return pyramid_of(*size, halving_of(renderer, driver))
 
     @property
     def _renderer(self) -> str:
@@ -113,7 +119,7 @@ class TransportCompositor(Pasting):
         self, sample: Any, number: int, view: str, pixels: tuple[Any, Any], gain: Any, size: tuple[int, int]
     ) -> SparseMatrix:
         """One surface's; rows are empty where it gives no light."""
-        record, pyramid = sample.record, pyramid_of(*size)
+        record, pyramid = sample.record, self._pyramid(size)
         surface, camera = record.surfaces[number], record.camera(view)
         lit = np.flatnonzero(gain.any(axis=1))
         spread = sparse.csr_matrix((np.ones(lit.size, np.float32), (lit, np.arange(lit.size))), (len(gain), lit.size))

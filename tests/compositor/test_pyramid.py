@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from gear.compositor.cache import Cache
-from gear.compositor.pyramid import axis_matrices, halving_matrix, pyramid_of
+from gear.compositor.pyramid import Halving, axis_matrices, halving_matrix, halving_of, pyramid_of
 from gear.compositor.sampling import Samples
 from gear.compositor.sparse import SparseMatrix, stacked_product
 from gear.compositor.warp import warp_matrix
@@ -15,18 +15,19 @@ from gear.values.geometry import Array
 from gear.world.faces import resample_linear
 
 SIZES = [(150, 300), (37, 50), (37, 75), (600, 1200), (700, 1300), (4, 4)]
+HALVINGS: tuple[Halving, ...] = ("middles", "areas")
 
 
 def noise(height: int, width: int) -> Array:
     return np.random.default_rng(height * width).random((height, width, 3))
 
 
-def levels_of(patch: Array) -> list[Array]:
+def levels_of(patch: Array, halving: Halving) -> list[Array]:
     """The slow way: the face, then its levels, one after the other."""
     levels = [resample_linear(patch)]
     while max(levels[-1].shape[:2]) > 1:
         last = levels[-1]
-        rows, columns = halving_matrix(last.shape[0]), halving_matrix(last.shape[1])
+        rows, columns = (halving_matrix(size, halving) for size in last.shape[:2])
         levels.append(np.einsum("ih,hwc,jw->ijc", rows, last, columns, optimize=True))
     return levels
 
@@ -36,28 +37,41 @@ def at(u: float, v: float, level: float) -> Samples:
     return Samples(u=u * one, v=v * one, level=level * one, weight=one, coverage=np.ones(1))
 
 
+@pytest.mark.parametrize("halving", HALVINGS)
 @pytest.mark.parametrize("size", [1, 2, 37, 75, 1200])
-def test_halving_averages(size: int) -> None:
-    matrix = halving_matrix(size)
+def test_halving_averages(size: int, halving: Halving) -> None:
+    matrix = halving_matrix(size, halving)
     assert matrix.shape == (max(1, size // 2), size)
     assert matrix.sum(axis=1) == pytest.approx(1)
     if size % 2 == 0:
         assert matrix @ np.arange(size) == pytest.approx(np.arange(size // 2) * 2 + 0.5)
 
 
+def test_areas_count_every_texel_alike_and_middles_leave_some_out() -> None:
+    assert halving_matrix(75, "areas").mean(axis=0) == pytest.approx(1 / 75)
+    assert halving_matrix(75, "middles").mean(axis=0).std() > 0.2 / 75
+
+
+def test_opengl_halves_as_its_driver_does_and_filament_as_itself() -> None:
+    nvidia, mesa = "4.6.0 NVIDIA 580.159.04", "4.5 (Compatibility Profile) Mesa 22.3.6"
+    assert halving_of("classic", nvidia) == "areas"
+    assert [halving_of("classic", mesa), halving_of("filament", nvidia)] == ["middles", "middles"]
+
+
 def test_levels_end_at_one_texel() -> None:
     assert [m.shape[0] for m in axis_matrices(300, 1200)] == [1200, 600, 300, 150, 75, 37, 18, 9, 4, 2, 1]
 
 
+@pytest.mark.parametrize("halving", HALVINGS)
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("level", [0.0, 0.6, 1.0, 2.3, 3.5, 4.5, 7.0, 10.0])
-def test_a_sample_reads_what_the_face_would_show(size: tuple[int, int], level: float) -> None:
+def test_a_sample_reads_what_the_face_would_show(size: tuple[int, int], level: float, halving: Halving) -> None:
     """Folded levels, chained levels and those made from the patch are all the same as a face made in full."""
     patch = noise(*size)
-    pyramid = pyramid_of(*size)
+    pyramid = pyramid_of(*size, halving)
     columns = pyramid.spread(torch.from_numpy(patch).permute(2, 0, 1).float())
     assert columns.shape == (pyramid.size, 3)
-    slow = levels_of(patch)
+    slow = levels_of(patch, halving)
     for u, v in ((0.31, 0.77), (0.0, 1.0), (0.5, 0.001)):
         wanted = np.zeros(3)
         low = min(int(level), len(slow) - 1)
