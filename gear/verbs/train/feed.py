@@ -110,18 +110,19 @@ class Feed:
     def from_position(self, position: Position) -> Generator[Batch]:
         """Batches of this pass and all that follow; close the iterator to end its threads."""
         pool = ThreadPoolExecutor(self._config.workers, thread_name_prefix="gear-train")
-        ahead: deque[tuple[tuple[int, ...], list[Future[Any]]]] = deque()
+        joining = ThreadPoolExecutor(1, thread_name_prefix="gear-train-batch")
+        ahead: deque[Future[Batch]] = deque()
         try:
             while True:
                 while len(ahead) < BATCHES_AHEAD:
                     indices = self._indices(position)
-                    futures = [pool.submit(self._sample, position.epoch, index) for index in indices]
-                    ahead.append((indices, futures))
+                    made = [pool.submit(self._sample, position.epoch, index) for index in indices]
+                    ahead.append(joining.submit(self._batch, indices, made))
                     position = position.following(self.batches)
-                indices, futures = ahead.popleft()
-                yield self._batch(indices, [future.result() for future in futures])
+                yield ahead.popleft().result()
         finally:
-            pool.shutdown(wait=True, cancel_futures=True)
+            for threads in (pool, joining):
+                threads.shutdown(wait=True, cancel_futures=True)
 
     def _indices(self, position: Position) -> tuple[int, ...]:
         """A last batch that would not be full is left out."""
@@ -138,12 +139,17 @@ class Feed:
         shown = augment(sample, self._config.augmentation, self._config.framing, rng)
         return shown, {name: picture_tensor(shown.images[name]) for name in self._views}
 
-    def _batch(self, indices: tuple[int, ...], made: list[tuple[Any, dict[str, torch.Tensor]]]) -> Batch:
+    def _batch(self, indices: tuple[int, ...], making: Sequence[Future[tuple[Any, dict[str, torch.Tensor]]]]) -> Batch:
+        """A whole batch, where the network is; the thread that steps does not wait for a copy to a GPU."""
+        made = [future.result() for future in making]
         tensors = {}
         for name in self._views:
             pictures = [views[name] for _, views in made]
             sizes = sorted({tuple(picture.shape[1:]) for picture in pictures})
             if len(sizes) > 1:
                 raise GearError(f"training pictures differ in size ({sizes}); say --set crop_px=[HEIGHT, WIDTH]")
-            tensors[name] = torch.stack(pictures).to(self._device)
+            stacked = torch.stack(pictures)
+            if self._device.type == "cuda":
+                stacked = stacked.pin_memory()
+            tensors[name] = stacked.to(self._device, non_blocking=True)
         return Batch(views=as_pictures(tensors), samples=tuple(sample for sample, _ in made), indices=indices)

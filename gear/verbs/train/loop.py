@@ -95,6 +95,7 @@ class Training:
                 parameter.data = parameter.data.contiguous(memory_format=self._memory)
         self._optimiser = optimiser_of(self._module, config)
         self._mean = RunningMean(self._module, config.ema)
+        self._before = Buffers(self._module)
         self._device = device_of(config.device)
         self._broken = 0
         found = checkpoint.load(parts.root, parts.plan, self._module, self._mean, self._optimiser)
@@ -168,7 +169,7 @@ class Training:
         for group in self._optimiser.param_groups:
             group["lr"] = config.learning_rate * factor
         views = {name: picture.contiguous(memory_format=self._memory) for name, picture in batch.views.items()}
-        before = Buffers(self._module)
+        self._before.keep()
         with seeded(int(derive_rng(config.seed, "step", progress.step).integers(2**31))):
             with autocast(self._device, config.precision):
                 loss = self._loss(views, batch)
@@ -181,7 +182,7 @@ class Training:
             self._mean.update(self._module, progress.step)
             progress.open_losses.append(float(loss.detach()))
         else:
-            before.put_back()
+            self._before.put_back()
         progress.step += 1
         progress.position = progress.position.following(self._parts.feed.batches)
         if progress.step % NOTE_EVERY == 0 and progress.open_losses:

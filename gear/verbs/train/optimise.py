@@ -54,25 +54,37 @@ class RunningMean:
     def update(self, module: nn.Module, step: int) -> None:
         """Takes in the weights after a step, counted from 0."""
         decay = min(self.decay, (1 + step) / (10 + step))
-        for key, value in module.state_dict().items():
-            if value.is_floating_point():
-                self.state[key].lerp_(value, 1 - decay)
-            else:
-                self.state[key].copy_(value)
+        newest = module.state_dict()
+        moving = [key for key, value in newest.items() if value.is_floating_point()]
+        if moving:
+            torch._foreach_lerp_([self.state[key] for key in moving], [newest[key] for key in moving], 1 - decay)
+        for key in newest.keys() - moving:
+            self.state[key].copy_(newest[key])
 
 
 class Buffers:
     """What forward passes write into a module, such as running statistics, as it was at one time."""
 
-    @torch.no_grad()
     def __init__(self, module: nn.Module) -> None:
-        self._kept = [(buffer, buffer.clone()) for buffer in module.buffers()]
+        self._module = module
+        self._buffers: list[Tensor] = []
+        self._kept: list[Tensor] = []
+        self.keep()
+
+    @torch.no_grad()
+    def keep(self) -> None:
+        """As it is now."""
+        buffers = list(self._module.buffers())
+        if list(map(id, buffers)) == list(map(id, self._buffers)) and buffers:
+            torch._foreach_copy_(self._kept, buffers)
+        else:
+            self._buffers, self._kept = buffers, [buffer.clone() for buffer in buffers]
 
     @torch.no_grad()
     def put_back(self) -> None:
         """Undoes what has been written since."""
-        for buffer, kept in self._kept:
-            buffer.copy_(kept)
+        if self._kept:
+            torch._foreach_copy_(self._buffers, self._kept)
 
 
 def clip_gradients(module: nn.Module, most: float) -> Tensor:
