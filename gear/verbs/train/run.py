@@ -155,9 +155,6 @@ def train(
     begun = begun_config(root)
     config = with_scale(found, without_empty_margins(config, training), share, begun)
     refuse_dataset(root, "train into a folder of its own")
-    with explained(root):
-        root.mkdir(parents=True, exist_ok=True)
-    clear_scratch(root)
     flags = {"epochs": epochs, "time_budget": _budget(time_budget_s), "batch": batch, "lr": lr, "seed": seed,
              "init": init, "precision": precision, "allow_test_data": allow_test_data}  # fmt: skip
     origin = Origin(
@@ -176,6 +173,9 @@ def train(
         watch=watch,
         keep=lambda state, progress: keep_weights(root, state, origin, progress),
     )
+    with explained(root):
+        root.mkdir(parents=True, exist_ok=True)
+    clear_scratch(root)
     progress = training_run.run()
     write_curves(root, spec, progress, f"{found.spec.name} on {task}")
     write_history(root, origin, progress)

@@ -242,6 +242,7 @@ def test_what_cannot_be_trained_is_said_in_a_line(street: Street, tmp_path: Path
     install(replace(tiny_segmenter, recipe=None))
     with pytest.raises(GearError, match="gives no recipe"):
         quick(street, out)
+    assert not out.exists()
 
 
 def test_it_begins_with_what_it_is_told(street: Street, tmp_path: Path, install: Any) -> None:
@@ -281,6 +282,7 @@ def test_it_begins_with_the_trunk_of_another_network(street: Street, tmp_path: P
         quick(street, tmp_path / "none", init="trunk:ddrnet23_slm")
     with pytest.raises(GearError, match="there is no such weights file"):
         quick(street, tmp_path / "none", init="trunk:gone.safetensors")
+    assert not (tmp_path / "none").exists()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
