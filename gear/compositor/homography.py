@@ -10,11 +10,12 @@ Source: CARLA-GeAR (Nesti et al., 2022), section on patch generation; Nesti et a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 import torch
 from torch import Tensor
 
@@ -24,15 +25,20 @@ from gear.compositor.sampling import Samples, Scan, take_samples, unit_from_imag
 from gear.compositor.sparse import SparseMatrix
 from gear.compositor.warp import warp_matrix
 from gear.values.geometry import Array
-from gear.values.optics import CameraEffects
+from gear.values.optics import CameraEffects, Lens
+from gear.values.scene import CameraRecord
 
 _SCAN = Scan(supersampled=True, extrapolates=False, smooths=False, effects=CameraEffects())
+Ints = npt.NDArray[np.intp]
 _NOWHERE = np.zeros((1, 1), np.bool_)
+
+PIXELS_AT_ONCE = 1 << 17
+"""That are looked at together for whether a surface covers them; samples of a whole picture take a gigabyte."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Outline:
-    """Surfaces as the pinhole projects them.
+    """Surfaces as the pinhole projects them, and its lens bends them where it has one.
 
     Attributes:
         background: (N, 3) float32 of the stored picture, 0..1.
@@ -68,16 +74,18 @@ class HomographyCompositor(Pasting):
         truths = [self._truth(sample, s.name, view) for s in record.surfaces]
         units = [unit_from_image(t, s, camera) for t, s in zip(truths, record.surfaces, strict=True)]
 
-        def samples_at(unit: Array, rows: Any, columns: Any) -> Samples:
-            return take_samples(_SCAN, unit, (columns, rows), _NOWHERE, camera, (0.0, 0.0, 0.0))
+        scan = _scan(camera)
+
+        def samples_at(unit: Array, where: Ints) -> Samples:
+            return take_samples(scan, unit, (where % width, where // width), _NOWHERE, camera, (0.0, 0.0, 0.0))
 
         covered = np.zeros(height * width, np.bool_)
+        parts = np.array_split(np.arange(covered.size), math.ceil(covered.size / PIXELS_AT_ONCE))
         for truth, unit in zip(truths, units, strict=True):
-            if truth.incidence_deg < 90:
-                rows, columns = (grid.reshape(-1) for grid in np.mgrid[0:height, 0:width])
-                covered |= samples_at(unit, rows, columns).coverage > 0
+            for part in parts if truth.incidence_deg < 90 else ():
+                covered[part] |= samples_at(unit, part).coverage > 0
         where = np.flatnonzero(covered)
-        found = [samples_at(unit, where // width, where % width) for unit in units]
+        found = [samples_at(unit, where) for unit in units]
         left = np.ones(len(where))
         covers = [left] * len(found)
         for number in sorted(range(len(found)), key=lambda n: truths[n].distance_m):
@@ -95,3 +103,10 @@ class HomographyCompositor(Pasting):
 
     def _moved(self, values: Array) -> Tensor:
         return torch.from_numpy(values.astype(np.float32)).to(self.device)
+
+
+def _scan(camera: CameraRecord) -> Scan:
+    """Four samples a pixel; behind a lens, four of each of the pinhole's pixels that it mixes."""
+    if camera.lens is None:
+        return _SCAN
+    return replace(_SCAN, effects=CameraEffects(lens=Lens(k1=camera.lens.k1, k2=camera.lens.k2)))

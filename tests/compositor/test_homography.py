@@ -15,6 +15,9 @@ from gear.plugins.build import build_task
 from gear.testing.synthetic import synthetic_frame
 from gear.testing.things import CAR, Thing, board
 from gear.values.optics import CameraEffects
+from gear.verbs.gap.figures import visible_mask
+
+from .conftest import MakeTwins
 
 WIDTH, HEIGHT = 320, 160
 FULL = (1.0, 0.0, 0.0)
@@ -110,3 +113,19 @@ def test_a_mip_level_is_the_logarithm_of_a_samples_longer_edge_in_texels(distanc
     found = take_samples(scan, unit, middle, np.ones((HEIGHT, WIDTH), np.bool_), camera, (0.0, 0.0, 0.0))
     texels = (distance_m - 1.5) / camera.focal_px * 1200 / 7.4
     assert found.level[0, 0] == pytest.approx(np.log2(texels), abs=1e-6)
+
+
+def test_a_lens_bends_what_is_pasted_as_it_bends_the_board(twins: MakeTwins) -> None:
+    _, twin = twins(settings=("camera.lens.k1=-0.3",))
+    sample = twin[0]
+    seen = visible_mask(sample.surfaces, "left", *sample.images["left"].shape[:2])
+    compositor = HomographyCompositor(twin)
+    patches = [[flat(*colour)] * compositor.surfaces for colour in (FULL, (0.0, 0.0, 1.0))]
+    red, blue = (compositor.compose(several, [0], "left")[0] for several in patches)
+    pasted = ((red - blue)[0] > 0.5).numpy()
+    assert (pasted & seen).sum() > 0.93 * (pasted | seen).sum()
+    truth = np.array(sample.surfaces[0].image_from_unit).reshape(3, 3)
+    y, x = np.mgrid[: seen.shape[0], : seen.shape[1]]
+    u, v, w = np.einsum("ij,jhw->ihw", np.linalg.inv(truth), np.stack([x, y, np.ones_like(x)]))
+    unbent = (w > 0) & (abs(u / w - 0.5) <= 0.5) & (abs(v / w - 0.5) <= 0.5)
+    assert (unbent & seen).sum() < 0.8 * (unbent | seen).sum()
