@@ -52,7 +52,7 @@ def test_the_network_takes_them(path: Path) -> None:
     state = model.module().state_dict()  # type: ignore[attr-defined]
     given, _ = read(path)
     assert mismatches(state, given) == []
-    assert all(bool((state[key] == value).all()) for key, value in given.items())
+    assert all(bool((state[key].cpu() == value).all()) for key, value in given.items())
 
 
 UNSEEN: dict[str, tuple[str, dict[str, tuple[float, float]]]] = {
