@@ -46,7 +46,7 @@ _FRAMES_TO_SETTLE = 24
 """After so many frames Filament lets go of what it uploaded the model through: a quarter of what it takes of a town."""
 
 _FIRST_LOOK = CameraRecord(
-    name="first", width_px=16, height_px=16, focal_px=8.0, world_from_camera=Pose(position_m=(0.0, 0.0, 0.0))
+    name="first", width_px=16, height_px=16, focal_px=8.0, world_from_camera=Pose(position_m=(0.0, 0.0, -1e5))
 )
 
 
