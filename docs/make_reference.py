@@ -15,7 +15,7 @@ PAGE = Path(__file__).parent / "reference.md"
 
 SPECS = (specs.Spec, specs.TaskSpec, specs.ModelSpec, specs.AttackSpec, specs.DefenseSpec)
 PROTOCOLS = (
-    tasks.Task, tasks.Evaluator, models.Model, attacks.Attack, attacks.Compositor, defenses.Defense,
+    tasks.Task, tasks.Evaluator, models.Model, attacks.Attack, attacks.Compositor, defenses.Defense, defenses.Taught,
 )  # fmt: skip
 VALUES = (
     tasks.Sample, tasks.SplitInfo, tasks.Encoded, tasks.Sidecar, attacks.Patch, attacks.Budget, defenses.DefenseResult,

@@ -14,6 +14,9 @@ from gear.contracts.defenses import Defense
 from gear.contracts.models import Model
 from gear.values.frames import UInt8Image
 
+CleansBatches = Callable[[Mapping[str, Tensor]], Mapping[str, Tensor]]
+"""(B, 3, H, W) pictures in 0..1 by camera name to the same."""
+
 
 class Group(nn.Module):
     """Several models as one: outputs, losses and taps are the members', under `<member>/<name>`.
@@ -51,11 +54,15 @@ class Defended(nn.Module):
         model: as the defense wraps it.
         defense: what cleans its pictures.
         bare: the model that was wrapped, if the wrapping is another: its networks are attacked too.
+        clean: what cleans batches; by default the defense's `forward`.
     """
 
-    def __init__(self, model: Model, defense: Defense, bare: Model | None = None) -> None:
+    def __init__(
+        self, model: Model, defense: Defense, bare: Model | None = None, clean: CleansBatches | None = None
+    ) -> None:
         super().__init__()
         self.model, self.defense = model, defense
+        self._clean_batch = defense.forward if clean is None else clean
         inside = [model] if bare is None or bare is model else [bare, model]
         self.networks = _networks(*(one for one in inside if one is not model or not isinstance(one, nn.Module)))
 
@@ -65,7 +72,7 @@ class Defended(nn.Module):
 
     def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
         """The model's, of the cleaned pictures; gradients pass the defense as it declares."""
-        return self.model.forward(self.defense.forward(views), targets)
+        return self.model.forward(self._clean_batch(views), targets)
 
     def taps(self) -> Mapping[str, nn.Module]:
         """The model's."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -57,10 +57,25 @@ class Defense(Protocol):
         exact where the spec says `differentiable`, a stand-in where it says `surrogate`.
 
         Raises:
-            ValueError: the spec says `none`.
+            ValueError: the spec says `none`, or the defense is `Taught`.
         """
         ...
 
     def wrap(self, model: Model) -> Model:
         """The model inside the defense, for defenses of several passes; others return it as it is."""
+        ...
+
+
+@runtime_checkable
+class Taught(Protocol):
+    """A defense whose cleaning in torch needs the model, or what `fit` made of it."""
+
+    def forward_taught(self, views: Mapping[str, Tensor], model: Model, state: Any) -> Mapping[str, Tensor]:
+        """As `Defense.forward`, which attacks do not call where there is this.
+
+        Args:
+            views: (B, 3, H, W) float pictures in 0..1 by camera name.
+            model: that is guarded; its parameters may need no gradient.
+            state: what `fit` returned for this model.
+        """
         ...

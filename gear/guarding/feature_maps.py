@@ -18,21 +18,37 @@ PAPERS_DEEPEST = "ct1"
 
 
 def feature_maps(model: Model, views: Mapping[str, UInt8Image], names: Iterable[str]) -> dict[str, Tensor]:
-    """What the named taps give for one sample.
+    """What the named taps give for one sample: (C, h, w) float32 on the CPU by name, without gradients.
 
     Args:
         model: with such taps.
         views: (H, W, 3) uint8 pictures by camera name.
         names: of taps.
 
+    Raises:
+        GearError: the model has no such tap, or its output is no map.
+    """
+    with torch.no_grad():
+        return {name: maps[0] for name, maps in tapped(model, as_batch([views], tuple(views)), names).items()}
+
+
+def tapped(model: Model, batch: Mapping[str, Tensor], names: Iterable[str]) -> dict[str, Tensor]:
+    """What the named taps give for a batch, with gradients where torch is keeping track.
+
+    Args:
+        model: with such taps.
+        batch: (B, 3, H, W) pictures in 0..1 by camera name.
+        names: of taps.
+
     Returns:
-        (C, h, w) float32 on the CPU by name. Of a tap that sees both pictures of a pair at once, which have the left
-        ones first, it is the left one's.
+        (B, C, h, w) float32 on the CPU by name. Of a tap that sees both pictures of pairs at once, which have the left
+        ones first, it is the left ones'.
 
     Raises:
         GearError: the model has no such tap, or its output is no map.
     """
     taps, wanted = model.taps(), tuple(dict.fromkeys(names))
+    count = len(next(iter(batch.values())))
     seen: dict[str, Tensor] = {}
     lacking = [name for name in wanted if name not in taps]
     if lacking:
@@ -43,19 +59,18 @@ def feature_maps(model: Model, views: Mapping[str, UInt8Image], names: Iterable[
         def hook(_: nn.Module, __: Any, output: Any) -> None:
             # A copy: what comes after the tap may rectify it in place. A tap that runs more than once is taken first.
             if isinstance(output, Tensor):
-                seen.setdefault(name, output[0].detach().to("cpu", torch.float32, copy=True))
+                seen.setdefault(name, output[:count].to("cpu", torch.float32, copy=True))
 
         return hook
 
     handles = [taps[name].register_forward_hook(keep(name)) for name in wanted]
     try:
-        with torch.no_grad():
-            model.forward(as_batch([views], tuple(views)))
+        model.forward(batch)
     finally:
         for handle in handles:
             handle.remove()
     for name in wanted:
-        if name not in seen or seen[name].ndim != 3:
+        if name not in seen or seen[name].ndim != 4:
             raise GearError(f"the model's tap {name!r} gives no feature map of (B, C, H, W)")
     return {name: seen[name] for name in wanted}
 

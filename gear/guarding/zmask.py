@@ -13,10 +13,11 @@ import numpy as np
 import numpy.typing as npt
 import torch
 from torch import Tensor
+from torch.nn import functional
 
 from gear.contracts.defenses import DefenseResult
 from gear.contracts.models import Model
-from gear.guarding.feature_maps import feature_maps, spread
+from gear.guarding.feature_maps import feature_maps, spread, tapped
 from gear.guarding.mask_block import Example, MaskBlock, learn
 from gear.guarding.over_activation import (
     Cells,
@@ -91,7 +92,7 @@ class ZMask:
             raise GearError("no patch is seen in the patched calibration data: Z-Mask has nothing to learn from")
         block = learn(examples, self._settings.steps, rng)
         scores = [
-            block.score(*self._heats(model, looks(sample)[0], layers, statistics))
+            block.score(*self._seen(model, looks(sample)[0], layers, statistics))
             for sample in spread(clean, self._settings.learning_pictures)
         ]
         level = alarm_level(scores, self._settings.false_alarms)
@@ -103,7 +104,7 @@ class ZMask:
         masks = {name: np.zeros(picture.shape[:2], np.float32) for name, picture in views.items()}
         score = 0.0
         for look in looks(views):
-            shallow, deep = self._heats(model, look, state.layers, state.statistics)
+            shallow, deep = self._seen(model, look, state.layers, state.statistics)
             score = max(score, sureness(state.block.score(shallow, deep), state.level))
             size = masks[look.camera].shape[::-1]
             masks[look.camera] = cv2.resize(
@@ -119,7 +120,32 @@ class ZMask:
         Raises:
             ValueError: always.
         """
-        raise ValueError("Z-Mask declares no gradient")
+        raise ValueError("Z-Mask looks into the model: it has `forward_taught`")
+
+    def forward_taught(self, views: Mapping[str, Tensor], model: Model, state: Learnt) -> Mapping[str, Tensor]:
+        """Covers as `apply` does; how far a patch is covered has the gradient of the mask before it is rounded."""
+        masks = {name: torch.zeros_like(pictures[:, :1]) for name, pictures in views.items()}
+        scores = [0.0] * len(next(iter(views.values())))
+        for look in looks(views):
+            maps = tapped(model, look.views, state.layers.all())
+            height, width = look.views[look.camera].shape[2:]
+            said = []
+            for number in range(len(scores)):
+                own = {name: features[number] for name, features in maps.items()}
+                heats = self._heats(own, self._grid(height, width), state.layers, state.statistics)
+                heats = _flipped(heats) if look.is_mirrored else heats
+                raw = state.block.score(*(heat.detach() for heat in heats))
+                scores[number] = max(scores[number], sureness(raw, state.level))
+                said.append(state.block.mask(*heats))
+            soft = functional.interpolate(torch.stack(said)[:, None], size=(height, width), mode="nearest-exact")
+            masks[look.camera] = ((soft > COVERED_FROM).float() + soft - soft.detach()).to(masks[look.camera])
+        sure = [score > COVERED_FROM or not self._settings.only_if_sure for score in scores]
+        fill = torch.from_numpy(FILL / np.float32(255))[:, None, None]
+        cleaned = {}
+        for name, pictures in views.items():
+            mask = masks[name] * pictures.new_tensor(sure)[:, None, None, None]
+            cleaned[name] = pictures * (1 - mask) + fill.to(pictures) * mask
+        return cleaned
 
     def wrap(self, model: Model) -> Model:
         """The model as it is."""
@@ -129,8 +155,9 @@ class ZMask:
         each: dict[str, list[ChannelStatistics]] = {name: [] for name in layers.all()}
         for sample in spread(clean, self._settings.statistics_pictures):
             look = looks(sample)[0]
+            grid = self._grid(*look.views[look.camera].shape[:2])
             for name, features in feature_maps(model, look.views, layers.all()).items():
-                each[name].append(channel_statistics(features, self._grid(look)))
+                each[name].append(channel_statistics(features, grid))
         return {name: mean_of(many) for name, many in each.items()}
 
     def _examples(
@@ -146,31 +173,46 @@ class ZMask:
             without, look = looks(clean[number])[0], looks(patched[number])[0]
             area = patch_area(without.views[look.camera], look.views[look.camera], number)
             if area.any():
-                shallow, deep = self._heats(model, look, layers, statistics)
+                shallow, deep = self._seen(model, look, layers, statistics)
                 share = cv2.resize(area.astype(np.float32), shallow.shape[::-1], interpolation=cv2.INTER_AREA)
                 truth = torch.from_numpy((share >= MOSTLY).astype(np.float32))
                 yield Example(shallow=shallow, deep=deep, truth=truth)
 
-    def _grid(self, look: Look) -> Cells:
-        """Its cells are as square as those of 150 x 300 are in a picture of 2048 x 1024."""
-        height, width = look.views[look.camera].shape[:2]
+    def _grid(self, height: int, width: int) -> Cells:
+        """Of a picture of that size: its cells are as square as those of 150 x 300 are in one of 2048 x 1024."""
         return self._settings.rows, max(1, round(self._settings.rows * width / height))
 
-    def _heats(
-        self, model: Model, look: Look, layers: Layers, statistics: Mapping[str, ChannelStatistics]
+    def _seen(
+        self, model: Model, look: Look[UInt8Image], layers: Layers, statistics: Mapping[str, ChannelStatistics]
     ) -> tuple[Tensor, Tensor]:
-        """The shallow and the deep heat map of the look's camera: cell by cell the largest of the layers'."""
+        """The heat maps of what a model sees, the right way round."""
+        grid = self._grid(*look.views[look.camera].shape[:2])
+        heats = self._heats(feature_maps(model, look.views, layers.all()), grid, layers, statistics)
+        return _flipped(heats) if look.is_mirrored else heats
+
+    def _heats(
+        self,
+        maps: Mapping[str, Tensor],
+        grid: Cells,
+        layers: Layers,
+        statistics: Mapping[str, ChannelStatistics],
+    ) -> tuple[Tensor, Tensor]:
+        """The shallow and the deep heat map of one camera's features: cell by cell the largest of the layers'."""
         shallow, deep = self._settings.shallow_kernels, self._settings.deep_kernels
         heats: dict[str, list[Tensor]] = {"shallow": [], "deep": []}
-        for name, features in feature_maps(model, look.views, layers.all()).items():
+        for name, features in maps.items():
             z = statistics[name].z_scores(features)
-            pooled = {rows: pooled_sizes(z, self._grid(look), (rows, 2 * rows)) for rows in {*shallow, *deep}}
+            pooled = {rows: pooled_sizes(z, grid, (rows, 2 * rows)) for rows in {*shallow, *deep}}
             if name in layers.shallow:
                 heats["shallow"].append(refined([pooled[rows] for rows in shallow]))
             if name in layers.deep:
                 heats["deep"].append(refined([pooled[rows] for rows in deep]))
         first, second = (torch.stack(maps).amax(dim=0) for maps in heats.values())
-        return (first.flip(1), second.flip(1)) if look.is_mirrored else (first, second)
+        return first, second
+
+
+def _flipped(heats: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
+    return heats[0].flip(1), heats[1].flip(1)
 
 
 def _covered(picture: UInt8Image, mask: npt.NDArray[np.float32], is_covered: bool) -> UInt8Image:

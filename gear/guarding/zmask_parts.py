@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
+from torch import Tensor
 
 from gear.contracts.models import Model
 from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
 
 Views = Mapping[str, UInt8Image]
+Shown = TypeVar("Shown", UInt8Image, Tensor)
+"""One picture of (H, W, 3) bytes, or a batch of (B, 3, H, W) numbers."""
 
 LEFT, RIGHT = "left", "right"
 
@@ -55,21 +59,21 @@ def layers_of(model: Model, shallow: Sequence[str], deep: Sequence[str]) -> Laye
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Look:
-    """One way to show a sample to the network.
+class Look(Generic[Shown]):
+    """One way to show a sample, or a batch of them, to the network.
 
     Attributes:
         camera: whose picture its feature maps tell of.
-        views: what the network is shown.
+        views: what the network is shown, by camera name.
         is_mirrored: whether that is left and right the wrong way round.
     """
 
     camera: str
-    views: Views
+    views: Mapping[str, Shown]
     is_mirrored: bool
 
 
-def looks(views: Views) -> tuple[Look, ...]:
+def looks(views: Mapping[str, Shown]) -> tuple[Look[Shown], ...]:
     """A look for each camera whose picture the network can be made to tell of, that of the reference camera first.
 
     A stereo network tells of the left picture. In a mirror the right picture is the left one of another pair, so that
@@ -79,5 +83,9 @@ def looks(views: Views) -> tuple[Look, ...]:
     plain = Look(camera=first, views=views, is_mirrored=False)
     if set(views) != {LEFT, RIGHT}:
         return (plain,)
-    swapped = {one: np.ascontiguousarray(views[other][:, ::-1]) for one, other in ((LEFT, RIGHT), (RIGHT, LEFT))}
+    swapped = {one: _mirrored(views[other]) for one, other in ((LEFT, RIGHT), (RIGHT, LEFT))}
     return (plain, Look(camera=RIGHT, views=swapped, is_mirrored=True))
+
+
+def _mirrored(picture: Shown) -> Shown:
+    return picture.flip(3) if isinstance(picture, Tensor) else np.ascontiguousarray(picture[:, ::-1])

@@ -16,7 +16,7 @@ import pytest
 from gear.config.dump import to_yaml
 from gear.config.nodes import parse_text
 from gear.config.reader import read_node
-from gear.contracts.defenses import Defense, DefenseResult
+from gear.contracts.defenses import Defense, DefenseResult, Taught
 from gear.contracts.models import Model
 from gear.contracts.specs import DefenseSpec
 from gear.plugins.manager import spec_problem
@@ -171,11 +171,18 @@ class DefenseContract:
             with pytest.raises(ValueError, match=r"\S"):
                 defense.forward(batch(pictures))
             return
-        both, one = batch(pictures), defense.forward(batch(pictures[:1]))
+        state = self.state(defense)
+
+        def forward(views: dict[str, Any]) -> Any:
+            model = self.model()
+            if isinstance(defense, Taught) and model is not None:
+                return defense.forward_taught(views, model, state)
+            return defense.forward(views)
+
+        both, one = batch(pictures), forward(batch(pictures[:1]))
         for tensor in both.values():
             tensor.requires_grad_(True)
-        cleaned = defense.forward(both)
-        state = self.state(defense)
+        cleaned = forward(both)
         for name in self.views:
             assert torch.allclose(cleaned[name][:1], one[name], atol=1e-5)
             assert cleaned[name].shape == both[name].shape

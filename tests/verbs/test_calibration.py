@@ -85,6 +85,35 @@ def test_an_attack_looks_through_what_has_learnt(small: Small, learner: list[Lea
     assert not np.array_equal(plain.patches[0].rgb, aware.patches[0].rgb)
 
 
+class Dimmer(Learner):
+    """Leaves the share of all light that it has learnt."""
+
+    def apply(self, views: Any, model: Any, state: float, rng: np.random.Generator) -> DefenseResult:
+        dimmed = {name: np.rint(one * (state / 255)).astype(np.uint8) for name, one in views.items()}
+        return DefenseResult(views=dimmed, score=0.0)
+
+    def forward_taught(self, views: Any, model: Any, state: float) -> Any:
+        assert "stem" in model.taps()
+        return {name: one * (state / 255) for name, one in views.items()}
+
+
+def test_gradients_pass_what_has_learnt(small: Small, install: Install, tmp_path: Path) -> None:
+    dimmer = Dimmer(Nothing())
+    spec: DefenseSpec[Any] = DefenseSpec(
+        name="dimmer", summary="Dims.", config=Nothing, build=lambda config: dimmer, needs_calibration=True,
+        outputs=frozenset({"images", "score"}), needs_model=True, gradient="differentiable",
+    )  # fmt: skip
+    install(spec, tiny_segmenter)
+    asked: dict[str, Any] = {
+        "model": "tiny_segmenter", "attack": "scene_specific", "steps": 3,
+        "settings": ["height_px=12", "width_px=24"],
+    }  # fmt: skip
+    plain = attack(small(), out=tmp_path / "plain", **asked)
+    aware = attack(small(), out=tmp_path / "aware", defense="dimmer", calibration=small(split="val"), **asked)
+    assert dimmer.fits == [(2, 0)], "it learns once"
+    assert not np.array_equal(plain.patches[0].rgb, aware.patches[0].rgb)
+
+
 def test_a_gap_stands_behind_what_has_learnt(small: Small, learner: list[Learner], tmp_path: Path) -> None:
     asked: dict[str, Any] = {
         "patch": "random", "out": tmp_path / "gap", "model": "tiny_segmenter", "defense": "learner", "samples": 1,

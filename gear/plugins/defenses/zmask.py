@@ -21,7 +21,7 @@ spec = DefenseSpec(
     config=ZMaskConfig,
     build=build,
     outputs=frozenset({"images", "mask", "score"}),
-    gradient="none",
+    gradient="surrogate",
     needs_calibration=True,
     needs_model=True,
 )

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import Any
 
 from gear.attacking.group import Cleaned, Defended, Group
-from gear.contracts.defenses import Defense
+from gear.contracts.defenses import Defense, Taught
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec, DefenseSpec, ModelSpec
 from gear.dataset.reading import Dataset
 from gear.plugins.build import blamed, build
 from gear.plugins.catalogue import Found
 from gear.values.errors import GearError
-from gear.values.frames import UInt8Image
 from gear.values.rng import derive_rng
 from gear.verbs.defend import Guard
 from gear.verbs.evaluate.calibration import Calibration
@@ -99,29 +98,33 @@ def check_attack(
 
 
 def build_model(models: Sequence[Chosen], defense: Chosen | None, calibration: Calibration, seed: int) -> Model:
-    """What `Attack.optimise` is given; a defense without gradients learns from the calibration data, for each model
-    anew."""
+    """What `Attack.optimise` is given; a defense that learns does so for each model anew."""
     built: dict[str, Model] = {}
     for chosen in models:
         model: Model = build(chosen.found, chosen.options)
+        spec = chosen.found.spec
+        assert isinstance(spec, ModelSpec)
         if defense is not None:
-            guard: Defense = build(defense.found, defense.options)
-            spec, guarded = defense.found.spec, chosen.found.spec
-            assert isinstance(spec, DefenseSpec) and isinstance(guarded, ModelSpec)
-            with blamed(defense.found, "wrap"):
-                wrapped = guard.wrap(model)
-            if spec.gradient == "none":  # others clean in `forward`, which knows of nothing that was learnt
-                learn = partial(calibration.fit, defense, guard, model, guarded.views, seed)
-                model = Cleaned(wrapped, guard, model, _cleaning(defense.found, spec, guard, model, learn))
-            else:
-                model = Defended(wrapped, guard, model)
-        built[chosen.found.spec.name] = model
+            model = _behind(defense, model, spec.views, calibration, seed)
+        built[spec.name] = model
     return next(iter(built.values())) if len(built) == 1 else Group(built)
 
 
-def _cleaning(
-    found: Found, spec: DefenseSpec[Any], product: Defense, model: Model, learn: Callable[[], Any]
-) -> Callable[[Mapping[str, UInt8Image]], Mapping[str, UInt8Image]]:
-    """What a defense makes of a sample's pictures; what it draws, it draws alike each time it is asked."""
-    guard = Guard(found, product, model if spec.needs_model or spec.taps else None, learn)
-    return lambda views: guard.apply(views, derive_rng(0, "attack", spec.name), 0).views
+def _behind(defense: Chosen, model: Model, cameras: Sequence[str], calibration: Calibration, seed: int) -> Model:
+    """A model behind a defense, which learns from the calibration data when it is first asked."""
+    product: Defense = build(defense.found, defense.options)
+    spec = defense.found.spec
+    assert isinstance(spec, DefenseSpec)
+    with blamed(defense.found, "wrap"):
+        wrapped = product.wrap(model)
+    learn = partial(calibration.fit, defense, product, model, cameras, seed)
+    guard = Guard(defense.found, product, model if spec.needs_model or spec.taps else None, learn)
+    if spec.gradient == "none":
+        # What it draws, it draws alike each time it is asked.
+        return Cleaned(
+            wrapped, product, model, lambda views: guard.apply(views, derive_rng(0, "attack", spec.name), 0).views
+        )
+    if isinstance(product, Taught):
+        taught = product
+        return Defended(wrapped, product, model, lambda views: taught.forward_taught(views, model, guard.state))
+    return Defended(wrapped, product, model)

@@ -39,12 +39,9 @@ class Entrant:
         return isinstance(spec, DefenseSpec) and spec.needs_calibration
 
     def is_looked_through(self, attack: AttackSpec[object]) -> bool:
-        """Whether it is a defense that changes pictures and through which the attack can make patches.
-
-        Those that learn are left out: what lets no gradient pass must learn before the attack does.
-        """
+        """Whether it is a defense that changes pictures and through which the attack can make patches."""
         spec = self.chosen.found.spec
-        if not isinstance(spec, DefenseSpec) or spec.needs_calibration or "images" not in spec.outputs:
+        if not isinstance(spec, DefenseSpec) or "images" not in spec.outputs:
             return False
         return not attack.needs_gradients or spec.gradient != "none"
 

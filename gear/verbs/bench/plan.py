@@ -102,12 +102,12 @@ class Plan:
         for contest in self.contests:
             for scene in self.scenes:
                 yield from self._pictures(contest, scene)
-            for scene in self.scenes:
-                for model in contest.models:
-                    yield from self._patch(contest, scene, model)
             learning = [defense for defense in contest.defenses if defense.learns]
             if self._calibration is not None and learning:
                 yield from self._lessons(contest, self._calibration)
+            for scene in self.scenes:
+                for model in contest.models:
+                    yield from self._patch(contest, scene, model)
             for match in self.matches(contest):
                 yield self._evaluation(match)
 
@@ -250,16 +250,13 @@ class Plan:
                 "settings": tuple(settings_of(attack.set)),
                 "model_settings": model.settings,
                 **_guarded(defense),
+                **self._learnt(contest, model, defense),
                 "compositor": attack.compositor,
                 "seed": self.config.seed,
             },
         )
 
     def _evaluation(self, match: Match) -> Step:
-        lessons = {}
-        if match.defense is not None and match.defense.learns:
-            lessons["calibration"] = str(self._lesson(match.contest, NONE))
-            lessons["calibration_patched"] = str(self._lesson(match.contest, match.model.label))
         return Step(
             verb="evaluate",
             title=f"evaluate {self.name(match.model, match.defense)} in {match.contest.name}",
@@ -267,7 +264,7 @@ class Plan:
                 "model": match.model.plugin,
                 "settings": match.model.settings,
                 **_guarded(match.defense),
-                **lessons,
+                **self._learnt(match.contest, match.model, match.defense),
                 "data": [str(root) for roots in match.pools.values() for root in roots],
                 "reports": reports_of(match.contest),
                 "out": str(match.out),
@@ -275,6 +272,15 @@ class Plan:
                 "pools": {name: [str(root) for root in roots] for name, roots in match.pools.items()},
             },
         )
+
+    def _learnt(self, contest: Contest, model: Entrant, defense: Entrant | None) -> dict[str, Any]:
+        """What a defense that must learn learns from, before a network."""
+        if defense is None or not defense.learns:
+            return {}
+        return {
+            "calibration": str(self._lesson(contest, NONE)),
+            "calibration_patched": str(self._lesson(contest, model.label)),
+        }
 
 
 def reports_of(contest: Contest) -> tuple[str, ...]:

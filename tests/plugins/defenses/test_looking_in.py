@@ -131,6 +131,39 @@ def test_zmask_leaves_alone_what_it_is_not_sure_of() -> None:
         assert np.array_equal(cleaned, picture) == is_left_alone
 
 
+def tensor(*pictures: UInt8Image) -> torch.Tensor:
+    return torch.from_numpy(np.stack(pictures)).permute(0, 3, 1, 2).float() / 255
+
+
+def test_what_zmask_is_not_sure_of_passes_in_a_batch_too() -> None:
+    model, defense, state = fitted(only_if_sure=True, false_alarms=0.01)
+    shown = tensor(street(80), noisy_patch(street(80), 1)[0])
+    cleaned = defense.forward_taught({"left": shown}, model, state)["left"]
+    assert torch.equal(cleaned[0], shown[0]) and not torch.equal(cleaned[1], shown[1])
+
+
+def test_a_patch_that_knows_zmask_is_covered_less() -> None:
+    model, defense, state = fitted()
+    picture, area = noisy_patch(street(77), 77)
+    inside = torch.from_numpy(area)
+    shown = tensor(picture)
+    for _ in range(30):
+        shown.requires_grad_(True)
+        hidden = (defense.forward_taught({"left": shown}, model, state)["left"] - shown).square().sum()
+        (gradient,) = torch.autograd.grad(hidden, shown)
+        assert float(gradient[..., inside].abs().sum()) > 0
+        shown = (shown.detach() - 0.02 * gradient.sign() * inside).clamp(0, 1)
+
+    def covered(one: torch.Tensor) -> float:
+        seen = (one[0].permute(1, 2, 0).numpy() * 255).round().astype(np.uint8)
+        mask = defense.apply({"left": seen}, model, state, derive_rng(SEED, "apply")).mask
+        assert mask is not None
+        return float((mask["left"][area] > 0.5).mean())
+
+    assert covered(tensor(picture)) > 0.6
+    assert covered(shown) < 0.3
+
+
 def test_a_patch_in_the_right_picture_is_covered_there() -> None:
     model = Siamese(TinyConfig())
     defense = zmask.build(zmask.ZMaskConfig(**ON_TRUNK))  # type: ignore[arg-type]

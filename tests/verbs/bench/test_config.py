@@ -84,9 +84,13 @@ def arguments(plan: Plan, verb: str) -> list[dict[str, Any]]:
     return [step.arguments for step in plan.steps() if step.verb == verb]
 
 
+LEARNS = ("      fpda: {}\n", "      fpda: {}\n      zmask: {}\n")
+"""A change that adds a defense that learns and changes pictures."""
+
+
 def test_every_step_finds_what_it_needs(written: Written, tmp_path: Path) -> None:
     done: set[str] = set()
-    for step in prepared(written(), out=tmp_path / "out").steps():
+    for step in prepared(written(LEARNS), out=tmp_path / "out").steps():
         given = step.arguments
         needed = [*given.get("data", []), *given.get("val", [])]
         needed += [given[key] for key in ("calibration", "calibration_patched") if key in given]
@@ -112,6 +116,9 @@ def test_no_two_purposes_show_the_same_pictures(written: Written, tmp_path: Path
 def test_patches_look_through_defenses_only_if_they_are_to(written: Written, tmp_path: Path) -> None:
     through = [given.get("defense") for given in arguments(prepared(written(), out=tmp_path), "attack")]
     assert through.count("gaussian") == 4 and "fpda" not in through, "fpda leaves pictures as they are"
+    learnt = arguments(prepared(written(LEARNS), out=tmp_path), "attack")
+    assert [given.get("defense") for given in learnt].count("zmask") == 4
+    assert all(("calibration_patched" in given) == (given.get("defense") == "zmask") for given in learnt)
     plain = prepared(written(("adaptive: true", "adaptive: false")), out=tmp_path)
     assert all("defense" not in given for given in arguments(plain, "attack"))
 
