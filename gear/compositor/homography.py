@@ -28,8 +28,9 @@ from gear.values.geometry import Array
 from gear.values.optics import CameraEffects, Lens
 from gear.values.scene import CameraRecord
 
-_SCAN = Scan(supersampled=True, extrapolates=False, smooths=False, effects=CameraEffects())
 Ints = npt.NDArray[np.intp]
+
+_SCAN = Scan(supersampled=True, extrapolates=False, smooths=False, effects=CameraEffects())
 _NOWHERE = np.zeros((1, 1), np.bool_)
 
 PIXELS_AT_ONCE = 1 << 17
