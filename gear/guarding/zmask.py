@@ -128,16 +128,17 @@ class ZMask:
         scores = [0.0] * len(next(iter(views.values())))
         for look in looks(views):
             maps = tapped(model, look.views, state.layers.all())
-            height, width = look.views[look.camera].shape[2:]
+            size = look.views[look.camera].shape[2:]
+            grid = self._grid(*size)
             said = []
             for number in range(len(scores)):
                 own = {name: features[number] for name, features in maps.items()}
-                heats = self._heats(own, self._grid(height, width), state.layers, state.statistics)
+                heats = self._heats(own, grid, state.layers, state.statistics)
                 heats = _flipped(heats) if look.is_mirrored else heats
                 raw = state.block.score(*(heat.detach() for heat in heats))
                 scores[number] = max(scores[number], sureness(raw, state.level))
                 said.append(state.block.mask(*heats))
-            soft = functional.interpolate(torch.stack(said)[:, None], size=(height, width), mode="nearest-exact")
+            soft = functional.interpolate(torch.stack(said)[:, None], size=size, mode="nearest-exact")
             masks[look.camera] = ((soft > COVERED_FROM).float() + soft - soft.detach()).to(masks[look.camera])
         sure = [score > COVERED_FROM or not self._settings.only_if_sure for score in scores]
         fill = torch.from_numpy(FILL / np.float32(255))[:, None, None]

@@ -48,6 +48,7 @@ _FRAMES_TO_SETTLE = 24
 _FIRST_LOOK = CameraRecord(
     name="first", width_px=16, height_px=16, focal_px=8.0, world_from_camera=Pose(position_m=(0.0, 0.0, -1e5))
 )
+"""From so far away that no town is drawn: a look at one takes two cores 0.15 s, even at this size."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
