@@ -41,7 +41,7 @@ def main(folder: str) -> None:
     lighting = _lighting_beside(weather)
     known = {os.path.realpath(path) for path in asset_files(library).values()}
     heard = _watched()
-    compiled = compile_world(library, scene, weather, lighting)
+    compiled = compile_world(library, scene, weather, lighting, readers=os.cpu_count() or 1)
     is_covered = heard <= known
     with ThreadPoolExecutor(1) as aside:
         read = aside.submit(order_of, library, scene, weather)

@@ -13,13 +13,13 @@ import numpy as np
 
 from gear.values.scene import Weather
 from gear.values.serial import from_json, to_json
+from gear.world.ahead import assets_ahead
 from gear.world.assets import ActorFacts, AssetLibrary
 from gear.world.catalogue import actor_types
 from gear.world.classes import GeomClasses
 from gear.world.compose import Slot, compose, slots_of
 from gear.world.instances import FaceName
 from gear.world.light import Lighting
-from gear.world.memory import keep_no_assets
 from gear.world.mjb import read_model, write_model
 from gear.world.models import placement_model, render_model
 from gear.world.pool import plan_pool
@@ -90,23 +90,29 @@ class Compiled:
 
 
 def compile_world(
-    library: AssetLibrary, scene: SceneSpec, weather: Weather, lighting: Callable[[], Lighting] | None = None
+    library: AssetLibrary,
+    scene: SceneSpec,
+    weather: Weather,
+    lighting: Callable[[], Lighting] | None = None,
+    *,
+    readers: int = 0,
 ) -> Compiled:
     """Composes and compiles.
 
     Args:
         library, scene, weather: of the world.
         lighting: as for `compose`.
+        readers: threads that read meshes and textures meanwhile. It is sooner done, and town10 takes 2.2 GB for 1.4 GB.
 
     Raises:
         UnknownNameError: there is no such board or truck.
         TownError: a file breaks the conventions.
     """
-    keep_no_assets()
-    with tempfile.TemporaryDirectory(prefix="gear-") as folder:
-        composition = compose(
-            library, scene.boards, plan_pool(scene, library), carrier_of(scene, library), weather, lighting
-        ).laid_out(Path(folder))
+    with assets_ahead(readers) as ahead, tempfile.TemporaryDirectory(prefix="gear-") as folder:
+        pool, carrier = plan_pool(scene, library), carrier_of(scene, library)
+        composition = compose(library, scene.boards, pool, carrier, weather, lighting, ahead).laid_out(Path(folder))
+        ahead.expect(composition.pictures)
+        ahead.wait()
         model, classes = render_model(composition)
     wet_own_colours(model, classes.label_code, wetness(weather))
     data = mujoco.MjData(model)

@@ -21,6 +21,7 @@ from xml.sax.saxutils import quoteattr, unescape
 
 from gear.values.errors import TownError
 from gear.values.scene import Weather
+from gear.world.ahead import AssetsAhead
 from gear.world.assets import ActorFacts, AssetLibrary
 from gear.world.instances import AssetParts, FaceName, load_mjcf
 from gear.world.light import Lighting, lighting_of
@@ -73,6 +74,11 @@ class Composition:
     faces: tuple[FaceName, ...]
     folder: Path | None = None
 
+    @property
+    def pictures(self) -> list[str]:
+        """Paths of the textures, once it is laid out."""
+        return [str(path) for path in self.folder.glob("*.png")] if self.folder else []
+
     def laid_out(self, folder: Path) -> Composition:
         """The same with its files written into a folder, but for meshes, which it refers to where they lie: MuJoCo
         copies what is in memory, all of it at once.
@@ -95,6 +101,7 @@ def compose(
     carrier: ActorFacts | None,
     weather: Weather,
     lighting: Callable[[], Lighting] | None = None,
+    ahead: AssetsAhead | None = None,
 ) -> Composition:
     """Puts a town, its boards and its actors into one tree.
 
@@ -105,17 +112,20 @@ def compose(
         carrier: an actor that bears a surface, besides the pool.
         weather: light and air.
         lighting: waits for the weather's light, where that is being worked out already.
+        ahead: is told of meshes as soon as they are known.
 
     Raises:
         TownError: a file cannot be composed.
         UnknownNameError: a board's asset is not there.
     """
+    ahead = ahead or AssetsAhead(None)
     with ThreadPoolExecutor(1) as aside:
         light = aside.submit(lighting or partial(lighting_of, weather))
         text, statics = split_town(library.town)
+        ahead.expect(map(os.fsdecode, statics.places.values()))
         root = load_mjcf(library.town, text, statics.places)
         slots = slots_of(pool, carrier)
-        parts = AssetParts(root)
+        parts = AssetParts(root, ahead)
         faces = _fill(root, parts, library, statics, boards, slots)
     apply_weather(root, weather, light.result(), statics.worn)
     return Composition(

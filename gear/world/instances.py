@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from gear.values.errors import TownError
+from gear.world.ahead import AssetsAhead
 from gear.world.faces import FACE_SIZE_PX
 from gear.world.quiet_mjcf import mjcf
 from gear.world.refusals import refusal_of, without_breaks
@@ -83,8 +85,9 @@ def class_name(dclass: Any) -> str:
 class AssetParts:
     """The assets that a composition has taken in, each file once."""
 
-    def __init__(self, root: mjcf.RootElement) -> None:
+    def __init__(self, root: mjcf.RootElement, ahead: AssetsAhead) -> None:
         self._root = root
+        self._ahead = ahead
         self._turns = _turns_of(root)
         self._models: dict[Path, mjcf.RootElement] = {}
         self._textures: dict[tuple[str, ...], Any] = {}
@@ -148,6 +151,7 @@ class AssetParts:
                 if other.stem == path.stem:
                     raise TownError(path, f"has the name of {other}, which is in the same world; rename one of them")
             split = split_asset(path)
+            self._ahead.expect(map(os.fsdecode, split.places.values()))
             model = load_mjcf(path, split.text, split.places)
             if _turns_of(model) != self._turns:
                 told = "turns geoms by {} and the town by {}; write both with the same compiler setting"
