@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import functools
-import os
 import sys
 from collections.abc import Iterator
 from typing import Literal
@@ -13,6 +12,7 @@ from typing import Literal
 import torch
 
 from gear.values.errors import GearError
+from gear.values.machine import cores
 
 M_TRIM_THRESHOLD, M_TOP_PAD, M_MMAP_MAX = -1, -2, -4
 TOP_PAD_BYTES = 256 << 20
@@ -30,8 +30,7 @@ def prepare(threads: int = 0) -> None:
         threads: of torch's own; 0 for as many as torch would take (`OMP_NUM_THREADS`, or what was set before), but no
             more than one a core that this process may use.
     """
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    torch.set_num_threads(threads or min(torch.get_num_threads(), cores))
+    torch.set_num_threads(threads or min(torch.get_num_threads(), cores()))
     if not sys.platform.startswith("linux"):
         return
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -20,6 +19,7 @@ from gear.dataset.files import inside, read_bytes
 from gear.dataset.reading import Dataset
 from gear.values.errors import DatasetError, GearError
 from gear.values.frames import UInt8Image
+from gear.values.machine import cores
 from gear.values.serial import Json
 from gear.view.channels import Channel, PreviewError, Shown, images, previews
 from gear.view.encoding import Picture, encode, largest_scale
@@ -71,7 +71,7 @@ class Builder:
 
     def entries(self, count: int, progress: Progress | None = None) -> Iterator[Entry]:
         """The first `count` samples, in order; a few at a time, because decoding and encoding can overlap."""
-        executor = ThreadPoolExecutor(min(8, os.cpu_count() or 1))
+        executor = ThreadPoolExecutor(min(8, cores()))
         try:
             for done, entry in enumerate(executor.map(self.entry, range(count)), start=1):
                 if progress is not None:

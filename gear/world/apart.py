@@ -12,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
+from gear.values.machine import cores
 from gear.values.scene import Weather
 from gear.values.serial import from_json
 from gear.world.assets import AssetLibrary
@@ -23,6 +24,9 @@ from gear.world.shelf import DONE, MAY_KEEP, order_of
 
 _SWITCH_S = 0.0005
 """How long one thread may keep others from Python: what runs beside is quick to go on."""
+
+_READERS = 8
+"""There are no more than forty shares to read."""
 
 _CODE_SUFFIXES = (".py", ".pyc", ".so")
 
@@ -41,7 +45,7 @@ def main(folder: str) -> None:
     lighting = _lighting_beside(weather)
     known = {os.path.realpath(path) for path in asset_files(library).values()}
     heard = _watched()
-    compiled = compile_world(library, scene, weather, lighting, readers=os.cpu_count() or 1)
+    compiled = compile_world(library, scene, weather, lighting, readers=min(_READERS, cores()))
     is_covered = heard <= known
     with ThreadPoolExecutor(1) as aside:
         read = aside.submit(order_of, library, scene, weather)

@@ -18,6 +18,7 @@ from gear.nn.options import SHIPPED
 from gear.nn.shipped import resolve
 from gear.plugins.build import find
 from gear.values.errors import DatasetError, GearError
+from gear.values.machine import cores
 from gear.values.serial import Json, to_json
 
 EFFECT, MINUTES = "effect.json", "minutes.json"
@@ -31,7 +32,7 @@ Told = Callable[[str], None]
 
 def gear_process(jobs: int = 1) -> Gear:
     """Runs commands in processes of their own, each with its share of the cores."""
-    threads = max(1, (os.cpu_count() or 1) // jobs)
+    threads = max(1, cores() // jobs)
     environment = {"OMP_NUM_THREADS": str(threads), **os.environ}
 
     def run(arguments: Sequence[str]) -> None:
