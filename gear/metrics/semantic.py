@@ -67,12 +67,13 @@ class SemanticEvaluator:
         """Takes (H, W) uint8 label ids; returns `miou` of this picture.
 
         Raises:
-            ValueError: the prediction has another shape or holds ids above 33.
+            ValueError: the prediction has another shape or holds ids below 0 or above 33.
         """
         if prediction.shape != sample.label_ids.shape:
             raise ValueError(f"prediction must have shape {sample.label_ids.shape}, got {prediction.shape}")
-        if prediction.size and prediction.max() >= COUNT:
-            raise ValueError(f"prediction must hold label ids 0..{COUNT - 1}, got {prediction.max()}")
+        for extreme in (prediction.min(), prediction.max()) if prediction.size else ():
+            if not 0 <= extreme < COUNT:
+                raise ValueError(f"prediction must hold label ids 0..{COUNT - 1}, got {extreme}")
         confusion = _confusion(sample.label_ids.reshape(-1), prediction.reshape(-1))
         self.confusion += confusion
         self._weigh(sample.instance_ids, prediction)

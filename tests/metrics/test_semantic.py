@@ -152,3 +152,11 @@ def test_wrong_predictions_are_refused() -> None:
         SemanticEvaluator().update(sample, np.zeros((2, 2), dtype=np.uint8))
     with pytest.raises(ValueError, match="label ids"):
         SemanticEvaluator().update(sample, np.full((120, 200), 255, dtype=np.uint8))
+
+
+def test_an_id_below_0_is_no_pixel_of_the_class_before() -> None:
+    """Minus one is what networks say of what they do not know; it would land among the pixels of the label before."""
+    sample = labelled(0)
+    unsure = np.where(sample.label_ids == 7, -1, sample.label_ids.astype(np.int64))
+    with pytest.raises(ValueError, match=r"label ids 0\.\.33, got -1"):
+        SemanticEvaluator().update(sample, unsure)
