@@ -52,7 +52,8 @@ class KittiEvaluator(Generic[SampleT]):
         See `gear.metrics.single_picture`; average precision has no meaning for a single picture.
 
         Raises:
-            ValueError: a detection has no score, a box turned inside out, or a number that is not finite.
+            ValueError: a detection has no score, a type that is none of KITTI's, a box turned inside out, or a number
+                that is not finite.
         """
         for found in prediction:
             _check(found)
@@ -124,6 +125,8 @@ def _check(found: KittiLabel) -> None:
     """Raises `ValueError` for a detection that cannot be measured, which would count as one that found nothing."""
     if found.score is None:
         raise ValueError("every detection needs a score")
+    if found.type not in TYPES:
+        raise ValueError(f"type must be one of {', '.join(TYPES)}, got {found.type!r}")
     left, top, right, bottom = found.box_px
     body = (found.alpha_rad, found.height_m, found.width_m, found.length_m, *found.location_m, found.rotation_y_rad)
     if not np.isfinite((*found.box_px, *body, found.score)).all():

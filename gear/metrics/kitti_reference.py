@@ -28,7 +28,8 @@ class NearCars(KittiEvaluator[SampleT]):
         They are those of moderate difficulty; detections count from a score of 0.5 on.
 
         Raises:
-            ValueError: a detection has no score, a box turned inside out, or a number that is not finite.
+            ValueError: a detection has no score, a type that is none of KITTI's, a box turned inside out, or a number
+                that is not finite.
         """
         super().update(sample, prediction)
         here = count(_near(self.pictures[-1], _moderate_first()[0]), np.array([SURE]))

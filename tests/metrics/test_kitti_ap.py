@@ -245,6 +245,13 @@ def test_a_detection_needs_a_score() -> None:
         evaluate([([CAR], [CAR])])
 
 
+@pytest.mark.parametrize("evaluator", [KittiEvaluator, NearCars])
+def test_a_detection_of_a_type_that_is_none_is_refused(evaluator: Any) -> None:
+    """It would find nothing, and its result file could not be read again."""
+    with pytest.raises(ValueError, match=r"type must be one of Car, .*, got 'car'"):
+        evaluator(lambda labels: labels).update([CAR], [replace(CAR, type="car", score=0.9)])
+
+
 @pytest.mark.parametrize(
     "change",
     [
