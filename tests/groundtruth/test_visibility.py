@@ -47,6 +47,8 @@ def test_each_limit_holds(changes: dict[str, Any], distance_m: float) -> None:
         ({"visible_box": (10.0, 10.0, 40.0, 40.0)}, 50.0),
         ({"visible_px": 100, "amodal_in_image_px": 400}, 50.0),
         ({"visible_px": 201, "amodal_in_image_px": 2000, "amodal_px": 9000}, 50.0),
+        ({"visible_px": 200, "amodal_in_image_px": 2000}, 50.0),
+        ({"visible_px": 123, "amodal_in_image_px": 1230}, 50.0),
     ],
 )
 def test_what_just_reaches_a_limit_is_labelled(changes: dict[str, Any], distance_m: float) -> None:
