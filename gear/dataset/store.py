@@ -266,7 +266,8 @@ def remove_split(root: Path, split: str) -> None:
     """Deletes what gear wrote for a split, and nothing else: the files that its sidecars, its manifest and the notes of
     what was being written name, and the copy of its patches, unless another split shows them.
 
-    A sample's sidecar goes before its files: where this is cut short, no sample without them is taken for whole.
+    A sample's sidecar goes before its files: where this is cut short, no sample without them is taken for whole. Of one
+    whose sidecar is gone or damaged, the manifest knows the files.
 
     Raises:
         DatasetError: a file cannot be deleted, or names a path outside the root.
@@ -279,12 +280,15 @@ def remove_split(root: Path, split: str) -> None:
     manifest = inside(root, manifest_path(split))
     doomed = [(path, _files_named(root, path)) for path in (manifest, *sidecars)]
     unfinished = [(path, _files_named(root, path)) for path in begun]
+    without_sidecar = _files_of_samples(root, manifest)
     label = _patch_label(root, split)
     with explained(root):
         for path, files in doomed:
             path.unlink(missing_ok=True)
             for file in files:
                 file.unlink(missing_ok=True)
+        for file in without_sidecar:
+            file.unlink(missing_ok=True)
         for path, files in unfinished:
             for file in (*files, path):
                 file.unlink(missing_ok=True)
@@ -306,14 +310,35 @@ def _files_named(root: Path, path: Path) -> list[Path]:
     Raises:
         DatasetError: a path outside the root.
     """
-    try:
-        there = load_json(path)
-    except DatasetError:
-        return []
-    named = there if isinstance(there, list) else []
-    if isinstance(there, dict):
-        named = [name for key in ("files", "indexes") if isinstance(there.get(key), dict) for name in there[key]]
+    there = _load_if_whole(path)
+    named = there if isinstance(there, list) else _names(there, "files") + _names(there, "indexes")
     return [inside(root, name) for name in named if isinstance(name, str)]
+
+
+def _files_of_samples(root: Path, manifest: Path) -> list[Path]:
+    """What a manifest says that samples own; nothing where it is gone or damaged.
+
+    Raises:
+        DatasetError: a path outside the root.
+    """
+    there = _load_if_whole(manifest)
+    samples = there.get("samples") if isinstance(there, dict) else None
+    return [
+        inside(root, name) for one in (samples if isinstance(samples, list) else ()) for name in _names(one, "files")
+    ]
+
+
+def _load_if_whole(path: Path) -> Json:
+    try:
+        return load_json(path)
+    except DatasetError:
+        return None
+
+
+def _names(value: Json, key: str) -> list[str]:
+    """Keys of an object inside another one."""
+    inner = value.get(key) if isinstance(value, dict) else None
+    return list(inner) if isinstance(inner, dict) else []
 
 
 def _patch_label(root: Path, split: str) -> str:

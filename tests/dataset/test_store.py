@@ -268,7 +268,20 @@ def test_what_a_killed_run_had_not_finished_goes_with_its_split(
     assert not any("/begun/" in path for path in tree(tmp_path))
 
 
-@pytest.mark.parametrize("text", ["[]", "{", '{"files": [1], "indexes": 3}'])
+@pytest.mark.parametrize("text", ["", "{"])
+def test_files_of_a_sample_whose_sidecar_is_gone_or_damaged_go_with_their_split(tmp_path: Path, text: str) -> None:
+    """Readers of the format list folders: what is left over would be one of the next split's pictures."""
+    fill(tmp_path, plan())
+    sidecar = tmp_path / "gear/test/samples/000002.json"
+    sidecar.unlink()  # as messages about damaged files advise
+    if text:
+        sidecar.write_text(text)
+    fewer = Store(tmp_path, plan(samples=2))
+    with fewer.begun({}, force=True):
+        assert not [path for path in tree(tmp_path) if "rgb_" in path]
+
+
+@pytest.mark.parametrize("text", ["[]", "{", '{"files": [1], "indexes": 3}', '{"samples": [3, {"files": [1]}, {}]}'])
 def test_what_is_damaged_can_be_replaced(tmp_path: Path, text: str) -> None:
     fill(tmp_path, plan())
     (tmp_path / "gear/test/samples/000001.json").write_text(text)
