@@ -2,10 +2,14 @@
 
 Every connected piece of the map becomes its outline, and outlines are listed by the area that they enclose, largest
 first: what lies in a hole of a piece encloses less than the piece and is painted over it, so painting in order gives
-the map back.
+the map back. Where a line one pixel thin runs aslant, what is behind it holds together from one side to the other, and
+the line's own outline would close over one of them: what painting loses gets outlines of its own.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -17,6 +21,9 @@ from gear.values.serial import Json
 
 MIN_PIECE_PX = 4
 """Smaller pieces go to what surrounds them."""
+
+MOST_REPAIRS = 8
+"""What is lost is looked for so often: thin lines may lie behind thin lines."""
 
 
 def polygons_json(instances: npt.NDArray[np.uint16]) -> Json:
@@ -30,23 +37,74 @@ def polygons_json(instances: npt.NDArray[np.uint16]) -> Json:
         borders. An instance that something cuts into pieces is one polygon a piece.
     """
     height, width = instances.shape
-    pieces: list[tuple[float, str, npt.NDArray[np.int32]]] = []
+    pieces = _outlines(instances)
+    for _ in range(MOST_REPAIRS):
+        lost = _outlines_of_lost(instances, _painted(pieces, instances.shape))
+        if not lost:
+            break
+        pieces = sorted(pieces + lost, key=_order)
+    objects = [{"label": LABELS[_label_id(piece.value)].name, "polygon": _corners(piece.outline)} for piece in pieces]
+    return {"imgHeight": height, "imgWidth": width, "objects": objects}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Piece:
+    """A connected piece of the map: what it holds, its outline through pixel centres, and what that encloses."""
+
+    value: int
+    outline: npt.NDArray[np.int32]
+    enclosed_px: float
+
+
+def _outlines(instances: npt.NDArray[np.uint16], x: int = 0, y: int = 0) -> list[_Piece]:
+    """Pieces of a map in the order of painting; those that are too small are left out, and value 0, unlabelled.
+
+    Args:
+        instances: the map, or what is looked at of it.
+        x, y: where that lies.
+    """
+    pieces: list[_Piece] = []
     runs = Runs.of(instances)
-    # Unlabelled pixels, value 0, have no box and get no outline.
     for value, ((left, top, right, bottom), _) in runs.boxes(runs.values).items():
-        label = LABELS[value // INSTANCE_FACTOR if value >= INSTANCE_FACTOR else value]
         inside = cv2.inRange(instances[top:bottom, left:right], value, value)
-        outlines, tree = cv2.findContours(inside, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE, offset=(left, top))
+        outlines, tree = cv2.findContours(inside, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE, offset=(x + left, y + top))
         # Holes, which have a parent, are what others paint; pieces inside holes have none.
         pieces += [
-            (_enclosed_px(outline), label.name, outline)
+            _Piece(value, outline, _enclosed_px(outline))
             for outline, (_, _, _, parent) in zip(outlines, tree[0], strict=True)
             if parent < 0
         ]
-    kept = [piece for piece in pieces if piece[0] >= MIN_PIECE_PX]
-    kept.sort(key=lambda piece: (-piece[0], piece[1], piece[2][0, 0, 0], piece[2][0, 0, 1]))
-    objects = [{"label": name, "polygon": _corners(outline)} for _, name, outline in kept]
-    return {"imgHeight": height, "imgWidth": width, "objects": objects}
+    return sorted((piece for piece in pieces if piece.enclosed_px >= MIN_PIECE_PX), key=_order)
+
+
+def _outlines_of_lost(instances: npt.NDArray[np.uint16], painted: npt.NDArray[np.uint16]) -> list[_Piece]:
+    """Pieces of what painting loses."""
+    wrong = (painted != instances).view(np.uint8)
+    found: list[_Piece] = []
+    for outline in cv2.findContours(wrong, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)[0]:
+        if _enclosed_px(outline) >= MIN_PIECE_PX:
+            x, y, width, height = cv2.boundingRect(outline)
+            there = np.s_[y : y + height, x : x + width]
+            inside = cv2.fillPoly(np.zeros((height, width), np.uint8), [outline], 1, offset=(-x, -y))
+            found += _outlines(np.where(inside & wrong[there], instances[there], np.uint16(0)), x, y)
+    return found
+
+
+def _order(piece: _Piece) -> tuple[float, str, int, int]:
+    x, y = piece.outline[0, 0].tolist()
+    return -piece.enclosed_px, LABELS[_label_id(piece.value)].name, x, y
+
+
+def _label_id(value: int) -> int:
+    return value // INSTANCE_FACTOR if value >= INSTANCE_FACTOR else value
+
+
+def _painted(pieces: Sequence[_Piece], shape: tuple[int, ...]) -> npt.NDArray[np.uint16]:
+    """The map that pieces give when they are painted in order."""
+    canvas = np.zeros(shape, np.uint16)
+    for piece in pieces:
+        cv2.fillPoly(canvas, [piece.outline], piece.value)
+    return canvas
 
 
 def _enclosed_px(outline: npt.NDArray[np.int32]) -> float:

@@ -125,6 +125,18 @@ def test_polygons_of_noise_stay_close(seed: int) -> None:
     assert (painted(polygons_json(picture)) == picture).mean() > 0.995
 
 
+@pytest.mark.parametrize("rings", [1, 2])
+def test_what_lies_behind_a_thin_line_is_not_painted_over(rings: int) -> None:
+    """Sky inside a loop of wire holds together with the sky around it, across every place where the wire is aslant."""
+    picture = np.full((120, 160), 23, np.uint16)
+    for ring in range(rings):
+        corners = np.array([[80, 10 + 16 * ring], [140 - 16 * ring, 60], [80, 110 - 16 * ring], [20 + 16 * ring, 60]])
+        cv2.polylines(picture, [corners], True, 17)
+    picture[55:65, 75:85] = 26000
+    labels = np.where(picture >= 1000, picture // 1000, picture)
+    assert (painted(polygons_json(picture)) == labels).all()
+
+
 def test_islands_in_holes_have_outlines_too() -> None:
     """Road seen through a car's windows, and leaves in a gap of a crown."""
     picture = np.full((60, 60), 7, np.uint16)

@@ -67,7 +67,7 @@ class SemsegConfig(CameraOptions):
 
     Attributes:
         labels: how fine the labels are.
-        polygons: whether to write polygon files too (about a third of the task's own time).
+        polygons: whether to write polygon files too (about two fifths of the task's own time).
     """
 
     width_px: int = 2048
