@@ -216,10 +216,15 @@ class Guard:
         sizes = {name: picture.shape[:2] for name, picture in views.items()}
         outputs = self._found.spec.outputs  # type: ignore[attr-defined]
         for name, size in sizes.items():
-            if not _is_array(result.views.get(name), (*size, 3), np.uint8):
+            if not _is_array(_of_camera(result.views, name), (*size, 3), np.uint8):
                 return f"views[{name!r}] must have shape {(*size, 3)} of uint8"
-            if "mask" in outputs and not _is_array((result.mask or {}).get(name), size, np.float32):
+            if "mask" not in outputs:
+                continue
+            mask = _of_camera(result.mask, name)
+            if not _is_array(mask, size, np.float32):
                 return f"mask[{name!r}] must have shape {size} of float32"
+            if not (mask.min() >= 0 and mask.max() <= 1):  # NaN is neither
+                return f"mask[{name!r}] must lie in 0..1, got {mask.min():g} to {mask.max():g}"
         if "score" in outputs and not (isinstance(result.score, NUMBERS) and 0 <= result.score <= 1):
             return f"score must be a float in 0..1, got {result.score!r}"
         return ""
@@ -272,6 +277,11 @@ def _score(path: Path) -> float:
 
 def _marker(split: str, index: int) -> str:
     return f"{FOLDER}/{split}/samples/{index:06d}.json"
+
+
+def _of_camera(given: object, name: str) -> Any:
+    """What a defense says of a camera; None where it does not say it by name."""
+    return given.get(name) if isinstance(given, Mapping) else None
 
 
 def _is_array(value: object, shape: tuple[int, ...], dtype: npt.DTypeLike) -> bool:

@@ -149,6 +149,15 @@ def raises(views: Any) -> Any:
     raise RuntimeError("boom")
 
 
+MASK = {"outputs": frozenset({"images", "mask"})}
+
+
+def masked(views: Any, value: float = 0.0, *, by_name: bool = True) -> DefenseResult:
+    """The pictures as they came, with one value as the mask of each, or of the first alone without its name."""
+    masks = {name: np.full(picture.shape[:2], value, np.float32) for name, picture in views.items()}
+    return DefenseResult(views=views, mask=masks if by_name else next(iter(masks.values())))  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize(
     ("answer", "facts", "message"),
     [
@@ -159,6 +168,10 @@ def raises(views: Any) -> Any:
         (lambda views: DefenseResult(views={k: v / 2 for k, v in views.items()}), {}, "uint8"),
         (lambda views: DefenseResult(views=views), {"outputs": frozenset({"images", "mask"})}, r"mask\['left'\]"),
         (lambda views: DefenseResult(views=views, score=7.0), {"outputs": frozenset({"score"})}, r"score .* got 7\.0"),
+        (lambda views: DefenseResult(views=list(views.values())), {}, r"views\['left'\] must have shape"),  # type: ignore[arg-type]
+        (lambda views: masked(views, by_name=False), MASK, r"mask\['left'\] must have shape"),
+        (lambda views: masked(views, 255), MASK, r"mask\['left'\] must lie in 0\.\.1, got 255 to 255"),
+        (lambda views: masked(views, np.nan), MASK, r"mask\['left'\] must lie in 0\.\.1, got nan to nan"),
     ],
 )
 def test_a_defense_that_breaks_is_named(
