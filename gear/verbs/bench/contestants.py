@@ -6,8 +6,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from gear.config.nodes import Node
+from gear.config.overrides import with_overrides
+from gear.config.reader import read_node
 from gear.contracts.specs import AttackSpec, DefenseSpec, Kind, ModelSpec, TaskSpec
-from gear.plugins.build import find
+from gear.plugins.build import NO_OPTIONS, find
 from gear.plugins.catalogue import Found
 from gear.values.errors import GearError
 from gear.verbs.attack.models import check_attack
@@ -76,12 +78,17 @@ def find_attack(config: BenchConfig, node: Node) -> Found:
     """The plugin that makes the patches.
 
     Raises:
-        ConfigError: there is none of that name.
+        ConfigError: there is none of that name, or an option does not fit.
     """
     try:
-        return find("attack", config.attack.plugin)
+        found = find("attack", config.attack.plugin)
     except GearError as error:
         raise located(node, error, "attack", "plugin") from error
+    try:
+        read_node(found.spec.config, with_overrides(NO_OPTIONS, settings_of(config.attack.set)), "")
+    except GearError as error:
+        raise located(node, error, "attack", "set") from error
+    return found
 
 
 def contests(

@@ -43,6 +43,8 @@ Written = Callable[..., Path]
         ("{steps: 2}", "{steps: 0}", r"bench\.yml:14:.*attack\.steps: must be at least 1"),
         ("{steps: 2}", "{plugin: sqare}", r"bench\.yml:14:.*attack\.plugin: .*square"),
         ("{steps: 2}", "{plugin: square}", r"bench\.yml:14:1: attack: .*counted in forward passes"),
+        ("{steps: 2}", "{set: {btach: 2}}", r"bench\.yml:14:10: attack\.set: .*did you mean 'batch'"),
+        ("{steps: 2}", "{plugin: eot, set: {share: 9}}", r"bench\.yml:14:.* attack\.set: .*share: must be 0\.01 to 1"),
         ("attack: 2", "attack: 0", r"samples\.attack: must be 1 to"),
         ("transfer: true", "transfers: true", r"unknown key \(did you mean 'transfer'\?\)"),
         ("      fpda: {}", "      fpda: {set: {layer: {}}}", r"bench\.yml:9:7: .*fpda: .*layer: expected str"),
