@@ -31,9 +31,9 @@ def choose_models(names: Sequence[str], settings: Iterable[str], datasets: Seque
     """
     if not names:
         raise GearError("name a model to attack: --model NAME (gear plugins --kind model lists them)")
-    if len(set(names)) < len(names):
-        raise GearError(f"a model is named twice: {', '.join(names)}")
     chosen = [chosen_model(name, settings) for name in names]
+    if len({one.found.full_name for one in chosen}) < len(names):
+        raise GearError(f"a model is named twice: {', '.join(names)}")
     for model in chosen:
         for dataset in datasets:
             check_model(model, dataset, FLAG)
@@ -100,13 +100,15 @@ def check_attack(
 def build_model(models: Sequence[Chosen], defense: Chosen | None, calibration: Calibration, seed: int) -> Model:
     """What `Attack.optimise` is given; a defense that learns does so for each model anew."""
     built: dict[str, Model] = {}
+    short = [chosen.found.spec.name for chosen in models]
     for chosen in models:
         model: Model = build(chosen.found, chosen.options)
         spec = chosen.found.spec
         assert isinstance(spec, ModelSpec)
         if defense is not None:
             model = _behind(defense, model, spec.views, calibration, seed)
-        built[spec.name] = model
+        # Two packages may each have a network of one name: both are attacked.
+        built[spec.name if short.count(spec.name) == 1 else chosen.found.full_name] = model
     return next(iter(built.values())) if len(built) == 1 else Group(built)
 
 
