@@ -23,11 +23,13 @@ class Group(nn.Module):
 
     Attributes:
         members: by name.
+        device: where the first of them runs.
     """
 
     def __init__(self, members: Mapping[str, Model]) -> None:
         super().__init__()
         self.members = dict(members)
+        self.device = device_of(next(iter(members.values())))
         self.networks = _networks(*members.values())
 
     def predict(self, views: Mapping[str, UInt8Image]) -> dict[str, Any]:
@@ -55,6 +57,9 @@ class Defended(nn.Module):
         defense: what cleans its pictures.
         bare: the model that was wrapped, if the wrapping is another: its networks are attacked too.
         clean: what cleans batches; by default the defense's `forward`.
+
+    Attributes:
+        device: where the model runs, whatever is around it.
     """
 
     def __init__(
@@ -63,6 +68,7 @@ class Defended(nn.Module):
         super().__init__()
         self.model, self.defense = model, defense
         self._clean_batch = defense.forward if clean is None else clean
+        self.device = device_of(model if bare is None else bare)
         inside = [model] if bare is None or bare is model else [bare, model]
         self.networks = _networks(*(one for one in inside if one is not model or not isinstance(one, nn.Module)))
 
@@ -121,6 +127,11 @@ def _as_bytes(batch: Tensor) -> UInt8Image:
 def _networks(*models: Model) -> nn.ModuleList:
     """What models that are no modules themselves hold counts too, where weights are frozen and hashed."""
     return nn.ModuleList([network for model in models for _, network in networks_of(model)])
+
+
+def device_of(model: Model) -> str:
+    """Where a model says that it runs; the CPU where it does not say."""
+    return str(getattr(model, "device", "cpu"))
 
 
 def members_of(model: Model) -> Mapping[str, Model]:

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import sys
-import types
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
@@ -25,12 +22,10 @@ from gear.cli.main import main
 from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
 from gear.contracts.attacks import Patch
-from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import AttackSpec, DefenseSpec
 from gear.plugins import build as building
 from gear.plugins.attacks.scene_specific import SceneSpecificConfig
 from gear.plugins.defenses.per_picture import PerPicture
-from gear.plugins.manager import discover
 from gear.testing.compare import difference
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_segmenter
 from gear.values.errors import DatasetError, GearError, PluginError
@@ -179,25 +174,6 @@ def test_several_models_and_scenes_at_once(small: Small, install: Install, tmp_p
     assert any(name.startswith("tiny_segmenter/") for name in names)
     assert any(name.startswith("other_segmenter/") for name in names)
     assert [one["scene"] for one in report.facts["data"]] == ["tiny/board", "tiny/truck"]
-
-
-def test_networks_of_one_name_are_all_attacked(small: Small, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    entries = []
-    for number, package in enumerate(("first_package", "second_package")):
-        module = types.ModuleType(package)
-        spec = dataclasses.replace(
-            tiny_segmenter, name="net", build=lambda config, number=number: TinySegmenter(TinyConfig(seed=number))
-        )
-        setattr(module, "gear_models", hookimpl(lambda spec=spec: [spec], specname="gear_models"))  # noqa: B010
-        monkeypatch.setitem(sys.modules, package, module)
-        entries.append(EntryPoint(name=package, value=package, group="gear"))
-    found = discover(entries)
-    monkeypatch.setattr(building, "catalogue", lambda: found)
-    names = [f"{package}/net" for package in ("first_package", "second_package")]
-    report = attack(small(), model=names, out=tmp_path, steps=1, settings=SMALL)
-    assert all(any(curve.startswith(f"{name}/") for curve in report.facts["curves"]) for name in names)
-    with pytest.raises(GearError, match="named twice"):
-        attack(small(), model=["ddrnet23_slim", "mujoco-gear/ddrnet23_slim"], out=tmp_path / "twice", steps=1)
 
 
 def test_a_defense_is_looked_through(small: Small, install: Install, tmp_path: Path) -> None:
