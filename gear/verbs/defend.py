@@ -215,17 +215,21 @@ class Guard:
             return f"apply returns a DefenseResult, got {type(result).__name__}"
         sizes = {name: picture.shape[:2] for name, picture in views.items()}
         outputs = self._found.spec.outputs  # type: ignore[attr-defined]
+        has_mask = "mask" in outputs or result.mask is not None  # what was not promised is used, too
         for name, size in sizes.items():
             if not _is_array(_of_camera(result.views, name), (*size, 3), np.uint8):
                 return f"views[{name!r}] must have shape {(*size, 3)} of uint8"
-            if "mask" not in outputs:
+            if not has_mask:
                 continue
             mask = _of_camera(result.mask, name)
             if not _is_array(mask, size, np.float32):
                 return f"mask[{name!r}] must have shape {size} of float32"
             if not (mask.min() >= 0 and mask.max() <= 1):  # NaN is neither
                 return f"mask[{name!r}] must lie in 0..1, got {mask.min():g} to {mask.max():g}"
-        if "score" in outputs and not (isinstance(result.score, NUMBERS) and 0 <= result.score <= 1):
+        if unknown := (result.mask or {}).keys() - sizes.keys():
+            return f"mask[{min(unknown)!r}] is of no camera that it was shown"
+        has_score = "score" in outputs or result.score is not None
+        if has_score and not (isinstance(result.score, NUMBERS) and 0 <= result.score <= 1):
             return f"score must be a float in 0..1, got {result.score!r}"
         return ""
 

@@ -169,6 +169,9 @@ def masked(views: Any, value: float = 0.0, *, by_name: bool = True) -> DefenseRe
         (lambda views: DefenseResult(views=views), {"outputs": frozenset({"images", "mask"})}, r"mask\['left'\]"),
         (lambda views: DefenseResult(views=views, score=7.0), {"outputs": frozenset({"score"})}, r"score .* got 7\.0"),
         (lambda views: DefenseResult(views=list(views.values())), {}, r"views\['left'\] must have shape"),  # type: ignore[arg-type]
+        (lambda views: DefenseResult(views=views, score=7.0), {}, r"score .* got 7\.0"),
+        (lambda views: masked(views, 255), {}, r"mask\['left'\] must lie in 0\.\.1"),
+        (lambda views: masked({**views, "rear": views["left"]}), MASK, r"mask\['rear'\] is of no camera"),
         (lambda views: masked(views, by_name=False), MASK, r"mask\['left'\] must have shape"),
         (lambda views: masked(views, 255), MASK, r"mask\['left'\] must lie in 0\.\.1, got 255 to 255"),
         (lambda views: masked(views, np.nan), MASK, r"mask\['left'\] must lie in 0\.\.1, got nan to nan"),
