@@ -17,6 +17,9 @@ from gear.values.errors import FieldError
 
 LABEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 
+TAKEN = frozenset({"none", "random"})
+"""Kinds of pictures: those with a network's patch have the network's name."""
+
 MOST_SAMPLES = 100_000
 
 
@@ -58,6 +61,8 @@ class TaskBench:
             for label in getattr(self, name):
                 if not LABEL.fullmatch(label):
                     raise FieldError(name, f"{label!r} names folders and rows: letters, digits, `_`, `.` and `-`")
+        for label in TAKEN & self.models.keys():
+            raise FieldError("models", f"{label!r} is what pictures without the network's patch are called")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
