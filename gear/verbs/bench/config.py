@@ -11,11 +11,14 @@ import yaml
 
 from gear.config.collection import WeatherConfig
 from gear.config.dump import node_to_json
-from gear.config.nodes import MARKS, Node, Place, Scalar
 from gear.config.nodes import Mapping as MappingNode
+from gear.config.nodes import Node, Place, Scalar
 from gear.values.errors import FieldError
 
 LABEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
+
+WORD = re.compile(r"[-+]?[\w./](?:[\w./+=, -]*[\w./+=,-])?")
+"""Texts that are the same to YAML without quotes, null apart: numbers, names and paths above all."""
 
 TAKEN = frozenset({"none", "random"})
 """Kinds of pictures: those with a network's patch have the network's name."""
@@ -177,6 +180,5 @@ def _quoted(node: Scalar) -> str:
     """So that it is read as the same text again."""
     if node.is_null:
         return ""
-    plain = node.text == node.text.strip() and not node.text.startswith(tuple(MARKS)) and "#" not in node.text
-    is_word = plain and node.text and ": " not in node.text and node.text.casefold() not in ("null", "~")
+    is_word = WORD.fullmatch(node.text) and node.text.casefold() != "null"
     return node.text if is_word else "'" + node.text.replace("'", "''") + "'"

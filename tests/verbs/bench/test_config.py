@@ -150,6 +150,7 @@ def test_where_networks_run(written: Written, tmp_path: Path, monkeypatch: pytes
     [
         "{a: 1, b: {c: x, d: [1, 2]}}",
         "{a: '#1', b: 'it''s', c: ' spaced ', d: '', e: null, f: 'null', g: '[1]', h: 'k: v'}",
+        "{a: 'C:', b: '@here/w', c: '%w', d: '? x', e: '- x', f: -0.5, g: '-', h: 'a: b: c', i: '---', j: 1e-5}",
         "{a: ['x, y', {b: 2}], 'weights': 'runs/a b/model.safetensors'}",
     ],
 )
