@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 
 from gear.contracts.tasks import SplitInfo
@@ -119,6 +120,12 @@ def differences(old: Json, new: Json, key: str = "") -> list[str]:
                 continue
             found += differences(old.get(name), new.get(name), f"{key}.{name}" if key else name)
         return found
+    if isinstance(old, list) and isinstance(new, list):
+        return [
+            difference
+            for place, (before, after) in enumerate(zip_longest(old, new))
+            for difference in differences(before, after, f"{key}[{place}]")
+        ]
     return [] if old == new else [f"{key}: {_short(old)} there, {_short(new)} now"]
 
 

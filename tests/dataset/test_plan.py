@@ -9,7 +9,7 @@ import pytest
 
 from gear.dataset.plan import Plan, differences
 from gear.testing.task_contract import INFO
-from gear.values.serial import from_json
+from gear.values.serial import Json, from_json
 
 PLAN = Plan(
     task={"name": "semseg", "version": "1"},
@@ -19,6 +19,8 @@ PLAN = Plan(
     info=INFO,
     samples=4,
 )
+
+BOARD: dict[str, Json] = {"asset": "billboard", "facing_deg": 205.0, "position_m": [120.0, 29.0]}
 
 
 @pytest.mark.parametrize(
@@ -57,3 +59,16 @@ def test_a_plan_comes_back_and_speaks_of_auxiliary_files_where_there_are_any(aux
 def test_differences_are_named_with_both_values_but_for_what_may_differ() -> None:
     other = replace(PLAN, samples=9, info=replace(INFO, created="x"), options={"width_px": 32, "height_px": 32})
     assert differences(PLAN.as_json(), other.as_json()) == ["options.width_px: 64 there, 32 now"]
+
+
+@pytest.mark.parametrize(
+    ("now", "expected"),
+    [
+        ([BOARD | {"facing_deg": 20.0}], ["boards[0].facing_deg: 205.0 there, 20.0 now"]),
+        ([BOARD | {"position_m": [9.0, 29.0]}], ["boards[0].position_m[0]: 120.0 there, 9.0 now"]),
+        ([BOARD, 1], ["boards[1]: null there, 1 now"]),
+        ([], ['boards[0]: {"asset": "billboard", "facing_deg": ... there, null now']),
+    ],
+)
+def test_differences_in_lists_are_named_by_their_place(now: list[Json], expected: list[str]) -> None:
+    assert differences({"boards": [BOARD]}, {"boards": now}) == expected
