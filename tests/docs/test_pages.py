@@ -48,6 +48,14 @@ def test_the_python_of_the_page_on_evaluating_runs(tmp_path: Path, monkeypatch: 
     assert runpy.run_path(str(module))["batch"].indices
 
 
+def test_the_contract_of_a_town_that_the_page_on_mjcf_shows_can_be_subclassed_as_shown(tmp_path: Path) -> None:
+    (code,) = blocks(DOCS / "mjcf-conventions.md", "python")
+    module = tmp_path / "test_mine.py"
+    module.write_text(code)
+    contract = runpy.run_path(str(module))["TestMyTown"]
+    assert (contract.town, contract.scenes) == ("path/to/towns/mytown.xml", "path/to/mytown.yml")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_the_shell_of_a_page_runs(page: Path, tmp_path: Path) -> None:
