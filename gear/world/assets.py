@@ -163,7 +163,8 @@ class AssetLibrary:
             problem = getattr(error, "strerror", None) or error
             raise UnknownNameError("town", text, hint=f"(cannot look there: {problem})") from error
         if not is_there:
-            raise UnknownNameError("town", text, _names(towns), "(or give the path of a MJCF)" if is_path else "")
+            hint = "(that file does not exist; or give the path of a MJCF that does)" if is_path else ""
+            raise UnknownNameError("town", text, _names(towns), hint)
         return AssetLibrary(path.resolve() if is_path else path)
 
     @property
