@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 from gear.config.nodes import Mapping, Node, Place
+from gear.config.reader import PLACES
 from gear.contracts.rendering import Quality
 from gear.values.errors import FieldError
 from gear.values.optics import CameraEffects
@@ -27,6 +28,7 @@ class WeatherConfig:
         fog_distance_m: where the fog begins.
         fog_falloff: how quickly fog thins with height.
         scattering_intensity, mie_scattering_scale, rayleigh_scattering_scale: strength of scattering, not negative.
+        places: where a file or a flag gives what, by key.
     """
 
     SHORTHAND: ClassVar[str] = "preset"
@@ -53,6 +55,7 @@ class WeatherConfig:
     scattering_intensity: float | None = None
     mie_scattering_scale: float | None = None
     rayleigh_scattering_scale: float | None = None
+    places: dict[str, Place] = field(default_factory=dict, compare=False, repr=False, metadata=PLACES)
 
     def __post_init__(self) -> None:
         for name in self.PERCENT:
@@ -145,6 +148,7 @@ class CollectionConfig:
         probes: also keep each surface's reach rendered black and white, from which compositors put patches in.
         simulation: name or path of the simulation config.
         options: the task's own options (`gear plugins show TASK`).
+        places: where a file or a flag gives what, by key.
     """
 
     task: str
@@ -165,6 +169,7 @@ class CollectionConfig:
     probes: bool = False
     simulation: str = "default"
     options: Node = field(default_factory=lambda: Mapping({}, Place("defaults")))
+    places: dict[str, Place] = field(default_factory=dict, compare=False, repr=False, metadata=PLACES)
 
     def __post_init__(self) -> None:
         if not SPLIT_NAME.fullmatch(self.split):

@@ -9,6 +9,7 @@ from typing import Any
 import yaml
 
 from gear.config.nodes import Items, Mapping, Node, Scalar
+from gear.config.reader import holds_places
 from gear.values.serial import Json
 
 MAX_NODES = 100_000
@@ -56,7 +57,8 @@ def to_plain(value: Any) -> Json:
     if isinstance(value, Path):
         return str(value)
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {field.name: to_plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+        said = [field.name for field in dataclasses.fields(value) if not holds_places(field)]
+        return {name: to_plain(getattr(value, name)) for name in said}
     if isinstance(value, (tuple, list)):
         return [to_plain(item) for item in value]
     if isinstance(value, dict):

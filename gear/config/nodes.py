@@ -107,10 +107,20 @@ def parse_text(text: str, name: str) -> Node:
 
 
 def parse_value(text: str, name: str) -> Node:
-    """Reads one value as given on the command line: `12`, `fog`, `[1, 2]`, `{a: 1}`. Nothing is a comment there."""
+    """Reads one value as given on the command line: `12`, `fog`, `[1, 2]`, `{a: 1}`. Nothing is a comment there, and no
+    place in it is worth a line and a column."""
     if "#" in text and text.strip()[0] not in MARKS:
         return Scalar(text.strip(), False, Place(name))
-    return parse_text(text, name) if text.strip() else Scalar("", True, Place(name))
+    return in_one_place(parse_text(text, name), Place(name)) if text.strip() else Scalar("", True, Place(name))
+
+
+def in_one_place(node: Node, place: Place) -> Node:
+    """The same tree with one place for all of it: of a text whose lines nobody has before them."""
+    if isinstance(node, Items):
+        return Items(tuple(in_one_place(item, place) for item in node.items), place)
+    if isinstance(node, Mapping):
+        return Mapping({key: (place, in_one_place(item, place)) for key, (_, item) in node.entries.items()}, place)
+    return Scalar(node.text, node.is_null, place)
 
 
 def _convert(node: yaml.Node, name: str, key: str, done: dict[int, Node | None]) -> Node:

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import difflib
 import math
 import types
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin
 
 from gear.config.nodes import Items, Mapping, Node, Place, Scalar
-from gear.values.errors import FieldError
+from gear.values.errors import DuplicateNameError, FieldError, PatchError, UnknownNameError
 from gear.values.serial import type_hints
 
 T = TypeVar("T")
 
 TRUE_WORDS = ("true", "yes", "on")
 FALSE_WORDS = ("false", "no", "off")
+
+PLACES = {"places": True}
+"""Metadata of a field that is no key: the reader puts the places of the given values there, by their keys."""
 
 WHOLE = {"whole": True}
 """Metadata of a field whose default is one thing: who gives some of its keys does not mean the default's others."""
@@ -33,6 +38,27 @@ def read_node(kind: type[T], node: Node, key: str = "") -> T:
         ConfigError: a key is unknown, missing or repeated, a value has another type, or the class refuses it.
     """
     return cast(T, _read(kind, node, key))
+
+
+@contextlib.contextmanager
+def told_at(places: dict[str, Place], key: str, above: str = "") -> Iterator[None]:
+    """For looking up what a config names: where a file names what is not there, it is told with line and column.
+
+    Args:
+        places: of the given values, by key.
+        key: whose value is looked up.
+        above: the key that `key` stands below, if any.
+
+    Raises:
+        ConfigError: in place of `UnknownNameError`, `DuplicateNameError` and `PatchError`, where a file has the key.
+    """
+    try:
+        yield
+    except (UnknownNameError, DuplicateNameError, PatchError) as error:
+        place = places.get(key)
+        if place is None or not place.line:
+            raise
+        raise place.error(join(above, key), str(error)) from error
 
 
 def spelled_out(kind: Any, node: Node) -> Node:
@@ -91,7 +117,7 @@ def _read_dataclass(kind: Any, node: Node, key: str, default: Any) -> Any:
     """What is not given is as in `default`, or as the class has it where that is None."""
     mapping = _expect_mapping(_in_full(kind, node), key)
     hints = type_hints(kind)
-    fields = {field.name: field for field in dataclasses.fields(kind) if field.init}
+    fields = {field.name: field for field in dataclasses.fields(kind) if field.init and not holds_places(field)}
     given = {} if default is None else {name: getattr(default, name) for name in fields}
     places: dict[str, Place] = {}
     for name, (place, item) in mapping.entries.items():
@@ -105,10 +131,16 @@ def _read_dataclass(kind: Any, node: Node, key: str, default: Any) -> Any:
         has_default = field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING
         if name not in given and not has_default:
             raise mapping.place.error(join(key, name), "missing")
+    given.update({field.name: places for field in dataclasses.fields(kind) if holds_places(field)})
     try:
         return kind(**given)
     except FieldError as error:
         raise places.get(error.field, mapping.place).error(join(key, error.field), error.problem) from error
+
+
+def holds_places(field: dataclasses.Field[Any]) -> bool:
+    """Whether a field says where the others were given, and is nothing that one can say."""
+    return PLACES.items() <= field.metadata.items()
 
 
 def _usual(field: dataclasses.Field[Any], default: Any) -> Any:

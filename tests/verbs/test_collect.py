@@ -249,6 +249,35 @@ def test_bad_input_gets_one_line_and_leaves_nothing(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("task: stereo3", r"c.yml:2:7: task: no task named 'stereo3'; did you mean stereo3d"),
+        ("scene: bord", r"c.yml:2:8: scene: no scene of tiny named 'bord'; did you mean board"),
+        ("scene: my.yml:bord", r"c.yml:2:8: scene: no scene of tiny named 'bord'"),
+        ("town: tinny", r"c.yml:2:7: town: no town named 'tinny'"),
+        ("weather: ClearNon", r"c.yml:2:10: weather.preset: no weather named 'ClearNon'; did you mean ClearNoon"),
+        ("weather: {wetness: 3, preset: Wet}", r"c.yml:2:31: weather.preset: no weather named 'Wet'"),
+        ("split: tset", r"c.yml:2:8: split: no split named 'tset'; did you mean test"),
+        ("simulation: defalt", r"c.yml:2:13: simulation: no simulation config named 'defalt'; did you mean default"),
+        ("patch: nowhere.png", r"c.yml:2:8: patch: patch nowhere.png: is not there"),
+    ],
+)
+def test_a_name_in_a_file_is_told_with_its_line(line: str, message: str, tmp_path: Path) -> None:
+    """A flag that gives another one is named as a flag's is: without a place."""
+    key = line.partition(":")[0]
+    usual = {"task": "depth", "town": str(TINY_TOWN), "scenes": str(TINY_SCENES), "scene": "board"}
+    (tmp_path / "my.yml").write_bytes(Path(TINY_SCENES).read_bytes())
+    line = line.replace("my.yml", str(tmp_path / "my.yml"))
+    file = tmp_path / "c.yml"
+    file.write_text(f"# mine\n{line}\n")
+    others = {name: value for name, value in usual.items() if name != key}
+    with pytest.raises(ConfigError, match=message):
+        resolve(load_collection(str(file), others))
+    with pytest.raises((UnknownNameError, PatchError)):
+        resolve(load_collection(str(file), others, [f"{key}=nonsense"]))
+
+
 def test_a_file_that_is_gone_or_damaged_is_named_with_its_remedy(tmp_path: Path, collect_small: Collect) -> None:
     collect_small("semseg", tmp_path)
     dataset = gear.open_dataset(tmp_path)

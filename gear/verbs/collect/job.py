@@ -20,7 +20,7 @@ from gear.config.collection import CollectionConfig, SplitConfig, WeatherConfig
 from gear.config.dump import to_plain
 from gear.config.load import load_simulation, split_of
 from gear.config.nodes import parse_file
-from gear.config.reader import read_node
+from gear.config.reader import holds_places, read_node, told_at
 from gear.contracts.rendering import RendererInfo
 from gear.contracts.tasks import SplitInfo
 from gear.dataset.plan import Plan
@@ -84,28 +84,37 @@ def resolve(config: CollectionConfig) -> Job:
 
     Raises:
         UnknownNameError: a task, town, scene, split or weather is not known; says what may have been meant.
-        ConfigError: a scene library or the task's options cannot be read, or the lens folds its pictures over.
+        ConfigError: likewise, of a name that a file has; a scene library or the task's options cannot be read, or the
+            lens folds its pictures over.
         PatchError: the patch cannot be used.
         BackendError: the renderer cannot start here.
     """
-    config = with_scene_file(config)
-    found = find("task", config.task)
+    with told_at(config.places, "scene"):
+        config = with_scene_file(config)
+    with told_at(config.places, "task"):
+        found = find("task", config.task)
     options = read_node(found.spec.config, config.options, "options")
     _check_lens(config, found)
-    library = AssetLibrary.for_town(config.town)
-    simulation = load_simulation(config.simulation)
-    scene = find_scene(config, library.town_name)
+    with told_at(config.places, "town"):
+        library = AssetLibrary.for_town(config.town)
+    with told_at(config.places, "simulation"):
+        simulation = load_simulation(config.simulation)
+    with told_at(config.places, "scene"):
+        scene = find_scene(config, library.town_name)
     roomy = 1 if scene.boards else ROOMY_FACTOR
     scene = scene.capped(simulation.max_vehicles * roomy, simulation.max_pedestrians).crowded(config.crowd)
-    split = split_of(simulation, config.split)
+    with told_at(config.places, "split"):
+        split = split_of(simulation, config.split)
     split = dataclasses.replace(
         split,
         seed=split.seed if config.seed is None else config.seed,
         samples=split.samples if config.samples is None else config.samples,
     )
-    weather = find_weather(config.weather)
+    with told_at(config.weather.places, "preset", "weather"):
+        weather = find_weather(config.weather)
     surfaces = len(scene.boards) if scene.truck is None else 1
-    patch = resolve_patch(config.patch, surfaces=surfaces, seed=config.patch_seed)
+    with told_at(config.places, "patch"):
+        patch = resolve_patch(config.patch, surfaces=surfaces, seed=config.patch_seed)
     info = SplitInfo(
         town=library.town_name, scene=config.scene, split=config.split, seed=split.seed, patch_label=patch.label
     )
@@ -218,7 +227,7 @@ def find_weather(config: WeatherConfig) -> Weather:
     changes: dict[str, Any] = {
         field.name: getattr(config, field.name)
         for field in dataclasses.fields(config)
-        if field.name != "preset" and getattr(config, field.name) is not None
+        if field.name != "preset" and not holds_places(field) and getattr(config, field.name) is not None
     }
     preset = PRESETS[config.preset]
     if all(getattr(preset, name) == value for name, value in changes.items()):

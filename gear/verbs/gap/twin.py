@@ -8,7 +8,7 @@ from typing import Any
 import yaml
 
 from gear.config.collection import CollectionConfig
-from gear.config.nodes import parse_text
+from gear.config.nodes import Place, in_one_place, parse_text
 from gear.config.reader import read_node
 from gear.dataset.plan import read_plan
 from gear.dataset.reading import Dataset
@@ -64,7 +64,8 @@ def collect_twin(
     }
     remedy = f"collect the twin yourself, as the dataset was but with --patch {patch}, and name it with --twin DIR"
     try:
-        node = parse_text(yaml.safe_dump(config, sort_keys=False), f"{clean.root} manifest")
+        name = f"{clean.root} manifest"
+        node = in_one_place(parse_text(yaml.safe_dump(config, sort_keys=False), name), Place(name))
         job = resolve(read_node(CollectionConfig, node))
     except (UnknownNameError, ConfigError) as error:
         files = "" if town and scenes else "say where its town and scene library lie with --town and --scenes, or "
