@@ -24,6 +24,7 @@ from gear.values.serial import Json
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the flags."""
+    others = "".join(f"; {task} {steps}" for task, steps in STEPS_OF.items())
     parser.add_argument("--task", required=True, choices=tuple(TRAINING_OPTIONS))
     parser.add_argument("--model", required=True, metavar="NAME", help="model plugin")
     parser.add_argument("--out", type=Path, required=True, help="folder; <model>/<town>-<scene>/ lies in it")
@@ -32,9 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--samples", type=int, metavar="N", help=f"a scene, to make the patch on and to measure it ({SAMPLES['train']})"
     )
-    parser.add_argument(
-        "--steps", type=int, metavar="N", help=f"of each attack ({STEPS}; stereo3d {STEPS_OF['stereo3d']})"
-    )
+    parser.add_argument("--steps", type=int, metavar="N", help=f"of each attack ({STEPS}{others})")
     parser.add_argument("--weights", default=SHIPPED, metavar="FILE", help="the network's, while none are shipped")
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings", help="a key of the collections"

@@ -32,7 +32,7 @@ SAMPLES_OF = {"stereo3d": {"train": 48, "val": 8, "test": 96}}
 """Of tasks whose pictures say less each: a street has few cars, and many pictures only some that a patch can reach."""
 
 STEPS = 120
-STEPS_OF = {"stereo3d": 300}
+STEPS_OF = {"detect2d": 150, "stereo3d": 300}
 """Of tasks whose networks need more to give in."""
 
 EVERY = 25
@@ -41,6 +41,7 @@ EVERY = 25
 PICTURES: dict[str, tuple[str, ...]] = {
     "semseg": ("quality=fast",),
     "depth": ("quality=fast",),
+    "detect2d": ("crowd=3",),
     "stereo3d": ("quality=fast", "crowd=3"),
 }
 """Settings of a task's pictures beside those of training: what costs most is rendered as `fast`, which networks know,
