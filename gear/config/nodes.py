@@ -116,11 +116,19 @@ def parse_value(text: str, name: str) -> Node:
 
 def in_one_place(node: Node, place: Place) -> Node:
     """The same tree with one place for all of it: of a text whose lines nobody has before them."""
-    if isinstance(node, Items):
-        return Items(tuple(in_one_place(item, place) for item in node.items), place)
-    if isinstance(node, Mapping):
-        return Mapping({key: (place, in_one_place(item, place)) for key, (_, item) in node.entries.items()}, place)
-    return Scalar(node.text, node.is_null, place)
+    done: dict[int, Node] = {}
+
+    def moved(node: Node) -> Node:
+        if id(node) not in done:  # once for whatever aliases share
+            if isinstance(node, Items):
+                done[id(node)] = Items(tuple(map(moved, node.items)), place)
+            elif isinstance(node, Mapping):
+                done[id(node)] = Mapping({key: (place, moved(item)) for key, (_, item) in node.entries.items()}, place)
+            else:
+                done[id(node)] = Scalar(node.text, node.is_null, place)
+        return done[id(node)]
+
+    return moved(node)
 
 
 def _convert(node: yaml.Node, name: str, key: str, done: dict[int, Node | None]) -> Node:

@@ -108,6 +108,28 @@ def test_settings_go_through_the_same_reader() -> None:
         with_overrides(node, ["lens"])
 
 
+def test_what_is_wrong_in_a_setting_has_no_line() -> None:
+    """One sees the whole of it; `--set lens.baseline_m=x:1:1` would look like a value of another text."""
+    node = parse_text("name: a\n", "run.yaml")
+    for setting, problem in (
+        ("lens.baseline_m=x", r"^--set lens.baseline_m=x: lens.baseline_m: expected float, got 'x'$"),
+        ("lens={baseline_m: x}", r"^--set lens=\{baseline_m: x\}: lens.baseline_m: expected float"),
+        ("steps=[1, b]", r"^--set steps=\[1, b\]: steps\[1\]: expected float, got 'b'$"),
+        ("lens={baseline_m: -1}", r"^--set lens=\{baseline_m: -1\}: lens.baseline_m: "),
+    ):
+        with pytest.raises(ConfigError, match=problem):
+            read_node(Run, with_overrides(node, [setting]))
+
+
+def test_aliases_of_a_setting_cost_nothing() -> None:
+    bomb = "&a0 [x]"
+    for i in range(1, 40):
+        bomb = f"&a{i} [{bomb}{f', *a{i - 1}' * 9}]"
+    node = with_overrides(parse_text("name: a\n", "run.yaml"), [f"steps={bomb}"])
+    with pytest.raises(ConfigError, match=r"steps\[0\]: expected float, got a list$"):
+        read_node(Run, node)
+
+
 @pytest.mark.parametrize("text", ["#1", "data/run #2", " runs/a#b ", "'data/run #2'", '"#1"'])
 def test_nothing_of_a_setting_is_a_comment(text: str) -> None:
     node = with_overrides(parse_text("name: a\n", "run.yaml"), [f"name={text}"])
