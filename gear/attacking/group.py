@@ -29,7 +29,7 @@ class Group(nn.Module):
     def __init__(self, members: Mapping[str, Model]) -> None:
         super().__init__()
         self.members = dict(members)
-        self.device = device_of(next(iter(members.values())))
+        self.device = device_name(next(iter(members.values())))
         self.networks = _networks(*members.values())
 
     def predict(self, views: Mapping[str, UInt8Image]) -> dict[str, Any]:
@@ -68,7 +68,7 @@ class Defended(nn.Module):
         super().__init__()
         self.model, self.defense = model, defense
         self._clean_batch = defense.forward if clean is None else clean
-        self.device = device_of(model if bare is None else bare)
+        self.device = device_name(model if bare is None else bare)
         inside = [model] if bare is None or bare is model else [bare, model]
         self.networks = _networks(*(one for one in inside if one is not model or not isinstance(one, nn.Module)))
 
@@ -129,7 +129,7 @@ def _networks(*models: Model) -> nn.ModuleList:
     return nn.ModuleList([network for model in models for _, network in networks_of(model)])
 
 
-def device_of(model: Model) -> str:
+def device_name(model: Model) -> str:
     """Where a model says that it runs; the CPU where it does not say."""
     return str(getattr(model, "device", "cpu"))
 

@@ -52,11 +52,6 @@ class VisibilityLimits:
         return (
             distance_m <= self.max_distance_m
             and (right - left) * (bottom - top) >= self.min_box_area_px2
-            and _seen_share(truth) >= self.min_visible_fraction
+            and truth.uncovered_fraction >= self.min_visible_fraction
             and truth.visible_px >= self.min_visible_px
         )
-
-
-def _seen_share(truth: ObjectTruth) -> float:
-    """Share of the silhouette in the picture that is seen; 3 of 30 pixels are 0.1, of which 1 - 0.9 falls short."""
-    return truth.visible_px / max(truth.visible_px, truth.amodal_in_image_px, 1)

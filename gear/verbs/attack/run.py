@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from gear.attacking.group import device_of
+from gear.attacking.group import device_name
 from gear.attacking.objectives import Objective, default_objective
 from gear.config.dump import to_plain
 from gear.contracts.attacks import Budget, Patch
@@ -173,7 +173,7 @@ def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, p
         PluginError: it does not.
         GearError: it has nothing to begin with.
     """
-    seen, held = (Scenes(group, job.compositor, device_of(network)) for group in (job.datasets, job.validation))
+    seen, held = (Scenes(group, job.compositor, device_name(network)) for group in (job.datasets, job.validation))
     # One each: an objective remembers the clean answers of its samples by their numbers.
     make = product.objective if hasattr(product, "objective") else default_objective
     settings = product.settings(seen.samples[0]) if hasattr(product, "settings") else job.config
