@@ -100,8 +100,8 @@ def compose(
     pool: Sequence[tuple[ActorFacts, int]],
     carrier: ActorFacts | None,
     weather: Weather,
-    lighting: Callable[[], Lighting] | None = None,
-    ahead: AssetsAhead | None = None,
+    lighting: Callable[[], Lighting] | None,
+    ahead: AssetsAhead,
 ) -> Composition:
     """Puts a town, its boards and its actors into one tree.
 
@@ -111,14 +111,13 @@ def compose(
         pool: actors and how many instances of each; the first one is the ego car's.
         carrier: an actor that bears a surface, besides the pool.
         weather: light and air.
-        lighting: waits for the weather's light, where that is being worked out already.
+        lighting: waits for the weather's light, where that is being worked out already; else None.
         ahead: is told of meshes as soon as they are known.
 
     Raises:
         TownError: a file cannot be composed.
         UnknownNameError: a board's asset is not there.
     """
-    ahead = ahead or AssetsAhead(None)
     with ThreadPoolExecutor(1) as aside:
         light = aside.submit(lighting or partial(lighting_of, weather))
         text, statics = split_town(library.town)
