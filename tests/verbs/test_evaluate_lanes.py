@@ -13,7 +13,7 @@ import torch
 
 from gear.nn.network import Network
 from gear.verbs.collect.run import CollectReport
-from gear.verbs.evaluate import player
+from gear.verbs.evaluate import player, scoring
 from gear.verbs.evaluate.lanes import MOST, lanes, lanes_of
 from gear.verbs.evaluate.run import evaluate
 
@@ -105,6 +105,56 @@ def test_a_network_that_fails_stops_the_run_and_it_is_taken_up_again(
     (row,) = evaluate(pictures, model=NAME, settings=SETTINGS, out=tmp_path, resamples=0, batch=1).rows
     assert row.samples == 5 and 1 <= row.made < 5
     assert len(files(tmp_path)) == 5
+
+
+def test_nobody_works_slower_for_a_slow_disk(tmp_path: Path, pictures: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the first sample's files wait for is that every lane has answered twice."""
+    torch.set_num_threads(2)
+    predict, write, answered = Network.predict_many, scoring.write_whole, threading.Semaphore(0)
+
+    def watched(network: Any, samples: Any) -> Any:
+        answers = predict(network, samples)
+        answered.release()
+        return answers
+
+    def slow(*arguments: Any) -> None:
+        with first:
+            if not enough.is_set():
+                assert all(answered.acquire(timeout=60) for _ in range(4)), "the network waits for the disk"
+                enough.set()
+        write(*arguments)
+
+    first, enough = threading.Lock(), threading.Event()
+    monkeypatch.setattr(Network, "predict_many", watched)
+    monkeypatch.setattr(scoring, "write_whole", slow)
+    (row,) = evaluate(pictures, model=NAME, settings=SETTINGS, out=tmp_path, resamples=0, batch=1).rows
+    assert row.made == 5 and len(files(tmp_path)) == 5
+
+
+def test_what_is_predicted_is_written_though_the_run_fails(
+    tmp_path: Path, pictures: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    torch.set_num_threads(2)
+    predict, write, failed = Network.predict_many, scoring.write_whole, threading.Event()
+    shown = list[int]()
+
+    def failing(network: Any, samples: Any) -> Any:
+        shown.append(1)
+        if len(shown) == 4:
+            failed.set()
+            raise RuntimeError("out of luck")
+        return predict(network, samples)
+
+    def late(*arguments: Any) -> None:
+        assert failed.wait(60)
+        write(*arguments)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Network, "predict_many", failing)
+        patched.setattr(scoring, "write_whole", late)
+        with pytest.raises(RuntimeError, match="out of luck"):
+            evaluate(pictures, model=NAME, settings=SETTINGS, out=tmp_path, resamples=0, batch=1)
+    assert len(files(tmp_path)) >= 3
 
 
 @pytest.mark.parametrize("threads", [1, 2])

@@ -41,8 +41,9 @@ def evaluate_row(dataset: Dataset[Any], scorer: Scorer, player: Player, *, batch
     Batches are always the same samples, those that are finished already among them, and there are as many lanes as the
     whole dataset has work for: networks round a batch otherwise than one sample, and on several threads otherwise than
     on one, and a run that was interrupted is to end with the same bytes. Each of several lanes takes a batch from its
-    files to its note: what changes hands less is done sooner. Else pictures are decoded, and predictions measured and
-    written, in threads beside the model. What waits is bounded, so memory does not grow with the dataset.
+    files to its figures, since what changes hands less is done sooner; threads beside them wait for the disk. Else
+    pictures are decoded, and predictions measured and written, in threads beside the model. What waits is bounded, so
+    memory does not grow with the dataset.
     """
     desk = _Desk(2 * batch + workers, told)
     with ThreadPoolExecutor(workers) as readers, ThreadPoolExecutor(workers) as scorers:
@@ -53,20 +54,19 @@ def evaluate_row(dataset: Dataset[Any], scorer: Scorer, player: Player, *, batch
             made = len(dataset) - len(notes)
             count = min(player.lanes, len(every))
             if count > 1:
-                notes |= _in_lanes(dataset, scorer, player, blocks, notes.keys(), count, desk)
+                scored = _in_lanes(dataset, scorer, player, blocks, notes.keys(), count, desk, scorers)
             else:
-                scored: dict[int, Future[Note]] = {}
+                scored = {}
                 for indices, samples in _batches(dataset, blocks, readers, workers):
                     answers = player.play([sample.images for sample in samples], indices)
                     for index, sample, answer in zip(indices, samples, answers, strict=True):
                         if index not in notes:
                             scored[index] = desk.submit(scorers, scorer.first, index, sample, answer)
                     desk.check()
-                notes |= {index: future.result() for index, future in scored.items()}
+            notes |= {index: future.result() for index, future in scored.items()}
         except BaseException:
             readers.shutdown(wait=False, cancel_futures=True)
-            scorers.shutdown(wait=False, cancel_futures=True)
-            raise
+            raise  # once the few samples that have their predictions are written
     desk.check()  # looked at again now that every callback has ended: that of the last sample may fail too
     return Row(notes=[notes[index] for index in range(len(dataset))], made=made, damaged=tuple(damaged))
 
@@ -79,28 +79,29 @@ def _in_lanes(
     finished: Set[int],
     count: int,
     desk: _Desk,
-) -> dict[int, Note]:
-    """Batches side by side, each whole in one thread."""
+    writers: ThreadPoolExecutor,
+) -> dict[int, Future[Note]]:
+    """Batches side by side, each in one thread until there is nothing left to do but to wait for the disk."""
 
-    def whole(indices: Sequence[int]) -> dict[int, Note]:
+    def worked_out(indices: Sequence[int]) -> dict[int, Future[Note]]:
         samples = [dataset[index] for index in indices]
         answers = player.play([sample.images for sample in samples], indices)
-        notes = {}
-        for index, sample, answer in zip(indices, samples, answers, strict=True):
-            if index not in finished:
-                notes[index] = scorer.first(index, sample, answer)
-                desk.tell()
-        return notes
+        return {
+            index: desk.submit(writers, scorer.write, scorer.measured(index, sample, answer))
+            for index, sample, answer in zip(indices, samples, answers, strict=True)
+            if index not in finished
+        }
 
-    notes: dict[int, Note] = {}
+    written: dict[int, Future[Note]] = {}
     with lanes(count) as submit:
         coming = deque(blocks)
-        played: deque[Future[dict[int, Note]]] = deque()
+        played: deque[Future[dict[int, Future[Note]]]] = deque()
         while coming or played:
             while coming and len(played) <= count:
-                played.append(submit(whole, coming.popleft()))
-            notes |= played.popleft().result()
-    return notes
+                played.append(submit(worked_out, coming.popleft()))
+            written |= played.popleft().result()
+            desk.check()
+    return written
 
 
 class _Desk:

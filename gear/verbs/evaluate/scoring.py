@@ -71,6 +71,19 @@ class Note:
         }
 
 
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Unwritten:
+    """A sample that is measured and not yet on the disk.
+
+    Attributes:
+        note: what will be said of it.
+        files: its prediction, content by name.
+    """
+
+    note: Note
+    files: Mapping[str, bytes]
+
+
 class Scorer:
     """Measures and keeps the samples of one dataset; its methods may run in several threads."""
 
@@ -101,15 +114,14 @@ class Scorer:
             return set()
         return {int(p.stem) for p in folder.glob("*.json") if p.stem.isdecimal() and int(p.stem) < len(self._dataset)}
 
-    def first(self, index: int, sample: Sample, answer: Answer) -> Note:
-        """Measures an answer and writes it, the note last."""
+    def measured(self, index: int, sample: Sample, answer: Answer) -> Unwritten:
+        """What there is to say of an answer, with the files that say it."""
         with self._blamed(index):
             figures, parts = self._measure(sample, answer.prediction)
             encoded = self._keeper and self._keeper.encode_prediction(
                 sample, answer.prediction, self._dataset.plan.info
             )
-        for relative, data in (encoded.files if encoded else {}).items():
-            write_whole(self._root, f"{self._folder}/{PREDICTIONS}/{relative}", data)
+        files = encoded.files if encoded else {}
         note = Note(
             index=index,
             figures=figures,
@@ -118,10 +130,21 @@ class Scorer:
             score=answer.score,
             mask=None if answer.mask is None else mask_figures(sample, answer.mask),
             facts=encoded.facts if encoded else None,
-            sha256={name: sha256(data) for name, data in (encoded.files if encoded else {}).items()},
+            sha256={name: sha256(data) for name, data in files.items()},
         )
-        write_whole(self._root, f"{self._folder}/samples/{index:06d}.json", dump_json(note.as_json()))
+        return Unwritten(note=note, files=files)
+
+    def write(self, unwritten: Unwritten) -> Note:
+        """Puts the prediction's files on the disk, the note last."""
+        note = unwritten.note
+        for relative, data in unwritten.files.items():
+            write_whole(self._root, f"{self._folder}/{PREDICTIONS}/{relative}", data)
+        write_whole(self._root, f"{self._folder}/samples/{note.index:06d}.json", dump_json(note.as_json()))
         return note
+
+    def first(self, index: int, sample: Sample, answer: Answer) -> Note:
+        """Measures an answer and writes it."""
+        return self.write(self.measured(index, sample, answer))
 
     def again(self, index: int) -> Note | DatasetError:
         """Measures what a former run predicted; or what is wrong with its note or its prediction.
