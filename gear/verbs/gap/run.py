@@ -72,7 +72,7 @@ def gap(
         calibration: dataset from which the defense learns.
         calibration_patched: the same with patches.
         compositors: names of compositors.
-        samples: so many of the split's first samples; all unless given.
+        samples: so many of the split's first samples, of which alone a twin is collected then; all unless given.
         town, scenes: with `patch`, files of the town and of its scene library, where they are none of gear's own.
         out: folder for `gap.json` and `gap.txt`; needed with `patch`.
         progress: told after every sample.
@@ -125,7 +125,7 @@ def gap(
     if noted is not None and effect is not None and effect.note is not None:
         noted(effect.note)
     if patch is not None:
-        collect_twin(clean, patch, root, town=town, scenes=scenes)
+        collect_twin(clean, patch, root, samples=samples, town=town, scenes=scenes)
         pairs = pair_twins(clean, open_dataset(root, clean.plan.info.split))
     if out is not None:
         with explained(Path(out)):

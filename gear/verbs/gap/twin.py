@@ -34,6 +34,7 @@ def collect_twin(
     patch: str | Path,
     root: Path,
     *,
+    samples: int | None = None,
     town: str | Path | None = None,
     scenes: str | Path | None = None,
 ) -> None:
@@ -43,6 +44,7 @@ def collect_twin(
         clean: the split.
         patch: what to show.
         root: of the twin.
+        samples: at least so many of the first ones, whole sequences of them; all unless given.
         town, scenes: files of the town and of its scene library (`FILE`, or `FILE:SCENE`), where they were given by
             path: a dataset holds no paths of the machine that it was made on.
 
@@ -50,12 +52,16 @@ def collect_twin(
         PatchError: the patch cannot be used.
         DatasetError: with these files and versions the same scenes cannot be made again.
     """
+    wanted = clean.plan.samples if samples is None else min(samples, clean.plan.samples)
+    there = read_plan(root, clean.plan.info.split)
+    if there is not None:
+        wanted = max(wanted, there.samples)
     if not isinstance(clean.manifest.get("config"), dict):
         raise DatasetError(clean.root, "has a manifest without the config that it was collected with; give --twin DIR")
     config: dict[str, Any] = {
         **clean.manifest["config"],
         "town": str(town or clean.content(str, "town")),
-        "samples": clean.plan.samples // max(clean.content(int, "frames"), 1),
+        "samples": -(-wanted // max(clean.content(int, "frames"), 1)),
         "patch": str(patch),
         "root": str(root),
         "probes": False,
@@ -75,7 +81,6 @@ def collect_twin(
     surfaces, patches = len(clean.sidecar(0).record.surfaces), len(job.patch.images)
     if patches < surfaces:
         raise DatasetError(clean.root, f"has {surfaces} surfaces for patches, {patch} has {patches}; give one for each")
-    there = read_plan(root, job.plan.info.split)
     if there is not None and there.patch != job.plan.patch and Store(root, there).missing() != [*range(there.samples)]:
         raise DatasetError(
             root, f"is another gap's twin, with the patch {there.patch['label']}; use another --out, or remove it"
