@@ -110,6 +110,13 @@ class DatasetError(GearError):
         return f"{self.path}: {self.problem}"
 
 
+class ReplaceableError(DatasetError):
+    """What lies there is in the way: it was made with other settings, or is broken. A `--force` replaces it."""
+
+    def __str__(self) -> str:
+        return f"{super().__str__()}; use another --out, or --force to replace it"
+
+
 class TownError(GearError):
     """A town, actor or surface whose MJCF does not keep gear's conventions."""
 

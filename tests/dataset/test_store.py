@@ -98,7 +98,7 @@ def test_more_samples_are_added_and_fewer_are_refused(tmp_path: Path) -> None:
     assert store.missing() == [2]
     fill(tmp_path, plan(samples=3))
     assert len(open_dataset(tmp_path)) == 3
-    with pytest.raises(DatasetError, match="was begun with 3 samples, 2 were asked for; use --force"):
+    with pytest.raises(DatasetError, match="was begun with 3 samples, 2 were asked for; use another --out, or --force"):
         Store(tmp_path, plan(samples=2)).open({})
 
 

@@ -17,7 +17,7 @@ from gear.contracts.attacks import Patch, surface_of
 from gear.dataset.files import clear_scratch, explained, read_bytes, sha256
 from gear.dataset.plan import differences
 from gear.dataset.store import refuse_dataset
-from gear.values.errors import DatasetError, FieldError
+from gear.values.errors import FieldError, ReplaceableError
 from gear.values.serial import Json, from_json
 from gear.verbs.attack.watch import CHECKPOINT
 from gear.verbs.collect.patches import read_patch
@@ -31,7 +31,7 @@ EXACT = "patch.safetensors"
 
 NAME = re.compile(r"patch_\d+")
 
-AGAIN = "is gone, damaged or of other patches; --force makes them again"
+BROKEN = "is gone, damaged or of other patches"
 
 TOLD: Any = {
     "steps_done": int, "steps_per_s": float | None, "stopped": str, "masking": dict[str, float] | None,
@@ -44,7 +44,8 @@ def begin(root: Path, plan: Json, *, force: bool) -> Json | None:
     """The notes of patches that are there already and whole, or nothing, and then the folder is there.
 
     Raises:
-        DatasetError: something else is there, or the disk refuses.
+        ReplaceableError: something else is there, or what is there is broken.
+        DatasetError: the disk refuses.
     """
     refuse_dataset(root, "make patches in a folder of their own")
     finished = root / NOTES
@@ -58,9 +59,7 @@ def begin(root: Path, plan: Json, *, force: bool) -> Json | None:
         wanted = json.loads(json.dumps(plan))
         what = ", ".join(differences({key: there.get(key) for key in wanted}, wanted)[:3])
         if what:
-            raise DatasetError(
-                root, f"holds patches that were made otherwise ({what}); use another --out, or --force to replace them"
-            )
+            raise ReplaceableError(root, f"holds patches that were made otherwise ({what})")
         _check_whole(root, there)
         return there
     with explained(root):
@@ -72,15 +71,15 @@ def read_patches(root: Path) -> tuple[Patch, ...]:
     """The exact values of patches that are there.
 
     Raises:
-        DatasetError: they are gone or damaged.
+        ReplaceableError: they are gone or damaged.
     """
     path = root / EXACT
     try:
         arrays = from_bytes(path.read_bytes())
     except (OSError, SafetensorError) as error:
-        raise DatasetError(path, AGAIN) from error
+        raise ReplaceableError(path, BROKEN) from error
     if any(array.ndim != 3 or array.shape[2] != 3 or array.dtype != np.float32 for array in arrays.values()):
-        raise DatasetError(path, AGAIN)
+        raise ReplaceableError(path, BROKEN)
     return tuple(Patch(name=name, rgb=arrays[name]) for name in sorted(arrays, key=surface_of))
 
 
@@ -97,7 +96,7 @@ def _read_notes(path: Path) -> Json:
     except (ValueError, RecursionError):
         there = None
     if not isinstance(there, dict):
-        raise DatasetError(path, AGAIN)
+        raise ReplaceableError(path, BROKEN)
     return there
 
 
@@ -105,7 +104,7 @@ def _check_whole(root: Path, notes: Json) -> None:
     """Whether the notes say what is told of finished patches, and the pictures are those that they speak of.
 
     Raises:
-        DatasetError: they do not, or a picture is another, or is gone.
+        ReplaceableError: they do not, or a picture is another, or is gone.
     """
     try:
         for key, kind in TOLD.items():
@@ -114,12 +113,12 @@ def _check_whole(root: Path, notes: Json) -> None:
             for key in ("promised", "kept"):
                 from_json(float, notes["masking"][key], key)
     except (KeyError, FieldError) as error:
-        raise DatasetError(root / NOTES, AGAIN) from error
+        raise ReplaceableError(root / NOTES, BROKEN) from error
     for name, digest in notes["patches"].items():
         path = root / f"{name}.png"
         if not NAME.fullmatch(name):  # it may lead anywhere
-            raise DatasetError(root / NOTES, AGAIN)
+            raise ReplaceableError(root / NOTES, BROKEN)
         if not path.is_file() or sha256(read_patch(path).tobytes()) != digest:
-            raise DatasetError(path, AGAIN)
+            raise ReplaceableError(path, BROKEN)
     if {patch.name for patch in read_patches(root)} != notes["patches"].keys():
-        raise DatasetError(root / EXACT, AGAIN)
+        raise ReplaceableError(root / EXACT, BROKEN)

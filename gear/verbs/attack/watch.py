@@ -17,7 +17,7 @@ from safetensors.numpy import save as to_bytes
 from gear.contracts.attacks import Patch, State, surface_of
 from gear.dataset.files import write_whole
 from gear.plugins.catalogue import one_line
-from gear.values.errors import DatasetError
+from gear.values.errors import DatasetError, ReplaceableError
 from gear.values.serial import from_json
 
 CHECKPOINT = "checkpoint.safetensors"
@@ -76,7 +76,8 @@ class Recorder:
         """The checkpoint's state, with curves and validations taken up again.
 
         Raises:
-            DatasetError: the checkpoint cannot be read or is of another attack.
+            ReplaceableError: the checkpoint is of another attack.
+            DatasetError: it cannot be read.
         """
         self.is_asked = True
         path = self.root / CHECKPOINT
@@ -91,9 +92,7 @@ class Recorder:
         except (SafetensorError, OSError, KeyError, AttributeError, ValueError, RecursionError) as error:
             raise DatasetError(path, f"is damaged ({one_line(error)}); delete it to start afresh") from error
         if notes["key"] != self.key:
-            raise DatasetError(
-                self.root, "holds an unfinished attack with other settings; use another --out or --force"
-            )
+            raise ReplaceableError(self.root, "holds an unfinished attack with other settings")
         self.curves, self.judged = notes["curves"], [(int(step), float(harm)) for step, harm in notes["judged"]]
         self.seconds = notes["seconds"]
         kept = sorted((name for name in arrays if name.startswith("best/")), key=surface_of)

@@ -17,7 +17,7 @@ from gear.contracts.specs import AttackSpec
 from gear.dataset.files import clear_scratch, explained, write_whole
 from gear.dataset.sidecar import dump_json
 from gear.dataset.store import refuse_dataset
-from gear.values.errors import GearError
+from gear.values.errors import GearError, ReplaceableError
 from gear.verbs.attack.run import attack
 from gear.verbs.bench.chart import chart
 from gear.verbs.bench.config import BenchConfig
@@ -112,6 +112,8 @@ def bench(
             told["apart"] = apart
         try:
             done = VERBS[step.verb](**step.arguments, **told)
+        except ReplaceableError as error:
+            raise GearError(f"{step.title}: {error.path}: {error.problem}; use another --out, or remove it") from error
         except GearError as error:
             raise GearError(f"{step.title}: {error}") from error
         if isinstance(done, EvaluateReport):

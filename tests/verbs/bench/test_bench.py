@@ -13,7 +13,7 @@ import pytest
 
 import gear
 from gear.cli.main import main
-from gear.values.errors import GearError
+from gear.values.errors import GearError, ReplaceableError
 from gear.verbs.bench.plan import Step
 from gear.verbs.bench.report import BenchReport
 from gear.verbs.bench.run import VERBS
@@ -165,3 +165,16 @@ def test_a_step_that_fails_says_which(tmp_path: Path, written: Callable[..., Pat
     with pytest.raises(GearError, match=r"collect semseg in tiny-board ClearNoon to attack.*plan\.json"):
         gear.bench(config, out=out)
     assert not (out / "bench.json").exists()
+
+
+def test_what_lies_in_the_way_is_told_without_a_flag_that_bench_has_not(
+    tmp_path: Path, written: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def in_the_way(**arguments: Any) -> None:
+        raise ReplaceableError(arguments["out"], "split 'train' was made with another configuration (seed: 1 there)")
+
+    monkeypatch.setitem(VERBS, "collect", in_the_way)
+    with pytest.raises(
+        GearError, match=r"attack: .*/attack: split .*\(seed: 1 there\); use another --out, or remove it$"
+    ):
+        gear.bench(written(*FEW), out=tmp_path / "out")
