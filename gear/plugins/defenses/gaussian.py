@@ -58,9 +58,22 @@ class Gaussian(PerPicture):
 
         kernel = torch.from_numpy(self._kernel).to(pictures)
         radius, channels = len(kernel) // 2, pictures.shape[1]
-        padded = functional.pad(pictures, (radius,) * 4, mode="reflect")
+        padded = pictures
+        for axis in (2, 3):
+            places = torch.from_numpy(_mirrored(pictures.shape[axis], radius)).to(pictures.device)
+            padded = padded.index_select(axis, places)
         rows = functional.conv2d(padded, kernel.view(1, 1, 1, -1).expand(channels, 1, 1, -1), groups=channels)
         return functional.conv2d(rows, kernel.view(1, 1, -1, 1).expand(channels, 1, -1, 1), groups=channels)
+
+
+def _mirrored(side_px: int, radius_px: int) -> npt.NDArray[np.int64]:
+    """Which of `side_px` pixels lie in a row with borders, mirrored as often as a border wider than the row asks for.
+
+    Torch's own padding ends at the picture's side.
+    """
+    there_and_back_px = max(2 * (side_px - 1), 1)
+    steps = np.arange(-radius_px, side_px + radius_px) % there_and_back_px
+    return np.minimum(steps, there_and_back_px - steps) if side_px > 1 else np.zeros_like(steps)
 
 
 spec = DefenseSpec(

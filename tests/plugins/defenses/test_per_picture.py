@@ -59,6 +59,15 @@ def test_the_blur_spreads_a_point_as_its_bell_says() -> None:
     assert blurred[15, 17] / blurred[15, 15] == pytest.approx(np.exp(-2 / 1.5**2), abs=0.05)
 
 
+@pytest.mark.parametrize("size_px", [(9, 7), (1, 5), (2, 30)])
+def test_a_blur_wider_than_the_picture_is_the_same_in_torch(size_px: tuple[int, int]) -> None:
+    picture = np.random.default_rng(2).integers(0, 256, (*size_px, 3), np.uint8)
+    wide = gaussian.Gaussian(gaussian.GaussianConfig(sigma_px=6))
+    tensor = torch.from_numpy(picture).permute(2, 0, 1)[None].float()
+    cleaned = wide.clean_tensor(tensor)[0].permute(1, 2, 0).numpy()
+    assert np.abs(cleaned - wide.clean(picture)[0]).max() <= 0.51
+
+
 def test_four_bits_are_sixteen_levels_with_black_and_white_kept() -> None:
     ramp = np.repeat(np.arange(256, dtype=np.uint8)[None, :, None], 3, axis=2)
     squeezed = bit_depth.BitDepth(bit_depth.BitDepthConfig(bits=4)).clean(ramp)[0]
