@@ -105,6 +105,12 @@ def test_every_command_is_one_that_gear_understands(task: str) -> None:
             assert (args.dataset, args.twin, args.compositors) == ("out/none", "out/patched", ["transport"])
 
 
+def test_the_attack_alone_runs_at_half_precision() -> None:
+    (plan,) = of("semseg", towns=["suburb"], scenes=["truck"], precision="bfloat16")
+    told = [step.name for step in plan.commands(Path("out")) if "precision=bfloat16" in step.arguments]
+    assert told == ["attack"]
+
+
 def test_small_pictures_are_seen_at_the_size_that_the_weights_know(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("authoring.weights.patches.plan.trained_option", lambda *_: 0.75)
     told = model_settings("semseg", "ddrnet23_slim", "net.safetensors", TRAINING_OPTIONS["semseg"])

@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from authoring.weights.patches.install import install
-from authoring.weights.patches.plan import SAMPLES, STEPS, STEPS_OF, PatchPlan, plans
+from authoring.weights.patches.plan import PRECISION, SAMPLES, STEPS, STEPS_OF, PatchPlan, plans
 from authoring.weights.patches.run import Gear, Told, gear_process, make_patch, measure_again
 from authoring.weights.patches.summary import table
 from authoring.weights.plan import TOWNS, TRAINING_OPTIONS
@@ -34,6 +34,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--samples", type=int, metavar="N", help=f"a scene, to make the patch on and to measure it ({SAMPLES['train']})"
     )
     parser.add_argument("--steps", type=int, metavar="N", help=f"of each attack ({STEPS}{others})")
+    parser.add_argument(
+        "--precision",
+        choices=("float32", "bfloat16"),
+        default=PRECISION,
+        help="of the network's passes in the attack, not in what measures it (float32); half of it is quicker where the"
+        " processor can",
+    )
     parser.add_argument("--weights", default=SHIPPED, metavar="FILE", help="the network's, while none are shipped")
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings", help="a key of the collections"
@@ -77,6 +84,7 @@ def run(args: argparse.Namespace) -> int:
         weights=args.weights,
         settings=args.settings,
         attack_settings=args.attack_set,
+        precision=args.precision,
     )
     root: Path = args.out / args.model.replace("/", "-")
     if args.list:

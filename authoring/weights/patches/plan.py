@@ -35,6 +35,9 @@ STEPS = 120
 STEPS_OF = {"detect2d": 150, "stereo3d": 300}
 """Of tasks whose networks need more to give in."""
 
+PRECISION = "float32"
+"""Of an attack's passes, where nothing else is said."""
+
 EVERY = 25
 """Steps between two looks at the validation pictures."""
 
@@ -98,6 +101,7 @@ class PatchPlan:
         settings: `--set` texts of the collections.
         model_settings: `KEY=VALUE` texts of the model's options.
         attack_settings: of the attack's.
+        precision: of the network's passes in the attack; figures are taken in float32.
     """
 
     task: str
@@ -110,6 +114,7 @@ class PatchPlan:
     settings: tuple[str, ...] = ()
     model_settings: tuple[str, ...] = ()
     attack_settings: tuple[str, ...] = ()
+    precision: str = PRECISION
 
     @property
     def place(self) -> str:
@@ -128,6 +133,7 @@ class PatchPlan:
     def commands(self, root: Path) -> list[Step]:
         """What makes the patch in `root/<name>` and measures it on pictures that it was not made on."""
         patch, model = str(root / self.name), _repeated("--set", self.model_settings)
+        passes = () if self.precision == PRECISION else (f"precision={self.precision}",)
         task = build(find("task", self.task), NO_OPTIONS)
         reports = ("reference", "outside_patch") if isinstance(task, Maskable) else ("reference",)
         return [
@@ -136,7 +142,7 @@ class PatchPlan:
             _step(
                 "attack", "--model", self.model, "--data", root / "train", "--val", root / "val", "--out", patch,
                 "--steps", self.steps, "--every", min(EVERY, self.steps), *_repeated("--set", self.attack_settings),
-                *_repeated("--model-set", self.model_settings),
+                *_repeated("--model-set", (*self.model_settings, *passes)),
             ),
             self._collect("test", root / "none", probes=True),
             self._collect("test", root / "random", patch="random"),
@@ -184,6 +190,7 @@ def plans(
     weights: str = SHIPPED,
     settings: Iterable[str] = (),
     attack_settings: Iterable[str] = (),
+    precision: str = PRECISION,
 ) -> list[PatchPlan]:
     """The patches of a network, at the size that it was trained at.
 
@@ -197,6 +204,7 @@ def plans(
         weights: as the networks' option of that name.
         settings: further `KEY=VALUE` texts of the collections.
         attack_settings: of the attack.
+        precision: of the network's passes in it.
 
     Raises:
         GearError: there is no such task, model, town, scene or weights file, or the model does another task.
@@ -229,6 +237,7 @@ def plans(
             settings=chosen,
             model_settings=model_settings(task, model, weights, chosen),
             attack_settings=(*ATTACK.get(model, ()), *attack_settings),
+            precision=precision,
         )
         for number, (town, scene) in here
         if not scenes or scene in scenes
