@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import cv2
@@ -178,11 +178,11 @@ class Detect2dTask:
 
     def evaluator(self) -> Evaluator[Detect2dSample, tuple[coco.Detection, ...]]:
         """COCO's average precision."""
-        return CocoEvaluator(lambda sample: self._as_picture(sample.record, sample.objects))
+        return CocoEvaluator(self._as_shown)
 
     def reports(self) -> Mapping[str, Evaluator[Detect2dSample, tuple[coco.Detection, ...]]]:
         """`reference`: AP50 of traffic's categories, of objects that are tall enough."""
-        return {"reference": TallObjects(lambda sample: self._as_picture(sample.record, sample.objects))}
+        return {"reference": TallObjects(self._as_shown)}
 
     def encode_prediction(
         self, sample: Detect2dSample, prediction: Sequence[coco.Detection], info: SplitInfo
@@ -232,6 +232,11 @@ class Detect2dTask:
 
     def _picture(self, sidecar: Sidecar) -> coco.Picture:
         return self._as_picture(sidecar.record, _objects(sidecar, Path()))
+
+    def _as_shown(self, sample: Detect2dSample) -> coco.Picture:
+        """At the size of the sample's own picture, which may be smaller than the one that was rendered."""
+        height, width = sample.images[VIEW].shape[:2]
+        return replace(self._as_picture(sample.record, sample.objects), height_px=height, width_px=width)
 
     def _as_picture(self, record: SceneRecord, objects: tuple[Object2d, ...]) -> coco.Picture:
         camera = record.camera(VIEW)

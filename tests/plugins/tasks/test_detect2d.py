@@ -11,6 +11,7 @@ from pycocotools import mask as coco_mask
 from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
 
+from gear.augment.apply import shrunk
 from gear.formats import rle
 from gear.groundtruth.visibility import VisibilityLimits
 from gear.plugins.tasks.detect2d import Detect2dConfig, Detect2dTask, detect2d
@@ -135,6 +136,19 @@ def test_three_pixels_are_not_mentioned() -> None:
     (seen,) = observe([far], min_pixels_px=1)
     assert seen.area_px > 3
     assert observe([far], min_pixels_px=seen.area_px + 1) == []
+
+
+def test_what_is_tall_enough_is_so_in_a_smaller_picture_too() -> None:
+    """24 of 400 rows are 48 of 800, where 32 are enough; so are 12 of 200."""
+    task = Detect2dTask(Detect2dConfig(width_px=667, height_px=400, visibility=VisibilityLimits(min_box_area_px2=0)))
+    sample = task.ground_truth(*synthetic_frame(task.rig(), [car(25.0)]))
+    for share, height_px in ((1.0, 24), (0.5, 12)):
+        small = shrunk(sample, share)
+        (thing,) = small.objects
+        assert thing.box_px[3] - thing.box_px[1] == height_px and not thing.is_ignored
+        evaluator = task.reports()["reference"]
+        assert evaluator.update(small, task.as_prediction(small))["found_share"] == 1
+        assert evaluator.result()["instances_car"] == 1
 
 
 def test_annotations_keep_the_masks_order(tmp_path: Path) -> None:
