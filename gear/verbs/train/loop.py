@@ -176,8 +176,9 @@ class Training:
             self._optimiser.zero_grad(set_to_none=True)
             loss.backward()  # type: ignore[no-untyped-call]
         norm = clip_gradients(self._module, config.gradient_norm)
-        self._count_broken(bool(torch.isfinite(norm)), loss)
-        if torch.isfinite(norm):
+        is_finite = bool(torch.isfinite(norm) & torch.isfinite(loss.detach()))
+        self._count_broken(is_finite, loss)
+        if is_finite:
             self._optimiser.step()
             self._mean.update(self._module, progress.step)
             progress.open_losses.append(float(loss.detach()))

@@ -417,6 +417,32 @@ def test_a_loss_that_is_no_number_ends_it(street: Street, tmp_path: Path, instal
         quick(street, tmp_path / "out", epochs=30, batch=1)
 
 
+class Unlabelled(TinySegmenter):
+    """Finds nothing to learn from, now and then or ever: its loss is no number, and its gradients are zero."""
+
+    def __init__(self, config: TinyConfig, every: int) -> None:
+        super().__init__(config)
+        self.every, self.steps = every, 0
+
+    def loss(self, raw: torch.Tensor, targets: Any) -> torch.Tensor:
+        self.steps += self.training
+        if self.steps % self.every:
+            return super().loss(raw, targets)
+        return torch.nn.functional.cross_entropy(raw, torch.full_like(raw[:, 0], 255).long(), ignore_index=255)
+
+
+def test_a_loss_that_is_no_number_is_left_out_whatever_its_gradients_are(
+    street: Street, tmp_path: Path, install: Any
+) -> None:
+    install(replace(tiny_segmenter, build=lambda config: Unlabelled(config, 5), recipe=Recipe(batch=1, epochs=9)))
+    quick(street, tmp_path / "some", epochs=4, batch=1)
+    history = json.loads((tmp_path / "some" / "train.json").read_text(), parse_constant=float)
+    assert [np.isfinite(point["loss"]) for point in history["steps"]] == [True, True]
+    install(replace(tiny_segmenter, build=lambda config: Unlabelled(config, 1), recipe=Recipe(batch=1, epochs=9)))
+    with pytest.raises(GearError, match=r"loss is nan .* lower --lr"):
+        quick(street, tmp_path / "all", epochs=30, batch=1)
+
+
 def test_answers_that_cannot_be_measured_end_it(street: Street, tmp_path: Path, install: Any) -> None:
     install(replace(tiny_segmenter, build=Cropping, recipe=Recipe(batch=1, epochs=9)))
     with pytest.raises(GearError, match=r"cannot be measured \(prediction must have shape .* lower --lr"):
