@@ -161,6 +161,19 @@ def test_a_mean_lies_between_and_says_of_what_it_is(tmp_path: Path, capsys: pyte
     assert average_weights(before, after, tmp_path / "half.safetensors", halves=True).size_mb < 0.6 * again.size_mb
 
 
+def test_either_state_may_be_without_counters(tmp_path: Path) -> None:
+    """Published files are often older than they are, and a training from them writes them."""
+    before, after = _two(tmp_path)
+    state, said = read(before)
+    older = tmp_path / "older.safetensors"
+    write(older, {key: value for key, value in state.items() if not key.endswith("num_batches_tracked")}, said)
+    newer = average_weights(older, after, tmp_path / "newer.safetensors")
+    assert newer.tensors == len(state) > average_weights(after, older, tmp_path / "short.safetensors").tensors
+    average_weights(before, after, tmp_path / "whole.safetensors")
+    (one, _), (two, _) = read(newer.path), read(tmp_path / "whole.safetensors")
+    assert all(torch.equal(one[key], two[key]) for key in state)
+
+
 def test_what_has_no_mean_is_refused(
     tmp_path: Path, official: dict[str, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -17,7 +17,7 @@ from torch import Tensor
 
 from gear.dataset.files import read_bytes, sha256
 from gear.nn.shipped import inspect
-from gear.nn.weights import mismatches, read, write
+from gear.nn.weights import OPTIONAL, mismatches, read, write
 from gear.values.errors import GearError
 from gear.values.serial import Json
 from gear.verbs.weights.convert import ConvertReport, check_target
@@ -57,7 +57,8 @@ def average_weights(
             raise GearError(
                 f"{two}: is of {key} {said_two[key]}, {one} of {said_one[key]}; only states of one network have a mean"
             )
-    problems = mismatches(state_one, state_two)
+    counters = {key: value for key, value in state_two.items() if key.endswith(OPTIONAL)}
+    problems = mismatches(counters | state_one, state_two)
     if problems:
         raise GearError(f"{two}: not of the same network as {one}: {'; '.join(problems)}")
     state = {key: _between(state_one.get(key, value), value, share) for key, value in state_two.items()}
