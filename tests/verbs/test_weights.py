@@ -192,6 +192,10 @@ def test_what_has_no_mean_is_refused(
     write(tmp_path / "short.safetensors", {k: v for k, v in state.items() if k != "conv1.0.bias"}, said)
     with pytest.raises(GearError, match=r"not of the same network as .*1 missing \(conv1\.0\.bias\)"):
         average_weights(before, tmp_path / "short.safetensors", out)
+    write(tmp_path / "broken.safetensors", state | {"conv1.0.bias": state["conv1.0.bias"] * float("nan")}, said)
+    for files in (("broken.safetensors", after.name), (after.name, "broken.safetensors")):
+        with pytest.raises(GearError, match=r"1 with numbers that are not finite \(conv1\.0\.bias\)"):
+            average_weights(*(tmp_path / file for file in files), out)
     with pytest.raises(GearError, match="is the file to read"):
         average_weights(before, after, after)
     with pytest.raises(GearError, match="there is no such weights file"):

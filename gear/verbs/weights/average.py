@@ -61,6 +61,9 @@ def average_weights(
     problems = mismatches(counters | state_one, state_two)
     if problems:
         raise GearError(f"{two}: not of the same network as {one}: {'; '.join(problems)}")
+    broken = mismatches(state_one, state_one)
+    if broken:
+        raise GearError(f"{one}: has no mean with anything: {'; '.join(broken)}")
     state = {key: _between(state_one.get(key, value), value, share) for key, value in state_two.items()}
     metadata = {key: text for key, text in (said_one | said_two).items() if key not in MEASURED}
     metadata["averaged"] = json.dumps(
