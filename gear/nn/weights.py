@@ -140,7 +140,8 @@ def write(path: str | Path, state: Mapping[str, Tensor], metadata: Mapping[str, 
         path: of the file.
         state: by key.
         metadata: any texts; `gear.nn.shipped.WeightsFile` says which ones gear looks at.
-        halves: whether weights of two dimensions and more are stored in float16; statistics and biases never are.
+        halves: whether weights of two dimensions and more are stored in float16; statistics and biases never are, nor
+            are weights beyond its range.
     """
     tensors = {key: value.detach().cpu().clone().contiguous() for key, value in state.items()}
     if halves:
@@ -164,7 +165,8 @@ def _finite(tensor: Tensor) -> bool:
 
 
 def _may_halve(tensor: Tensor) -> bool:
-    return tensor.dtype == torch.float32 and tensor.dim() > 1
+    is_matrix = tensor.dtype == torch.float32 and tensor.dim() > 1
+    return is_matrix and bool((tensor.abs() <= torch.finfo(torch.float16).max).all())
 
 
 def _few(keys: list[Any]) -> str:

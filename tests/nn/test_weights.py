@@ -56,6 +56,14 @@ def test_halves_are_read_as_floats_and_statistics_stay_whole(tmp_path: Path) -> 
     assert torch.equal(state["1.running_var"], graph.state_dict()["1.running_var"])
 
 
+def test_what_no_half_can_say_stays_whole(tmp_path: Path) -> None:
+    state = {"large": torch.tensor([[70000.0, 0.1]]), "small": torch.tensor([[65504.0, 0.1]]), "none": torch.ones(0, 2)}
+    write(tmp_path / "half.safetensors", state, {}, halves=True)
+    found, _ = read(tmp_path / "half.safetensors")
+    assert torch.equal(found["large"], state["large"])
+    assert torch.equal(found["small"], state["small"].half().float())
+
+
 def test_another_networks_file_is_refused_with_the_reason(tmp_path: Path) -> None:
     state = small().state_dict()
     state["0.weight"] = torch.zeros(4, 3, 5, 5)
