@@ -70,7 +70,7 @@ def recolour(images: Mapping[str, UInt8Image], colours: Colours, rng: np.random.
     """New pictures of one sample. All its views are changed alike, as one make of camera would; noise is each one's
     own."""
     table, saturation = _table(colours, rng), 1 + rng.uniform(-colours.saturation, colours.saturation)
-    blur_px = rng.uniform(0.3, max(0.3, colours.blur_px)) if rng.random() < colours.blur else 0.0
+    blur_px = rng.uniform(min(0.3, colours.blur_px), colours.blur_px) if rng.random() < colours.blur else 0.0
     noise_levels = rng.uniform(0, colours.noise_levels) if rng.random() < colours.noise else 0.0
     quality = int(rng.integers(colours.jpeg_quality, 101)) if rng.random() < colours.jpeg else 0
     erased = rng.uniform(0, 1, 4) if rng.random() < colours.erase else None

@@ -79,6 +79,14 @@ def test_noise_makes_no_picture_darker() -> None:
     assert np.mean(means) == pytest.approx(128, abs=0.05)
 
 
+def test_a_picture_is_blurred_no_further_than_it_says() -> None:
+    edge = np.zeros((9, 9, 3))
+    edge[:, 5:] = 255
+    assert np.array_equal(changed(edge, blur=1.0, blur_px=0.0), edge)
+    slight, strong = (changed(edge, blur=1.0, blur_px=px)[0, 4, 0] for px in (0.25, 1.2))
+    assert 0 <= slight <= 1 < strong
+
+
 def test_jpeg_keeps_colours_where_they_are() -> None:
     rows = np.array([[200, 40, 40], [40, 200, 40], [40, 40, 200]]).repeat(16, axis=0)[:, None].repeat(48, axis=1)
     assert np.abs(changed(rows, jpeg=1.0, jpeg_quality=95) - rows)[4::16].max() < 12
