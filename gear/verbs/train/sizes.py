@@ -12,7 +12,7 @@ from gear.nn.input_scale import OPTION
 from gear.nn.runtime import device_of
 from gear.plugins.catalogue import Found
 from gear.values.errors import GearError
-from gear.verbs.train.config import TrainConfig
+from gear.verbs.train.config import CROPS_PX, TrainConfig
 from gear.verbs.train.data import Samples
 
 PIXELS_A_SECOND = (1 << 18) / 600
@@ -51,13 +51,13 @@ def picture_scale(found: Found, config: TrainConfig, samples: Samples) -> float:
 
 
 def without_empty_margins(config: TrainConfig, samples: Samples) -> TrainConfig:
-    """Crops no larger than the largest picture is ever shown: beyond there is nothing but padding."""
+    """Crops no larger than the largest picture is ever shown, if that is a crop: beyond there is only padding."""
     if config.crop_px is None:
         return config
     cameras = [camera for dataset in samples.datasets for camera in dataset.sidecar(0).record.cameras]
     most = samples.scale * config.scales[1]
     height_px, width_px = (
-        math.ceil(most * max(sizes))
+        max(CROPS_PX[0], math.ceil(most * max(sizes)))
         for sizes in zip(*((camera.height_px, camera.width_px) for camera in cameras), strict=True)
     )
     return replace(config, crop_px=(min(config.crop_px[0], height_px), min(config.crop_px[1], width_px)))

@@ -128,6 +128,8 @@ def test_crops_are_never_larger_than_what_is_shown(street: Street) -> None:
     assert crop("[32, 640]") == (32, WIDTH)
     assert crop("[384, 100]", "[0.5, 1.25]") == (80, 100)
     assert crop("[384, 100]", "[0.5, 1.25]", 0.5) == (40, 80)
+    assert crop("[384, 100]", "[0.1, 0.1]") == (16, 16)
+    assert crop("[384, 640]", scale=0.2) == (16, 26)
     assert crop("null") is None
 
 
