@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from gear.config.dump import to_plain
 from gear.contracts.specs import ModelSpec, TaskSpec
 from gear.dataset.files import clear_scratch, explained
@@ -291,4 +293,5 @@ def _listed(paths: Paths) -> list[str]:
 
 
 def _budget(seconds: float | None) -> str | None:
-    return None if seconds is None else f"{seconds:g}s"
+    """As the command takes it: every digit, no exponent, and nothing where epochs are counted."""
+    return None if not seconds else f"{np.format_float_positional(seconds, trim='-')}s"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -20,6 +21,7 @@ from safetensors.torch import save as to_bytes
 
 import gear
 from gear.cli.main import main
+from gear.cli.train import budget
 from gear.config.reader import read_node
 from gear.contracts.models import Recipe
 from gear.nn.weights import load_into, read, write
@@ -202,6 +204,15 @@ def test_a_time_budget_ends_it(street: Street, tmp_path: Path, install: Any) -> 
     history = json.loads((tmp_path / "out" / "train.json").read_text())
     rates = [point["rate"] for point in history["steps"]]
     assert rates == [] or rates[-1] <= max(rates)
+
+
+def test_the_noted_command_has_the_whole_time_budget(street: Street, tmp_path: Path, install: Any) -> None:
+    for number, seconds in enumerate((1e-5, 0.0123456789)):
+        quick(street, tmp_path / f"{number}", epochs=None, time_budget_s=seconds)
+        words = shlex.split(json.loads((tmp_path / f"{number}" / "train.json").read_text())["command"])
+        assert budget(words[words.index("--time-budget") + 1]) == seconds
+    quick(street, tmp_path / "none", epochs=1, time_budget_s=0)
+    assert "--time-budget" not in (tmp_path / "none" / "train.json").read_text()
 
 
 def test_patience_ends_it(street: Street, tmp_path: Path, install: Any) -> None:
