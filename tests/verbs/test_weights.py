@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -159,6 +160,9 @@ def test_a_mean_lies_between_and_says_of_what_it_is(tmp_path: Path, capsys: pyte
     again = average_weights(before, after, out, share=0.25)
     assert again.sha256 == show_weights(out).sha256
     assert average_weights(before, after, tmp_path / "half.safetensors", halves=True).size_mb < 0.6 * again.size_mb
+    average_weights(before, after, tmp_path / "exact.safetensors", share=0.12345678, halves=True)
+    words = shlex.split(show_weights(tmp_path / "exact.safetensors").file.metadata["command"])
+    assert words[-3:] == ["--share", "0.12345678", "--half"]
 
 
 def test_either_state_may_be_without_counters(tmp_path: Path) -> None:

@@ -70,7 +70,8 @@ def average_weights(
         {"first_sha256": sha256(read_bytes(one)), "second_sha256": sha256(read_bytes(two)), "share": share}
     )
     metadata["command"] = shlex.join(
-        ["gear", "weights", "average", str(first), str(second), str(out), "--share", f"{share:g}"]
+        ["gear", "weights", "average", str(first), str(second), str(out), "--share", f"{share}"]
+        + (["--half"] if halves else [])
     )
     data = _both(inspect(one).facts().get("data"), inspect(two).facts().get("data"))
     if data is not None:
