@@ -273,6 +273,8 @@ def _plan(origin: Origin) -> Json:
 def _samples(
     data: Sequence[str], val: Sequence[str], task: str, config: TrainConfig, allow_tests: bool
 ) -> tuple[Samples, Samples]:
+    if not data:
+        raise GearError("there are no data to train on; give --data DIR")
     training = all_of(open_all(data, task, names=TRAINING, allow_tests=allow_tests))
     if val:
         held_out = all_of(open_all(val, task, names=VALIDATION, allow_tests=allow_tests))

@@ -240,6 +240,9 @@ def test_what_cannot_be_trained_is_said_in_a_line(street: Street, tmp_path: Path
         train("semseg", "tiny_segmenter", tmp_path / "nowhere", out=out)
     with pytest.raises(DatasetError, match="holds no dataset"):
         train("semseg", "tiny_segmenter", tmp_path, out=out)
+    for val in ((), street("semseg")):
+        with pytest.raises(GearError, match="there are no data to train on"):
+            train("semseg", "tiny_segmenter", [], val=val, out=out)
     with pytest.raises(UnknownNameError, match="no start named 'imagenet'"):
         quick(street, out, init="imagenet")
     with pytest.raises(GearError, match="no such file"):
