@@ -37,6 +37,7 @@ class Progress:
         elapsed_s: time that steps and validations have taken.
         best_step: after which step the kept weights stood; -1 before the first validation.
         worse: validations since then.
+        broken: steps in a row, up to the last one, that were left out.
         steps: `step`, `loss`, `rate` of stretches of the training.
         open_losses: of steps that are in no stretch yet.
         validations: `step`, `elapsed_s`, `took_s`, `loss` and figures of every validation.
@@ -47,6 +48,7 @@ class Progress:
     elapsed_s: float = 0.0
     best_step: int = -1
     worse: int = 0
+    broken: int = 0
     steps: list[dict[str, float]] = field(default_factory=list)
     open_losses: list[float] = field(default_factory=list)
     validations: list[dict[str, Any]] = field(default_factory=list)
@@ -65,6 +67,7 @@ class Progress:
         kinds = {"step": int, "best_step": int, "worse": int, "elapsed_s": float}
         for name, kind in kinds.items():
             from_json(kind, value[name], name)
+        from_json(int, value.get("broken", 0), "broken")
         from_json(Position, value["position"], "position")
         from_json(tuple[float, ...], value["open_losses"], "open_losses")
         for name in ("steps", "validations"):

@@ -97,7 +97,6 @@ class Training:
         self._mean = RunningMean(self._module, config.ema)
         self._before = Buffers(self._module)
         self._device = device_of(config.device)
-        self._broken = 0
         found = checkpoint.load(parts.root, parts.plan, self._module, self._mean, self._optimiser)
         self.progress, extra = found or (Progress(), {})
         if parts.adversary is not None:
@@ -208,11 +207,12 @@ class Training:
 
     def _count_broken(self, is_finite: bool, loss: torch.Tensor) -> None:
         """A step that overflows is left out; a training that only overflows is over."""
-        self._broken = 0 if is_finite else self._broken + 1
-        if self._broken > MOST_BROKEN_STEPS:
+        progress = self.progress
+        progress.broken = 0 if is_finite else progress.broken + 1
+        if progress.broken > MOST_BROKEN_STEPS:
             raise GearError(
-                f"the loss is {float(loss.detach()):g} or its gradients are, {self._broken} steps in a row, at step "
-                f"{self.progress.step}; lower --lr, or clip with --set gradient_norm=1"
+                f"the loss is {float(loss.detach()):g} or its gradients are, {progress.broken} steps in a row, at step "
+                f"{progress.step}; lower --lr, or clip with --set gradient_norm=1"
             )
 
     def _validate(self) -> None:

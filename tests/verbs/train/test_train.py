@@ -457,6 +457,22 @@ def test_a_loss_that_is_no_number_is_left_out_whatever_its_gradients_are(
         quick(street, tmp_path / "all", epochs=30, batch=1)
 
 
+def test_steps_that_are_left_out_are_counted_over_a_stop(
+    street: Street, tmp_path: Path, install: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(loop, "CHECKPOINT_EVERY_S", 0.0)
+    install(replace(tiny_segmenter, build=Overflowing, recipe=Recipe(batch=1, epochs=9)))
+
+    def stop(progress: Progress, share: float, figures: Any) -> None:
+        if progress.step == 13:
+            raise StopError
+
+    with pytest.raises(StopError):
+        quick(street, tmp_path / "out", epochs=30, batch=1, watch=stop)
+    with pytest.raises(GearError, match="21 steps in a row, at step 20;"):
+        quick(street, tmp_path / "out", epochs=30, batch=1)
+
+
 def test_answers_that_cannot_be_measured_end_it(street: Street, tmp_path: Path, install: Any) -> None:
     install(replace(tiny_segmenter, build=Cropping, recipe=Recipe(batch=1, epochs=9)))
     with pytest.raises(GearError, match=r"cannot be measured \(prediction must have shape .* lower --lr"):
