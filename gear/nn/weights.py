@@ -134,10 +134,14 @@ def read(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
 
 
 def write(path: str | Path, state: Mapping[str, Tensor], metadata: Mapping[str, str], *, halves: bool = False) -> None:
-    """Writes tensors whole or not at all; the same tensors and texts give the same bytes.
+    """Writes tensors whole or not at all; see `serialised`."""
+    write_alone(Path(path), serialised(state, metadata, halves=halves))
+
+
+def serialised(state: Mapping[str, Tensor], metadata: Mapping[str, str], *, halves: bool = False) -> bytes:
+    """A safetensors file; the same tensors and texts give the same bytes.
 
     Args:
-        path: of the file.
         state: by key.
         metadata: any texts; `gear.nn.shipped.WeightsFile` says which ones gear looks at.
         halves: whether weights of two dimensions and more are stored in float16; statistics and biases never are, nor
@@ -146,7 +150,7 @@ def write(path: str | Path, state: Mapping[str, Tensor], metadata: Mapping[str, 
     tensors = {key: value.detach().cpu().clone().contiguous() for key, value in state.items()}
     if halves:
         tensors = {key: value.half() if _may_halve(value) else value for key, value in tensors.items()}
-    write_alone(Path(path), _in_order(to_bytes(tensors, dict(metadata))))
+    return _in_order(to_bytes(tensors, dict(metadata)))
 
 
 def _in_order(data: bytes) -> bytes:

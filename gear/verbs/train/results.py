@@ -19,7 +19,7 @@ from gear.config.nodes import Mapping
 from gear.config.reader import read_node
 from gear.dataset.files import sha256, write_whole
 from gear.nn.options import CIRCUMSTANCES
-from gear.nn.weights import write as write_weights
+from gear.nn.weights import serialised
 from gear.plugins.catalogue import Found
 from gear.values.errors import DatasetError
 from gear.values.serial import to_json
@@ -111,7 +111,7 @@ def command_of(
 def keep_weights(root: Path, state: AnyMapping[str, Tensor], origin: Origin, progress: Progress) -> None:
     """Writes the weights, matrices in float16."""
     figures = figures_of(progress.validations[-1])
-    write_weights(root / WEIGHTS, state, origin.metadata(figures), halves=True)
+    write_whole(root, WEIGHTS, serialised(state, origin.metadata(figures), halves=True))
 
 
 def write_history(root: Path, origin: Origin, progress: Progress) -> None:

@@ -126,6 +126,23 @@ def test_a_killed_process_is_taken_up_again(street: Street, tmp_path: Path, inst
     assert weights[0] == weights[1]
 
 
+def test_what_is_half_written_lies_where_the_next_run_tidies_up(
+    street: Street, tmp_path: Path, install: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    results = ["card.md", "checkpoint.safetensors", "curves.png", "model.safetensors", "train.json"]
+    street("semseg")
+    beside: set[str] = set()
+    sync = os.fsync
+
+    def look(descriptor: int) -> None:
+        beside.update(path.name for path in (tmp_path / "out").iterdir())
+        sync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", look)
+    quick(street, tmp_path / "out", epochs=1)
+    assert beside <= {*results, "gear"} and sorted(path.name for path in (tmp_path / "out").iterdir()) == results
+
+
 def test_finished_work_is_not_done_again(street: Street, tmp_path: Path, install: Any) -> None:
     first = quick(street, tmp_path / "out")
     steps: list[int] = []
