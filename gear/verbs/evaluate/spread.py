@@ -130,18 +130,34 @@ def paired_p(differences: Values, seed: int) -> Values:
     Returns:
         (F,) in 0..1; NaN where no difference is known.
     """
-    known = np.where(np.isnan(differences), 0.0, differences)
+    is_known = ~np.isnan(differences)
+    pairs = is_known.sum(axis=0)
+    found = np.where(pairs > 0, _as_far(np.where(is_known, differences, 0.0), seed), np.nan)
+    if not _is_exact(len(differences)):
+        for figure in np.flatnonzero(pairs):
+            if _is_exact(int(pairs[figure])):
+                found[figure] = _as_far(differences[is_known[:, figure], figure, None], seed)[0]
+    return found
+
+
+def _as_far(known: Values, seed: int) -> Values:
+    """(F,) shares of the sign patterns of (N, F) numbers that bring their sums at least as far from 0 as they are."""
     least = np.abs(known.sum(axis=0)) - ROUNDING * np.abs(known).sum(axis=0)
     as_far, tried = np.zeros(known.shape[1]), 0
     for signs in _sign_patterns(len(known), seed):
         as_far += (np.abs(signs @ known) >= least).sum(axis=0)
         tried += len(signs)
-    return np.where(np.isnan(differences).all(axis=0), np.nan, as_far / tried)
+    return np.asarray(as_far / tried)
+
+
+def _is_exact(count: int) -> bool:
+    """Whether so many pairs have few enough sign patterns to try them all."""
+    return count < FLIPS.bit_length()
 
 
 def _sign_patterns(count: int, seed: int) -> Iterator[Values]:
     """Blocks of (R, count) of -1 and 1: all patterns, or the one without a flip and `FLIPS` drawn ones."""
-    if 2**count <= FLIPS:
+    if _is_exact(count):
         flipped = np.arange(2**count)[:, None] >> np.arange(count) & 1
         yield np.asarray(1 - 2 * flipped, np.float64)
         return
