@@ -16,6 +16,7 @@ from gear.attacking.borrowed import frozen
 from gear.attacking.group import members_of
 from gear.attacking.objectives import Objective
 from gear.attacking.regularisers import non_printability, smoothness
+from gear.attacking.saved import check_saved
 from gear.attacking.settings import Settings, TextureSettings
 from gear.contracts.attacks import Budget, Compositor, Patch, State, Watch
 from gear.contracts.models import Model
@@ -51,12 +52,8 @@ class TextureOptimiser:
             self.done, self.seed = 0, int(rng.integers(2**62))
             self.felt, self.silent = False, 0
             return
-        if missing := {*ARRAYS, *NUMBERS} - set(saved):
-            raise GearError(
-                f"the saved attack is of an older gear, it lacks {', '.join(sorted(missing))}; start it afresh"
-            )
-        if saved["textures"].shape != shape:
-            raise GearError(f"the saved attack has patches of {saved['textures'].shape}, not {shape}; start it afresh")
+        blank, number = np.broadcast_to(np.float32(0), shape), np.array(0)
+        check_saved(saved, dict.fromkeys(ARRAYS, blank) | dict.fromkeys(NUMBERS, number))
         self.textures, self.mean, self.square = (torch.from_numpy(saved[n].copy()) for n in ARRAYS)
         self.done, self.seed = int(saved["done"]), int(saved["seed"])
         self.felt, self.silent = bool(saved["felt"]), int(saved["silent"])

@@ -11,6 +11,7 @@ import torch
 
 from gear.attacking.group import members_of
 from gear.attacking.objectives import Objective, counted
+from gear.attacking.saved import check_saved
 from gear.contracts.attacks import Budget, Compositor, Patch, State
 from gear.contracts.models import Model
 from gear.values.errors import GearError
@@ -43,7 +44,12 @@ class Oracle:
         return {"left": np.array(self.left), "paid": np.array(sorted(self._seen), np.int64)}
 
     def restore(self, state: State) -> None:
-        """Goes on where `state` was taken."""
+        """Goes on where `state` was taken.
+
+        Raises:
+            GearError: it is none.
+        """
+        check_saved(state, {"left": np.array(0), "paid": np.zeros(np.size(state.get("paid", ())), np.int64)})
         self.left, self._seen = int(state["left"]), {int(index) for index in state["paid"]}
 
     def cost(self, indexes: Sequence[int]) -> int:

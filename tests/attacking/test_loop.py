@@ -223,6 +223,24 @@ def test_a_state_of_another_size_is_refused() -> None:
         run(Watching(start=state))
 
 
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        ({"mean": np.zeros((1, 3, 12, 1), np.float32)}, r"patches of \(1, 3, 12, 1\), not \(1, 3, 12, 24\)"),
+        ({"square": np.zeros((1, 3, 12, 24))}, "its 'square' is no float32"),
+        ({"textures": np.full((1, 3, 12, 24), np.nan, np.float32)}, "its 'textures' is no float32"),
+        ({"done": np.zeros(2, np.int64)}, "its 'done' is no int64"),
+        ({"seed": np.array(0.5)}, "its 'seed' is no int64"),
+    ],
+)
+def test_a_damaged_state_is_refused(damage: State, said: str) -> None:
+    """Moments of one column would be spread over all of them, in silence."""
+    whole = Watching()
+    run(whole)
+    with pytest.raises(GearError, match=f"{said}.*start it afresh$"):
+        run(Watching(start=dict(whole.states[-1]) | dict(damage)))
+
+
 def test_a_state_of_an_older_gear_is_refused() -> None:
     whole = Watching()
     run(whole)

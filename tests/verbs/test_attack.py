@@ -97,6 +97,18 @@ def test_a_checkpoint_that_says_something_else_is_one_line(tmp_path: Path, notes
         Recorder(root=tmp_path, key="k", steps=4).resume()
 
 
+@pytest.mark.parametrize(
+    "best",
+    [{}, {"best/patch_0": np.zeros((2, 2), np.float32)}, {"best/patch_0": np.full((2, 2, 3), np.nan, np.float32)}],
+)
+def test_a_checkpoint_whose_best_patches_are_none_is_one_line(tmp_path: Path, best: Any) -> None:
+    notes = {"key": "k", "done": 2, "queries_left": None, "curves": {}, "judged": [[2, 0.5]], "seconds": 1.0}
+    arrays = {"state/a": np.zeros(1, np.float32), **best}
+    (tmp_path / CHECKPOINT).write_bytes(to_bytes(arrays, {"notes": json.dumps(notes)}))
+    with pytest.raises(DatasetError, match=r"checkpoint\.safetensors: is damaged \(.*\); delete it to start afresh$"):
+        Recorder(root=tmp_path, key="k", steps=4).resume()
+
+
 def test_a_patch_folder_is_whole(small: Small, install: Install, tmp_path: Path) -> None:
     data, out = small(), tmp_path / "patches"
     report = attack(data, model="tiny_segmenter", out=out, steps=4, settings=SMALL)

@@ -18,6 +18,7 @@ from gear.testing.compare import difference
 from gear.testing.tiny_networks import tiny_segmenter
 from gear.values.errors import GearError
 from gear.verbs.attack.run import attack
+from gear.verbs.attack.watch import Recorder
 
 SMALL = ["height_px=12", "width_px=24", "batch=1"]
 Small = Callable[..., Path]
@@ -98,6 +99,35 @@ def test_a_killed_search_pays_no_query_twice(
     resumed = attack(small("depth"), out=tmp_path / "cut", **facts)
     assert resumed.facts["curves"] == whole.facts["curves"]
     assert not difference(resumed.patches, whole.patches, "patches")
+
+
+@pytest.mark.parametrize(
+    ("name", "damage", "said"),
+    [
+        ("nes", {"grid": np.zeros((1, 3, 1, 1), np.float32)}, r"patches of \(1, 3, 1, 1\), not \(1, 3, 2, 3\)"),
+        ("nes", {"paid": np.zeros(1, np.float32)}, "its 'paid' is no int64"),
+        ("nes", {"done": None}, "it lacks done"),
+        ("square", {"textures": np.zeros((1, 3, 12, 1), np.float32)}, r"patches of \(1, 3, 12, 1\), not"),
+        ("square", {"left": np.zeros(2, np.int64)}, "its 'left' is no int64"),
+        ("square", {"best": np.array(np.nan)}, "its 'best' is no float64"),
+    ],
+)
+def test_a_damaged_search_is_refused(
+    small: Small, install: Install, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, damage: Any, said: str
+) -> None:
+    facts: dict[str, Any] = {"model": "tiny_segmenter", "attack": name, "queries": 40, "settings": SMALL[:2]}
+    whole: list[dict[str, Any]] = []
+    monkeypatch.setattr(Recorder, "save", lambda self, done, state: whole.append(dict(state)))
+    monkeypatch.setattr("gear.verbs.attack.watch.SECONDS_BETWEEN", 0.0)
+    attack(small(), out=tmp_path / "whole", **facts)
+    damaged = {key: value for key, value in (whole[0] | damage).items() if value is not None}
+
+    def resumed(self: Recorder) -> Any:
+        return damaged
+
+    monkeypatch.setattr(Recorder, "resume", resumed)
+    with pytest.raises(GearError, match=f"{said}.*start it afresh$"):
+        attack(small(), out=tmp_path / "cut", **facts)
 
 
 class Hard(PerPicture):

@@ -72,6 +72,7 @@ class Nes:
         from gear.attacking.loop import batch_of
         from gear.attacking.objectives import default_objective
         from gear.attacking.queries import Oracle, as_patches
+        from gear.attacking.saved import check_saved
 
         config, count = self._config, len(dataset[0].record.surfaces)
         oracle = Oracle(model, dataset, compositor, default_objective(dataset[0]), budget)
@@ -80,6 +81,7 @@ class Nes:
         grid = rng.uniform(0, 1, (count, 3, rows, columns)).astype(np.float32)
         seed, done = int(rng.integers(2**62)), 0
         if saved is not None:
+            check_saved(saved, {"grid": grid, "seed": np.array(0), "done": np.array(0)})
             grid, seed, done = saved["grid"].copy(), int(saved["seed"]), int(saved["done"])
             oracle.restore(saved)
         while done < budget.steps:

@@ -70,6 +70,7 @@ class Square:
         from gear.attacking.loop import batch_of
         from gear.attacking.objectives import default_objective
         from gear.attacking.queries import Oracle, as_patches
+        from gear.attacking.saved import check_saved
 
         config, count = self._config, len(dataset[0].record.surfaces)
         oracle = Oracle(model, dataset, compositor, default_objective(dataset[0]), budget)
@@ -77,6 +78,8 @@ class Square:
         textures = self._first(rng, count)
         seed, done, best, whole = int(rng.integers(2**62)), 0, -math.inf, oracle.left
         if saved is not None:
+            number = np.array(0)
+            check_saved(saved, {"textures": textures, "seed": number, "done": number, "best": np.array(0.0)})
             textures, seed, done = saved["textures"].copy(), int(saved["seed"]), int(saved["done"])
             best = float(saved["best"])
             oracle.restore(saved)

@@ -22,6 +22,7 @@ from gear.values.serial import from_json
 
 CHECKPOINT = "checkpoint.safetensors"
 SECONDS_BETWEEN = 20.0
+BEST = "best/"
 NOTED: Any = {
     "key": str, "done": int, "queries_left": float | None, "curves": dict[str, tuple[float, ...]],
     "judged": tuple[tuple[int, float], ...], "seconds": float,
@@ -89,15 +90,14 @@ class Recorder:
                 arrays = {name: opened.get_tensor(name) for name in opened.keys()}  # noqa: SIM118
             for name, kind in NOTED.items():
                 from_json(kind, notes.get(name), name)
+            kept = _best(arrays, is_judged=bool(notes["judged"]))
         except (SafetensorError, OSError, KeyError, AttributeError, ValueError, RecursionError) as error:
             raise DatasetError(path, f"is damaged ({one_line(error)}); delete it to start afresh") from error
         if notes["key"] != self.key:
             raise ReplaceableError(self.root, "holds an unfinished attack with other settings")
         self.curves, self.judged = notes["curves"], [(int(step), float(harm)) for step, harm in notes["judged"]]
         self.seconds = notes["seconds"]
-        kept = sorted((name for name in arrays if name.startswith("best/")), key=surface_of)
-        if kept:
-            self.best = tuple(Patch(name=name.removeprefix("best/"), rgb=arrays[name]) for name in kept)
+        self.best = kept or self.best
         self.tell(notes["done"], notes.get("queries_left"))
         return {name.removeprefix("state/"): arrays[name] for name in arrays if name.startswith("state/")}
 
@@ -142,7 +142,7 @@ class Recorder:
             return
         self.clock()
         arrays: dict[str, Any] = {f"state/{name}": np.array(value, order="C") for name, value in state.items()}
-        arrays |= {f"best/{patch.name}": np.ascontiguousarray(patch.rgb) for patch in self.best or ()}
+        arrays |= {f"{BEST}{patch.name}": np.ascontiguousarray(patch.rgb) for patch in self.best or ()}
         notes = {
             "key": self.key,
             "done": done,
@@ -168,6 +168,22 @@ class Recorder:
         best = max(range(len(self.judged)), key=lambda number: _worth(self.judged[number][1]))
         if self.patience and len(self.judged) - 1 - best >= self.patience:
             self.stopped = f"no better on the validation samples for {self.patience} validations"
+
+
+def _best(arrays: State, *, is_judged: bool) -> tuple[Patch, ...]:
+    """The patches of a checkpoint that did most harm; none before the first validation.
+
+    Raises:
+        ValueError: something else is there.
+    """
+    names = sorted((name for name in arrays if name.startswith(BEST)), key=surface_of)
+    if is_judged and not names:
+        raise ValueError("patches were judged, and the best are not there")
+    for name in names:
+        rgb = arrays[name]
+        if rgb.dtype != np.float32 or rgb.ndim != 3 or rgb.shape[2] != 3 or not np.isfinite(rgb).all():
+            raise ValueError(f"{name} is no patch")
+    return tuple(Patch(name=name.removeprefix(BEST), rgb=arrays[name]) for name in names)
 
 
 def _worth(harm: float) -> float:

@@ -1,0 +1,28 @@
+"""What an attack goes on from, looked at first: a checkpoint that was damaged is told in one line."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gear.contracts.attacks import State
+from gear.values.errors import GearError
+
+TEXTURE_AXES = 4
+"""Of what is as large as the patches: surfaces, channels, rows, columns."""
+
+
+def check_saved(saved: State, fresh: State) -> None:
+    """Whether a saved state holds what one that begins has: the same arrays by name, of the same shapes and types.
+
+    Raises:
+        GearError: it does not.
+    """
+    if missing := fresh.keys() - saved.keys():
+        raise GearError(f"the saved attack is of an older gear, it lacks {', '.join(sorted(missing))}; start it afresh")
+    for name, wanted in fresh.items():
+        there = saved[name]
+        if there.shape != wanted.shape and wanted.ndim == TEXTURE_AXES:
+            raise GearError(f"the saved attack has patches of {there.shape}, not {wanted.shape}; start it afresh")
+        if there.shape != wanted.shape or there.dtype != wanted.dtype or np.isnan(there).any():
+            kind = f"{wanted.dtype} of {wanted.shape}" if wanted.shape else f"{wanted.dtype}"
+            raise GearError(f"the saved attack is damaged, its {name!r} is no {kind}; start it afresh")
