@@ -14,7 +14,7 @@ from torch import Tensor
 from gear.attacking.appearance import vary
 from gear.attacking.borrowed import frozen
 from gear.attacking.group import members_of
-from gear.attacking.objectives import Objective
+from gear.attacking.objectives import Objective, not_finite
 from gear.attacking.regularisers import non_printability, smoothness
 from gear.attacking.saved import check_saved
 from gear.attacking.settings import Settings, TextureSettings
@@ -161,7 +161,8 @@ def climb(
         before: called with the number of steps done before each.
 
     Raises:
-        GearError: no gradient of the objective reaches the textures, or there is nothing to attack.
+        GearError: no gradient of the objective reaches the textures or one is not finite, or there is nothing to
+            attack.
     """
     settings, count = problem.settings, len(problem.dataset)
     saved = watch.resume() if watch is not None else None
@@ -175,6 +176,8 @@ def climb(
             indexes = batch_of(done, count, settings.batch, optimiser.seed)
             textures = optimiser.textures.clone().requires_grad_(True)
             direction, figures = ascend(textures, problem.seen(textures, indexes, done, optimiser.seed))
+            if not bool(direction.isfinite().all()):
+                raise not_finite(f"the gradient of step {done + 1}", indexes)
             optimiser.feel(figures.get("gradient"))
             if optimiser.silent * settings.batch >= 2 * count + settings.batch:
                 raise GearError(NO_GRADIENT)

@@ -279,6 +279,14 @@ def weighted(
     ]
 
 
+def not_finite(what: str, indexes: Sequence[int]) -> GearError:
+    """What is said of a number along which nothing can be optimised, with the samples that it came of."""
+    which = f"sample{'s' * (len(indexes) > 1)} {', '.join(map(str, indexes))}"
+    return GearError(
+        f"{what} is NaN or infinite, as is what the model says of {which} with the patch; see to its weights"
+    )
+
+
 def loss_names(model: Model, sample: Any) -> list[str]:
     """What a model calls its losses, of a group all members', in the order that they come in."""
     views = as_batch([sample.images], list(sample.images))

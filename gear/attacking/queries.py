@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy.typing as npt
 import torch
 
 from gear.attacking.group import members_of
-from gear.attacking.objectives import Objective, counted
+from gear.attacking.objectives import Objective, counted, not_finite
 from gear.attacking.saved import check_saved
 from gear.contracts.attacks import Budget, Compositor, Patch, State
 from gear.contracts.models import Model
@@ -63,6 +64,7 @@ class Oracle:
 
         Raises:
             RuntimeError: there are no queries left.
+            GearError: the objective is not finite.
         """
         cost = self.cost(indexes)
         if self.left < cost:
@@ -73,7 +75,10 @@ class Oracle:
         samples = [self._dataset[index] for index in indexes]
         with torch.no_grad():
             views = {view: self._compositor.compose(patches, indexes, view) for view in samples[0].images}
-            return sum(map(float, counted(self._objective, self._model, views, samples, indexes)))
+            harm = sum(map(float, counted(self._objective, self._model, views, samples, indexes)))
+        if not math.isfinite(harm):
+            raise not_finite("the objective", indexes)
+        return harm
 
 
 def as_patches(textures: Textures) -> tuple[Patch, ...]:

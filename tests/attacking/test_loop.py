@@ -273,6 +273,24 @@ def test_a_model_that_passes_no_gradient_is_told_of() -> None:
         )
 
 
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_a_gradient_that_is_no_number_ends_it_there(value: float) -> None:
+    """The textures would be NaN from then on, and what was found before would be lost."""
+    contract = Contract()
+    dataset = contract.dataset()
+    problem = Problem(model=contract.model(), dataset=dataset, compositor=TinyCompositor(dataset), settings=SETTINGS)
+    watch = Watching()
+
+    def ascend(textures: Tensor, seen: Seen) -> tuple[Tensor, dict[str, float]]:
+        slope = torch.ones_like(textures)
+        slope[0, 0, 0, 0] = value if len(watch.states) == 2 else 1.0
+        return slope, {"gradient": float(slope.norm())}
+
+    with pytest.raises(GearError, match=r"^the gradient of step 3 is NaN or infinite.* sample \d with the patch"):
+        climb(problem, ascend, budget=Budget(steps=5), rng=derive_rng(3, "attack"), watch=watch)
+    assert len(watch.states) == 2
+
+
 def test_looks_differ_and_have_gradients() -> None:
     patch = torch.full((3, 8, 8), 0.5, requires_grad=True)
     looks = [vary(Appearance(), patch, derive_rng(1, "look", n)) for n in range(3)]

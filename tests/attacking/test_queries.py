@@ -65,6 +65,19 @@ def test_objectives_of_others_ask_for_nothing_but_the_question() -> None:
     assert (oracle.left, model.passes) == (49, 1)
 
 
+class Unsaid:
+    """An objective of a network that says nothing."""
+
+    def terms(self, model: Any, views: Any, samples: Any, indexes: Any) -> dict[str, Term]:
+        return {"unsaid": Term(value=model.forward(views)["logits"].mean() * float("nan"))}
+
+
+def test_an_answer_that_is_no_number_is_said() -> None:
+    _, oracle = oracle_of(OnSemseg(), Unsaid())
+    with pytest.raises(GearError, match=r"^the objective is NaN or infinite.* samples 0, 1 with the patch"):
+        oracle.harm(TEXTURES, [0, 1])
+
+
 def test_what_cannot_be_paid_is_not_asked() -> None:
     model, oracle = oracle_of(OnSemseg(), SemsegObjective(gamma=0.5), queries=3)
     oracle.harm(TEXTURES, [0])
