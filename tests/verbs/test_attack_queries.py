@@ -55,6 +55,27 @@ def test_who_counts_queries_need_not_be_watched(small: Small, install: Install, 
     assert attack(small(), model="tiny_segmenter", out=tmp_path, attack="unwatched", queries=3).made
 
 
+class Curveless(Unwatched):
+    """Has nothing to draw a curve of."""
+
+    def optimise(self, *asked: Any, watch: Any, **rest: Any) -> Any:
+        patches = super().optimise(*asked, **rest)
+        assert watch.resume() is None
+        for done in (1, 2):
+            assert not watch.step(done, {}, lambda: patches, dict)
+        return patches
+
+
+def test_steps_need_no_figures(small: Small, install: Install, tmp_path: Path) -> None:
+    spec = AttackSpec(name="curveless", summary="x.", config=Nothing, build=Curveless, needs_gradients=False)
+    install(tiny_segmenter, spec)
+    report = attack(
+        small(), model="tiny_segmenter", out=tmp_path, attack="curveless", queries=3, val=small(split="val")
+    )
+    assert report.facts["steps_done"] == 2 and report.facts["curves"] == {}
+    assert [step for step, _ in report.facts["validation_harm"]] == [2]
+
+
 def test_queries_that_end_between_two_looks_are_judged_too(small: Small, install: Install, tmp_path: Path) -> None:
     report = attack(
         small(), model="tiny_segmenter", val=small(split="val"), out=tmp_path, attack="square", queries=7, every=50,

@@ -201,9 +201,9 @@ def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, p
     _check_patches(last, job.surfaces, f"{job.spec.name} ({job.found.owner.package} {job.found.owner.version})")
     if weights_digest(network) != plan["weights_sha256"]:
         raise PluginError(job.spec.name, "optimise", "the attack changed the model; nothing was written")
-    if job.queries is not None and recorder.is_asked and not recorder.curves:
+    if job.queries is not None and recorder.is_asked and not recorder.done:
         raise GearError(f"{job.queries} queries are too few for one step; give more with --queries N")
-    done = 0 if job.spec.is_control else max((len(curve) for curve in recorder.curves.values()), default=job.steps)
+    done = 0 if job.spec.is_control else recorder.done or job.steps
     if not recorder.stopped:
         recorder.finish(done, last)
     return _Made(

@@ -50,6 +50,7 @@ class Recorder:
         judged: (step, harm) of every validation.
         best: the patches that did most harm there.
         is_asked: whether the attack pays it attention.
+        done: steps that it was told of, over all runs.
         stopped: why the attack ended before its budget.
         seconds: spent so far, over all runs.
     """
@@ -66,6 +67,7 @@ class Recorder:
     judged: list[tuple[int, float]] = field(default_factory=list)
     best: tuple[Patch, ...] | None = None
     is_asked: bool = False
+    done: int = 0
     stopped: str = ""
     seconds: float = 0.0
 
@@ -96,7 +98,7 @@ class Recorder:
         if notes["key"] != self.key:
             raise ReplaceableError(self.root, "holds an unfinished attack with other settings")
         self.curves, self.judged = notes["curves"], [(int(step), float(harm)) for step, harm in notes["judged"]]
-        self.seconds = notes["seconds"]
+        self.done, self.seconds = notes["done"], notes["seconds"]
         self.best = kept or self.best
         self.tell(notes["done"], notes.get("queries_left"))
         return {name.removeprefix("state/"): arrays[name] for name in arrays if name.startswith("state/")}
@@ -109,6 +111,7 @@ class Recorder:
         state: Callable[[], State],
     ) -> bool:
         """Notes the figures, validates and saves when it is time; True where validation says that it is enough."""
+        self.done = done
         for name, value in figures.items():
             curve = self.curves.setdefault(name, [float("nan")] * (done - 1))
             curve += [float("nan")] * (done - 1 - len(curve)) + [float(value)]
