@@ -291,6 +291,22 @@ def test_an_attack_that_breaks_its_promise_is_named(small: Small, install: Insta
     assert not list(tmp_path.glob("*.png")) and not (tmp_path / "attack.json").exists()
 
 
+class BadOnTheWay:
+    """Shows its watch what it would not return."""
+
+    def optimise(self, model: Any, dataset: Any, compositor: Any, *, watch: Any, **rest: Any) -> Any:
+        bright, grey = ((Patch(name="patch_0", rgb=np.full((4, 8, 3), v, np.float32)),) for v in (2.0, 0.5))
+        watch.step(1, {"a": 0.0}, lambda: bright, dict)
+        return grey
+
+
+def test_the_best_patches_are_held_to_the_promise_too(small: Small, install: Install, tmp_path: Path) -> None:
+    spec = AttackSpec(name="bad", summary="Bad.", config=Nothing, build=lambda config: BadOnTheWay())
+    install(tiny_segmenter, spec)
+    with pytest.raises(PluginError, match=r"bad.*patch_0 leaves 0\.\.1"):
+        attack(small(), model="tiny_segmenter", out=tmp_path, attack="bad", steps=1, val=small(split="val"))
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

@@ -198,7 +198,8 @@ def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, p
             rng=derive_rng(job.seed, "attack", job.spec.name),
             watch=recorder,
         )
-    _check_patches(last, job.surfaces, f"{job.spec.name} ({job.found.owner.package} {job.found.owner.version})")
+    for patches in (last, recorder.best or last):
+        _check_patches(patches, job.surfaces, f"{job.spec.name} ({job.found.owner.package} {job.found.owner.version})")
     if weights_digest(network) != plan["weights_sha256"]:
         raise PluginError(job.spec.name, "optimise", "the attack changed the model; nothing was written")
     if job.queries is not None and recorder.is_asked and not recorder.done:
