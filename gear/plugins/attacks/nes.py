@@ -89,7 +89,7 @@ class Nes:
             indexes = batch_of(done, len(dataset), config.batch, seed)
             slope, seen = np.zeros_like(grid), list[float]()
             for _ in range(config.pairs):
-                if oracle.left < 2 * oracle.cost(indexes):
+                if oracle.left < oracle.cost(indexes) + oracle.cost(()):  # clean answers are paid for once
                     break
                 change = self._change(draws, grid.shape)
                 ahead = oracle.harm(self._spread_out(np.clip(grid + change, 0, 1)), indexes)

@@ -73,6 +73,10 @@ class TestNes(Beside):
     passes_per_step = 10
 
 
+class NesOnDepth(TestNes):
+    task = "depth"
+
+
 class TestSpsa(Beside):
     spec = nes
     options: ClassVar[Options] = {**SMALL, "grid_px": 8, "pairs": 4, "draws": "spsa", "batch": 1, "step": 0.2}
@@ -226,6 +230,15 @@ def test_queries_are_counted_not_steps() -> None:
         nes.build(NesConfig(**SMALL)).optimise(
             model, dataset, TinyCompositor(dataset), budget=Budget(steps=3), rng=derive_rng(1, "q")
         )
+
+
+def test_a_pair_pays_for_a_clean_answer_once() -> None:
+    """In depth the first look at a sample costs one query more, and the second of a pair is none."""
+    contract = NesOnDepth()
+    model, dataset = contract.model(), contract.dataset()
+    attack = nes.build(NesConfig(**contract.options))
+    attack.optimise(model, dataset, TinyCompositor(dataset), budget=Budget(steps=9, queries=3), rng=derive_rng(1, "q"))
+    assert model.passes == 3
 
 
 @pytest.mark.parametrize("models", [1, 3])
