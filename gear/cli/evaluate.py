@@ -97,5 +97,5 @@ def run(args: argparse.Namespace) -> int:
     for row in report.rows:
         for problem in row.damaged:
             print(f"gear: note: {problem}; the sample was predicted again", file=sys.stderr)
-    print(json.dumps(report.as_json(), indent=1, allow_nan=False) if args.json else table(report), end="")
+    print(json.dumps(report.as_json(), indent=1, allow_nan=False) + "\n" if args.json else table(report), end="")
     return 0

@@ -304,7 +304,9 @@ def test_a_built_in_defense_by_the_command(
     assert plain.startswith("depth: tiny_depth\n") and "mae_m" in plain and "defense" not in plain
     guard = ["--defense", "jpeg", "--defense-set", "quality=5"]
     assert main([*command, *guard, "--out", str(tmp_path / "jpeg"), "--json"]) == 0
-    facts = json.loads(capsys.readouterr().out)
+    said = capsys.readouterr().out
+    assert said.endswith("}\n")
+    facts = json.loads(said)
     assert facts["defense"]["options"]["quality"] == 5 and facts["model"]["name"] == "tiny_depth"
     plain_figure = timeless(tmp_path / "plain")["rows"][0]["figures"]["task"]["mae_m"]["value"]
     assert facts["rows"][0]["figures"]["task"]["mae_m"]["value"] != plain_figure
