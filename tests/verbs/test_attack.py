@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -328,6 +329,15 @@ def test_bad_wishes_get_a_line(
     wishes: dict[str, Any] = {"model": "tiny_segmenter", "steps": 1, "settings": SMALL, **changes}
     with pytest.raises(GearError, match=message):
         attack(small(), out=tmp_path / "out", **wishes)
+
+
+@pytest.mark.parametrize("plan", ["[]", "{}", '{"task": "semseg"}'])
+def test_a_plan_that_names_no_task_is_one_line(small: Small, install: Install, tmp_path: Path, plan: str) -> None:
+    data = shutil.copytree(small(), tmp_path / "data")
+    (path,) = data.glob("gear/*/plan.json")
+    path.write_text(plan)
+    with pytest.raises(DatasetError, match=r"plan\.json: is not of this version of gear"):
+        attack(data, model="tiny_segmenter", out=tmp_path / "x", steps=1, settings=SMALL)
 
 
 def test_test_splits_and_empty_scenes_are_refused(small: Small, install: Install, tmp_path: Path) -> None:

@@ -14,8 +14,9 @@ from gear.config.reader import read_node
 from gear.contracts.specs import AttackSpec
 from gear.dataset.files import sha256
 from gear.dataset.reading import Dataset, scenes_of
-from gear.dataset.sidecar import dump_json, load_json
-from gear.opening import root_and_split
+from gear.dataset.sidecar import dump_json
+from gear.dataset.store import plan_of, splits_of
+from gear.opening import root_and_split, roots_of
 from gear.plugins.build import NO_OPTIONS, find
 from gear.plugins.catalogue import Found
 from gear.values.errors import DatasetError, GearError
@@ -201,10 +202,14 @@ def _facts(dataset: Dataset[Any]) -> Json:
 
 
 def _task_of(data: Paths) -> str:
-    """The task of the first dataset that the paths mean."""
+    """The task of the first dataset that the paths mean.
+
+    Raises:
+        DatasetError: there is none, or it does not say its task.
+    """
     for path in _list(data):
-        for plan in sorted(root_and_split(path)[0].glob("**/gear/*/plan.json")):
-            return str(load_json(plan)["task"]["name"])
+        for root in roots_of(root_and_split(path)[0]):
+            return plan_of(root, splits_of(root)[0]).task["name"]
     raise DatasetError(str(next(iter(_list(data)), "")), "there is no dataset of gear's here")
 
 
