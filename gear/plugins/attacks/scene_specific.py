@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from gear.attacking.objectives import Objective
 
 CATEGORY_IDS = {name: number for number, name in CATEGORY_NAMES.items()}
+APPEARS = "person"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +53,7 @@ class SceneSpecificConfig(Settings):
     target: str = ""
     direction: Literal["any", "farther", "nearer"] = "any"
     goal: Literal["harm", "vanish", "appear"] = "harm"
-    appears: str = "person"
+    appears: str = APPEARS
     losses: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -62,6 +63,8 @@ class SceneSpecificConfig(Settings):
         check_classes(self.attacked, self.target)
         if self.appears not in CATEGORY_IDS:
             raise FieldError("appears", f"must be a COCO category such as person or car, got {self.appears!r}")
+        if self.appears != APPEARS and self.goal != "appear":
+            raise FieldError("appears", "must come with goal=appear, which makes it appear")
         for name, sign in self.losses.items():
             if sign not in SIGNS:
                 raise FieldError(f"losses.{name}", f"must be one of {', '.join(SIGNS)}, got {sign!r}")
@@ -131,13 +134,14 @@ class SceneSpecific:
     def _check(self, kind: str) -> None:
         config = self._config
         for name, is_set, wanted, whose in (
-            ("target", config.target, "semseg", "semantic segmentation"),
-            ("attacked", config.attacked, "semseg", "semantic segmentation"),
-            ("direction", config.direction != "any", "depth", "depth"),
-            ("goal", config.goal != "harm", "losses", "detectors and stereo networks"),
-            ("losses", config.losses, "losses", "detectors and stereo networks"),
+            ("target", config.target, ("semseg",), "semantic segmentation"),
+            ("attacked", config.attacked, ("semseg",), "semantic segmentation"),
+            ("gamma", config.gamma >= 0, ("semseg", "depth"), "semantic segmentation and depth"),
+            ("direction", config.direction != "any", ("depth",), "depth"),
+            ("goal", config.goal != "harm", ("losses",), "detectors and stereo networks"),
+            ("losses", config.losses, ("losses",), "detectors and stereo networks"),
         ):
-            if is_set and kind != wanted:
+            if is_set and kind not in wanted:
                 raise GearError(f"option {name} of the attack is for {whose}; these are other samples")
 
     def _check_losses(self, model: Model, sample: Any) -> None:

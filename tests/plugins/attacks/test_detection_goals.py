@@ -74,6 +74,11 @@ def test_goals_are_options_of_the_scene_specific_attack() -> None:
         SceneSpecific(SceneSpecificConfig(goal="vanish")).objective(type("Odd", (), {"images": {}})())
 
 
+def test_detectors_have_no_pixels_to_share_out() -> None:
+    with pytest.raises(GearError, match="option gamma of the attack is for semantic segmentation and depth"):
+        SceneSpecific(SceneSpecificConfig(gamma=0.5)).objective(sample())
+
+
 def test_losses_can_be_left_out_of_a_goal() -> None:
     options = SceneSpecificConfig(goal="vanish", losses={"bbox_regression": "0"})
     objective = SceneSpecific(options).objective(sample())

@@ -156,6 +156,8 @@ def test_a_class_becomes_another() -> None:
         ({"gamma": 1.5}, "gamma"),
         ({"target": "rode"}, "target"),
         ({"attacked": "car"}, "target"),
+        ({"appears": "car"}, "appears"),
+        ({"appears": "car", "goal": "vanish"}, "appears"),
         ({"losses": {"bbox_regression": "x"}}, "losses.bbox_regression"),
     ],
 )
