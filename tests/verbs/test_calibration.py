@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -125,6 +127,22 @@ def test_a_gap_stands_behind_what_has_learnt(small: Small, learner: list[Learner
     assert learner[0].fits == [(2, 2)] and report.defense == "learner"
     with pytest.raises(GearError, match="a defense guards a model"):
         gear.gap(small(), twin=tmp_path / "gap/twin", calibration=small(split="val"))
+
+
+def test_what_learnt_from_more_samples_is_another_defense(small: Small, learner: list[Learner], tmp_path: Path) -> None:
+    whole = small(split="val")
+    fewer = shutil.copytree(whole, tmp_path / "fewer")
+    (path,) = fewer.glob("gear/*/manifest.json")
+    manifest = json.loads(path.read_text())
+    path.write_text(json.dumps(manifest | {"samples": manifest["samples"][:1]}))
+    facts: dict[str, Any] = {"model": "tiny_segmenter", "defense": "learner"}
+    evaluate(small(), calibration=fewer, out=tmp_path / "figures", resamples=0, **facts)
+    with pytest.raises(GearError, match=r"something else \(calibration_samples.*1.*2.*use another --out"):
+        evaluate(small(), calibration=whole, out=tmp_path / "figures", resamples=0, **facts)
+    facts |= {"attack": "square", "queries": 4, "settings": ["height_px=12", "width_px=24"]}
+    attack(small(), calibration=fewer, out=tmp_path / "patches", **facts)
+    with pytest.raises(GearError, match=r"made otherwise \(calibration_samples"):
+        attack(small(), calibration=whole, out=tmp_path / "patches", **facts)
 
 
 def test_learning_from_what_is_measured_is_noted(small: Small, learner: list[Learner], tmp_path: Path) -> None:

@@ -87,6 +87,7 @@ class Job:
             "weights_sha256": weights_sha256,
             "defense": None if self.defense is None else self.defense.facts(),
             **({} if self.calibration.clean is None else {"calibration": self.calibration.facts()}),
+            **self.calibration.counted(),
             "task": self.task,
             "data": [_facts(dataset) for dataset in self.datasets],
             "validation": [_facts(dataset) for dataset in self.validation],

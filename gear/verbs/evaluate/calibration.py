@@ -16,6 +16,7 @@ from gear.plugins.build import blamed
 from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
 from gear.values.rng import derive_rng
+from gear.values.serial import Json
 from gear.verbs.evaluate.choice import Chosen, check_model
 
 Views = Mapping[str, UInt8Image]
@@ -60,6 +61,12 @@ class Calibration:
     def facts(self) -> list[str | None]:
         """Content keys of both."""
         return [None if one is None else one.plan.content_key for one in (self.clean, self.patched)]
+
+    def counted(self) -> Json:
+        """How many samples they have, which their keys do not say; nothing where nothing was given."""
+        if self.clean is None:
+            return {}
+        return {"calibration_samples": [None if one is None else len(one) for one in (self.clean, self.patched)]}
 
     def note(self, measured: Dataset[Any]) -> str | None:
         """One line where a defense is measured on scenes that it learnt from."""

@@ -107,6 +107,7 @@ def evaluate(
         "model": chosen.facts() | {"weights_sha256": player.weights_sha256},
         "defense": None if guard is None else guard.facts(),
         "calibration": learnt.facts(),
+        **learnt.counted(),
         "seed": seed,
     }
     _begin(root, facts)
