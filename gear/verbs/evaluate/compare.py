@@ -13,7 +13,7 @@ from gear.dataset.reading import Dataset
 from gear.values.errors import DatasetError
 from gear.verbs.evaluate.report import Difference, Estimate, PairedTest, RowReport, Together
 from gear.verbs.evaluate.scoring import Note, Scorer
-from gear.verbs.evaluate.spread import Figures, auroc, auroc_interval, bounds, draw, gather, paired_p
+from gear.verbs.evaluate.spread import Figures, Values, auroc, auroc_interval, bounds, draw, gather, paired_p
 
 NONE = "none"
 CONTROLS = (NONE, "random")
@@ -177,7 +177,7 @@ def _paired(one: Figures, other: Figures) -> dict[str, Estimate]:
     for name in one.overall:
         if name in other.overall:
             both = name in one.spread and name in other.spread
-            interval = bounds(one.spread[name] - other.spread[name]) if both else None
+            interval = bounds(_finite(one.spread[name]) - _finite(other.spread[name])) if both else None
             found[name] = Estimate(value=one.overall[name] - other.overall[name], interval=interval)
     return found
 
@@ -189,7 +189,7 @@ def _tested(here: list[Note], there: list[Note], report: str, seed: int) -> dict
         np.array([[note.figures[report].get(name, np.nan) for name in names] for note in notes], np.float64)
         for notes in (here, there)
     )
-    differences = ours - theirs
+    differences = _finite(ours) - _finite(theirs)
     return {
         name: PairedTest(mean=_known_mean(values), p=float(p), pairs=int(np.isfinite(values).sum()))
         for name, values, p in zip(names, differences.T, paired_p(differences, seed), strict=True)
@@ -202,6 +202,10 @@ def _auroc(here: list[Note], there: list[Note], draws: Draws) -> Estimate | None
     if len(high) != len(here) or len(low) != len(there):
         return None
     return Estimate(value=auroc(high, low), interval=auroc_interval(high, low, draws))
+
+
+def _finite(values: Values) -> Values:
+    return np.where(np.isfinite(values), values, np.nan)
 
 
 def _known_mean(values: Sequence[float]) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,9 +25,9 @@ class Estimate:
     ceiling: float = 1.0
 
     def as_json(self) -> Json:
-        """null for NaN; the ceiling is left out where it is 1."""
-        low, high = self.interval or (None, None)
-        value = {"value": self.value if self.value == self.value else None, "low": low, "high": high}
+        """null for what is not finite; the ceiling is left out where it is 1."""
+        low, high = self.interval or (math.nan, math.nan)
+        value = known_json({"value": self.value, "low": low, "high": high})
         return value | ({"ceiling": self.ceiling} if self.ceiling < 1 else {})
 
 
@@ -122,8 +123,7 @@ class PairedTest:
 
     def as_json(self) -> Json:
         """null for NaN."""
-        mean, p = (value if value == value else None for value in (self.mean, self.p))
-        return {"mean": mean, "p": p, "pairs": self.pairs}
+        return {**known_json({"mean": self.mean, "p": self.p}), "pairs": self.pairs}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -241,5 +241,5 @@ def figures_json(figures: Figures) -> Json:
 
 
 def known_json(figures: Mapping[str, float]) -> Json:
-    """null for NaN."""
-    return {name: value if value == value else None for name, value in figures.items()}
+    """null for what is not finite, which JSON cannot say."""
+    return {name: value if math.isfinite(value) else None for name, value in figures.items()}

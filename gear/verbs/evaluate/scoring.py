@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -233,8 +234,8 @@ def _read_note(path: Path) -> dict[str, Any]:
 
 
 def without_nan(figures: Mapping[str, float]) -> dict[str, float | None]:
-    """JSON has no NaN."""
-    return {name: float(value) if value == value else None for name, value in figures.items()}
+    """JSON has no NaN, and nothing infinite."""
+    return {name: float(value) if math.isfinite(value) else None for name, value in figures.items()}
 
 
 def _with_nan(figures: Mapping[str, float | None]) -> dict[str, float]:

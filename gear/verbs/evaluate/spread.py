@@ -93,7 +93,7 @@ def _added(parts: Sequence[Any], draws: Draws) -> dict[str, npt.NDArray[Any]]:
 
 def bounds(values: Values) -> tuple[float, float] | None:
     """Bounds of 95 % of the known values."""
-    known = values[~np.isnan(values)]
+    known = values[np.isfinite(values)]
     if not len(known):
         return None
     low, high = np.percentile(known, PERCENTILES)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,8 @@ import numpy as np
 import pytest
 
 import gear
+from gear.metrics.depth import DepthEvaluator
+from gear.plugins.tasks.depth import DepthTask
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import DatasetError, GearError
 from gear.verbs.collect.run import collect
@@ -133,6 +136,34 @@ def test_twins_are_tested_sample_by_sample(tmp_path: Path, small: Small, install
     assert len(json.loads((tmp_path / "out/results.json").read_text())["rows"][0]["per_sample"][0]["figures"]) == 2
     line = (tmp_path / "out/table.txt").read_text().splitlines()[-1]
     assert "minus none: mae_m +" in line and "outside_patch.mae_m +2.000 (p 0.25, 3 pairs)" in line
+
+
+class Boundless(DepthEvaluator):
+    """Somebody's metric, one of whose figures is infinite where nothing is wrong."""
+
+    def update(self, sample: Any, prediction: Any) -> Mapping[str, float]:
+        return {**super().update(sample, prediction), "psnr_db": np.inf}
+
+    def result(self) -> Mapping[str, float]:
+        return {**super().result(), "psnr_db": np.inf if self.figures else np.nan}
+
+    def resampled(self, draws: Any) -> Mapping[str, Any]:
+        return {**super().resampled(draws), "psnr_db": np.full(len(draws), np.inf)}
+
+
+def test_what_is_infinite_is_nothing_in_json(
+    tmp_path: Path, small: Small, install: Install, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    roots = [small("depth", "none"), small("depth", "random")]
+    monkeypatch.setattr(DepthTask, "evaluator", lambda self: Boundless())
+    install(model_spec(lambda _: Oracle(roots), "depth"))
+    report = evaluate(roots, model="odd", out=tmp_path / "out", resamples=20)
+    found = json.loads((tmp_path / "out/results.json").read_text())
+    assert found["rows"][0]["figures"]["task"]["psnr_db"] == {"value": None, "low": None, "high": None}
+    (difference,) = report.differences
+    assert difference.as_json()["figures"]["task"]["psnr_db"]["value"] is None
+    assert difference.as_json()["paired"]["task"]["psnr_db"] == {"mean": None, "p": None, "pairs": 0}
+    assert difference.paired["task"]["mae_m"].pairs > 0
 
 
 def test_frames_of_a_drive_are_not_taken_for_scenes_without_a_word(
