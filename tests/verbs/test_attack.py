@@ -488,6 +488,15 @@ def test_a_minus_is_no_list() -> None:
     assert config.losses == {"bbox_regression": "-"}
 
 
+@pytest.mark.parametrize("found", [(float("nan"), 1.0), (1.0, float("inf"))])
+def test_a_check_that_comes_to_no_number_is_none(
+    small: Small, install: Install, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, found: tuple[float, float]
+) -> None:
+    monkeypatch.setattr(Scenes, "masking", lambda *asked: found)
+    report = attack(small(), model="tiny_segmenter", out=tmp_path, steps=1, settings=SMALL)
+    assert report.facts["masking"] is None and (tmp_path / "attack.json").exists()
+
+
 def test_a_look_at_validation_samples_changes_no_check(small: Small, install: Install, tmp_path: Path) -> None:
     """Clean answers are remembered by sample number; those of other data sets must not be taken for them."""
     train, val = small("depth"), small("depth", split="val")

@@ -232,7 +232,7 @@ def _facts(job: Job, network: Model, plan: Json, made: _Made) -> Json:
         "steps_per_s": round(done / seconds, 4) if done and seconds else None,
         "stopped": recorder.stopped,
         "gradient": _gradient_facts(recorder.curves.get("gradient", [])),
-        "masking": {"promised": promised, "kept": kept} if promised else None,
+        "masking": {"promised": promised, "kept": kept} if promised and np.isfinite([promised, kept]).all() else None,
         "patches": {patch.name: sha256(as_picture(patch).tobytes()) for patch in made.patches},
         "curves": {name: [_plain(value) for value in curve] for name, curve in recorder.curves.items()},
         "validation_harm": [[step, _plain(harm)] for step, harm in recorder.judged],
