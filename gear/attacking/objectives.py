@@ -146,7 +146,7 @@ class SemsegObjective:
         logits, labels, counts = self._answers(model, views, samples)
 
         def rightly_said(sample: Any) -> Tensor:
-            clean = _said(model, as_batch([sample.images], list(views)), "logits")
+            clean = _logits(model, as_batch([sample.images], list(views)))
             return _is_right(clean, train_labels([sample], clean.shape[1]).to(clean.device))[0]
 
         right = counts & self._right.of(model, samples, indexes, rightly_said).to(logits.device)
@@ -157,7 +157,7 @@ class SemsegObjective:
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any]
     ) -> tuple[Tensor, Tensor, Tensor]:
         """Logits, the labels that they should show, and which pixels count."""
-        logits = _said(model, views, "logits")
+        logits = _logits(model, views)
         labels = train_labels(samples, logits.shape[1]).to(logits.device)
         return logits, labels, outside(samples, next(iter(views)), logits.device) & (labels != IGNORED_TRAIN_ID)
 
@@ -335,6 +335,22 @@ def _said(model: Model, views: Mapping[str, Tensor], name: str) -> Tensor:
             f"an attack works on the output {name!r}, and the network gives {given} (docs/write-a-model.md)"
         )
     return outputs[name]
+
+
+def _logits(model: Model, views: Mapping[str, Tensor]) -> Tensor:
+    """(B, C, H, W) of a network that knows Cityscapes' classes.
+
+    Raises:
+        GearError: it knows others.
+    """
+    logits = _said(model, views, "logits")
+    known = TRAIN_CLASSES, len(TRAIN_IDS)
+    if logits.shape[1] not in known:
+        raise GearError(
+            f"an attack works on logits over Cityscapes' {known[0]} train ids or {known[1]} label ids, and the network "
+            f"gives {logits.shape[1]} classes (docs/write-a-model.md)"
+        )
+    return logits
 
 
 @functools.lru_cache(maxsize=64)

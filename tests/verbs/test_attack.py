@@ -528,3 +528,15 @@ def test_a_network_without_the_output_that_attacks_need_is_told_so(
     install(dataclasses.replace(tiny_segmenter, build=Misnaming))
     with pytest.raises(GearError, match=r"works on the output 'logits', and the network gives classes"):
         attack(small(), model="tiny_segmenter", out=tmp_path / "p", steps=1, settings=SMALL)
+
+
+class Foreign(TinySegmenter):
+    def forward(self, views: Any, targets: Any = None) -> Any:
+        return {"logits": super().forward(views)["logits"][:, :21]}
+
+
+@pytest.mark.parametrize("setting", ["gamma=-1", "gamma=0.5", "target=road"])
+def test_a_network_of_other_classes_is_told_so(small: Small, install: Install, tmp_path: Path, setting: str) -> None:
+    install(dataclasses.replace(tiny_segmenter, build=Foreign))
+    with pytest.raises(GearError, match="19 train ids or 34 label ids, and the network gives 21 classes"):
+        attack(small(), model="tiny_segmenter", out=tmp_path / "p", steps=1, settings=[*SMALL, setting])
