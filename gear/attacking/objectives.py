@@ -323,10 +323,10 @@ def _is_right(logits: Tensor, labels: Tensor) -> Tensor:
 
 
 def _said(model: Model, views: Mapping[str, Tensor], name: str) -> Tensor:
-    """The output that every network of the task has.
+    """The output that every network of the task has, at the picture's size.
 
     Raises:
-        GearError: this one has not.
+        GearError: this one has not, or at another size.
     """
     outputs = model.forward(views)
     if name not in outputs:
@@ -334,7 +334,14 @@ def _said(model: Model, views: Mapping[str, Tensor], name: str) -> Tensor:
         raise GearError(
             f"an attack works on the output {name!r}, and the network gives {given} (docs/write-a-model.md)"
         )
-    return outputs[name]
+    said, size = outputs[name], next(iter(views.values())).shape[-2:]
+    if said.shape[-2:] != size:
+        there, wanted = (" x ".join(map(str, shape)) for shape in (said.shape[-2:], size))
+        raise GearError(
+            f"an attack works on {name!r} at the picture's size, {wanted}, and the network gives {there} "
+            "(docs/write-a-model.md)"
+        )
+    return said
 
 
 def _logits(model: Model, views: Mapping[str, Tensor]) -> Tensor:

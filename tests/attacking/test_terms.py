@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,12 +18,14 @@ from gear.attacking.objectives import (
     LossObjective,
     SemsegObjective,
     class_of,
+    counted,
     default_objective,
     outside,
     train_labels,
 )
 from gear.formats import rle
 from gear.formats.cityscapes import LABELS
+from gear.values.errors import GearError
 
 SHAPE = (2, 4)
 ROAD, CAR, STATIC = 7, 26, 4
@@ -186,3 +189,16 @@ def test_labels_are_train_ids_or_label_ids_as_the_network_has_them() -> None:
     assert (class_of(CAR, 19), class_of(CAR, 34)) == (13, 26)
     with pytest.raises(ValueError, match="19 train ids"):
         train_labels([sample], 18)
+
+
+@pytest.mark.parametrize("objective", [SemsegObjective(), SemsegObjective(gamma=0.5), DepthObjective()])
+def test_what_is_smaller_than_the_picture_is_told_so(objective: Any) -> None:
+    class Coarse:
+        def forward(self, views: Mapping[str, Tensor], targets: Any = None) -> Mapping[str, Tensor]:
+            return {"logits": torch.zeros(1, 19, 2, 4), "depth_m": torch.ones(1, 2, 4)}
+
+    one = SimpleNamespace(
+        images={"left": np.zeros((8, 16, 3), np.uint8)}, surfaces=(), label_ids=np.full((8, 16), CAR, np.uint8)
+    )
+    with pytest.raises(GearError, match="at the picture's size, 8 x 16, and the network gives 2 x 4"):
+        counted(objective, Coarse(), {"left": torch.zeros(1, 3, 8, 16)}, [one], [0])  # type: ignore[arg-type]
