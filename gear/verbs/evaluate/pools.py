@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
@@ -17,15 +18,20 @@ def check_pools(pools: Pools, roots: Iterable[Path]) -> None:
     """Whether pools hold what is evaluated, and some of it.
 
     Raises:
-        GearError: one is empty, or names a dataset that is not among the data.
+        GearError: one is empty, names a dataset twice, or one that is not among the data, or is there in several
+            splits.
     """
-    known = {root.resolve() for root in roots}
+    known = Counter(root.resolve() for root in roots)
     for name, members in pools.items():
         if not members:
             raise GearError(f"pool {name!r} holds no dataset")
-        for root in members:
-            if Path(root).resolve() not in known:
+        for root, times in Counter(Path(member).resolve() for member in members).items():
+            if not known[root]:
                 raise GearError(f"pool {name!r} holds {root}, which is not among the data")
+            if times > 1:
+                raise GearError(f"pool {name!r} holds {root} twice; give it once")
+            if known[root] > 1:
+                raise GearError(f"pool {name!r} holds {root}, of which several splits are among the data; evaluate one")
 
 
 def pooled(rows: Sequence[Measured], pools: Pools, seed: int, resamples: int) -> Iterable[Pool]:

@@ -17,6 +17,7 @@ from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import DatasetError, GearError
 from gear.verbs.collect.run import collect
 from gear.verbs.evaluate.patch_area import patch_masks
+from gear.verbs.evaluate.pools import check_pools
 from gear.verbs.evaluate.run import evaluate
 from tests.verbs.conftest import size_settings
 from tests.verbs.evaluate.conftest import Install, Oracle, Small, model_spec
@@ -79,6 +80,16 @@ def test_pools_are_datasets_that_count_as_one(tmp_path: Path, small: Small, inst
     for wrong, said in (({"none": []}, "'none' holds no dataset"), ({"a": [tmp_path / "no"]}, "not among the data")):
         with pytest.raises(GearError, match=said):
             evaluate(every, model="odd", out=tmp_path / "wrong", pools=wrong)
+
+
+def test_a_pool_counts_nothing_twice_and_leaves_nothing_out(tmp_path: Path) -> None:
+    """Samples that count twice make intervals too narrow, and of two splits in one root the last one alone counted."""
+    one, other = tmp_path / "one", tmp_path / "other"
+    check_pools({"a": [one, other], "b": [one]}, [one, other])
+    with pytest.raises(GearError, match=r"pool 'a' holds .*one twice"):
+        check_pools({"a": [one, other, tmp_path / "other/../one"]}, [one, other])
+    with pytest.raises(GearError, match=r"pool 'b' holds .*other, of which several splits"):
+        check_pools({"a": [one], "b": [other]}, [one, other, other])
 
 
 def test_datasets_of_one_label_have_a_row_together(tmp_path: Path, small: Small, install: Install) -> None:
