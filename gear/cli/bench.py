@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
         return 0
     with _Bars() as watch:
         report = bench(args.config, **given, apart=True, watch=watch)
-    print(json.dumps(report.as_json(), indent=1, allow_nan=False) if args.json else text(report), end="")
+    print(json.dumps(report.as_json(), indent=1, allow_nan=False) + "\n" if args.json else text(report), end="")
     return 0
 
 

@@ -131,7 +131,7 @@ def test_the_command(tmp_path: Path, written: Callable[..., Path], capsys: pytes
     capsys.readouterr()
     assert main(["bench", config, "--out", out, "--json"]) == 0
     told = capsys.readouterr()
-    assert json.loads(told.out)["format"] == "gear-bench" and told.err == ""
+    assert json.loads(told.out)["format"] == "gear-bench" and told.out.endswith("}\n") and told.err == ""
     report = gear.bench(config, out=out)
     assert all(row.made == 0 for one in report.tasks[0].results for row in one.evaluation.rows)
     assert main(["bench", config, "--out", out, "--list", "--json"]) == 0
