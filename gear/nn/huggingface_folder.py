@@ -24,6 +24,12 @@ ADAPTER = "write an adapter (docs/write-a-model.md)"
 SHOWN = 240
 """Characters of what transformers says."""
 
+OF_TIMM = {"in_chans": "num_channels", "out_indices": "out_indices", "output_stride": "output_stride"}
+"""What transformers before 5 says of a backbone of timm's in `backbone_kwargs`, and what it says since."""
+
+DILATED_STRIDE_PX = 16
+"""Of the last map of such a backbone that is dilated, where nothing else is said."""
+
 
 def open_folder(options: FolderOptions, auto: str) -> nn.Module:
     """The graph of a folder, in float32.
@@ -74,10 +80,18 @@ def _opened(options: FolderOptions, auto: str) -> tuple[nn.Module, Mapping[str, 
     kind: Any = getattr(transformers, auto)
     # Left open, transformers asks, and runs the folder's code at a "y".
     common: dict[str, Any] = {"local_files_only": True, "trust_remote_code": False}
+    said = read_mapping(Path(options.folder) / "config.json")
+    described = _with_backbone(said)
+    config = (
+        transformers.AutoConfig.from_pretrained(options.folder, **common)
+        if described == said
+        else transformers.AutoConfig.for_model(**described)
+    )
     if options.weights == FOLDER:
         # In the precision of the file, as transformers would have it, the network does not take gear's pictures.
         loaded: tuple[nn.Module, Mapping[str, Any]] = kind.from_pretrained(
             options.folder,
+            config=config,
             use_safetensors=True,
             dtype=torch.float32,
             output_loading_info=True,
@@ -85,9 +99,26 @@ def _opened(options: FolderOptions, auto: str) -> tuple[nn.Module, Mapping[str, 
             **common,
         )
         return loaded
-    config = transformers.AutoConfig.from_pretrained(options.folder, **common)
     with seeded(options.seed):
         return kind.from_config(config, dtype=torch.float32, trust_remote_code=False), {}
+
+
+def _with_backbone(said: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A config.json whose backbone of timm's is described in it rather than named beside its options.
+
+    transformers before 5 wrote DETRs so; today it asks the net whether the name is a repository's.
+    """
+    name, options = said.get("backbone"), said.get("backbone_kwargs", {})
+    if said.get("use_timm_backbone") is not True or said.get("backbone_config") is not None or not name:
+        return said
+    if options is None:
+        return {key: value for key, value in said.items() if key != "backbone_kwargs"}
+    if not isinstance(options, dict) or "out_indices" not in options or options.keys() - OF_TIMM:
+        return said
+    kept = {key: value for key, value in said.items() if "backbone" not in key}
+    stride = {"output_stride": DILATED_STRIDE_PX} if said.get("dilation") else {}
+    of_timm = {OF_TIMM[key]: value for key, value in options.items()}
+    return {**kept, "backbone_config": {"model_type": "timm_backbone", "backbone": name, **stride, **of_timm}}
 
 
 def _need_safetensors(folder: Path) -> None:

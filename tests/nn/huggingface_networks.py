@@ -129,20 +129,21 @@ DETR: dict[str, Any] = {
 }  # fmt: skip
 
 
-def detr() -> Any:
-    network = transformers.DetrForObjectDetection(transformers.DetrConfig(backbone_config=_resnet(), **DETR))
+def detr(backbone: Any = None) -> Any:
+    config = transformers.DetrConfig(backbone_config=backbone or _resnet(), **DETR)
+    network = transformers.DetrForObjectDetection(config)
     network.class_labels_classifier.bias.data.copy_(torch.tensor([3.0, 3.0, 3.0, 0.0, 0.0]))  # unicorns are rare
     return network
 
 
-def conditional_detr() -> Any:
-    config = transformers.ConditionalDetrConfig(backbone_config=_resnet(), **DETR)
+def conditional_detr(backbone: Any = None) -> Any:
+    config = transformers.ConditionalDetrConfig(backbone_config=backbone or _resnet(), **DETR)
     return transformers.ConditionalDetrForObjectDetection(config)
 
 
-def deformable_detr() -> Any:
+def deformable_detr(backbone: Any = None) -> Any:
     config = transformers.DeformableDetrConfig(
-        backbone_config=_resnet(), num_feature_levels=3, **DETR | {"d_model": 32}
+        backbone_config=backbone or _resnet(), num_feature_levels=3, **DETR | {"d_model": 32}
     )
     return transformers.DeformableDetrForObjectDetection(config)
 

@@ -18,7 +18,18 @@ from safetensors.torch import load_file, save_file
 from gear.nn.huggingface_options import DepthFolderOptions, DetectorFolderOptions, FolderOptions
 from gear.plugins.models.huggingface import depth, detect2d, semseg
 from gear.values.errors import GearError
-from tests.nn.huggingface_networks import depth_anything, detr, glpn, saved, segformer, yolos
+from tests.nn.huggingface_networks import (
+    conditional_detr,
+    deformable_detr,
+    depth_anything,
+    detr,
+    glpn,
+    saved,
+    segformer,
+    yolos,
+)
+
+import transformers  # isort: skip  # after gear.nn.vision.prepare, which the helpers call
 
 CLASSIFIER = "decode_head.classifier.weight"
 
@@ -208,6 +219,37 @@ def test_the_net_is_not_asked_for_a_backbone(tmp_path: Path, backbone: str, monk
     with pytest.raises(GearError, match="gear fetches nothing") as caught:
         detect2d.build(DetectorFolderOptions(folder=str(folder), device="cpu"))
     assert not asked and str(folder) in str(caught.value) and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("make", [detr, conditional_detr, deformable_detr])
+@pytest.mark.parametrize("weights", ["folder", "none"])
+@pytest.mark.parametrize("is_dilated", [False, True])
+def test_a_backbone_of_timms_may_be_named_as_transformers_4_does(
+    tmp_path: Path, make: Callable[..., Any], weights: str, is_dilated: bool
+) -> None:
+    backbone = {"model_type": "timm_backbone", "backbone": "test_resnet", "num_channels": 3}
+    places = {"out_indices": [2, 3, 4]}
+    stride = {"output_stride": 16} if is_dilated else {}
+    described = transformers.TimmBackboneConfig(**backbone, **places, **stride)
+    folder = saved(lambda: make(described), tmp_path)
+    options = DetectorFolderOptions(folder=str(folder), device="cpu", weights=weights)
+    wanted: Any = detect2d.build(options)
+    named = {"use_timm_backbone": True, "backbone": "test_resnet", "backbone_kwargs": {"in_chans": 3, **places}}
+    changed(backbone_config=None, dilation=is_dilated, **named)(folder)
+    found: Any = detect2d.build(options)
+    state = found.module().state_dict()
+    assert all(torch.equal(value, state[key]) for key, value in wanted.module().state_dict().items())
+    pictures = {"left": torch.rand(1, 3, 64, 128)}
+    torch.testing.assert_close(found(pictures), wanted(pictures), rtol=0, atol=0)
+
+
+def test_a_backbone_of_timms_may_have_no_options(tmp_path: Path) -> None:
+    described = transformers.TimmBackboneConfig(backbone="test_resnet", out_indices=[1, 2, 3, 4])
+    folder = saved(lambda: detr(described), tmp_path)
+    path = folder / "config.json"
+    said = {**json.loads(path.read_text()), "backbone_config": None, "backbone": "test_resnet"}
+    path.write_text(json.dumps({**said, "use_timm_backbone": True, "backbone_kwargs": None}))
+    assert detect2d.build(DetectorFolderOptions(folder=str(folder), device="cpu"))
 
 
 @pytest.mark.parametrize("folder", ["", "nowhere"])
