@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from gear.nn.huggingface_options import DepthFolderOptions, DetectorFolderOption
 from gear.nn.huggingface_processor_file import read_processor
 from gear.nn.label_maps import best_class
 from gear.nn.network import Network
+from gear.nn.runtime import autocast
 from gear.nn.semseg import CLASSES, LABEL_ID_OF_TRAIN_ID
 from gear.values.errors import GearError
 from gear.values.frames import FloatImage
@@ -188,6 +190,8 @@ class FolderDetector(FolderNetwork):
 
     def __init__(self, graph: nn.Module, options: DetectorFolderOptions) -> None:
         super().__init__(graph, options)
+        network: Any = graph
+        network.loss_function = partial(_in_float32, network.loss_function, self.device.type)
         self._categories = self.matched({name: number for number, name in CATEGORY_NAMES.items()}, "COCO")
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
@@ -201,10 +205,11 @@ class FolderDetector(FolderNetwork):
         return {"seen": self.seen(pictures), PICTURE: size.expand(len(pictures[VIEW]), -1)}
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """The network's own set loss against the objects of classes that it has."""
+        """The network's own set loss, in float32, against the objects of classes that it has."""
         height, width = outputs[PICTURE][0].tolist()
         labels = [self._labels(sample, torch.tensor([width, height] * 2)) for sample in targets]
-        return {"set_loss": self.said(outputs["seen"], labels=labels).loss}
+        with autocast(self.device, self.options.precision):
+            return {"set_loss": self.said(outputs["seen"], labels=labels).loss}
 
     def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[Detection, ...]]:
         """Sure enough boxes of classes that COCO has, surest first."""
@@ -244,3 +249,14 @@ class FolderDetector(FolderNetwork):
         boxes = torch.cat([(edges[:, :2] + edges[:, 2:]) / 2, edges[:, 2:] - edges[:, :2]], dim=1)
         classes = torch.tensor([index_of[thing.category_id] for thing in things], dtype=torch.int64)
         return {"class_labels": classes.to(self.device), "boxes": boxes.to(self.device)}
+
+
+def _in_float32(loss: Callable[..., Any], device_type: str, *said: Any, **more: Any) -> Any:
+    """A loss of transformers' on what its network says, whatever precision that was worked out in."""
+    floats = {key: _float(value) for key, value in more.items()}
+    with torch.autocast(device_type, enabled=False):
+        return loss(*map(_float, said), **floats)
+
+
+def _float(value: Any) -> Any:
+    return value.float() if isinstance(value, Tensor) and value.is_floating_point() else value

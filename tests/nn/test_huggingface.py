@@ -12,13 +12,23 @@ from safetensors.torch import load_file, save_file
 
 from gear.contracts.models import Model
 from gear.nn.huggingface_labels import match
-from gear.nn.huggingface_options import DepthFolderOptions, FolderOptions
+from gear.nn.huggingface_options import DepthFolderOptions, DetectorFolderOptions, FolderOptions
 from gear.nn.weights import write
 from gear.plugins.models.huggingface import depth, detect2d, semseg
 from gear.testing.model_contract import ModelContract
 from gear.values.errors import FieldError, GearError
-from tests.nn.detector_samples import SMALL
-from tests.nn.huggingface_networks import depth_anything, glpn, rt_detr, saved, segformer, yolos
+from tests.nn.detector_samples import SMALL, street_samples
+from tests.nn.huggingface_networks import (
+    conditional_detr,
+    deformable_detr,
+    depth_anything,
+    detr,
+    glpn,
+    rt_detr,
+    saved,
+    segformer,
+    yolos,
+)
 
 
 class FolderContract(ModelContract):
@@ -130,3 +140,20 @@ def test_a_training_can_begin_with_the_folders_own_weights(spec: Any, network: A
     assert any(not torch.equal(value, own[key]) for key, value in other.module().state_dict().items())
     spec.starts["folder"](other)
     assert all(torch.equal(value, own[key]) for key, value in other.module().state_dict().items())
+
+
+@pytest.mark.parametrize("network", [detr, conditional_detr, deformable_detr, rt_detr, yolos])
+def test_a_detectors_losses_run_at_the_precision_that_was_asked_for(network: Any, tmp_path: Path) -> None:
+    folder = str(saved(network, tmp_path))
+    samples = street_samples(128, 64)
+    pictures = {"left": torch.rand(2, 3, 64, 128, generator=torch.Generator().manual_seed(1))}
+    found = {}
+    for precision, wanted in (("float32", torch.float32), ("bfloat16", torch.bfloat16)):
+        model: Any = detect2d.build(DetectorFolderOptions(folder=folder, device="cpu", precision=precision))
+        kinds: set[torch.dtype] = set()
+        for layer in model.graph.modules():
+            if isinstance(layer, torch.nn.Linear):
+                layer.register_forward_hook(lambda _layer, _given, made, kinds=kinds: kinds.add(made.dtype))
+        found[precision] = model(pictures, samples)["set_loss"]
+        assert kinds == {wanted} and found[precision].dtype == torch.float32
+    assert 0 < abs(found["bfloat16"] / found["float32"] - 1) < 0.02
