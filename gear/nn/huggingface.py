@@ -54,7 +54,8 @@ class FolderNetwork(Network):
 
     def __init__(self, graph: nn.Module, options: FolderOptions) -> None:
         super().__init__(graph, options, views=(VIEW,))
-        self.processor = read_processor(Path(options.folder), resizes=options.input_size == "processor")
+        resizes = options.input_size == "processor"
+        self.processor = read_processor(Path(options.folder), resizes=resizes, config=graph.config)
 
     def seen(self, pictures: Mapping[str, Tensor]) -> Tensor:
         """(B, 3, h, w) as the network wants it."""

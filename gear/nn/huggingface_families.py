@@ -29,6 +29,10 @@ NEEDED_PX: Mapping[str, int] = MappingProxyType(
 )
 """By `model_type`: what sides must be multiples of, or a network's maps of several scales do not fit one another."""
 
+IN_PATCHES = ("beit", "data2vec-vision", "depth_anything", "dpt", "yolos", "zoedepth")
+"""By `model_type`: networks that look at whole patches only. What is left of a picture on the right and below they do
+not see, and what they say is of the rest alone."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Family:

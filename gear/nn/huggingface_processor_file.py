@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeGuard
 
-from gear.nn.huggingface_families import FAMILIES, NEEDED_PX, Family, family_of
+from gear.nn.huggingface_families import FAMILIES, IN_PATCHES, NEEDED_PX, Family, family_of
 from gear.nn.huggingface_processor import Channels, Processor
 from gear.values.errors import GearError
 
@@ -26,19 +26,20 @@ DETR_LONGEST_PX = 1333
 """Of files from before `longest_edge`, which say `max_size` or nothing."""
 
 
-def read_processor(folder: Path, *, resizes: bool = True) -> Processor:
+def read_processor(folder: Path, *, resizes: bool = True, config: object = None) -> Processor:
     """The image processor of a folder; without one, ImageNet's normalisation and no resizing.
 
     Args:
         folder: of the network.
         resizes: whether to resize pictures as the file says; what the network needs is done in any case.
+        config: the network's, as transformers has it, for the patches that it looks at.
 
     Raises:
         GearError: it is not JSON, or asks for what gear does not do.
     """
-    path, config = folder / FILE, folder / "config.json"
-    model_type = str(read_mapping(config).get("model_type")) if config.is_file() else ""
-    needed_px = NEEDED_PX.get(model_type, 1)
+    path, beside = folder / FILE, folder / "config.json"
+    model_type = str(read_mapping(beside).get("model_type")) if beside.is_file() else ""
+    needed_px = _patch_px(config) if model_type in IN_PATCHES else NEEDED_PX.get(model_type, 1)
     if not path.is_file():
         return Processor(multiple_px=needed_px, rounds_down=model_type == "glpn")
     said = read_mapping(path)
@@ -158,8 +159,10 @@ def _processor(name: str, facts: _Facts, needed_px: int, *, resizes: bool) -> Pr
     if facts.flag("do_normalize") and name != "MobileViT":  # whose class never does
         mean, std = facts.channels("image_mean", is_positive=False), facts.channels("image_std", is_positive=True)
     multiple_px = _multiple_px(name, facts, size) if does_resize else 1
-    if not (does_resize and resizes):
-        multiple_px = max(multiple_px, needed_px)
+    pads_to_px = facts.pixels("size_divisor") if name == "DPT" and facts.flag("do_pad") else 0
+    fits = multiple_px % needed_px == 0 or (pads_to_px and pads_to_px % needed_px == 0)
+    if not (does_resize and resizes) and not fits:
+        multiple_px = needed_px
     return Processor(
         mean=_divided(mean, scale),
         std=_divided(std, scale),
@@ -168,7 +171,7 @@ def _processor(name: str, facts: _Facts, needed_px: int, *, resizes: bool) -> Pr
         multiple_px=multiple_px,
         keeps_ratio=name in ("DPT", "ZoeDepth") and facts.flag("keep_aspect_ratio"),
         rounds_down=name in ("GLPN", "Yolos"),
-        pads_to_px=facts.pixels("size_divisor") if name == "DPT" and facts.flag("do_pad") else 0,
+        pads_to_px=pads_to_px,
         has_margin=name == "ZoeDepth" and facts.flag("do_pad"),
         aligns_corners=name == "ZoeDepth",
         is_bgr=facts.flag("do_flip_channel_order"),
@@ -181,6 +184,12 @@ def _multiple_px(name: str, facts: _Facts, size: dict[str, int] | None) -> float
     if name == "Yolos" and size and "longest_edge" in size:
         return YOLOS_PATCH_PX
     return facts.number("ensure_multiple_of") if "ensure_multiple_of" in facts.family.defaults else 1
+
+
+def _patch_px(config: object) -> int:
+    """What the sides of whole patches are multiples of; 1 where the config says nothing of use."""
+    said = [getattr(each, "patch_size", None) for each in (config, getattr(config, "backbone_config", None))]
+    return math.lcm(*(int(each) for each in said if _is_pixels(each)))
 
 
 def _divided(channels: Channels, scale: float) -> Channels:

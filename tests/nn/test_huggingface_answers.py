@@ -158,3 +158,32 @@ def test_pictures_of_any_size_go_through_without_a_processor(
     folder = saved(make, tmp_path)
     model = spec.build(spec.config(folder=str(folder), device="cpu", input_size=input_size))
     model.predict({"left": shown((375, 250))})
+
+
+@pytest.mark.parametrize("processor", [{}, processed("DPT", size=70), processed("Yolos", size=64)], ids=str)
+@pytest.mark.parametrize(
+    ("make", "spec", "options"),
+    [
+        (lambda: networks.depth_anything("metric"), depth, {}),
+        (networks.dpt, depth, {"inverse_scale": 0.5, "inverse_shift": 0.1}),
+        (networks.zoedepth, depth, {}),
+        (networks.yolos, detect2d, {}),
+    ],
+    ids=["depth_anything", "dpt", "zoedepth", "yolos"],
+)
+def test_pictures_that_keep_their_size_are_seen_to_their_edges(
+    make: Make, spec: Any, options: dict[str, Any], processor: dict[str, Any], tmp_path: Path
+) -> None:
+    folder = saved(lively(make), tmp_path, **processor)
+    model = spec.build(spec.config(folder=str(folder), device="cpu", input_size="picture", **options))
+    shown = torch.rand(1, 3, 79, 159, generator=torch.Generator().manual_seed(1)).requires_grad_()
+    said = model({"left": shown})
+    (seen,) = torch.autograd.grad(sum(each.sum() for each in said.values()), shown)
+    assert bool(seen[..., -1, :].any()) and bool(seen[..., -1].any())
+
+
+def test_pictures_that_are_filled_up_to_whole_patches_are_not_resized(tmp_path: Path) -> None:
+    folder = saved(networks.depth_anything, tmp_path, **processed("DPT", do_resize=False, do_pad=True, size_divisor=14))
+    model: Any = depth.build(DepthFolderOptions(folder=str(folder), device="cpu", inverse_scale=1.0))
+    assert model.processor.target((79, 159)) == (79, 159)
+    assert model.seen({"left": torch.rand(1, 3, 79, 159)}).shape == (1, 3, 84, 168)
