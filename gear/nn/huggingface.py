@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from gear.nn.huggingface_folder import in_one_line
 from gear.nn.huggingface_labels import match
 from gear.nn.huggingface_options import DepthFolderOptions, DetectorFolderOptions, FolderOptions
 from gear.nn.huggingface_processor_file import read_processor
+from gear.nn.huggingface_set_loss import IGNORED, set_loss
 from gear.nn.label_maps import best_class
 from gear.nn.network import Network
 from gear.nn.runtime import autocast
@@ -192,7 +193,7 @@ class FolderDetector(FolderNetwork):
     def __init__(self, graph: nn.Module, options: DetectorFolderOptions) -> None:
         super().__init__(graph, options)
         network: Any = graph
-        network.loss_function = partial(_in_float32, network.loss_function, self.device.type)
+        network.loss_function = partial(set_loss, network.loss_function, self.device.type)
         self._categories = self.matched({name: number for number, name in CATEGORY_NAMES.items()}, "COCO")
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
@@ -206,7 +207,7 @@ class FolderDetector(FolderNetwork):
         return {"seen": self.seen(pictures), PICTURE: size.expand(len(pictures[VIEW]), -1)}
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """The network's own set loss, in float32, against the objects of classes that it has."""
+        """The network's own set loss, in float32, against the objects of classes that it has; others are ignored."""
         height, width = outputs[PICTURE][0].tolist()
         labels = [self._labels(sample, torch.tensor([width, height] * 2)) for sample in targets]
         with autocast(self.device, self.options.precision):
@@ -245,19 +246,15 @@ class FolderDetector(FolderNetwork):
 
     def _labels(self, sample: Any, scale: Tensor) -> dict[str, Tensor]:
         index_of = {category: index for index, category in reversed(self._categories.items())}
-        things = [thing for thing in sample.objects if not thing.is_ignored and thing.category_id in index_of]
+        wanted = [thing for thing in sample.objects if not thing.is_ignored and thing.category_id in index_of]
+        others = [thing for thing in sample.objects if thing.is_ignored or thing.category_id not in index_of]
+        classes = torch.tensor([index_of[thing.category_id] for thing in wanted], dtype=torch.int64)
+        return {
+            "class_labels": classes.to(self.device),
+            "boxes": self._boxes(wanted, scale),
+            IGNORED: self._boxes(others, scale),
+        }
+
+    def _boxes(self, things: Sequence[Any], scale: Tensor) -> Tensor:
         edges = torch.tensor([thing.box_px for thing in things], dtype=torch.float32).reshape(-1, 4) / scale
-        boxes = torch.cat([(edges[:, :2] + edges[:, 2:]) / 2, edges[:, 2:] - edges[:, :2]], dim=1)
-        classes = torch.tensor([index_of[thing.category_id] for thing in things], dtype=torch.int64)
-        return {"class_labels": classes.to(self.device), "boxes": boxes.to(self.device)}
-
-
-def _in_float32(loss: Callable[..., Any], device_type: str, *said: Any, **more: Any) -> Any:
-    """A loss of transformers' on what its network says, whatever precision that was worked out in."""
-    floats = {key: _float(value) for key, value in more.items()}
-    with torch.autocast(device_type, enabled=False):
-        return loss(*map(_float, said), **floats)
-
-
-def _float(value: Any) -> Any:
-    return value.float() if isinstance(value, Tensor) and value.is_floating_point() else value
+        return torch.cat([(edges[:, :2] + edges[:, 2:]) / 2, edges[:, 2:] - edges[:, :2]], dim=1).to(self.device)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -13,6 +14,8 @@ from safetensors.torch import load_file, save_file
 from gear.contracts.models import Model
 from gear.nn.huggingface_labels import match
 from gear.nn.huggingface_options import DepthFolderOptions, DetectorFolderOptions, FolderOptions
+from gear.nn.huggingface_set_loss import is_hidden
+from gear.nn.runtime import seeded
 from gear.nn.weights import write
 from gear.plugins.models.huggingface import depth, detect2d, semseg
 from gear.testing.model_contract import ModelContract
@@ -157,3 +160,54 @@ def test_a_detectors_losses_run_at_the_precision_that_was_asked_for(network: Any
         found[precision] = model(pictures, samples)["set_loss"]
         assert kinds == {wanted} and found[precision].dtype == torch.float32
     assert 0 < abs(found["bfloat16"] / found["float32"] - 1) < 0.02
+
+
+@pytest.mark.parametrize("is_whole", [True, False], ids=["all layers", "the last layer"])
+@pytest.mark.parametrize("network", [detr, conditional_detr, deformable_detr, rt_detr, yolos])
+def test_queries_in_ignored_objects_are_no_background(network: Any, is_whole: bool, tmp_path: Path) -> None:
+    folder = saved(network, tmp_path)
+    config = folder / "config.json"
+    said = json.loads(config.read_text())
+    config.write_text(json.dumps({**said, "auxiliary_loss": is_whole and network is not yolos}))
+    model: Any = detect2d.build(DetectorFolderOptions(folder=str(folder), device="cpu"))
+    sample = street_samples(128, 64)[0]
+    things = [replace(thing, category_id=1) for thing in sample.objects if not thing.is_ignored]
+    cover = replace(things[0], is_ignored=True, box_px=(0.0, 0.0, 128.0, 64.0))
+    foreign = replace(cover, is_ignored=False, category_id=15)  # a bench, which the network has no class for
+    for over in (cover, foreign):
+        pictures = torch.rand(2, 3, 64, 128, generator=torch.Generator().manual_seed(1)).requires_grad_()
+        samples = [replace(sample, objects=(over,)), replace(sample, objects=())]
+        loss = model({"left": pictures}, samples)["set_loss"]
+        (seen,) = torch.autograd.grad(loss, pictures)
+        assert not seen[0].any() and bool(seen[1].any())
+    assert model({"left": pictures[:1]}, samples[:1])["set_loss"].item() < 1e-6
+    found = model({"left": pictures[:1]}, [replace(sample, objects=(*things, cover))])["set_loss"]
+    assert bool(torch.autograd.grad(found, pictures)[0].any()), "objects to be found are learnt"
+
+
+def test_ignored_objects_leave_enough_queries_beside_noised_ones(tmp_path: Path) -> None:
+    folder = saved(rt_detr, tmp_path)
+    config = folder / "config.json"
+    config.write_text(json.dumps({**json.loads(config.read_text()), "num_denoising": 6}))
+    model: Any = detect2d.build(DetectorFolderOptions(folder=str(folder), device="cpu", weights="none"))
+    sample = street_samples(128, 64)[0]
+    thing = replace(next(thing for thing in sample.objects if not thing.is_ignored), category_id=1)
+    cover = replace(thing, is_ignored=True, box_px=(0.0, 0.0, 128.0, 64.0))
+    model.graph.train()
+    for layer in model.graph.modules():
+        layer.train(not isinstance(layer, torch.nn.BatchNorm2d))
+    pictures = torch.rand(1, 3, 64, 128, generator=torch.Generator().manual_seed(1)).requires_grad_()
+    losses = []
+    for objects in ((thing,), (thing, cover)):
+        with seeded(1):  # the noise is the same
+            losses.append(model({"left": pictures}, [replace(sample, objects=objects)])["set_loss"].item())
+    assert losses[1] == pytest.approx(losses[0], rel=0.05)
+
+
+def test_queries_near_an_object_or_without_others_take_part() -> None:
+    queries = torch.tensor([[0.2, 0.2, 0.2, 0.2], [0.25, 0.2, 0.2, 0.2], [0.3, 0.3, 0.6, 0.6], [0.8, 0.8, 0.2, 0.2]])
+    labels = {"boxes": queries[:1], "ignored": torch.tensor([[0.25, 0.25, 0.5, 0.5]])}
+    assert is_hidden(queries, labels).tolist() == [False, False, True, False]
+    assert is_hidden(queries, labels | {"boxes": queries[:0]}).tolist() == [True, True, True, False]
+    assert not is_hidden(queries, labels | {"boxes": queries[3:].expand(2, -1)}).any()
+    assert not is_hidden(queries, labels | {"ignored": queries[:0]}).any()
