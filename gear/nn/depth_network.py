@@ -25,10 +25,12 @@ class DepthNetwork(Network):
     Attributes:
         input_scale: share of the picture's size that the network sees.
         multiple_px: what the sides of the picture that the network sees are multiples of.
+        least_px: as many pixels, at least, each of those sides has.
     """
 
     options: DepthOptions
     multiple_px: ClassVar[int] = 1
+    least_px: ClassVar[int] = 1
     has_quick_copy = True
 
     def __init__(self, graph: nn.Module, options: DepthOptions, *, input_scale: float = 1.0) -> None:
@@ -60,7 +62,8 @@ class DepthNetwork(Network):
         return [depth_m.cpu().numpy() for depth_m in outputs[DEPTH]]
 
     def _seen(self, side_px: int) -> int:
-        return max(round(side_px * self.input_scale / self.multiple_px), 1) * self.multiple_px
+        scaled_px = max(round(side_px * self.input_scale / self.multiple_px), 1) * self.multiple_px
+        return max(scaled_px, self.least_px)
 
     @abstractmethod
     def estimate(self, picture: Tensor) -> Mapping[str, Tensor]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import ClassVar
 
 import torch
 from torch import Tensor, nn
@@ -21,11 +22,15 @@ from gear.nn.depth_packages import need_transformers
 
 MULTIPLE_PX = 32
 
+LEAST_PX = MULTIPLE_PX // 2 + 1
+"""Of a picture's sides: of fewer pixels there is not enough to mirror."""
+
 
 class Glpn(DepthNetwork):
     """GLPDepth; `graph` is a `GLPNForDepthEstimation` whose answers are shares of the greatest depth."""
 
     options: GlpnOptions
+    least_px: ClassVar[int] = LEAST_PX
 
     def estimate(self, picture: Tensor) -> Mapping[str, Tensor]:
         """`depth_m` at the picture's size; its sides must be above 16 pixels."""

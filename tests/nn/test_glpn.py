@@ -84,6 +84,18 @@ def test_input_scale_changes_what_it_sees_and_not_what_it_gives() -> None:
     assert seen == [(32, 64)] and halved.shape == (1, 64, 128)
 
 
+@pytest.mark.parametrize(("size", "scale", "wanted"), [((64, 128), 0.1, (32, 32)), ((16, 40), 1.0, (32, 64))])
+def test_pictures_too_small_to_be_mirrored_are_enlarged(
+    size: tuple[int, int], scale: float, wanted: tuple[int, int]
+) -> None:
+    graph = glpn_graph(SMALL)
+    seen = []
+    graph.register_forward_pre_hook(lambda _graph, inputs: seen.append(inputs[0].shape[2:]))
+    with torch.no_grad():
+        depth_m = Glpn(graph, SMALL, input_scale=scale)({"left": torch.rand((1, 3, *size))})["depth_m"]
+    assert seen == [wanted] and depth_m.shape == (1, *size)
+
+
 @pytest.mark.parametrize(
     ("wrong", "field"),
     [
