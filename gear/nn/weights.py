@@ -21,6 +21,9 @@ from gear.values.errors import GearError
 OPTIONAL = "num_batches_tracked"
 """Files older than this counter lack it; nothing uses it."""
 
+SHORT = (torch.float16, torch.bfloat16, torch.float8_e4m3fn, torch.float8_e5m2)
+"""Numbers that are stored in fewer bits than gear's networks have."""
+
 SHOWN_KEYS = 3
 
 HEADER_AT = 8
@@ -130,7 +133,7 @@ def read(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
             state = {key: opened.get_tensor(key) for key in opened.keys()}  # noqa: SIM118
     except (SafetensorError, OSError) as error:
         raise not_safetensors(path, error) from error
-    return {k: v.float() if v.dtype in (torch.float16, torch.bfloat16) else v for k, v in state.items()}, metadata
+    return {key: value.float() if value.dtype in SHORT else value for key, value in state.items()}, metadata
 
 
 def write(path: str | Path, state: Mapping[str, Tensor], metadata: Mapping[str, str], *, halves: bool = False) -> None:

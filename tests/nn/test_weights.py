@@ -64,6 +64,18 @@ def test_what_no_half_can_say_stays_whole(tmp_path: Path) -> None:
     assert torch.equal(found["small"], state["small"].half().float())
 
 
+@pytest.mark.parametrize("kind", [torch.float8_e4m3fn, torch.float8_e5m2, torch.bfloat16, torch.float16], ids=str)
+def test_numbers_that_are_stored_shorter_are_loaded(tmp_path: Path, kind: torch.dtype) -> None:
+    graph, path = small(), tmp_path / "short.safetensors"
+    state = {key: value.to(kind) if value.dim() > 1 else value for key, value in graph.state_dict().items()}
+    write(path, state, {})
+    load_into(graph, path)
+    assert torch.equal(graph.state_dict()["0.weight"], state["0.weight"].float())
+    write(path, state | {"0.weight": torch.full((4, 3, 3, 3), torch.nan).to(kind)}, {})
+    with pytest.raises(GearError, match=r"1 with numbers that are not finite \(0.weight\)"):
+        load_into(graph, path)
+
+
 def test_another_networks_file_is_refused_with_the_reason(tmp_path: Path) -> None:
     state = small().state_dict()
     state["0.weight"] = torch.zeros(4, 3, 5, 5)
