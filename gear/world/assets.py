@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -90,13 +91,13 @@ class ActorFacts:
 
 
 def read_actor_facts(path: Path) -> ActorFacts:
-    """Reads the `<custom>` section of an actor's MJCF.
+    """Reads the `<custom>` sections of an actor's MJCF, those of files that it includes too.
 
     Raises:
         TownError: it is no MJCF or breaks the conventions.
     """
-    custom = read_xml(path).find("custom")
-    entries = {} if custom is None else {item.get("name", ""): item.get("data", "") for item in custom}
+    sections = (custom for root in _with_included(path) for custom in root.iter("custom"))
+    entries = {item.get("name", ""): item.get("data", "") for custom in sections for item in custom}
     kind = entries.get("actor.kind", "")
     if kind not in KIND_WEIGHTS:
         raise TownError(path, f"actor.kind must be one of {', '.join(KIND_WEIGHTS)}, got {kind!r}")
@@ -125,6 +126,20 @@ def read_actor_facts(path: Path) -> ActorFacts:
         weight=weight[0] * KIND_WEIGHTS[kind],
         palette=colours,
     )
+
+
+def _with_included(path: Path) -> Iterator[ET.Element]:
+    """The roots of a MJCF file and of what it includes.
+
+    Raises:
+        TownError: one of them is no XML, or cannot be read.
+    """
+    files = [path]
+    for file in files:  # grows: what is included is looked at in turn
+        root = read_xml(file)
+        yield root
+        included = [path.parent / name for include in root.iter("include") if (name := include.get("file"))]
+        files += [one for one in included if one not in files]
 
 
 def _numbers(path: Path, name: str, text: str) -> tuple[float, ...]:

@@ -116,6 +116,22 @@ def test_actors_that_break_the_rules_are_refused(tmp_path: Path, custom: str, to
         read_actor_facts(actor(tmp_path, custom))
 
 
+def test_facts_may_stand_in_several_sections_and_in_files_that_are_included(tmp_path: Path) -> None:
+    """As MuJoCo reads them: a palette that several cars share is one file."""
+    for name, text in (
+        ("shared", '<include file="rare.xml"/><custom><numeric name="paint.palette" data="0.6 0.5 0.4 3"/></custom>'),
+        ("rare", '<custom><numeric name="actor.weight" data="0.5"/></custom>'),
+    ):
+        (tmp_path / f"{name}.xml").write_text(f"<mujoco>{text}</mujoco>")
+    kind = '<text name="actor.kind" data="car"/></custom><custom><text name="author" data="me"/>'
+    path = actor(tmp_path, f"{kind}</custom><include file='shared.xml'/><custom>")
+    facts = read_actor_facts(path)
+    assert (facts.kind, facts.weight, facts.palette) == ("car", 0.5, (((0.6, 0.5, 0.4), 3.0),))
+    (tmp_path / "rare.xml").unlink()
+    with pytest.raises(TownError, match=r"rare.xml: cannot be read as MJCF: .*No such file"):
+        read_actor_facts(path)
+
+
 def test_a_person_does_not_park_among_vehicles(tmp_path: Path) -> None:
     (tmp_path / "towns").mkdir()
     (tmp_path / "vehicles").mkdir()
