@@ -29,7 +29,8 @@ _OPAQUE = "1 1 1 1"
 """Rays pass through what has no colour."""
 
 _ASSET_REFERENCES = ("material", "mesh", "hfield")
-_PLACEMENT_SECTIONS = ("compiler", "option", "size", "default", "worldbody", "custom")
+_PLACEMENT_SECTIONS = ("compiler", "size", "default", "worldbody", "custom")
+"""A town's own options are left out: where it turns contacts or gravity off, nothing would be felt."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,12 +1,15 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from gear.testing.tiny_town import tiny_world
+from gear.testing.tiny_town import CLEAR, TINY_TOWN, tiny_scenes, tiny_world
 from gear.values.geometry import RigidTransform
 from gear.world.footprints import Footprint
 from gear.world.placement import PlacementSpace
+from gear.world.world import World
 
 WORLD = tiny_world("no_billboard")
 SPACE = PlacementSpace(WORLD.placement_model, {slot.body: WORLD.types[slot.actor.name] for slot in WORLD.slots})
@@ -34,6 +37,32 @@ def test_overlaps_are_felt_and_near_misses_are_not() -> None:
     assert SPACE.overlaps({"car_saloon_0": flat(-20, 10.5)}) == [("car_saloon_0", "")], "a house"
     assert SPACE.overlaps({"car_saloon_0": flat(-30, -6.9)}) == [("car_saloon_0", "")], "a lamp post"
     assert SPACE.overlaps({"car_saloon_0": flat(0, -5, 0.15)}) == [], "standing on a kerb is no overlap"
+
+
+@pytest.mark.parametrize(
+    "option",
+    ['<option><flag contact="disable"/></option>', '<option gravity="0 0 0"><flag constraint="disable"/></option>'],
+)
+def test_a_towns_own_options_change_nothing_of_what_is_felt(tmp_path: Path, option: str) -> None:
+    """A town that stands still for its viewer has contacts and gravity turned off."""
+    town = tmp_path / "towns" / "tiny.xml"
+    town.parent.mkdir()
+    compiler = '<compiler angle="degree"/>'
+    text = TINY_TOWN.read_text()
+    assert compiler in text
+    town.write_text(text.replace(compiler, compiler + option))
+    for kind in ("vehicles", "pedestrians", "surfaces"):
+        (tmp_path / kind).symlink_to(TINY_TOWN.parents[1] / kind)
+    world = World.build(town=town, scene_name="no_billboard", scene=tiny_scenes().scenes["no_billboard"], weather=CLEAR)
+    space = PlacementSpace(world.placement_model, {slot.body: world.types[slot.actor.name] for slot in world.slots})
+    apart, within = flat(0, 0), flat(1, 0)
+    assert space.overlaps({"car_saloon_0": apart, "van_small_0": within}) == [("van_small_0", "car_saloon_0")]
+    standing = space.stand(CAR, 0, -3.0, 0, 0.3)
+    assert standing is not None
+    settled, expected = (
+        one.settle({"car_saloon_0": standing.world_from_actor})["car_saloon_0"] for one in (space, SPACE)
+    )
+    np.testing.assert_array_equal(settled.matrix, expected.matrix)
 
 
 def test_a_car_on_the_hill_is_even() -> None:
