@@ -160,6 +160,13 @@ class LaneGraph:
         box = (bounds[0], bounds[1], bounds[2], bounds[3])
         return LaneGraph(lanes=lanes, previous=previous, walks=walks, bays=tuple(bays), bounds_m=box)
 
+    @property
+    def lowest_m(self) -> float:
+        """Height of the lowest place where road users may be."""
+        lines = [lane.line for lane in self.lanes.values()] + [walk.line for walk in self.walks.values()]
+        heights_m = [float(line.points_m[:, 2].min()) for line in lines]
+        return min(heights_m + [bay.position_m[2] for bay in self.bays])
+
     def project(self, position_m: Array) -> LanePoint:
         """The nearest place on any lane, measured in the plane; lanes on other levels lose by their height."""
         best: tuple[float, LanePoint] | None = None

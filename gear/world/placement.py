@@ -59,9 +59,14 @@ _ACTORS = _groups(ACTOR_GROUP)
 class PlacementSpace:
     """The placement model with nothing in it until asked; every answer starts from the reset state."""
 
-    def __init__(self, model: mujoco.MjModel, bodies: Mapping[str, ActorType]) -> None:
-        """Takes the placement model and its actors by body name."""
+    def __init__(
+        self, model: mujoco.MjModel, bodies: Mapping[str, ActorType], parked_m: float = -PARKED_DEPTH_M
+    ) -> None:
+        """Takes the placement model, its actors by body name, and the height at which those wait that are not asked
+        for.
+        """
         self._model = model
+        self._parked_m = parked_m
         self._types = dict(bodies)
         self._qpos = {name: int(model.joint(name).qposadr[0]) for name in bodies}
         self._dof = {name: int(model.joint(name).dofadr[0]) for name in bodies}
@@ -190,6 +195,6 @@ class PlacementSpace:
                 pose = Pose.from_transform(poses[name])
                 self._data.qpos[address : address + 7] = (*pose.position_m, *pose.quat_wxyz)
             else:
-                self._data.qpos[address : address + 7] = (30.0 * number, 0.0, -PARKED_DEPTH_M, 1.0, 0.0, 0.0, 0.0)
+                self._data.qpos[address : address + 7] = (30.0 * number, 0.0, self._parked_m, 1.0, 0.0, 0.0, 0.0)
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_comPos(self._model, self._data)

@@ -38,7 +38,7 @@ class ScenePlanner:
         self._split = split
         self._split_name = split_name
         bodies = {slot.body: world.types[slot.actor.name] for slot in world.slots}
-        space = PlacementSpace(world.placement_model, bodies)
+        space = PlacementSpace(world.placement_model, bodies, world.parked_m)
         spawner = Spawner(world.lanes)
         self._leads = Leads(
             scene_name=world.scene_name,

@@ -139,6 +139,11 @@ class World:
         return {name: kind.shape for name, kind in self.types.items()}
 
     @property
+    def parked_m(self) -> float:
+        """Height at which actors of the pool wait that a sample does not use, also in a town far below its origin."""
+        return min(0.0, self.lanes.lowest_m) - PARKED_DEPTH_M
+
+    @property
     def town_name(self) -> str:
         """Name of the town."""
         return self.library.town_name
@@ -223,7 +228,7 @@ class World:
 
     def _pose(self, record: SceneRecord, taken: list[_SlotGeoms]) -> None:
         xmin, ymin, xmax, ymax = self.lanes.bounds_m
-        self._data.mocap_pos[:] = ((xmin + xmax) / 2, (ymin + ymax) / 2, -PARKED_DEPTH_M)
+        self._data.mocap_pos[:] = ((xmin + xmax) / 2, (ymin + ymax) / 2, self.parked_m)
         self._data.mocap_quat[:] = (1.0, 0.0, 0.0, 0.0)
         for actor, geoms in zip(record.actors, taken, strict=True):
             self._data.mocap_pos[geoms.mocap_id] = actor.world_from_actor.position_m

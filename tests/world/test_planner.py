@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
+from pathlib import Path
+from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
@@ -138,6 +140,42 @@ def test_the_ground_carries_them() -> None:
                 elif y < 15:
                     assert z == pytest.approx(0, abs=1e-6), actor
     assert on_hill > 3
+
+
+def lowered(folder: Path, depth_m: float) -> Path:
+    """The tiny town with all that is in it so much further down."""
+    tree = ElementTree.parse(TINY_TOWN)
+    numbers = [(element, "pos", 0, 3) for element in tree.findall("worldbody/*")]
+    for name, leading, step in (("lane", 2, 3), ("sidewalk", 1, 3), ("crosswalk", 1, 3), ("parking", 2, 4)):
+        numbers += [(element, "data", leading, step) for element in tree.findall("custom/numeric")
+                    if element.get("name", "").startswith(f"{name}.")]  # fmt: skip
+    for element, key, leading, step in numbers:
+        values = [float(word) for word in element.get(key, "").split()]
+        values[leading + 2 :: step] = [z_m - depth_m for z_m in values[leading + 2 :: step]]
+        element.set(key, " ".join(map(str, values)))
+    town = folder / "towns" / "tiny.xml"
+    town.parent.mkdir()
+    tree.write(town)
+    for kind in ("vehicles", "pedestrians", "surfaces"):
+        (folder / kind).symlink_to(TINY_TOWN.parents[1] / kind)
+    return town
+
+
+@pytest.mark.parametrize("depth_m", [60.0, 100.0])
+def test_a_town_may_lie_far_below_its_origin(tmp_path: Path, depth_m: float) -> None:
+    """Whoever does not take part waits below it, not in its streets or its sky."""
+    scene = tiny_scenes().scenes["no_billboard"]
+    world = World.build(town=lowered(tmp_path, depth_m), scene_name="no_billboard", scene=scene, weather=CLEAR)
+    plans = ScenePlanner(world, SMALL_RIG, STILL, split_name="test")
+    for index, usual in enumerate(records("no_billboard")):
+        record = plans.plan(index)
+        assert [actor.asset for actor in record.actors] == [actor.asset for actor in usual.actors]
+        for actor, other in zip(record.actors, usual.actors, strict=True):
+            x_m, y_m, z_m = other.world_from_actor.position_m
+            assert actor.world_from_actor.position_m == pytest.approx((x_m, y_m, z_m - depth_m), abs=1e-3)
+        heights_m = world.place(record).stage.data.mocap_pos[:, 2]
+        assert (heights_m > -depth_m - 1).sum() == len(record.actors)
+        assert (heights_m < -depth_m - 50).sum() == len(heights_m) - len(record.actors)
 
 
 @pytest.mark.parametrize("scene", ["board", "double", "truck"])
