@@ -24,10 +24,14 @@ def asset_files(library: AssetLibrary) -> dict[str, Path]:
     files: dict[str, Path] = {}
     for root in roots:
         for path in root.rglob("*") if root.is_dir() else [root]:
-            if path.suffix.lower() in ASSET_SUFFIXES and path.is_file():
+            if (path.suffix.lower() in ASSET_SUFFIXES or path == library.town) and path.is_file():
                 files[f"{root.name}/{path.relative_to(root).as_posix()}"] = path
     # gear's own refer to nothing else, and there are many: asking where each really lies takes longer than the rest.
-    others = [path for path in files.values() if path.suffix.lower() == ".xml" and not path.is_relative_to(own)]
+    others = [
+        path
+        for path in files.values()
+        if (path.suffix.lower() == ".xml" or path == library.town) and not path.is_relative_to(own)
+    ]
     known = {path.resolve() for path in files.values()} if others else set()
     for path in others:
         for name, referred in _referred(path):

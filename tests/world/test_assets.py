@@ -78,6 +78,19 @@ def test_the_digest_covers_whatever_a_town_refers_to(tmp_path: Path) -> None:
     assert len(digests) == 1 + len(files)
 
 
+@pytest.mark.parametrize("name", ["mine.mjcf", "mine"])
+def test_the_digest_covers_a_town_whatever_its_file_is_called(tmp_path: Path, name: str) -> None:
+    town, mesh = tmp_path / name, tmp_path / "shapes" / "a.obj"
+    mesh.parent.mkdir()
+    mesh.write_text("a")
+    town.write_text('<mujoco><compiler meshdir="shapes"/><asset><mesh name="a" file="a.obj"/></asset></mujoco>')
+    digests = {assets_digest(AssetLibrary.for_town(town))}
+    for edited in (mesh, town):
+        edited.write_text(edited.read_text() + " ")
+        digests.add(assets_digest(AssetLibrary.for_town(town)))
+    assert len(digests) == 3
+
+
 @pytest.mark.parametrize("name", ["../vehicles/truck_box", "./truck_box", "a" * 300, ""])
 def test_an_asset_is_asked_for_by_a_plain_name(name: str) -> None:
     library = AssetLibrary.for_town(TINY_TOWN)
