@@ -99,9 +99,18 @@ class AssetParts:
         return tuple(self._models)
 
     def add_instance(self, path: Path, body: Any) -> None:
-        """Fills `body` with an instance of the asset that shares everything."""
-        for child in self._model(path).worldbody.all_children():
-            _copy(child, body, body.name)
+        """Fills `body` with an instance of the asset that shares everything.
+
+        Raises:
+            TownError: the file cannot be used, or its instance would have the name of something else in the world.
+        """
+        model = self._model(path)
+        try:
+            for child in model.worldbody.all_children():
+                _copy(child, body, body.name)
+        except ValueError as error:
+            told = f"cannot be put into one world with the town as {body.name!r}: {without_breaks(error)}"
+            raise TownError(path, told) from error
 
     def add_bearer(self, path: Path, body: Any, *, is_carried: bool) -> FaceName:
         """Fills `body` with an instance whose face has a texture of its own.

@@ -136,6 +136,20 @@ def test_a_town_that_breaks_the_rules_is_refused(tmp_path: Path, old: str, new: 
     assert "odd.xml" in str(caught.value)
 
 
+@pytest.mark.parametrize("elsewhere", ["", '<include file="more.inc"/>'])
+def test_nothing_in_a_town_has_the_name_of_a_cars_part(tmp_path: Path, elsewhere: str) -> None:
+    """Also in a town that is read whole, since it includes another file."""
+    town = tmp_path / "towns" / "odd.xml"
+    town.parent.mkdir()
+    text = TINY_TOWN.read_text().replace('name="hedge"', 'name="car_saloon_0_hull"')
+    town.write_text(text.replace("<custom>", f"{elsewhere}<custom>"))
+    (town.parent / "more.inc").write_text('<mujoco><custom><numeric name="more" data="1"/></custom></mujoco>')
+    for kind in ("vehicles", "pedestrians", "surfaces"):
+        (tmp_path / kind).symlink_to(TINY_TOWN.parents[1] / kind)
+    with pytest.raises(TownError, match="'car_saloon_0_hull'"):
+        World.build(town=town, scene_name="board", scene=tiny_scenes().scenes["board"], weather=CLEAR)
+
+
 def test_rain_wets_ground_that_has_a_colour_of_its_own(tmp_path: Path) -> None:
     """With a material or without one; what rain runs off, such as a lamp post, keeps its colour."""
     text = TINY_TOWN.read_text()
