@@ -5,6 +5,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import mujoco
 
@@ -83,16 +84,17 @@ def placement_model(composition: Composition, stances: Mapping[str, Stance]) -> 
                 geom.attrib.pop(reference, None)
     for parent, geom in _geoms(tree, lambda felt: not felt):
         parent.remove(geom)
-    for _, geom in _geoms(tree, _collides):
-        if "mesh" in geom.attrib or "hfield" in geom.attrib:
-            raise TownError(composition.town, f"collision geom {geom.get('name')!r} must be a primitive")
-        geom.attrib.pop("material", None)
     worldbody = tree.find("worldbody")
     assert worldbody is not None  # dm_control always writes one
     for light in list(worldbody.findall("light")):
         worldbody.remove(light)
-    paths = {slot.body: slot.actor.path for slot in composition.slots}
+    paths = _files_of_bodies(composition)
     for element in worldbody:
+        for geom in element.iter("geom"):
+            if "mesh" in geom.attrib or "hfield" in geom.attrib:
+                path = paths.get(element.get("name", ""), composition.town)
+                raise TownError(path, f"collision geom {geom.get('name')!r} must be a primitive")
+            geom.attrib.pop("material", None)
         if element.get("name") in stances and element.tag == "body":
             if next(element.iter("geom"), None) is None:
                 raise TownError(
@@ -103,6 +105,13 @@ def placement_model(composition: Composition, stances: Mapping[str, Stance]) -> 
             for geom in element.iter("geom"):
                 _fix(geom)
     return _compile(composition, tree, {})[1]
+
+
+def _files_of_bodies(composition: Composition) -> dict[str, Path]:
+    """Which file a body comes from, by its name, of those that gear puts into the town."""
+    files = {file.stem: file for file in composition.files[1:]}
+    boards = {face.owner: files[face.asset] for face in composition.faces}
+    return boards | {slot.body: slot.actor.path for slot in composition.slots}
 
 
 def _collides(felt: bool) -> bool:

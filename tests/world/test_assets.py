@@ -226,6 +226,9 @@ def test_a_board_must_keep_the_conventions(tmp_path: Path, old: str, new: str, t
         World.build(town=town, scene_name="board", scene=tiny_scenes().scenes["board"], weather=CLEAR)
 
 
+BLOCK = '<mesh name="block" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/>'
+
+
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
@@ -233,6 +236,11 @@ def test_a_board_must_keep_the_conventions(tmp_path: Path, old: str, new: str, t
             '<geom name="shell" class="collision"',
             '<geom name="shell" class="car.glass"',
             "car_saloon.xml: has no geom of class collision",
+        ),
+        (
+            '<geom name="shell" class="collision"',
+            '<geom name="shell" class="collision" type="mesh" mesh="block"',
+            "car_saloon.xml: collision geom 'car_saloon_0_shell' must be a primitive",
         ),
         ('class="car.glass" material="glass"', 'class="car.glass" type="plane"', "'car_saloon_0_cabin' is a plane"),
         ('size="2.25 0.9 0.35"', 'size="225 90 0.35"', "car_saloon.xml: its longest side is 450 m; MJCF is in metres"),
@@ -248,7 +256,7 @@ def test_a_vehicle_must_keep_the_conventions(tmp_path: Path, old: str, new: str,
         text = path.read_text()
         if path.stem == "car_saloon":
             assert old in text
-            text = text.replace(old, new)
+            text = text.replace(old, new).replace("<asset>", f"<asset>{BLOCK}")
         (tmp_path / "vehicles" / path.name).write_text(text)
     town = tmp_path / "towns" / "tiny.xml"
     town.write_text(TINY_TOWN.read_text())
