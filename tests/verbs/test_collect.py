@@ -256,6 +256,7 @@ def test_bad_input_gets_one_line_and_leaves_nothing(
         ("scene: bord", r"c.yml:2:8: scene: no scene of tiny named 'bord'; did you mean board"),
         ("scene: my.yml:bord", r"c.yml:2:8: scene: no scene of tiny named 'bord'"),
         ("town: tinny", r"c.yml:2:7: town: no town named 'tinny'"),
+        ("scenes: tyny", r"c.yml:2:9: scenes: no scene library for town named 'tyny'; there are: harbour"),
         ("weather: ClearNon", r"c.yml:2:10: weather.preset: no weather named 'ClearNon'; did you mean ClearNoon"),
         ("weather: {wetness: 3, preset: Wet}", r"c.yml:2:31: weather.preset: no weather named 'Wet'"),
         ("split: tset", r"c.yml:2:8: split: no split named 'tset'; did you mean test"),

@@ -99,8 +99,10 @@ def resolve(config: CollectionConfig) -> Job:
         library = AssetLibrary.for_town(config.town)
     with told_at(config.places, "simulation"):
         simulation = load_simulation(config.simulation)
+    with told_at(config.places, "scenes" if config.scenes else "town"):
+        scenes = find_scenes(config, library.town_name)
     with told_at(config.places, "scene"):
-        scene = find_scene(config, library.town_name)
+        scene = find_scene(config, scenes)
     roomy = 1 if scene.boards else ROOMY_FACTOR
     scene = scene.capped(simulation.max_vehicles * roomy, simulation.max_pedestrians).crowded(config.crowd)
     with told_at(config.places, "split"):
@@ -187,13 +189,18 @@ def with_scene_file(config: CollectionConfig) -> CollectionConfig:
     return dataclasses.replace(config, scenes=path, scene=name or next(iter(scenes)))
 
 
-def find_scene(config: CollectionConfig, town: str) -> SceneSpec:
-    """The scene by name, in the library that the config names or in the town's own."""
+def find_scenes(config: CollectionConfig, town: str) -> SceneLibrary:
+    """The scene library that the config names, or the town's own."""
     library = scene_library(config.scenes or town)
     if config.scenes and library.town != town:
         raise ConfigError(
             config.scenes, 0, 0, "town", f"its boards stand in {library.town}, not in {town}; use --town {library.town}"
         )
+    return library
+
+
+def find_scene(config: CollectionConfig, library: SceneLibrary) -> SceneSpec:
+    """The scene by name."""
     if config.scene not in library.scenes:
         raise UnknownNameError(f"scene of {library.town}", config.scene, library.scenes)
     return library.scenes[config.scene]
