@@ -26,7 +26,7 @@ PERSON_GAP_M = (0.35, 0.35)
 """Least gap ahead and behind, and to the sides, to everybody else."""
 
 UPRIGHT = 0.9
-"""What settles with its z axis lower than this has fallen over."""
+"""What stands with its z axis lower than this has fallen over, or has its wheels on different levels of the ground."""
 
 SLIP_M = 0.5
 """What moves further than this while it settles has slid off its place."""
@@ -183,7 +183,7 @@ class Crowd:
         for body in bodies:
             draft = cast.drafts[body]
             standing = self.space.stand(draft.kind, draft.x_m, draft.y_m, draft.near_z_m, draft.yaw_rad)
-            if standing is None:
+            if standing is None or (standing.is_even and not is_upright(standing.world_from_actor)):
                 cast.drop(body)
                 continue
             cast.poses[body] = standing.world_from_actor
@@ -191,7 +191,7 @@ class Crowd:
                 uneven[body] = standing.world_from_actor
         if uneven:
             for body, pose in self.space.settle(uneven).items():
-                if pose.rotation[2, 2] < UPRIGHT or _distance_m(pose, uneven[body]) > SLIP_M:
+                if not is_upright(pose) or _distance_m(pose, uneven[body]) > SLIP_M:
                     cast.drop(body)
                 else:
                     cast.poses[body] = pose
@@ -207,6 +207,11 @@ class Crowd:
         for body in sorted(offenders):
             cast.drop(body)
         return bool(offenders)
+
+
+def is_upright(pose: RigidTransform) -> bool:
+    """Whether an actor stands as it would drive or walk."""
+    return bool(pose.rotation[2, 2] >= UPRIGHT)
 
 
 def _distance_m(first: RigidTransform, second: RigidTransform) -> float:

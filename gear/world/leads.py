@@ -15,7 +15,7 @@ from gear.values.geometry import RigidTransform
 from gear.values.rig import Rig
 from gear.values.rng import derive_rng
 from gear.values.scene import Pose
-from gear.world.cast import Cast
+from gear.world.cast import Cast, is_upright
 from gear.world.catalogue import ActorType
 from gear.world.compose import Slot
 from gear.world.footprints import Footprint
@@ -97,6 +97,8 @@ class Leads:
             pose = standing.world_from_actor
             if not standing.is_even:
                 pose = self.space.settle({draft.body: pose})[draft.body]
+            if not is_upright(pose):
+                return "tipping over"
             cast.drafts[draft.body] = draft
             cast.poses[draft.body] = pose
         cast.leads = frozenset(cast.drafts)

@@ -178,6 +178,22 @@ def test_a_town_may_lie_far_below_its_origin(tmp_path: Path, depth_m: float) -> 
         assert (heights_m < -depth_m - 50).sum() == len(heights_m) - len(record.actors)
 
 
+@pytest.mark.parametrize("scene", ["truck", "no_billboard"])
+def test_nobody_stands_with_half_of_the_wheels_over_an_edge(tmp_path: Path, scene: str) -> None:
+    """The lane to the east leads along a drop; four feet on two levels lie in one plane, and that is no ground."""
+    town = lowered(tmp_path, 0.0)
+    text = town.read_text()
+    for old, new in (("0.0 0.0 -0.55", "0 0 -1.8"), ("0.0 0.0 -0.25", "0 1.75 -0.25")):
+        assert f'class="collision" pos="{old}"' in text
+        text = text.replace(f'class="collision" pos="{old}"', f'class="collision" pos="{new}"')
+    town.write_text(text)
+    world = World.build(town=town, scene_name=scene, scene=tiny_scenes().scenes[scene], weather=CLEAR)
+    plans = ScenePlanner(world, SMALL_RIG, STILL, split_name="test")
+    for index in range(12):
+        for actor in plans.plan(index).actors:
+            assert actor.world_from_actor.transform("world", "actor").rotation[2, 2] > 0.9
+
+
 @pytest.mark.parametrize("scene", ["board", "double", "truck"])
 def test_the_reference_camera_has_every_face_in_view(scene: str) -> None:
     world = tiny_world(scene)
