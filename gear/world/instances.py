@@ -82,6 +82,13 @@ def class_name(dclass: Any) -> str:
     return dclass if isinstance(dclass, str) else "" if dclass is None else str(dclass.dclass)
 
 
+def free_name(root: mjcf.RootElement, kind: str, name: str) -> str:
+    """The name, or one like it where the town has something of that kind and name."""
+    while root.find(kind, name) is not None:
+        name += "_"
+    return name
+
+
 class AssetParts:
     """The assets that a composition has taken in, each file once."""
 
@@ -197,7 +204,7 @@ class AssetParts:
         width, height = FACE_SIZE_PX
         texture = self._root.asset.add(
             "texture",
-            name=name,
+            name=free_name(self._root, "texture", name),
             type="2d",
             builtin="flat",
             colorspace="sRGB",
@@ -206,7 +213,8 @@ class AssetParts:
             rgb1=(1, 1, 1),
         )
         attributes = _attributes_outside(material)
-        attributes.update(name=name, texture=texture, rgba=(1.0, 1.0, 1.0, 1.0))
+        own_name = free_name(self._root, "material", name)
+        attributes.update(name=own_name, texture=texture, rgba=(1.0, 1.0, 1.0, 1.0))
         own = self._root.asset.add("material", **attributes)
         for layer in material.all_children():
             layer_attributes = layer.get_attributes()

@@ -13,6 +13,7 @@ from gear.config.reader import read_node
 from gear.values.frames import UInt8Image
 from gear.values.resources import data_dir
 from gear.values.scene import Weather
+from gear.world.instances import free_name
 from gear.world.light import FACE_ORDER, FILAMENT_LUX, Floats, Lighting, encode_srgb, lighting_of
 from gear.world.quiet_mjcf import mjcf
 from gear.world.wet import Worn, wet_materials
@@ -95,7 +96,7 @@ def _add_cube(root: mjcf.RootElement, name: str, kind: str, faces: UInt8Image) -
     strip = cv2.imencode(".png", faces[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 1])[1].tobytes()
     return root.asset.add(
         "texture",
-        name=name,
+        name=free_name(root, "texture", name),
         type=kind,
         file=mjcf.Asset(strip, ".png"),
         gridsize=(6, 1),

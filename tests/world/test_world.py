@@ -150,6 +150,23 @@ def test_nothing_in_a_town_has_the_name_of_a_cars_part(tmp_path: Path, elsewhere
         World.build(town=town, scene_name="board", scene=tiny_scenes().scenes["board"], weather=CLEAR)
 
 
+def test_a_town_may_call_its_textures_and_materials_what_it_likes(tmp_path: Path) -> None:
+    """Those that gear puts there, for the sky, for what lights a street and for faces, then have other names."""
+    names = ("sky", "street_light", "board_0_face")
+    flat = 'type="2d" builtin="flat" width="8" height="8"'
+    own = "".join(f'<texture name="{name}" {flat}/><material name="{name}" texture="{name}"/>' for name in names)
+    town = tmp_path / "towns" / "own.xml"
+    town.parent.mkdir()
+    town.write_text(TINY_TOWN.read_text().replace("<asset>", f"<asset>{own}"))
+    for kind in ("vehicles", "pedestrians", "surfaces"):
+        (tmp_path / kind).symlink_to(TINY_TOWN.parents[1] / kind)
+    model = World.build(town=town, scene_name="board", scene=tiny_scenes().scenes["board"], weather=CLEAR).model
+    usual = tiny_world("board").model
+    assert [model.tex(name).width[0] for name in names] == [8, 8, 8]
+    assert [int((model.tex_type == kind).sum() - (usual.tex_type == kind).sum()) for kind in range(3)] == [3, 0, 0]
+    assert model.nmat == usual.nmat + 3
+
+
 def test_rain_wets_ground_that_has_a_colour_of_its_own(tmp_path: Path) -> None:
     """With a material or without one; what rain runs off, such as a lamp post, keeps its colour."""
     text = TINY_TOWN.read_text()
