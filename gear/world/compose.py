@@ -152,6 +152,9 @@ def _fill(
         body = _new_body(root, library.town, statics, f"board_{index}", **_placed(board))
         faces.append(parts.add_bearer(path, body, is_carried=False))
     for slot in slots:
+        if slot.body in {face.owner for face in faces}:
+            problem = f"is called {slot.actor.name!r}, so its instances would have the names of the boards; rename it"
+            raise TownError(slot.actor.path, problem)
         body = _new_body(root, library.town, statics, slot.body, mocap=True)
         if slot.bears_surface:
             faces.append(parts.add_bearer(slot.actor.path, body, is_carried=True))

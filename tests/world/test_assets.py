@@ -171,6 +171,14 @@ def test_a_vehicle_is_not_named_like_a_pedestrian(tmp_path: Path) -> None:
         plan_pool(SceneSpec(), AssetLibrary.for_town(tmp_path / "towns" / "tiny.xml"))
 
 
+def test_a_vehicle_is_not_named_like_the_boards(tmp_path: Path) -> None:
+    shutil.copytree(TINY_TOWN.parents[1], tmp_path, dirs_exist_ok=True)
+    (tmp_path / "vehicles" / "van_small.xml").rename(tmp_path / "vehicles" / "board.xml")
+    town, scene = tmp_path / "towns" / "tiny.xml", tiny_scenes().scenes["board"]
+    with pytest.raises(TownError, match=r"vehicles/board.xml: is called 'board', so its instances"):
+        World.build(town=town, scene_name="board", scene=scene, weather=CLEAR)
+
+
 @pytest.mark.parametrize("name", ["kübelwagen", "two words", "a&b"])
 def test_an_asset_may_have_any_letters_in_its_name(tmp_path: Path, name: str) -> None:
     shutil.copytree(TINY_TOWN.parents[1], tmp_path, dirs_exist_ok=True)
