@@ -52,6 +52,9 @@ CIRCUMSTANCES = {
 
 FULL = {errno.ENOSPC, errno.EDQUOT}
 
+NO_TEMPORARY = "No usable temporary directory"
+"""How Python says, without a file's name, that every disk on which it looks for one is full or takes no files."""
+
 
 class Terminated(KeyboardInterrupt):
     """Somebody, a batch system perhaps, asks the process to end: it does as after Ctrl-C."""
@@ -87,6 +90,11 @@ def main(argv: Sequence[str]) -> int:
         if isinstance(error, OSError) and error.errno in FULL:  # a stream that says no name, as that of `> file`
             print(f"gear: {error.strerror}", file=sys.stderr)
             _print_no_more()
+            return 2
+        if isinstance(error, FileNotFoundError) and str(error.strerror).startswith(NO_TEMPORARY):
+            print(
+                f"gear: {error.strerror}; make room there, or set TMPDIR to a folder on another disk", file=sys.stderr
+            )
             return 2
         if not isinstance(error, GearError):
             raise

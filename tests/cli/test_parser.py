@@ -6,6 +6,7 @@ import argparse
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import IO
 
@@ -85,6 +86,18 @@ def test_what_a_disk_refuses_is_one_line(
     monkeypatch.setattr(doctor, "run", lambda args: (tmp_path / "gone").read_bytes())
     with pytest.raises(FileNotFoundError):
         main(["doctor"])
+
+
+def test_a_temporary_folder_that_is_nowhere_is_one_line(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """As where the disk of the system and of the folder is full."""
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    monkeypatch.setattr(tempfile, "_candidate_tempdir_list", lambda: [str(tmp_path / "gone")])
+    monkeypatch.setattr(doctor, "run", lambda args: tempfile.mkdtemp())
+    assert main(["doctor"]) == 2
+    told = f"gear: No usable temporary directory found in ['{tmp_path}/gone']; make room there, or set TMPDIR"
+    assert capsys.readouterr().err == f"{told} to a folder on another disk\n"
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no disk is full here")
