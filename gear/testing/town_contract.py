@@ -139,6 +139,7 @@ class TownContract:
             for geom in self.under_test().compiled[0].geoms
             if geom.group < FIRST_HIDDEN_GROUP and (label := _label(geom.classname.name)) in LABEL_BY_NAME
         }
+        tell("names in `expected` are no labels", sorted(self.expected - LABEL_BY_NAME.keys()))
         missing = sorted(name for name in self.expected if LABEL_BY_NAME[name].cityscapes_id not in there)
         tell("labels are missing from the town (if it needs none, take them out of `expected`)", missing)
 

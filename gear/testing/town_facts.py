@@ -120,7 +120,14 @@ class TownUnderTest:
         return self._felt(OBSTACLE_GROUP)
 
     def world(self, scene: str) -> World:
-        """Gear's world of a scene, freshly composed."""
+        """Gear's world of a scene, freshly composed.
+
+        Raises:
+            UnknownNameError: there is no such scene.
+            TownError: gear cannot compose it.
+        """
+        if scene not in self.scenes.scenes:
+            raise UnknownNameError(f"scene of {self.scenes.town}", scene, self.scenes.scenes)
         return World.build(town=self.path, scene_name=scene, scene=self.scenes.scenes[scene], weather=CLEAR)
 
     def _felt(self, group: int) -> Rays:

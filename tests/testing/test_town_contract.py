@@ -358,6 +358,23 @@ def test_what_a_town_needs_not_can_be_left_out(broken: Callable[..., TownContrac
     run(town, "test_every_class_of_a_street_is_there")
 
 
+@pytest.mark.parametrize(
+    ("attribute", "value", "check", "message"),
+    [
+        ("planned_scenes", ("bord",), "test_every_scene_can_be_planned_with_its_boards_in_view",
+         "scene bord: no scene of tiny named 'bord'; did you mean board"),
+        ("expected", frozenset({"rode"}), "test_every_class_of_a_street_is_there", "`expected` are no labels:\n  rode"),
+    ],
+)  # fmt: skip
+def test_what_a_contract_names_and_is_not_there_is_told(
+    broken: Callable[..., TownContract], attribute: str, value: object, check: str, message: str
+) -> None:
+    town = broken()
+    setattr(type(town), attribute, value)
+    with pytest.raises(AssertionError, match=message):
+        run(town, check)
+
+
 def run(contract: TownContract, check: str) -> None:
     takes_property = check in ("test_stock_mujoco_compiles_it", "test_gear_composes_it")
     getattr(contract, check)(*([lambda name, value: None] if takes_property else []))
