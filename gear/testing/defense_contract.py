@@ -97,9 +97,10 @@ class DefenseContract:
         assert dataclasses.replace(config) == config
 
     def test_pictures_keep_shape_and_type(self) -> None:
-        """Every view comes back, cleaned or not."""
+        """Every view comes back in a `DefenseResult`, cleaned or not."""
         pictures = self.pictures()
         result = self.result(pictures)
+        assert isinstance(result, DefenseResult)
         assert set(result.views) == set(pictures)
         for name, picture in result.views.items():
             assert picture.shape == pictures[name].shape
@@ -124,10 +125,11 @@ class DefenseContract:
         assert first.score == second.score
 
     def test_outputs_are_what_the_spec_declares(self) -> None:
-        """Masks and scores are there if declared, and only then; both lie in 0..1."""
+        """Masks and scores are there if declared, and only then; both lie in 0..1, and every view has a mask."""
         result = self.result(self.pictures())
         assert (result.mask is not None) == ("mask" in self.spec.outputs)
         assert (result.score is not None) == ("score" in self.spec.outputs)
+        assert result.mask is None or set(result.mask) == set(self.views)
         for name, mask in (result.mask or {}).items():
             assert mask.shape == result.views[name].shape[:2]
             assert mask.dtype == np.float32

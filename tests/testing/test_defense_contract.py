@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -86,6 +87,19 @@ class ScoresInTensors(Dims):
         return dataclasses.replace(result, score=torch.tensor(result.score))  # type: ignore[arg-type]
 
 
+class MasksOneCamera(Dims):
+    def apply(self, *rest: Any) -> Any:
+        result = super().apply(*rest)
+        assert result.mask is not None
+        return dataclasses.replace(result, mask={"left": result.mask["left"]})
+
+
+class GivesAnythingWithViews(Dims):
+    def apply(self, *rest: Any) -> Any:
+        result = super().apply(*rest)
+        return SimpleNamespace(views=result.views, mask=result.mask, score=result.score)
+
+
 class WrapsNothing(Dims):
     def wrap(self, model: Any) -> Any:
         return None
@@ -105,6 +119,8 @@ class Unwrapped:
         (RemembersMasks, "test_samples_do_not_touch_each_other"),
         (ScoresInNumpy, "test_outputs_are_what_the_spec_declares"),
         (ScoresInTensors, "test_outputs_are_what_the_spec_declares"),
+        (MasksOneCamera, "test_outputs_are_what_the_spec_declares"),
+        (GivesAnythingWithViews, "test_pictures_keep_shape_and_type"),
         (WrapsNothing, "test_a_wrapped_model_is_a_model"),
         (Unwrapped, "test_a_wrapped_model_is_a_model"),
     ],
