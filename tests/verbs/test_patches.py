@@ -58,6 +58,14 @@ def test_a_folder_gives_one_picture_a_surface_in_order(tmp_path: Path, picture: 
     assert len(resolve_patch(str(tmp_path), surfaces=2, seed=0).images) == 2
 
 
+def test_the_ending_of_a_patchs_name_may_be_large(tmp_path: Path, picture: np.ndarray) -> None:
+    """As some cameras and scanners write it; the second board showed its neutral face."""
+    save(tmp_path / "patch_0.png", picture)
+    save(tmp_path / "patch_1.PNG", 255 - picture)
+    found = resolve_patch(str(tmp_path), surfaces=2, seed=0)
+    assert [int(image[0, 0, 2]) for image in found.images] == [int(picture[0, 0, 0]), 255 - int(picture[0, 0, 0])]
+
+
 def test_patches_know_where_they_were_made(tmp_path: Path, picture: np.ndarray) -> None:
     save(tmp_path / "patch_0.png", picture)
     assert resolve_patch(str(tmp_path), surfaces=1, seed=0).made_for == ()

@@ -23,7 +23,7 @@ RANDOM_SIZE_PX = (300, 150)
 
 SIDE_PX = (2, 8192)
 MAX_BYTES = 256 << 20
-NUMBERED = re.compile(r".*_(\d+)\.png")
+NUMBERED = re.compile(r".*_(\d+)\.(?i:png)")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -144,7 +144,7 @@ def digest_of(images: Iterable[UInt8Image]) -> str:
 def _numbered(folder: Path) -> list[Path]:
     """`patch_0.png`, `patch_1.png`, … of a folder, or the original tool's `<anything>_0.png`, or its only picture."""
     pictures = sorted(p for p in folder.iterdir() if p.suffix.lower() == ".png" and p.is_file())
-    own = [p for p in pictures if re.fullmatch(r"patch_\d+\.png", p.name)]
+    own = [p for p in pictures if re.fullmatch(r"patch_\d+\.(?i:png)", p.name)]
     if len(pictures) == 1 and not own:
         return pictures
     numbered: dict[int, Path] = {}
