@@ -7,6 +7,7 @@ import json
 import multiprocessing
 import os
 import sys
+import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -32,17 +33,18 @@ _CODE_SUFFIXES = (".py", ".pyc", ".so")
 
 
 def main(folder: str) -> None:
-    """Compiles the order on standard input into a folder, and says there whether the order covers all that was read,
-    and on standard output when it is done.
+    """Compiles the order on the first line of standard input into a folder, and says there whether the order covers
+    all that was read, and on standard output when it is done.
 
     The order does not where a town refers to files far from it, or where somebody edited one meanwhile.
     """
     gc.disable()  # half a million objects of MJCF, all kept to the end: looking for garbage took a third of the time
     sys.setswitchinterval(_SWITCH_S)
-    order = json.load(sys.stdin)
+    order = json.loads(sys.stdin.readline())
     library = AssetLibrary(Path(order["town"]))
     scene, weather = from_json(SceneSpec, order["scene"]), from_json(Weather, order["weather"])
     lighting = _lighting_beside(weather)
+    threading.Thread(target=_follow_customer, daemon=True).start()
     known = {os.path.realpath(path) for path in asset_files(library).values()}
     heard = _watched()
     compiled = compile_world(library, scene, weather, lighting, readers=min(_READERS, cores()))
@@ -77,6 +79,14 @@ def _lighting_beside(weather: Weather) -> Callable[[], Lighting] | None:
         return lighting
 
     return wait
+
+
+def _follow_customer() -> None:
+    """Ends this process when the one that waits for the world is gone, killed perhaps: who gives the command again
+    should have the machine for itself."""
+    while os.read(0, 1):
+        pass
+    os._exit(1)
 
 
 def _watched() -> set[str]:

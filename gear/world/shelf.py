@@ -158,8 +158,9 @@ def _compiled_apart(order: dict[str, Json], folder: Path) -> Iterator[bool]:
     ) as compiler:
         assert compiler.stdin is not None and compiler.stdout is not None
         try:
-            with contextlib.suppress(BrokenPipeError), compiler.stdin as orders:
-                orders.write(json.dumps(order).encode())
+            with contextlib.suppress(BrokenPipeError):
+                compiler.stdin.write(json.dumps(order).encode() + b"\n")
+                compiler.stdin.flush()  # and stays open: that it is closed is how the other sees this process end
             yield compiler.stdout.read(len(DONE)) == DONE
         except BaseException:
             compiler.kill()

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import errno
+import json
 import shutil
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import mujoco
@@ -15,6 +19,7 @@ from gear.testing.tiny_town import CLEAR, TINY_TOWN, build_tiny_world, tiny_scen
 from gear.values.errors import TownError
 from gear.values.scene import Weather
 from gear.world import shelf
+from gear.world.assets import AssetLibrary
 from gear.world.shelf import ready_world
 from gear.world.trees import without_mesh_trees
 from gear.world.world import World
@@ -124,6 +129,27 @@ def test_half_a_world_is_made_anew(tmp_path: Path) -> None:
         seen.write_bytes(spoiled)
         assert model_bytes(take(tmp_path).model) == whole
         assert seen.stat().st_size == len(content)
+
+
+def test_who_compiles_for_others_ends_with_them(tmp_path: Path) -> None:
+    """A batch system kills workers; what they had begun would take the memory of the next ones."""
+    order = shelf.order_of(AssetLibrary.for_town(TINY_TOWN), tiny_scenes().scenes[SCENE], CLEAR)
+    endless = (
+        "import sys, time; from gear.world import apart; apart.compile_world = lambda *_, **__: time.sleep(40); "
+        "apart.main(sys.argv[1])"
+    )
+    customer = (
+        "import subprocess, sys, time; "
+        f"made = subprocess.Popen([sys.executable, '-c', {endless!r}, {str(tmp_path)!r}], stdin=subprocess.PIPE); "
+        f"made.stdin.write({json.dumps(order).encode()!r} + b'\\n'); made.stdin.flush(); "
+        "print('begun', flush=True); time.sleep(40)"
+    )
+    with subprocess.Popen([sys.executable, "-c", customer], stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None and process.stdout.readline() == b"begun\n"
+        process.kill()
+        began_s = time.monotonic()
+        process.stdout.read()  # both of them have it
+        assert time.monotonic() - began_s < 30
 
 
 def test_what_was_not_used_for_longest_goes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
