@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
@@ -138,8 +139,8 @@ def _with_included(path: Path) -> Iterator[ET.Element]:
     for file in files:  # grows: what is included is looked at in turn
         root = read_xml(file)
         yield root
-        included = [path.parent / name for include in root.iter("include") if (name := include.get("file"))]
-        files += [one for one in included if one not in files]
+        included = [file.parent / name for include in root.iter("include") if (name := include.get("file"))]
+        files += [one for one in map(Path, map(os.path.normpath, included)) if one not in files]
 
 
 def _numbers(path: Path, name: str, text: str) -> tuple[float, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from pathlib import Path
@@ -42,7 +43,7 @@ def asset_files(library: AssetLibrary) -> dict[str, Path]:
 
 def _referred(path: Path) -> Iterator[tuple[str, Path]]:
     """What an MJCF file and what is included in it name, as far as it is there: by how it is written, and where."""
-    elements: list[ET.Element] = []
+    elements: list[tuple[Path, ET.Element]] = []
     files, folders = [path], dict[str, str]()
     for file in files:  # grows: what is included is looked at in turn
         try:
@@ -51,16 +52,23 @@ def _referred(path: Path) -> Iterator[tuple[str, Path]]:
             continue  # whoever reads it says so
         for compiler in root.iter("compiler"):
             folders.update({key: value for key, value in compiler.items() if key.endswith("dir")})
-        elements += root.iter()
-        included = [path.parent / name for include in root.iter("include") if (name := include.get("file"))]
+        elements += [(file, element) for element in root.iter()]
+        names = [name for include in root.iter("include") if (name := include.get("file"))]
+        included = [Path(os.path.normpath(base / name)) for base in _bases(path, file) for name in names]
         files += [one for one in included if one not in files]
     usual = folders.get("assetdir", "")
-    for element in elements:
+    for file, element in elements:
         folder = folders.get("texturedir" if element.tag == "texture" else "meshdir", usual)
         for key, name in element.items():
-            target = path.parent / ("" if element.tag == "include" else folder) / name
-            if key.startswith("file") and target.is_file():
-                yield name, target
+            for base in _bases(path, file) if key.startswith("file") else ():
+                target = base / ("" if element.tag == "include" else folder) / name
+                if target.is_file():
+                    yield name if base == path.parent else f"{file.name}/{name}", target
+
+
+def _bases(path: Path, file: Path) -> list[Path]:
+    """Where what `file` names may lie, a part of the MJCF at `path`: MuJoCo looks beside both."""
+    return list(dict.fromkeys((path.parent, file.parent)))
 
 
 def assets_digest(library: AssetLibrary) -> str:

@@ -78,6 +78,27 @@ def test_the_digest_covers_whatever_a_town_refers_to(tmp_path: Path) -> None:
     assert len(digests) == 1 + len(files)
 
 
+def test_the_digest_covers_what_included_files_include_beside_them(tmp_path: Path) -> None:
+    for kind in ("towns", "vehicles", "pedestrians", "surfaces"):
+        (tmp_path / kind).mkdir()
+    town, parts = tmp_path / "towns" / "mine.xml", tmp_path / "towns" / "parts"
+    parts.mkdir()
+    files = {
+        town: '<mujoco><include file="parts/street.inc"/><include file="lamps.inc"/></mujoco>',
+        town.parent / "lamps.inc": "<mujoco/>",
+        parts / "street.inc": '<mujoco><include file="lamps.inc"/><include file="../parts/street.inc"/></mujoco>',
+        parts / "lamps.inc": '<mujoco><asset><mesh name="a" file="a.obj"/></asset></mujoco>',
+        parts / "a.obj": "a",
+    }
+    for path, text in files.items():
+        path.write_text(text)
+    digests = {assets_digest(AssetLibrary.for_town(town))}
+    for path, text in files.items():
+        path.write_text(text + " ")
+        digests.add(assets_digest(AssetLibrary.for_town(town)))
+    assert len(digests) == 1 + len(files)
+
+
 @pytest.mark.parametrize("name", ["mine.mjcf", "mine"])
 def test_the_digest_covers_a_town_whatever_its_file_is_called(tmp_path: Path, name: str) -> None:
     town, mesh = tmp_path / name, tmp_path / "shapes" / "a.obj"
@@ -131,16 +152,20 @@ def test_actors_that_break_the_rules_are_refused(tmp_path: Path, custom: str, to
 
 def test_facts_may_stand_in_several_sections_and_in_files_that_are_included(tmp_path: Path) -> None:
     """As MuJoCo reads them: a palette that several cars share is one file."""
+    (tmp_path / "shared").mkdir()
     for name, text in (
-        ("shared", '<include file="rare.xml"/><custom><numeric name="paint.palette" data="0.6 0.5 0.4 3"/></custom>'),
-        ("rare", '<custom><numeric name="actor.weight" data="0.5"/></custom>'),
+        (
+            "shared/car",
+            '<include file="rare.xml"/><custom><numeric name="paint.palette" data="0.6 0.5 0.4 3"/></custom>',
+        ),
+        ("shared/rare", '<custom><numeric name="actor.weight" data="0.5"/></custom>'),
     ):
         (tmp_path / f"{name}.xml").write_text(f"<mujoco>{text}</mujoco>")
     kind = '<text name="actor.kind" data="car"/></custom><custom><text name="author" data="me"/>'
-    path = actor(tmp_path, f"{kind}</custom><include file='shared.xml'/><custom>")
+    path = actor(tmp_path, f"{kind}</custom><include file='shared/car.xml'/><custom>")
     facts = read_actor_facts(path)
     assert (facts.kind, facts.weight, facts.palette) == ("car", 0.5, (((0.6, 0.5, 0.4), 3.0),))
-    (tmp_path / "rare.xml").unlink()
+    (tmp_path / "shared/rare.xml").unlink()
     with pytest.raises(TownError, match=r"rare.xml: cannot be read as MJCF: .*No such file"):
         read_actor_facts(path)
 
