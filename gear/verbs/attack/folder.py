@@ -9,7 +9,6 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load as from_bytes
 
@@ -19,7 +18,7 @@ from gear.dataset.plan import differences
 from gear.dataset.store import refuse_dataset
 from gear.values.errors import FieldError, ReplaceableError
 from gear.values.serial import Json, from_json
-from gear.verbs.attack.watch import CHECKPOINT
+from gear.verbs.attack.watch import CHECKPOINT, is_picture
 from gear.verbs.collect.patches import read_patch
 
 VERIFY = "verify"
@@ -78,7 +77,7 @@ def read_patches(root: Path) -> tuple[Patch, ...]:
         arrays = from_bytes(path.read_bytes())
     except (OSError, SafetensorError) as error:
         raise ReplaceableError(path, BROKEN) from error
-    if any(array.ndim != 3 or array.shape[2] != 3 or array.dtype != np.float32 for array in arrays.values()):
+    if not all(map(is_picture, arrays.values())):
         raise ReplaceableError(path, BROKEN)
     return tuple(Patch(name=name, rgb=arrays[name]) for name in sorted(arrays, key=surface_of))
 

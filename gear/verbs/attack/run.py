@@ -29,7 +29,7 @@ from gear.verbs.attack.models import FLAG, build_model
 from gear.verbs.attack.outputs import as_picture, write_curves, write_patches, write_samples
 from gear.verbs.attack.report import AttackReport
 from gear.verbs.attack.scenes import Scenes
-from gear.verbs.attack.watch import Recorder
+from gear.verbs.attack.watch import Recorder, is_picture
 from gear.verbs.evaluate.player import weights_digest
 from gear.verbs.evaluate.shown_size import size_note
 
@@ -247,10 +247,9 @@ def _check_patches(patches: Any, surfaces: int, owner: str) -> None:
     if [patch.name for patch in patches] != names:
         raise PluginError(owner, "optimise", f"must return {', '.join(names)}")
     for patch in patches:
-        rgb = patch.rgb
-        if rgb.dtype != np.float32 or rgb.ndim != 3 or rgb.shape[2] != 3 or not np.isfinite(rgb).all():
+        if not is_picture(patch.rgb):
             raise PluginError(owner, "optimise", f"{patch.name} must be (H, W, 3) float32 without NaN")
-        if rgb.min() < 0 or rgb.max() > 1:
+        if patch.rgb.min() < 0 or patch.rgb.max() > 1:
             raise PluginError(owner, "optimise", f"{patch.name} leaves 0..1")
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save as to_bytes
 
@@ -173,6 +174,11 @@ class Recorder:
             self.stopped = f"no better on the validation samples for {self.patience} validations"
 
 
+def is_picture(rgb: npt.NDArray[Any]) -> bool:
+    """Whether an array is what the values of a patch may be: (H, W, 3) float32, all of them numbers."""
+    return rgb.dtype == np.float32 and rgb.ndim == 3 and rgb.shape[2] == 3 and bool(np.isfinite(rgb).all())
+
+
 def _best(arrays: State, *, is_judged: bool) -> tuple[Patch, ...]:
     """The patches of a checkpoint that did most harm; none before the first validation.
 
@@ -183,8 +189,7 @@ def _best(arrays: State, *, is_judged: bool) -> tuple[Patch, ...]:
     if is_judged and not names:
         raise ValueError("patches were judged, and the best are not there")
     for name in names:
-        rgb = arrays[name]
-        if rgb.dtype != np.float32 or rgb.ndim != 3 or rgb.shape[2] != 3 or not np.isfinite(rgb).all():
+        if not is_picture(arrays[name]):
             raise ValueError(f"{name} is no patch")
     return tuple(Patch(name=name.removeprefix(BEST), rgb=arrays[name]) for name in names)
 

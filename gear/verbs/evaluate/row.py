@@ -123,17 +123,13 @@ class _Desk:
         if self._failed:
             raise self._failed[0]
 
-    def tell(self) -> None:
-        """Another sample is whole."""
-        with self._one_tells:
-            self._told()
-
     def _tell(self, done: Future[Any]) -> None:
         self._waiting.release()
         error = None if done.cancelled() else done.exception()
         try:
             if not done.cancelled() and error is None and isinstance(done.result(), Note):
-                self.tell()
+                with self._one_tells:
+                    self._told()
         except BaseException as problem:  # futures keep what is raised here to themselves
             error = problem
         if error is not None:
