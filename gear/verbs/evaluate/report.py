@@ -242,4 +242,4 @@ def figures_json(figures: Figures) -> Json:
 
 def known_json(figures: Mapping[str, float]) -> Json:
     """null for what is not finite, which JSON cannot say."""
-    return {name: value if math.isfinite(value) else None for name, value in figures.items()}
+    return {name: float(value) if math.isfinite(value) else None for name, value in figures.items()}

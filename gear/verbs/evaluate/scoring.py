@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -21,6 +20,7 @@ from gear.values.serial import Json, from_json
 from gear.verbs.evaluate.choice import OUTSIDE_PATCH
 from gear.verbs.evaluate.patch_area import MASK_FIGURES, mask_figures, patch_masks, widened
 from gear.verbs.evaluate.player import Answer, accusation
+from gear.verbs.evaluate.report import known_json
 from gear.verbs.evaluate.spread import AnyEvaluator
 
 TASK = "task"
@@ -63,10 +63,10 @@ class Note:
         """As written beside the predictions."""
         return {
             "index": self.index,
-            "figures": {name: without_nan(one) for name, one in self.figures.items()},
+            "figures": {name: known_json(one) for name, one in self.figures.items()},
             **self.cost,
             "score": self.score,
-            "mask": None if self.mask is None else without_nan(self.mask),
+            "mask": None if self.mask is None else known_json(self.mask),
             "facts": self.facts,
             "sha256": dict(self.sha256),
         }
@@ -231,11 +231,6 @@ def _read_note(path: Path) -> dict[str, Any]:
     if note["mask"] is not None and note["mask"].keys() != set(MASK_FIGURES):
         raise DatasetError(path, "is no note of a sample (mask: has other figures)")
     return note
-
-
-def without_nan(figures: Mapping[str, float]) -> dict[str, float | None]:
-    """JSON has no NaN, and nothing infinite."""
-    return {name: float(value) if math.isfinite(value) else None for name, value in figures.items()}
 
 
 def _with_nan(figures: Mapping[str, float | None]) -> dict[str, float]:
