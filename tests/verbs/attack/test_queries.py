@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,20 +17,12 @@ from gear.testing.tiny_networks import tiny_segmenter
 from gear.values.errors import GearError
 from gear.verbs.attack.run import attack
 from gear.verbs.attack.watch import Recorder
-
-SMALL = ["height_px=12", "width_px=24", "batch=1"]
-Small = Callable[..., Path]
-Install = Callable[..., None]
+from tests.verbs.attack.conftest import SMALL, Install, Nothing, Small
 
 
 def test_too_few_queries_are_said(small: Small, install: Install, tmp_path: Path) -> None:
     with pytest.raises(GearError, match="1 queries are too few for one step"):
         attack(small(), model="tiny_segmenter", out=tmp_path, attack="nes", queries=1, settings=SMALL[:2])
-
-
-@dataclass(frozen=True, kw_only=True)
-class Nothing:
-    """No options."""
 
 
 class Unwatched:

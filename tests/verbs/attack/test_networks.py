@@ -13,15 +13,14 @@ import pytest
 
 from gear.compositor.opening import open_compositor
 from gear.contracts.hookspecs import hookimpl
-from gear.contracts.specs import DefenseSpec
 from gear.plugins import build as building
 from gear.plugins.manager import discover
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_segmenter
 from gear.values.errors import GearError
 from gear.verbs.attack import scenes
 from gear.verbs.attack.run import attack
+from tests.verbs.attack.conftest import SMALL, Install, Small, wrapping
 from tests.verbs.conftest import other_segmenter
-from tests.verbs.test_attack import SMALL, Install, Nothing, Small, Wrapping
 
 
 def test_networks_of_one_name_are_all_attacked(small: Small, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -55,7 +54,6 @@ def test_networks_of_one_name_are_all_attacked(small: Small, monkeypatch: pytest
 def test_patches_are_put_into_pictures_where_the_network_runs(
     small: Small, install: Install, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, facts: dict[str, Any]
 ) -> None:
-    wrapping = DefenseSpec(name="wrapping", summary="Wraps.", config=Nothing, build=Wrapping, gradient="differentiable")
     install(tiny_segmenter, other_segmenter, wrapping)
     asked: list[str] = []
 

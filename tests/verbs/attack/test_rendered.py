@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -15,11 +14,8 @@ from gear.values.errors import DatasetError, GearError
 from gear.verbs.attack.run import attack
 from gear.verbs.attack.verify import verify
 from gear.verbs.collect.run import collect
+from tests.verbs.attack.conftest import SMALL, Install, Small
 from tests.verbs.conftest import size_settings
-
-SMALL = ["height_px=12", "width_px=24", "batch=1"]
-Small = Callable[..., Path]
-Install = Callable[..., None]
 
 
 def test_the_patch_goes_back_into_the_world(small: Small, install: Install, tmp_path: Path) -> None:

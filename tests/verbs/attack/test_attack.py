@@ -5,8 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import shutil
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -34,13 +33,7 @@ from gear.verbs.attack.folder import read_patches
 from gear.verbs.attack.run import attack
 from gear.verbs.attack.scenes import Scenes
 from gear.verbs.attack.watch import CHECKPOINT, Recorder
-
-SMALL = ["height_px=12", "width_px=24", "batch=1"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Nothing:
-    """No options."""
+from tests.verbs.attack.conftest import SMALL, Install, Nothing, Small
 
 
 class Bad:
@@ -58,10 +51,6 @@ class Bad:
 
 def bad(what: str) -> AttackSpec[Any]:
     return AttackSpec(name="bad", summary="Bad.", config=Nothing, build=lambda config: Bad(what))
-
-
-Small = Callable[..., Path]
-Install = Callable[..., None]
 
 
 def test_notes_that_somebody_changed_are_one_line(small: Small, install: Install, tmp_path: Path) -> None:
