@@ -7,7 +7,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
+import cv2
 import numpy as np
+import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 
@@ -152,6 +154,16 @@ def as_batch(
 
     They go to the device, if there is one, as bytes, and become numbers there.
     """
-    # Channels first in memory too: torch's CPU backward pass of small strided convolutions fails on channels last.
-    stacked = {name: np.stack([sample[name] for sample in samples]).transpose(0, 3, 1, 2) for name in views}
-    return {name: torch.from_numpy(np.ascontiguousarray(one)).to(device).float() / 255 for name, one in stacked.items()}
+    stacked = {name: _channels_first([sample[name] for sample in samples]) for name in views}
+    return {name: torch.from_numpy(one).to(device).float().div_(255) for name, one in stacked.items()}
+
+
+def _channels_first(pictures: Sequence[UInt8Image]) -> npt.NDArray[np.uint8]:
+    """(B, 3, H, W) in memory too: torch's CPU backward pass of small strided convolutions fails on channels last."""
+    height, width, channels = size = pictures[0].shape
+    stacked = np.empty((len(pictures), channels, height, width), np.uint8)
+    for planes, picture in zip(stacked, pictures, strict=True):
+        if picture.shape != size or picture.dtype != np.uint8:  # OpenCV would put its planes elsewhere
+            raise ValueError(f"a batch has uint8 pictures of one size: {size} and {picture.dtype} {picture.shape}")
+        cv2.split(picture, list(planes))
+    return stacked

@@ -43,6 +43,21 @@ def test_a_batch_is_rgb_in_front_of_rows() -> None:
     assert float(batch["left"][1, 2, 3, 5]) == pytest.approx(views["left"][3, 5, 2] / 255)
 
 
+def test_a_batch_takes_pictures_as_they_lie_in_memory() -> None:
+    picture = sample(8, 6, 0)["left"]
+    for seen in (picture[:, ::-1], picture[::2], picture[..., ::-1], np.broadcast_to(picture[:1, :1], picture.shape)):
+        batch = as_batch([{"left": seen}, {"left": seen}], ("left",))["left"]
+        wanted = np.stack([seen, seen]).transpose(0, 3, 1, 2).astype(np.float32) / 255
+        assert batch.is_contiguous() and np.array_equal(batch.numpy(), wanted)
+
+
+def test_a_batch_has_pictures_of_one_size_and_of_bytes() -> None:
+    picture = sample(8, 6, 0)["left"]
+    for other in (picture[:4], picture.astype(np.float32)):
+        with pytest.raises(ValueError, match="uint8 pictures of one size"):
+            as_batch([{"left": picture}, {"left": other}], ("left",))
+
+
 def test_pictures_of_one_size_go_together_and_answers_keep_their_order() -> None:
     samples = [sample(*size, index) for index, size in enumerate([(4, 6), (8, 8), (4, 6)])]
     answers = Brightness().predict_many(samples)
