@@ -76,15 +76,15 @@ class DepthEvaluator:
             near &= self._window(truth_m.shape)
         both = near & (prediction >= MIN_DEPTH_M) & (prediction <= self.max_depth_m) & (truth_m <= MAX_PNG_DEPTH_M)
         others = np.isfinite(truth_m) & ~both
-        other_truth_m, other_found_m = _at(others, truth_m, prediction)
+        other_truth_m, other_found_m = truth_m[others], prediction[others]
         if not np.isfinite(other_found_m).all() or (other_found_m <= 0).any():
             raise ValueError("prediction must be positive and finite wherever there is ground truth")
-        shared = _summed(*_at(both, truth_m, prediction))  # most pixels, worked on once for both kinds of figures
+        shared = _summed(truth_m[both], prediction[both])  # most pixels, and worked on once for both kinds of figures
         found = {}
         if self._wants_devkit:
             told = other_truth_m <= MAX_PNG_DEPTH_M
             found = _devkit(shared + _summed(other_truth_m[told], other_found_m[told]))
-        (strays,) = _at(others, near)
+        strays = near[others]
         clipped_m = other_found_m[strays].clip(MIN_DEPTH_M, self.max_depth_m)
         found |= _eigen(shared + _summed(other_truth_m[strays], clipped_m))
         for name, value in found.items():
@@ -177,12 +177,6 @@ class _Sums:
         """NaN where there were no pixels."""
         pixels = self._sums.get("pixels", 0.0)
         return self._sums[name] / pixels if pixels else float("nan")
-
-
-def _at(chosen: npt.NDArray[np.bool_], *images: npt.NDArray[Any]) -> list[npt.NDArray[Any]]:
-    """What images have at the chosen pixels: by their numbers, in a third of the time that numpy takes by a mask."""
-    places = np.flatnonzero(chosen)
-    return [image.ravel().take(places) for image in images]
 
 
 def _summed(truth_m: FloatImage, found_m: FloatImage) -> _Sums:
