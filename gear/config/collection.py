@@ -23,11 +23,11 @@ class WeatherConfig:
     Attributes:
         preset: name of a weather preset.
         cloudiness, precipitation, precipitation_deposits, wind_intensity, fog_density, wetness: percent, 0 to 100.
-        sun_azimuth_deg: counter-clockwise from east.
+        sun_azimuth_deg: counter-clockwise from east, -360 to 360.
         sun_altitude_deg: above the horizon, -90 to 90.
-        fog_distance_m: where the fog begins.
+        fog_distance_m: where the fog begins; 0 to `MOST`, as all that follows.
         fog_falloff: how quickly fog thins with height.
-        scattering_intensity, mie_scattering_scale, rayleigh_scattering_scale: strength of scattering, not negative.
+        scattering_intensity, mie_scattering_scale, rayleigh_scattering_scale: strength of scattering.
         places: where a file or a flag gives what, by key.
     """
 
@@ -40,6 +40,16 @@ class WeatherConfig:
         "fog_density",
         "wetness",
     )
+    DEGREES: ClassVar[dict[str, int]] = {"sun_azimuth_deg": 360, "sun_altitude_deg": 90}
+    AMOUNTS: ClassVar[tuple[str, ...]] = (
+        "fog_distance_m",
+        "fog_falloff",
+        "scattering_intensity",
+        "mie_scattering_scale",
+        "rayleigh_scattering_scale",
+    )
+    MOST: ClassVar[int] = 1_000_000
+    """CARLA's amounts have no upper end; the 32-bit numbers of pictures do."""
 
     preset: str = "ClearNoon"
     cloudiness: float | None = None
@@ -62,13 +72,14 @@ class WeatherConfig:
             value = getattr(self, name)
             if value is not None and not 0 <= value <= 100:
                 raise FieldError(name, f"is a percentage, 0 to 100, got {value:g}")
-        if self.sun_altitude_deg is not None and not -90 <= self.sun_altitude_deg <= 90:
-            raise FieldError("sun_altitude_deg", f"must be -90 to 90 degrees, got {self.sun_altitude_deg:g}")
-        for name in ("fog_distance_m", "fog_falloff", "scattering_intensity", "mie_scattering_scale",
-                     "rayleigh_scattering_scale"):  # fmt: skip
+        for name, most in self.DEGREES.items():
             value = getattr(self, name)
-            if value is not None and value < 0:
-                raise FieldError(name, f"must not be negative, got {value:g}")
+            if value is not None and not -most <= value <= most:
+                raise FieldError(name, f"must be -{most} to {most} degrees, got {value:g}")
+        for name in self.AMOUNTS:
+            value = getattr(self, name)
+            if value is not None and not 0 <= value <= self.MOST:
+                raise FieldError(name, f"must be 0 to {self.MOST}, got {value:g}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

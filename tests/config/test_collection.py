@@ -67,6 +67,22 @@ def test_mistakes_say_where(tmp_path: Path, text: str, message: str) -> None:
         load_collection(str(tmp_path / "c.yml"), {})
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("fog_falloff", "1e40", r"must be 0 to 1000000, got 1e\+40"),
+        ("mie_scattering_scale", "-1", "must be 0 to 1000000, got -1"),
+        ("sun_azimuth_deg", "361", "must be -360 to 360 degrees, got 361"),
+        ("sun_altitude_deg", "-91", "must be -90 to 90 degrees, got -91"),
+        ("fog_distance_m", "inf", "expected float, got 'inf'"),
+    ],
+)
+def test_weathers_that_no_picture_can_show_are_refused(tmp_path: Path, key: str, value: str, message: str) -> None:
+    (tmp_path / "c.yml").write_text(f"task: semseg\nweather:\n  {key}: {value}\n")
+    with pytest.raises(ConfigError, match=rf"c.yml:3:{len(key) + 5}: weather\.{key}: {message}"):
+        load_collection(str(tmp_path / "c.yml"), {})
+
+
 def test_the_papers_splits() -> None:
     simulation = load_simulation("default")
     counts = {name: (s.seed, s.samples, s.frames) for name, s in simulation.splits.items()}

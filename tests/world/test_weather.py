@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from gear.config.collection import WeatherConfig
 from gear.contracts.rendering import Stage
 from gear.render import RENDERERS, open_renderer
 from gear.values.geometry import Intrinsics, RigidTransform
@@ -287,6 +288,19 @@ def test_fog_hides_what_is_far(name: str) -> None:
     expected = math.exp(-fog_per_m(weathers[1]) * (28 - 0.75))
     through = air_of(weathers[1], name).transmittance(raw.depth_m, record)[pillar].mean()
     assert through == pytest.approx(expected, rel=0.03)
+
+
+@pytest.mark.parametrize("name", WeatherConfig.AMOUNTS)
+@pytest.mark.parametrize("height_m", [2.0, 9000.0])
+def test_air_of_the_most_and_the_least_that_a_config_takes_is_finite(name: str, height_m: float) -> None:
+    depth_m = np.full((96, 96), 20, np.float32)
+    depth_m[:20], depth_m[40:50] = np.nan, 9000
+    record = looking(np.array([[0, 0, 1.0], [-1.0, 0, 0], [0, -1.0, 0]]), (0, 0, height_m))
+    for others in (0.0, 1.0, float(WeatherConfig.MOST)):
+        amounts = {**dict.fromkeys(WeatherConfig.AMOUNTS, others), name: float(WeatherConfig.MOST)}
+        weather = dataclasses.replace(Weather(name="x", fog_density=60, precipitation=50), **amounts)
+        through = air_of(weather, "filament").transmittance(depth_m, record)
+        assert through.min() >= 0 and through.max() <= 1, "no number is neither"
 
 
 def test_distant_air_has_the_colour_of_the_horizon_behind_it() -> None:
