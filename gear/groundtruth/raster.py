@@ -1,10 +1,12 @@
 """Silhouettes of triangles, by the rule that GPUs draw by: a pixel is covered if its centre is inside.
 
-Every triangle becomes one span a pixel row; spans are summed as differences along the rows, so a mesh of any size is
-filled by a handful of array operations.
+Every triangle becomes one span a pixel row; spans are summed as differences along the rows, or counted in their order,
+so a mesh of any size is filled by a handful of array operations.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -72,42 +74,115 @@ def bounds(triangles_px: Array) -> Window:
     return (int(low[0]), int(low[1]), int(high[0]), int(high[1]))
 
 
-def fill(triangles_px: Array, window: Window, step_px: int = 1) -> Mask:
+def fill(triangles_px: Array, window: Window) -> Mask:
     """The silhouette of (T, 3, 2) triangles inside a window.
 
     Args:
         triangles_px: corners in index pixels.
         window: what to look at.
-        step_px: distance of samples; above 1, every sample stands for a square of `step_px` pixels a side.
 
     Returns:
-        (rows, columns) bool; edges that pass through a sample count on the left and at the top.
+        (rows, columns) bool; edges that pass through a pixel's centre count on the left and at the top.
     """
     x0, y0, x1, y1 = window
-    columns, rows = max(0, -(-(x1 - x0) // step_px)), max(0, -(-(y1 - y0) // step_px))
+    columns, rows = max(0, x1 - x0), max(0, y1 - y0)
     if not columns or not rows or not len(triangles_px):
         return np.zeros((rows, columns), dtype=np.bool_)
-    centre = (step_px - 1) / 2
     x, y = triangles_px.transpose(2, 1, 0)
-    if (x0, y0, step_px) != (0, 0, 1):
-        x, y = (x - (x0 + centre)) / step_px, (y - (y0 + centre)) / step_px
-    first = np.clip(np.ceil(y.min(axis=0)), 0, rows).astype(np.int64)
-    last = np.clip(np.ceil(y.max(axis=0)), 0, rows).astype(np.int64)
-    left, right = np.clip(np.ceil(x.min(axis=0)), 0, columns), np.clip(np.ceil(x.max(axis=0)), 0, columns)
-    # Most triangles of a distant object lie between samples.
-    seen = np.flatnonzero((last > first) & (right > left))
-    x, y = _by_row(x[:, seen], y[:, seen])
-    first, heights = first[seen], (last - first)[seen]
+    if (x0, y0) != (0, 0):
+        x, y = x - x0, y - y0
+    shown = _Shown.of(x, y, columns, rows)
     depth = np.zeros(rows * (columns + 1), dtype=np.int64)
-    ends = np.cumsum(heights)
+    ends = np.cumsum(shown.heights)
     start = 0
-    while start < len(heights):
+    while start < len(ends):
         done = ends[start - 1] if start else 0
         stop = max(start + 1, int(np.searchsorted(ends, done + SPANS_AT_ONCE, side="right")))
-        part = slice(start, stop)
-        _add_spans(depth, x[:, part], y[:, part], first[part], heights[part], columns)
+        begins, behind = shown.spans(slice(start, stop))
+        depth += np.bincount(begins, minlength=depth.size)
+        depth -= np.bincount(behind, minlength=depth.size)
         start = stop
     return np.cumsum(depth.reshape(rows, columns + 1)[:, :-1], axis=1) > 0
+
+
+def count(triangles_px: Array, window: Window, most_rows: int) -> int:
+    """Pixels of the silhouette of (T, 3, 2) triangles inside a window of any size: no mask is made of it.
+
+    Args:
+        triangles_px: corners in index pixels.
+        window: what to look at.
+        most_rows: where the window has more, so many are looked at, evenly spaced, and stand for the others.
+
+    Returns:
+        What `fill` covers, exactly where the window has no more rows than that.
+    """
+    x0, y0, x1, y1 = window
+    if x0 >= x1 or y0 >= y1 or not len(triangles_px):
+        return 0
+    rows = min(y1 - y0, most_rows)
+    step = (y1 - y0) / rows
+    x, y = triangles_px.transpose(2, 1, 0)
+    return round(_covered(x - x0, (y - (y0 + (step - 1) / 2)) / step, x1 - x0, rows) * step)
+
+
+def _covered(x: Array, y: Array, columns: int, rows: int) -> int:
+    """Pixels of a window at the origin that (3, T) triangles cover together."""
+    shown = _Shown.of(x, y, columns, rows)
+    if shown.heights.sum() > SPANS_AT_ONCE and rows > 1:
+        half = rows // 2
+        return _covered(x, y, columns, half) + _covered(x, y - half, columns, rows - half)
+    begins, behind = shown.spans(slice(None))
+    order = np.argsort(begins, kind="stable")
+    begins, reached = begins[order], np.maximum.accumulate(behind[order])
+    fresh = np.maximum(begins[1:], reached[:-1])
+    return int((reached[1:] - fresh).sum() + (reached[:1] - begins[:1]).sum())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Shown:
+    """Triangles with pixels in a window at the origin.
+
+    Attributes:
+        x, y: (3, T) corners, from top to bottom.
+        first, heights: (T,) the first row of each, and how many there are.
+        columns: of the window.
+    """
+
+    x: Array
+    y: Array
+    first: npt.NDArray[np.int64]
+    heights: npt.NDArray[np.int64]
+    columns: int
+
+    @staticmethod
+    def of(x: Array, y: Array, columns: int, rows: int) -> _Shown:
+        """Those among (3, T) triangles."""
+        first = np.clip(np.ceil(y.min(axis=0)), 0, rows).astype(np.int64)
+        last = np.clip(np.ceil(y.max(axis=0)), 0, rows).astype(np.int64)
+        left, right = np.clip(np.ceil(x.min(axis=0)), 0, columns), np.clip(np.ceil(x.max(axis=0)), 0, columns)
+        # Most triangles of a distant object lie between samples.
+        seen = np.flatnonzero((last > first) & (right > left))
+        return _Shown(*_by_row(x[:, seen], y[:, seen]), first[seen], (last - first)[seen], columns)
+
+    def spans(self, part: slice) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+        """One span a row and triangle: its first pixel and the one behind its last, in rows of `columns + 1` pixels."""
+        x, y, first, heights = self.x[:, part], self.y[:, part], self.first[part], self.heights[part]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            long_slope = (x[2] - x[0]) / (y[2] - y[0])
+            upper_slope = (x[1] - x[0]) / (y[1] - y[0])
+            lower_slope = (x[2] - x[1]) / (y[2] - y[1])
+        owner = np.repeat(np.arange(len(heights)), heights)
+        row = np.arange(len(owner)) + np.repeat(first - (np.cumsum(heights) - heights), heights)
+        long_x = x[0][owner] + (row - y[0][owner]) * long_slope[owner]
+        with np.errstate(invalid="ignore"):
+            # Level edges have no slope, and no row that would ask for it.
+            upper_x = x[0][owner] + (row - y[0][owner]) * upper_slope[owner]
+            lower_x = x[1][owner] + (row - y[1][owner]) * lower_slope[owner]
+        short_x = np.where(row < y[1][owner], upper_x, lower_x)
+        left = np.clip(np.ceil(np.minimum(long_x, short_x)), 0, self.columns).astype(np.int64)
+        right = np.clip(np.ceil(np.maximum(long_x, short_x)), 0, self.columns).astype(np.int64)
+        base = row * (self.columns + 1)
+        return base + left, base + right
 
 
 def _by_row(x: Array, y: Array) -> tuple[Array, Array]:
@@ -117,34 +192,6 @@ def _by_row(x: Array, y: Array) -> tuple[Array, Array]:
         for values in (x, y):
             values[i], values[j] = np.where(below, values[j], values[i]), np.where(below, values[i], values[j])
     return x, y
-
-
-def _add_spans(
-    depth: npt.NDArray[np.int64],
-    x: Array,
-    y: Array,
-    first: npt.NDArray[np.int64],
-    heights: npt.NDArray[np.int64],
-    columns: int,
-) -> None:
-    """Adds one at each span's first column and takes one away behind its last; (3, T) corners are sorted by row."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        long_slope = (x[2] - x[0]) / (y[2] - y[0])
-        upper_slope = (x[1] - x[0]) / (y[1] - y[0])
-        lower_slope = (x[2] - x[1]) / (y[2] - y[1])
-    owner = np.repeat(np.arange(len(heights)), heights)
-    row = np.arange(len(owner)) + np.repeat(first - (np.cumsum(heights) - heights), heights)
-    long_x = x[0][owner] + (row - y[0][owner]) * long_slope[owner]
-    with np.errstate(invalid="ignore"):
-        # Level edges have no slope, and no row that would ask for it.
-        upper_x = x[0][owner] + (row - y[0][owner]) * upper_slope[owner]
-        lower_x = x[1][owner] + (row - y[1][owner]) * lower_slope[owner]
-    short_x = np.where(row < y[1][owner], upper_x, lower_x)
-    left = np.clip(np.ceil(np.minimum(long_x, short_x)), 0, columns).astype(np.int64)
-    right = np.clip(np.ceil(np.maximum(long_x, short_x)), 0, columns).astype(np.int64)
-    base = row * (columns + 1)
-    depth += np.bincount(base + left, minlength=depth.size)
-    depth -= np.bincount(base + right, minlength=depth.size)
 
 
 def _odd_corner_first(triangles: Array, odd: Mask) -> Array:

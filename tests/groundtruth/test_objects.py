@@ -4,7 +4,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gear.groundtruth.objects import observe_objects
+from gear.groundtruth import objects
+from gear.groundtruth.objects import in_camera, observe_objects
+from gear.groundtruth.raster import bounds, fill, project_mesh
 from gear.testing.synthetic import behind_lens, synthetic_frame
 from gear.testing.things import CAR, CYCLIST, PERSON, TRUCK, Thing, board, street
 from gear.values.frames import Frame
@@ -61,7 +63,7 @@ def test_what_leaves_the_picture_is_counted_outside_it() -> None:
     (cut,) = observe(synthetic_frame(RIG, truck)[0])
     (whole,) = observe(synthetic_frame(WIDE, truck)[0])
     assert whole.truncated_fraction == 0 and 0.2 < cut.truncated_fraction < 0.8
-    assert cut.amodal_px == pytest.approx(whole.amodal_px, rel=0.02)
+    assert cut.amodal_px == whole.amodal_px
     assert cut.amodal_in_image_px == cut.visible_px
     shifted = [v - d for v, d in zip(whole.amodal_box, (612, 185, 612, 185), strict=True)]
     assert list(cut.amodal_box) == pytest.approx(shifted, abs=1)
@@ -69,12 +71,28 @@ def test_what_leaves_the_picture_is_counted_outside_it() -> None:
 
 @pytest.mark.parametrize(("ahead_m", "left_m"), [(6.0, 3.9), (6.0, -4.4), (4.0, 0.4)])
 def test_small_things_that_leave_the_picture_are_counted_to_the_pixel(ahead_m: float, left_m: float) -> None:
-    """On the left, on the right and at the bottom: up to 512 pixels a side nothing is sampled coarser."""
+    """On the left, on the right and at the bottom."""
     person = [thing(PERSON, ahead_m, left_m)]
     (cut,) = observe(synthetic_frame(RIG, person)[0])
     (whole,) = observe(synthetic_frame(WIDE, person)[0])
     assert 0.05 < cut.truncated_fraction < 0.95 and whole.truncated_fraction == 0
     assert (cut.amodal_px, cut.amodal_in_image_px) == (whole.amodal_px, cut.visible_px)
+
+
+@pytest.mark.parametrize(("parts", "ahead_m", "left_m"), [(CAR, 5.0, 3.0), (CAR, 2.0, 0.8), (TRUCK, 7.0, 6.0)])
+@pytest.mark.parametrize("most_rows", [4096, 200])
+def test_large_things_that_leave_the_picture_are_counted_to_a_thousandth(
+    parts: Any, ahead_m: float, left_m: float, most_rows: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(objects, "MOST_ROWS", most_rows)
+    frame, _ = synthetic_frame(RIG, [thing(parts, ahead_m, left_m)])
+    (cut,) = observe(frame, by_label=False)
+    camera, shown = frame.views["left"].camera, frame.objects[2]
+    triangles = project_mesh(in_camera(shown, camera), shown.shape.faces, camera.intrinsics)
+    whole = bounds(triangles)
+    assert max(whole[2] - whole[0], whole[3] - whole[1]) > 512
+    outside = int(fill(triangles, whole).sum()) - int(fill(triangles, (0, 0, 612, 185)).sum())
+    assert cut.amodal_px - cut.amodal_in_image_px == pytest.approx(outside, rel=0 if most_rows == 4096 else 1e-3)
 
 
 def test_pixels_that_the_triangles_just_miss_are_part_of_the_object() -> None:

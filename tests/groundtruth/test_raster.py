@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gear.groundtruth import raster
-from gear.groundtruth.raster import NEAR_M, bounds, clip_near, fill, project_mesh
+from gear.groundtruth.raster import NEAR_M, bounds, clip_near, count, fill, project_mesh
 from gear.values.geometry import Intrinsics
 
 WINDOW = (0, 0, 40, 30)
@@ -64,12 +64,22 @@ def test_triangles_may_be_filled_in_portions(portion: int, monkeypatch: pytest.M
     np.testing.assert_array_equal(fill(triangles, WINDOW), whole)
 
 
+@given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.sampled_from([1, 50, 10_000]))
+@settings(max_examples=60, deadline=None)
+def test_counts_are_those_of_masks(seed: int, triangles: int, portion: int) -> None:
+    rng = np.random.default_rng(seed)
+    corners = rng.uniform(-20, 60, (triangles, 1, 2)) + rng.uniform(-30, 30, (triangles, 3, 2))
+    expected = int(fill(corners, WINDOW).sum())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(raster, "SPANS_AT_ONCE", portion)
+        assert count(corners, WINDOW, 30) == count(corners, WINDOW, 1000) == expected
+
+
 @pytest.mark.parametrize("step", [3, 5])
-def test_coarse_samples_are_those_in_the_middle_of_their_squares(step: int) -> None:
+def test_rows_that_stand_for_others_are_those_in_their_middle(step: int) -> None:
     triangles = np.random.default_rng(6).uniform(-10, 50, (4, 3, 2))
-    window = (-15, -10, -15 + 14 * step, -10 + 12 * step)
-    fine = fill(triangles, window)
-    np.testing.assert_array_equal(fill(triangles, window, step), fine[step // 2 :: step, step // 2 :: step])
+    window = (-15, -10, 55, -10 + 12 * step)
+    assert count(triangles, window, 12) == step * fill(triangles, window)[step // 2 :: step].sum()
 
 
 def test_bounds_are_the_smallest_window_that_holds_all_covered_pixels() -> None:
@@ -85,17 +95,19 @@ def test_windows_may_lie_anywhere() -> None:
     np.testing.assert_array_equal(fill(triangle, (-5, 3, 12, 20)), whole[33:50, 35:52])
 
 
-def test_coarse_steps_keep_the_area() -> None:
-    triangle = np.array([[[0.0, 0.0], [2000.0, 300.0], [500.0, 1500.0]]])
-    area = 0.5 * (2000 * 1500 - 500 * 300)
-    coarse = fill(triangle, bounds(triangle), 7)
-    assert coarse.sum() * 49 == pytest.approx(area, rel=0.01)
+def test_few_rows_keep_the_area() -> None:
+    triangle = np.array([[[0.0, 0.0], [20_000.0, 3000.0], [5000.0, 15_000.0]]])
+    area = 0.5 * (20_000 * 15_000 - 5000 * 3000)
+    assert count(triangle, bounds(triangle), 500) == pytest.approx(area, rel=1e-4)
 
 
 def test_nothing_gives_nothing() -> None:
     assert bounds(np.zeros((0, 3, 2))) == (0, 0, 0, 0)
     assert fill(np.zeros((0, 3, 2)), WINDOW).shape == (30, 40)
     assert not fill(np.zeros((0, 3, 2)), WINDOW).any()
+    assert count(np.zeros((0, 3, 2)), WINDOW, 9) == 0
+    for empty in ((5, 0, 5, 9), (0, 7, 9, 7), (9, 0, 5, 9)):
+        assert count(np.array([[[0.0, 0.0], [20.0, 3.0], [5.0, 15.0]]]), empty, 9) == 0
 
 
 def test_the_near_plane_cuts_triangles() -> None:
