@@ -65,8 +65,8 @@ def label_map(instances: InstanceImage) -> npt.NDArray[np.uint8]:
 
 
 def coarsen(instances: InstanceImage, window_px: int) -> InstanceImage:
-    """The labels that a person with a polygon tool would draw: each pixel takes what fills most of the square around
-    it.
+    """The labels that a person with a polygon tool would draw: each pixel takes the label that fills most of the square
+    around it, and of that label's instances the one that fills most.
 
     Things thinner than about half the window (wires, thin poles, single leaves) and gaps as small (sky between twigs)
     go to what surrounds them; straight borders stay where they are.
@@ -75,21 +75,30 @@ def coarsen(instances: InstanceImage, window_px: int) -> InstanceImage:
         instances: (H, W) uint16 instance map.
         window_px: side of the square, odd.
     """
-    height, width = instances.shape
-    best_count = np.full((height, width), -1, dtype=np.int16)
-    best: InstanceImage = instances.copy()
+    labels = _filling(label_map(instances).astype(np.uint16), window_px)
+    return _filling(instances, window_px, labels)
+
+
+def _filling(values: InstanceImage, window_px: int, labels: InstanceImage | None = None) -> InstanceImage:
+    """What fills most of the square around each pixel; where (H, W) label ids are given, of what has the pixel's."""
+    height, width = values.shape
+    best_count = np.zeros((height, width), dtype=np.int16)
+    best: InstanceImage = values.copy()
     reach = window_px // 2
-    for value in np.unique(instances):
-        inside = instances == value
+    for value in np.unique(values):
+        inside = values == value
         rows, columns = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
         y0, y1 = max(0, int(rows[0]) - reach), min(height, int(rows[-1]) + 1 + reach)
         x0, x1 = max(0, int(columns[0]) - reach), min(width, int(columns[-1]) + 1 + reach)
-        crop = inside[y0:y1, x0:x1].astype(np.uint8)
+        around = np.s_[y0:y1, x0:x1]
+        crop = inside[around].astype(np.uint8)
         border = cv2.BORDER_CONSTANT
         count = cv2.boxFilter(crop, cv2.CV_16S, (window_px, window_px), normalize=False, borderType=border)
         # A tie stays with the pixel's own label.
         count = np.asarray(count * 2 + crop, dtype=np.int16)
-        wins = count > best_count[y0:y1, x0:x1]
-        best_count[y0:y1, x0:x1][wins] = count[wins]
-        best[y0:y1, x0:x1][wins] = value
+        wins = count > best_count[around]
+        if labels is not None:
+            wins &= labels[around] == (value // INSTANCE_FACTOR or value)
+        best_count[around][wins] = count[wins]
+        best[around][wins] = value
     return best

@@ -85,6 +85,19 @@ def test_coarse_maps_keep_borders_and_lose_specks() -> None:
     assert instances[20, 10] == 20, "the input is untouched"
 
 
+def test_a_crowd_is_not_outvoted_by_what_stands_behind_it() -> None:
+    """Each pixel of the crowd has more of the wall around it than of any one person, and more people than wall."""
+    people = 24000 + np.arange(40 * 60, dtype=np.uint16).reshape(40, 60) // 3 % 40
+    instances = np.where(np.arange(40)[:, None] % 5 < 3, people, np.uint16(11)).astype(np.uint16)
+    coarse = coarsen(instances, 9)
+    assert (label_map(coarse)[4:-4] == 24).all()
+    np.testing.assert_array_equal(label_map(coarse), coarsen(label_map(instances).astype(np.uint16), 9))
+    for y, x in ((10, 20), (13, 31), (21, 44)):
+        around = instances[y - 4 : y + 5, x - 4 : x + 5]
+        shares = {value: (around == value).sum() for value in np.unique(around) if value >= 24000}
+        assert shares[coarse[y, x]] == max(shares.values())
+
+
 def test_coarse_ties_stay() -> None:
     checker = (np.indices((20, 20)).sum(axis=0) // 10 % 2).astype(np.uint16) + 11
     np.testing.assert_array_equal(coarsen(checker, 3)[12:18, 12:18], checker[12:18, 12:18])
