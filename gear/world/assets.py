@@ -165,7 +165,7 @@ class AssetLibrary:
 
     @staticmethod
     def for_town(town: str | Path) -> AssetLibrary:
-        """By a town's name, or by the path of its MJCF.
+        """By a town's name, or by the path of its MJCF, with or without the `.xml` at its end.
 
         Raises:
             UnknownNameError: there is no such town.
@@ -173,15 +173,15 @@ class AssetLibrary:
         text, towns = str(town), data_dir("mjcf") / "towns"
         is_path = text.endswith(".xml") or "/" in text
         try:
-            path = Path(text).expanduser() if is_path else towns / f"{text}.xml"
-            is_there = path.is_file()
+            paths = [Path(text), Path(f"{text}.xml")] if is_path else [towns / f"{text}.xml"]
+            found = next((path for path in (path.expanduser() for path in paths) if path.is_file()), None)
         except (OSError, RuntimeError) as error:  # no such user's home, no permission, too long a name
             problem = getattr(error, "strerror", None) or error
             raise UnknownNameError("town", text, hint=f"(cannot look there: {problem})") from error
-        if not is_there:
+        if found is None:
             hint = "(that file does not exist; or give the path of a MJCF that does)" if is_path else ""
             raise UnknownNameError("town", text, _names(towns), hint)
-        return AssetLibrary(path.resolve() if is_path else path)
+        return AssetLibrary(found.resolve() if is_path else found)
 
     @property
     def town_name(self) -> str:

@@ -9,9 +9,8 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-import mujoco
-
 from gear.values.errors import TownError
+from gear.world.mjspec import read_spec
 
 _LINE = re.compile(r",? line \d+\b")
 
@@ -24,7 +23,7 @@ def without_breaks(error: BaseException) -> str:
 def refusal_of(path: Path) -> str:
     """What stock MuJoCo has against a file alone; empty where it compiles it."""
     try:
-        mujoco.MjSpec.from_file(str(path)).compile()
+        read_spec(path).compile()
     except ValueError as error:
         return without_breaks(error)
     return ""

@@ -96,6 +96,18 @@ def test_what_is_asked_for_wrongly_is_told(tmp_path: Path) -> None:
         read_town(tmp_path / "no.xml")
 
 
+@pytest.mark.parametrize(("file", "said"), [("tiny.xml", "tiny"), ("tiny", "tiny"), ("tiny.mjcf", "tiny.mjcf")])
+def test_a_town_is_read_by_every_spelling_that_collections_take(
+    file: str, said: str, tmp_path: Path, tiny: Town, tiny_map: UInt8Image
+) -> None:
+    path = edited_town(tmp_path, "</custom>", "</custom><include file='more.xml'/>")
+    (path.parent / "more.xml").write_text("<mujoco><worldbody/></mujoco>", encoding="utf-8")
+    path = path.rename(path.with_name(file))
+    town = read_town(path.with_name(said), TINY_SCENES)
+    assert town.library.town == path.resolve() and town.to_json() | {"path": ""} == tiny.to_json() | {"path": ""}
+    assert np.array_equal(town_map.draw_map(town, ground_layer.Relief.of(path)), tiny_map)
+
+
 def test_an_unlabelled_geom_stops_the_map(tmp_path: Path) -> None:
     path = edited_town(tmp_path, '<geom name="lamp_post" class="pole"', '<geom name="lamp_post" class="seen"')
     with pytest.raises(TownError, match="geom 'lamp_post' can be seen but has class 'seen'"):

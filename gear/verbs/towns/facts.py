@@ -14,6 +14,7 @@ from gear.values.resources import data_dir
 from gear.values.serial import Json, to_json
 from gear.world.assets import AssetLibrary, read_numbers
 from gear.world.lanes import LaneGraph
+from gear.world.mjspec import read_spec
 from gear.world.scene_spec import SceneLibrary
 
 
@@ -92,7 +93,7 @@ def read_lanes(path: Path) -> LaneGraph:
     """
     read_numbers(path)
     try:
-        whole, custom = mujoco.MjSpec.from_file(str(path)), mujoco.MjSpec()
+        whole, custom = read_spec(path), mujoco.MjSpec()
         for numeric in whole.numerics:
             custom.add_numeric(name=numeric.name, size=numeric.size, data=numeric.data)
         for text in whole.texts:

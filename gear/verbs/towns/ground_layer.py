@@ -16,6 +16,7 @@ from gear.values.geometry import Array
 from gear.values.labels import LABEL_BY_NAME
 from gear.verbs.towns.canvas import Canvas, Colour
 from gear.world.classes import FIRST_HIDDEN_GROUP, GeomClasses, classify
+from gear.world.mjspec import read_spec
 from gear.world.models import GROUND_PREFIX
 from gear.world.refusals import without_breaks
 from gear.world.shapes import geom_triangles
@@ -70,7 +71,7 @@ class Relief:
             TownError: MuJoCo refuses it, or a visible geom has no label.
         """
         try:
-            spec = mujoco.MjSpec.from_file(str(path))
+            spec = read_spec(path)
             model = spec.compile()
         except ValueError as error:
             raise TownError(path, f"MuJoCo cannot compile it: {without_breaks(error)}") from error
