@@ -25,7 +25,8 @@ from gear.dataset.store import Store
 from gear.opening import open_dataset
 from gear.plugins.build import build, find
 from gear.render import RENDERERS, open_renderer
-from gear.verbs.collect.job import Job, resolve, scene_library
+from gear.verbs.collect.job import Job, resolve
+from gear.verbs.collect.names import scene_library
 from gear.verbs.collect.pipeline import collect_samples
 from gear.verbs.collect.run import manifest_facts
 from gear.verbs.collect.session import Session

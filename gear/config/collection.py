@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 from gear.config.nodes import Mapping, Node, Place
-from gear.config.reader import PLACES
 from gear.contracts.rendering import Quality
 from gear.values.errors import FieldError
 from gear.values.optics import CameraEffects
+from gear.values.serial import PLACES
 
 SPLIT_NAME = re.compile(r"(?!(gear|patches|scratch)$)[a-z][a-z0-9]*(_[a-z0-9]+)*")
 """Folders of gear's own are no splits."""

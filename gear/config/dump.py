@@ -9,8 +9,7 @@ from typing import Any
 import yaml
 
 from gear.config.nodes import Items, Mapping, Node, Scalar
-from gear.config.reader import holds_places
-from gear.values.serial import Json
+from gear.values.serial import Json, holds_places
 
 MAX_NODES = 100_000
 """No options hold more: aliases of aliases, which cost nothing to read, would be written out one by one."""

@@ -13,15 +13,12 @@ from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin
 
 from gear.config.nodes import Items, Mapping, Node, Place, Scalar
 from gear.values.errors import DuplicateNameError, FieldError, PatchError, UnknownNameError
-from gear.values.serial import type_hints
+from gear.values.serial import holds_places, type_hints
 
 T = TypeVar("T")
 
 TRUE_WORDS = ("true", "yes", "on")
 FALSE_WORDS = ("false", "no", "off")
-
-PLACES = {"places": True}
-"""Metadata of a field that is no key: the reader puts the places of the given values there, by their keys."""
 
 WHOLE = {"whole": True}
 """Metadata of a field whose default is one thing: who gives some of its keys does not mean the default's others."""
@@ -136,11 +133,6 @@ def _read_dataclass(kind: Any, node: Node, key: str, default: Any) -> Any:
         return kind(**given)
     except FieldError as error:
         raise places.get(error.field, mapping.place).error(join(key, error.field), error.problem) from error
-
-
-def holds_places(field: dataclasses.Field[Any]) -> bool:
-    """Whether a field says where the others were given, and is nothing that one can say."""
-    return PLACES.items() <= field.metadata.items()
 
 
 def _usual(field: dataclasses.Field[Any], default: Any) -> Any:

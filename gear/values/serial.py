@@ -14,6 +14,10 @@ Json = Any
 
 T = TypeVar("T")
 
+PLACES = {"places": True}
+"""Metadata of a field that is no key: a config's reader puts the places of the given values there, by their keys, and
+nobody writes it."""
+
 SHOWN = 60
 """Characters of a wrong value that a message shows."""
 
@@ -21,7 +25,8 @@ SHOWN = 60
 def to_json(value: Any) -> Json:
     """Dataclasses become dicts, tuples become lists, everything else must be JSON already."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {field.name: to_json(getattr(value, field.name)) for field in dataclasses.fields(value)}
+        said = [field.name for field in dataclasses.fields(value) if not holds_places(field)]
+        return {name: to_json(getattr(value, name)) for name in said}
     if isinstance(value, (tuple, list)):
         return [to_json(item) for item in value]
     if isinstance(value, dict):
@@ -29,6 +34,11 @@ def to_json(value: Any) -> Json:
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
     raise TypeError(f"{type(value).__name__} has no JSON form")
+
+
+def holds_places(field: dataclasses.Field[Any]) -> bool:
+    """Whether a field says where the others were given, and is nothing that one can say."""
+    return PLACES.items() <= field.metadata.items()
 
 
 @cache
@@ -87,7 +97,7 @@ def _read_dataclass(kind: Any, value: Json, where: str) -> Any:
     if not isinstance(value, dict):
         raise FieldError(where, f"expected a mapping, got {_shown(value)}")
     hints = type_hints(kind)
-    fields = {field.name: field for field in dataclasses.fields(kind)}
+    fields = {field.name: field for field in dataclasses.fields(kind) if not holds_places(field)}
     for key in value:
         if key not in fields:
             raise FieldError(f"{where}.{key}".lstrip("."), "unknown key")

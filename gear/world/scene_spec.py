@@ -6,9 +6,11 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
+from gear.config.nodes import Place
 from gear.config.reader import WHOLE
 from gear.values.errors import FieldError
 from gear.values.scene import Vec3
+from gear.values.serial import PLACES
 
 Range = tuple[float, float]
 CountRange = tuple[int, int]
@@ -36,11 +38,13 @@ class BoardSpec:
         position_m: ground point under the middle of its face, in the world.
         facing_deg: where its face looks, counter-clockwise from east.
         asset: name of its MJCF in `mjcf/surfaces`.
+        places: where a file gives what, by key.
     """
 
     position_m: Vec3
     facing_deg: float
     asset: str = "billboard"
+    places: dict[str, Place] = field(default_factory=dict, compare=False, repr=False, metadata=PLACES)
 
     def __post_init__(self) -> None:
         if max(map(abs, self.position_m)) > FARTHEST_M:
@@ -139,10 +143,12 @@ class TruckSpec:
     Attributes:
         asset: name of its MJCF in `mjcf/vehicles`.
         gap_m: from, to, between the ego's front and the face.
+        places: where a file gives what, by key.
     """
 
     asset: str = "truck_box"
     gap_m: Range = (3.0, 30.0)
+    places: dict[str, Place] = field(default_factory=dict, compare=False, repr=False, metadata=PLACES)
 
     def __post_init__(self) -> None:
         _check_range("gap_m", self.gap_m, least=0.5)
@@ -221,10 +227,12 @@ class SceneLibrary:
     Attributes:
         town: name of the town that the poses belong to.
         scenes: by name.
+        places: where a file gives what, by key.
     """
 
     town: str
     scenes: dict[str, SceneSpec]
+    places: dict[str, Place] = field(default_factory=dict, compare=False, repr=False, metadata=PLACES)
 
     def __post_init__(self) -> None:
         if not self.scenes:

@@ -9,7 +9,9 @@ from pathlib import Path
 from gear.config.nodes import Mapping, Node, Place
 from gear.values.errors import ConfigError, GearError, UnknownNameError
 from gear.verbs.bench.config import BenchConfig
-from gear.verbs.collect.job import scene_library
+from gear.verbs.collect.names import find_scenes
+from gear.world.assets import AssetLibrary
+from gear.world.bearers import check_assets
 from gear.world.scene_spec import SceneSpec
 
 
@@ -75,14 +77,16 @@ def calibration_scene(config: BenchConfig, node: Node, measured: tuple[Scene, ..
 
 def _named(town: str, names: tuple[str, ...]) -> Iterator[Scene]:
     """Those scenes of a town; all of its own that show patches, where none is named."""
-    own = None if all(":" in name for name in names) and names else scene_library(Path(town).stem).scenes
+    library = AssetLibrary.for_town(town)
+    own = None if all(":" in name for name in names) and names else find_scenes(library).scenes
     for name in names or [name for name, scene in (own or {}).items() if _surfaces(scene)]:
         path, _, bare = name.rpartition(":")
-        known = scene_library(path).scenes if path else own or {}
+        known = find_scenes(library, path).scenes if path else own or {}
         if bare not in known:
             raise UnknownNameError(f"scene of {path or town}", bare, known)
         if not _surfaces(known[bare]):
             raise GearError(f"scene {bare!r} has neither a board nor the truck, so no patch would be seen")
+        check_assets(library, known[bare], f"scenes.{bare}")
         yield Scene(town=town, name=name, surfaces=_surfaces(known[bare]))
 
 

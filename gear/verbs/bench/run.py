@@ -27,7 +27,8 @@ from gear.verbs.bench.places import calibration_scene, located, measured_scenes
 from gear.verbs.bench.plan import Match, Plan, Step, Verb
 from gear.verbs.bench.report import COLUMNS, BenchReport, Figure, Result, SceneFigure, TaskResult
 from gear.verbs.bench.table import text
-from gear.verbs.collect.job import find_weather, versions
+from gear.verbs.collect.job import versions
+from gear.verbs.collect.names import find_weather
 from gear.verbs.collect.run import collect
 from gear.verbs.evaluate.choice import check_optics
 from gear.verbs.evaluate.report import EvaluateReport

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import importlib.metadata
 import platform
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import cv2
 import mujoco
@@ -16,29 +14,21 @@ import numpy as np
 
 from gear.camera.optics import lens_map
 from gear.camera.response import response_for
-from gear.config.collection import CollectionConfig, SplitConfig, WeatherConfig
+from gear.config.collection import CollectionConfig, SplitConfig
 from gear.config.dump import to_plain
-from gear.config.load import load_simulation, split_of
-from gear.config.nodes import parse_file
-from gear.config.reader import holds_places, read_node, told_at
 from gear.contracts.rendering import RendererInfo
 from gear.contracts.tasks import SplitInfo
 from gear.dataset.plan import Plan
-from gear.plugins.build import blamed, build, find
+from gear.plugins.build import blamed, build
 from gear.plugins.catalogue import Found
 from gear.render.probing import renderer_info
-from gear.values.errors import ConfigError, UnknownNameError
-from gear.values.resources import data_dir
+from gear.values.errors import ConfigError
 from gear.values.scene import Weather
 from gear.values.serial import Json, to_json
-from gear.verbs.collect.patches import PatchSet, resolve_patch
-from gear.world.assets import AssetLibrary
+from gear.verbs.collect.names import look_up
+from gear.verbs.collect.patches import PatchSet
 from gear.world.digest import assets_digest
-from gear.world.scene_spec import SceneLibrary, SceneSpec
-from gear.world.weather import PRESETS
-
-ROOMY_FACTOR = 100
-"""Scenes without a board take so many times the vehicles, as in the original: they are not bound to one corner."""
+from gear.world.scene_spec import SceneSpec
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -80,43 +70,17 @@ class Job:
 
 
 def resolve(config: CollectionConfig) -> Job:
-    """Looks up every name in a config, before anything is rendered.
+    """Looks up every name in a config and asks for the renderer, before anything is rendered.
 
     Raises:
-        UnknownNameError: a task, town, scene, split or weather is not known; says what may have been meant.
-        ConfigError: likewise, of a name that a file has; a scene library or the task's options cannot be read, or the
-            lens folds its pictures over.
-        PatchError: the patch cannot be used.
+        UnknownNameError, PatchError: as `look_up`.
+        ConfigError: likewise, or the lens folds its pictures over.
         BackendError: the renderer cannot start here.
     """
-    with told_at(config.places, "scene"):
-        config = with_scene_file(config)
-    with told_at(config.places, "task"):
-        found = find("task", config.task)
-    options = read_node(found.spec.config, config.options, "options")
-    _check_lens(config, found)
-    with told_at(config.places, "town"):
-        library = AssetLibrary.for_town(config.town)
-    with told_at(config.places, "simulation"):
-        simulation = load_simulation(config.simulation)
-    with told_at(config.places, "scenes" if config.scenes else "town"):
-        scenes = find_scenes(config, library.town_name)
-    with told_at(config.places, "scene"):
-        scene = find_scene(config, scenes)
-    roomy = 1 if scene.boards else ROOMY_FACTOR
-    scene = scene.capped(simulation.max_vehicles * roomy, simulation.max_pedestrians).crowded(config.crowd)
-    with told_at(config.places, "split"):
-        split = split_of(simulation, config.split)
-    split = dataclasses.replace(
-        split,
-        seed=split.seed if config.seed is None else config.seed,
-        samples=split.samples if config.samples is None else config.samples,
-    )
-    with told_at(config.weather.places, "preset", "weather"):
-        weather = find_weather(config.weather)
-    surfaces = len(scene.boards) if scene.truck is None else 1
-    with told_at(config.places, "patch"):
-        patch = resolve_patch(config.patch, surfaces=surfaces, seed=config.patch_seed)
+    named = look_up(config)
+    spec, owner = named.task.spec, named.task.owner
+    config, library, split, weather, patch = named.config, named.library, named.split, named.weather, named.patch
+    _check_lens(config, named.task)
     info = SplitInfo(
         town=library.town_name, scene=config.scene, split=config.split, seed=split.seed, patch_label=patch.label
     )
@@ -129,7 +93,7 @@ def resolve(config: CollectionConfig) -> Job:
         "seed": split.seed,
         "frames": split.frames,
         "interval_s": split.interval_s,
-        "scene": to_json(scene),
+        "scene": to_json(named.scene),
         "weather": to_json(weather),
         "renderer": to_json(renderer),
         "quality": config.quality,
@@ -139,8 +103,8 @@ def resolve(config: CollectionConfig) -> Job:
         "versions": versions(),
     }
     plan = Plan(
-        task={"name": found.spec.name, "package": found.owner.package, "version": found.owner.version},
-        options=to_plain(options),
+        task={"name": spec.name, "package": owner.package, "version": owner.version},
+        options=to_plain(named.options),
         content=content,
         patch={"label": patch.label, "sha256": patch.digest},
         info=info,
@@ -150,7 +114,7 @@ def resolve(config: CollectionConfig) -> Job:
     return Job(
         config=config,
         split=split,
-        scene=scene,
+        scene=named.scene,
         weather=weather,
         patch=patch,
         root=dataset_root(config, info, weather),
@@ -172,74 +136,6 @@ def _check_lens(config: CollectionConfig, task: Found) -> None:
         except ValueError as error:
             problem = f"{error}; take k1 and k2 nearer to 0, or a narrower field of view"
             raise ConfigError("camera", 0, 0, "lens", problem) from error
-
-
-def with_scene_file(config: CollectionConfig) -> CollectionConfig:
-    """Takes a scene given as a file apart: `my.yml:corner`, or `my.yml` where it holds only one.
-
-    Raises:
-        UnknownNameError: the file holds several scenes and none was named.
-    """
-    path, _, name = config.scene.rpartition(":") if ":" in config.scene else (config.scene, "", "")
-    if not path.endswith((".yml", ".yaml")):
-        return config
-    scenes = scene_library(path).scenes
-    if not name and len(scenes) > 1:
-        raise UnknownNameError("scene", config.scene, scenes, f"(say which: --scene {path}:{next(iter(scenes))})")
-    return dataclasses.replace(config, scenes=path, scene=name or next(iter(scenes)))
-
-
-def find_scenes(config: CollectionConfig, town: str) -> SceneLibrary:
-    """The scene library that the config names, or the town's own."""
-    library = scene_library(config.scenes or town)
-    if config.scenes and library.town != town:
-        raise ConfigError(
-            config.scenes, 0, 0, "town", f"its boards stand in {library.town}, not in {town}; use --town {library.town}"
-        )
-    return library
-
-
-def find_scene(config: CollectionConfig, library: SceneLibrary) -> SceneSpec:
-    """The scene by name."""
-    if config.scene not in library.scenes:
-        raise UnknownNameError(f"scene of {library.town}", config.scene, library.scenes)
-    return library.scenes[config.scene]
-
-
-def scene_library(name: str) -> SceneLibrary:
-    """A scene library by the name of its town, or by path.
-
-    Raises:
-        UnknownNameError: there is none.
-        ConfigError: it cannot be read.
-    """
-    path = Path(name)
-    if path.suffix not in (".yml", ".yaml"):
-        folder = data_dir("configs") / "scenes"
-        path = folder / f"{name}.yml"
-        if not path.is_file():
-            hint = "(write one and give it with --set scenes=FILE.yml)"
-            raise UnknownNameError("scene library for town", name, (p.stem for p in folder.glob("*.yml")), hint)
-    return read_node(SceneLibrary, parse_file(path))
-
-
-def find_weather(config: WeatherConfig) -> Weather:
-    """The preset with what the config changes in it.
-
-    Raises:
-        UnknownNameError: there is no such preset.
-    """
-    if config.preset not in PRESETS:
-        raise UnknownNameError("weather", config.preset, PRESETS)
-    changes: dict[str, Any] = {
-        field.name: getattr(config, field.name)
-        for field in dataclasses.fields(config)
-        if field.name != "preset" and not holds_places(field) and getattr(config, field.name) is not None
-    }
-    preset = PRESETS[config.preset]
-    if all(getattr(preset, name) == value for name, value in changes.items()):
-        return preset
-    return dataclasses.replace(preset, name=f"{preset.name}*", **changes)
 
 
 def dataset_root(config: CollectionConfig, info: SplitInfo, weather: Weather) -> Path:

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import mujoco
 
-from gear.config.nodes import parse_file
-from gear.config.reader import read_node
-from gear.values.errors import ConfigError, TownError, UnknownNameError
+from gear.values.errors import TownError, UnknownNameError
 from gear.values.resources import data_dir
 from gear.values.serial import Json, to_json
+from gear.verbs.collect.names import find_scenes
 from gear.world.assets import AssetLibrary, read_numbers
+from gear.world.bearers import check_assets
 from gear.world.lanes import LaneGraph
 from gear.world.mjspec import read_spec
 from gear.world.scene_spec import SceneLibrary
@@ -74,12 +74,12 @@ def read_town(town: str | Path, scenes: str | Path | None = None) -> Town:
 
     Args:
         town: its name, or the path of its MJCF.
-        scenes: path of its scene library; gear's own for that town if left out.
+        scenes: its scene library, as collections name it; gear's own for that town if left out.
 
     Raises:
-        UnknownNameError: there is no such town or file.
+        UnknownNameError: there is no such town or file, or a scene names a board or a truck that is not there.
         TownError: the town breaks the conventions.
-        ConfigError: the scene library cannot be read, or is another town's.
+        ConfigError: likewise, with its place; or the scene library cannot be read, or is another town's.
     """
     library = AssetLibrary.for_town(town)
     return Town(library=library, lanes=read_lanes(library.town), scenes=_scenes(library, scenes))
@@ -105,12 +105,12 @@ def read_lanes(path: Path) -> LaneGraph:
 
 
 def _scenes(library: AssetLibrary, given: str | Path | None) -> SceneLibrary | None:
-    path = Path(given) if given is not None else data_dir("configs") / "scenes" / f"{library.town_name}.yml"
-    if not path.is_file():
+    try:
+        scenes = find_scenes(library, "" if given is None else str(given))
+    except UnknownNameError:
         if given is None:
             return None
-        raise UnknownNameError("scene library", str(given), hint="(that file does not exist)")
-    found = read_node(SceneLibrary, parse_file(path))
-    if given is not None and found.town != library.town_name:
-        raise ConfigError(path, 0, 0, "town", f"its boards stand in {found.town}, not in {library.town_name}")
-    return found
+        raise
+    for name, scene in scenes.scenes.items():
+        check_assets(library, scene, f"scenes.{name}")
+    return scenes
