@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from gear.cli.main import main
 from gear.config.load import load_collection
-from gear.testing.tiny_town import TINY_TOWN
+from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import ConfigError, UnknownNameError
 from gear.verbs.collect.names import look_up
 from gear.verbs.towns.facts import read_town
@@ -48,3 +49,34 @@ def test_a_scene_library_is_found_by_commands_alike(tmp_path: Path) -> None:
     assert read_town("town10", "town10").scenes == read_town("town10").scenes
     with pytest.raises(UnknownNameError, match=r"no scene library named '.*gone.yml' \(that file does not exist\)"):
         look_up(load_collection(None, {"task": "depth"}, [f"scenes={tmp_path}/gone.yml"]))
+
+
+@pytest.mark.parametrize(
+    ("flag", "value", "message"),
+    [
+        ("--task", "semsex", "no task named 'semsex'; did you mean semseg?"),
+        ("--town", "tonw10", "no town named 'tonw10'; did you mean town10?"),
+        ("--scene", "truk", "no scene of town10 named 'truk'; did you mean truck?"),
+        ("--split", "trian", "no split named 'trian'; did you mean train?"),
+        ("--weather", "Foggy", "no weather named 'Foggy'"),
+        ("--patch", "nowhere", "patch nowhere: is not there"),
+        ("--set", "simulation=defalt", "no simulation config named 'defalt'; did you mean default?"),
+        ("--set", "options.width=3", "options.width: unknown key (did you mean 'width_px'?)"),
+    ],
+)
+def test_show_config_prints_nothing_that_cannot_be_collected(
+    flag: str, value: str, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["show-config", "--task", "semseg", flag, value]) == 2
+    printed = capsys.readouterr()
+    assert message in printed.err and printed.err.count("\n") == 1 and printed.out == ""
+
+
+def test_show_config_prints_what_reads_back_as_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "c.yml"
+    argv = ["--task", "semseg", "--town", str(TINY_TOWN), "--scene", f"{TINY_SCENES}:double"]
+    assert main(["show-config", *argv, "--set", "options.width_px=64"]) == 0
+    file.write_text(printed := capsys.readouterr().out)
+    assert f"scene: {TINY_SCENES}:double" in printed
+    assert main(["show-config", "--config", str(file)]) == 0
+    assert capsys.readouterr().out == printed
