@@ -33,6 +33,7 @@ from authoring.weights.plan import (
     held_out,
     training,
 )
+from gear.cli.unread import print_no_more
 from gear.values.errors import GearError
 
 TRAINING_SAMPLES = 1000
@@ -74,10 +75,15 @@ def main() -> int:
     renewed.set_defaults(run=renew.run)
     args = parser.parse_args()
     try:
-        return int(args.run(args))
+        code = int(args.run(args))
+        sys.stdout.flush()  # what fails at Python's own end, nobody catches
+    except BrokenPipeError:
+        print_no_more()
+        return 0
     except GearError as error:
         print(f"authoring.weights: {error}", file=sys.stderr)
         return 2
+    return code
 
 
 def run(args: argparse.Namespace) -> int:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import argparse
 import errno
 import importlib
-import os
 import signal
 import sys
 from collections.abc import Sequence
 from types import FrameType
 
 from gear.cli.parser import Parser
+from gear.cli.unread import print_no_more
 from gear.values.errors import GearError, UnknownNameError
 
 COMMANDS: dict[str, str] = {
@@ -77,7 +77,7 @@ def main(argv: Sequence[str]) -> int:
         code = _run(argv)
         sys.stdout.flush()  # what fails at Python's own end, nobody catches
     except BrokenPipeError:
-        _print_no_more()
+        print_no_more()
         return 0
     except (KeyboardInterrupt, Exception) as error:
         interrupt = _interrupt_behind(error)
@@ -89,7 +89,7 @@ def main(argv: Sequence[str]) -> int:
             return 2
         if isinstance(error, OSError) and error.errno in FULL:  # a stream that says no name, as that of `> file`
             print(f"gear: {error.strerror}", file=sys.stderr)
-            _print_no_more()
+            print_no_more()
             return 2
         if isinstance(error, FileNotFoundError) and str(error.strerror).startswith(NO_TEMPORARY):
             print(
@@ -140,14 +140,6 @@ def _run(argv: Sequence[str]) -> int:
 
 def _terminate(number: int, frame: FrameType | None) -> None:
     raise Terminated
-
-
-def _print_no_more() -> None:
-    """Drops what is still to be printed, where it can no more be: Python tries once more at its end."""
-    try:
-        sys.stdout.flush()
-    except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _interrupt_behind(error: BaseException | None) -> KeyboardInterrupt | None:

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
 
 from authoring.weights.plan import (
@@ -18,6 +23,7 @@ from gear.config.nodes import parse_file
 from gear.config.reader import read_node
 from gear.verbs.collect.job import resolve
 
+ROOT = Path(__file__).parents[2]
 TASKS = tuple(TRAINING_OPTIONS)
 
 
@@ -59,3 +65,15 @@ def test_every_collection_can_be_made(task: str) -> None:
         job = resolve(load_collection(None, flags(one), [*one.settings, f"patch_seed={one.seed}"]))
         assert job.plan.info.seed == one.seed and job.plan.samples == one.samples
         assert job.plan.info.split == one.split
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_list_that_nobody_reads_to_its_end_is_no_error(unbuffered: str) -> None:
+    """Whether it comes up at the first line or at the end, when the rest is printed."""
+    reading, writing = os.pipe()
+    os.close(reading)
+    command = [sys.executable, "-m", "authoring.weights", "training", "--task", "depth", "--list"]
+    with os.fdopen(writing, "wb") as closed:
+        env = os.environ | {"PYTHONUNBUFFERED": unbuffered}
+        done = subprocess.run(command, stdout=closed, stderr=subprocess.PIPE, check=False, env=env, cwd=ROOT)
+    assert (done.returncode, done.stderr) == (0, b"")
