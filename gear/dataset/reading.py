@@ -26,7 +26,8 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
         root: its folder.
         plan: what it was made with.
         task: the task that wrote it.
-        manifest: versions, renderer, configuration and file hashes.
+        manifest: versions, renderer, configuration and file hashes; of sidecars, where it was written by a gear that
+            says them.
     """
 
     root: Path
@@ -95,7 +96,7 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
 
     def verify(self) -> list[str]:
         """Files that are missing or differ from the manifest's hashes, by relative path."""
-        wanted: dict[str, str] = dict(self.manifest["indexes"])
+        wanted: dict[str, str] = {**self.manifest["indexes"], **self.manifest.get("sidecars", {})}
         for sample in self.manifest["samples"]:
             wanted.update(sample["files"])
         return [relative for relative, digest in wanted.items() if not self._is_whole(relative, digest)]
@@ -118,14 +119,15 @@ def read_manifest(root: Path, split: str) -> Json:
     remedy = "delete it and run the same collection again"
     try:
         samples = manifest["samples"]
-        files = [manifest["indexes"], *(sample["files"] for sample in samples)]
+        files = {"indexes": manifest["indexes"], "sidecars": manifest.get("sidecars", {})}
+        files |= {f"samples[{number}].files": sample["files"] for number, sample in enumerate(samples)}
     except (KeyError, TypeError) as error:
         raise DatasetError(path, f"is no manifest of this version of gear; {remedy}") from error
     if not isinstance(samples, list):
         raise DatasetError(path, f"has no list of samples; {remedy}")
-    for number, one in enumerate(files):
+    for key, one in files.items():
         try:
-            from_json(dict[str, str], one, "indexes" if number == 0 else f"samples[{number - 1}].files")
+            from_json(dict[str, str], one, key)
         except FieldError as error:
             raise DatasetError(path, f"is no manifest of this version of gear ({error}); {remedy}") from error
     return manifest

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gear.contracts.tasks import Auxiliary, Encoded, Sample, Sidecar, Task
-from gear.dataset.files import clear_scratch, explained, inside, sha256, sync_folder, write_whole
+from gear.dataset.files import clear_scratch, explained, inside, read_bytes, sha256, sync_folder, write_whole
 from gear.dataset.layout import GEAR, begun_path, manifest_path, patch_path, plan_path, sidecar_path, split_folder
 from gear.dataset.plan import Plan, begin, read_plan
 from gear.dataset.sidecar import dump_json, load_json, no_sidecar, read_sidecar, sidecar_bytes
@@ -48,13 +48,28 @@ class Store:
         """Begins the split or takes it up again; one that was killed before its first sample was not begun.
 
         Raises:
-            DatasetError: it cannot be written, or was made with another configuration.
+            DatasetError: it cannot be written, was made with another configuration, or has a sidecar that is no longer
+                the one that was collected.
         """
         clear_scratch(self.root)
         _forget_empty(self.root, self.plan)
+        self._refuse_changed()
         begin(self.root, self.plan)
         for name, data in patch_files.items():
             self._keep_patch(patch_path(self.plan.info.patch_label, name), data)
+
+    def _refuse_changed(self) -> None:
+        """The manifest that is written at the end would take changed sidecars for collected ones."""
+        there = _load_if_whole(inside(self.root, manifest_path(self.split)))
+        hashes = there.get("sidecars") if isinstance(there, dict) else None
+        for relative, digest in hashes.items() if isinstance(hashes, dict) else ():
+            path = inside(self.root, relative)
+            if path.exists() and sha256(read_bytes(path)) != digest:
+                read_sidecar(path)  # says more of what cannot be true
+                problem = (
+                    "is not what the manifest says that was collected; delete it and run the same collection again"
+                )
+                raise DatasetError(path, problem)
 
     def _keep_patch(self, relative: str, data: bytes) -> None:
         """Copies a patch into the dataset, unless another split shows another one of the same name."""
@@ -157,6 +172,10 @@ class Store:
         """
         return [read_sidecar(inside(self.root, sidecar_path(self.split, i))) for i in range(self.plan.samples)]
 
+    def _hashes_of_sidecars(self) -> dict[str, str]:
+        paths = [sidecar_path(self.split, index) for index in range(self.plan.samples)]
+        return {relative: sha256(read_bytes(inside(self.root, relative))) for relative in paths}
+
     def close(self, task: Task[Any, Any], facts: Mapping[str, Json]) -> None:
         """Writes the format's index files and then the manifest; nothing where a run of more samples has begun since:
         the split is whole when that one closes it.
@@ -196,6 +215,7 @@ class Store:
                 for s in sidecars
             ],
             "indexes": indexes,
+            "sidecars": self._hashes_of_sidecars(),
         }
         data = dump_json(manifest)
         target = inside(self.root, manifest_path(self.split))

@@ -109,7 +109,7 @@ def write_page(
 def about(dataset: Dataset[Any], scale: float) -> dict[str, Json]:
     """What the page says of the whole split."""
     plan = dataset.plan
-    known = {key: value for key, value in dataset.manifest.items() if key not in ("samples", "indexes")}
+    known = {key: value for key, value in dataset.manifest.items() if key not in ("samples", "indexes", "sidecars")}
     named = {"task": plan.task, "options": plan.options, "content": plan.content, "patch": plan.patch}
     info = plan.info
     return {
