@@ -237,3 +237,5 @@ class SceneLibrary:
     def __post_init__(self) -> None:
         if not self.scenes:
             raise FieldError("scenes", "a scene library needs at least one scene")
+        if "" in self.scenes:
+            raise FieldError("scenes", "a scene needs a name, such as corner")

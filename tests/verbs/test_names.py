@@ -10,6 +10,7 @@ from gear.cli.main import main
 from gear.config.load import load_collection
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import ConfigError, UnknownNameError
+from gear.verbs.collect.job import resolve
 from gear.verbs.collect.names import look_up
 from gear.verbs.towns.facts import read_town
 
@@ -49,6 +50,24 @@ def test_a_scene_library_is_found_by_commands_alike(tmp_path: Path) -> None:
     assert read_town("town10", "town10").scenes == read_town("town10").scenes
     with pytest.raises(UnknownNameError, match=r"no scene library named '.*gone.yml' \(that file does not exist\)"):
         look_up(load_collection(None, {"task": "depth"}, [f"scenes={tmp_path}/gone.yml"]))
+    for name in ("a" * 300, f"{'a' * 300}.yml"):
+        with pytest.raises(ConfigError, match=f"^{name}: cannot read it: File name too long"):
+            look_up(load_collection(None, {"task": "depth"}, [f"scenes={name}"]))
+
+
+def test_a_scene_without_a_name_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "my.yml"
+    file.write_text('town: tiny\nscenes:\n  "": {}\n')
+    with pytest.raises(ConfigError, match=r"my.yml:3:3: scenes: a scene needs a name"):
+        look_up(load_collection(None, {"task": "depth", "town": str(TINY_TOWN), "scene": str(file)}))
+
+
+def test_a_lens_that_folds_is_told_where_the_file_gives_it(tmp_path: Path) -> None:
+    file = tmp_path / "c.yml"
+    file.write_text("task: semseg\ncamera: {lens: {k1: -0.5, k2: -0.5}}\noptions: {hfov_deg: 150}\n")
+    flags = {"town": str(TINY_TOWN), "scene": f"{TINY_SCENES}:board", "renderer": "classic"}
+    with pytest.raises(ConfigError, match=r"c.yml:2:9: camera.lens: a lens of k1 -0.5 and k2 -0.5 folds"):
+        resolve(load_collection(str(file), flags))
 
 
 @pytest.mark.parametrize(

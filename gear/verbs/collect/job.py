@@ -135,6 +135,9 @@ def _check_lens(config: CollectionConfig, task: Found) -> None:
             lens_map(lens, camera.width_px, camera.height_px, camera.intrinsics.focal_px)
         except ValueError as error:
             problem = f"{error}; take k1 and k2 nearer to 0, or a narrower field of view"
+            place = config.places.get("camera")
+            if place is not None and place.line:
+                raise place.error("camera.lens", problem) from error
             raise ConfigError("camera", 0, 0, "lens", problem) from error
 
 

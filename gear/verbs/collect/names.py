@@ -13,7 +13,7 @@ from gear.config.nodes import Place, parse_file
 from gear.config.reader import read_node, told_at
 from gear.plugins.build import find
 from gear.plugins.catalogue import Found
-from gear.values.errors import UnknownNameError
+from gear.values.errors import ConfigError, UnknownNameError
 from gear.values.resources import data_dir
 from gear.values.scene import Weather
 from gear.values.serial import holds_places
@@ -143,14 +143,17 @@ def scene_library(name: str) -> SceneLibrary:
         UnknownNameError: there is none.
         ConfigError: it cannot be read.
     """
-    path, folder = Path(name), data_dir("configs") / "scenes"
-    if path.suffix not in (".yml", ".yaml"):
-        path = folder / f"{name}.yml"
-        if not path.is_file():
-            hint = "(write one and give its file, FILE.yml)"
-            raise UnknownNameError("scene library for town", name, (p.stem for p in folder.glob("*.yml")), hint)
-    elif not path.exists():
+    folder, is_path = data_dir("configs") / "scenes", Path(name).suffix in (".yml", ".yaml")
+    path = Path(name) if is_path else folder / f"{name}.yml"
+    try:
+        is_there = path.exists()
+    except OSError as error:
+        raise ConfigError(name, 0, 0, "", f"cannot read it: {error.strerror}") from error
+    if not is_there and is_path:
         raise UnknownNameError("scene library", name, hint="(that file does not exist)")
+    if not is_there:
+        hint = "(write one and give its file, FILE.yml)"
+        raise UnknownNameError("scene library for town", name, (p.stem for p in folder.glob("*.yml")), hint)
     return read_node(SceneLibrary, parse_file(path))
 
 
