@@ -7,6 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from gear.contracts.tasks import Sample
 from gear.dataset.files import refuse_folder, write_alone
 from gear.opening import open_dataset
 from gear.values.frames import UInt8Image
@@ -28,14 +29,22 @@ def contact_sheet(path: str | Path, *, split: str | None = None, samples: int = 
     dataset = open_dataset(path, split)
     rows: list[UInt8Image] = []
     for sample in dataset[: min(samples, len(dataset))]:
-        record = sample.record
-        cells = []
-        for name, picture in dataset.task.preview(sample).items():
-            seen = ", ".join(f"{s.name} {s.visible_fraction:.0%} at {s.distance_m:.0f} m" for s in sample.surfaces[:2])
-            cells.append(_cell(picture, f"{record.split} {record.index:06d}  {name}  {record.scene}  {seen}"))
-        rows.append(_beside(cells))
+        previews = dataset.task.preview(sample).items()
+        rows.append(_beside([_cell(picture, caption(sample, name)) for name, picture in previews]))
     width = max(row.shape[1] for row in rows)
     return np.concatenate([_widened(row, width) for row in rows])
+
+
+def caption(sample: Sample, name: str) -> str:
+    """The line over a preview: sample, name, scene, and how the first two surfaces are seen.
+
+    A preview that is called as a camera says what that camera sees, any other one what the first camera does.
+    """
+    record = sample.record
+    camera = name if name in sample.images else record.cameras[0].name
+    seen = [truth for truth in sample.surfaces if truth.camera == camera][:2]
+    surfaces = ", ".join(f"{truth.name} {truth.visible_fraction:.0%} at {truth.distance_m:.0f} m" for truth in seen)
+    return f"{record.split} {record.index:06d}  {name}  {record.scene}  {surfaces}"
 
 
 def write_sheet(path: str | Path, out: str | Path, *, split: str | None = None, samples: int = 12) -> Path:
