@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from pathlib import Path
+from statistics import fmean
+from typing import TYPE_CHECKING, Any
 
 from gear.contracts.specs import TaskSpec
 from gear.dataset.files import write_whole
 from gear.verbs.train.checkpoint import Progress
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 FILE = "curves.png"
 BLUE, RED, GREEN = "#1f5fa8", "#b3402a", "#2f7d4f"
@@ -23,7 +29,10 @@ def write_curves(root: Path, spec: TaskSpec, progress: Progress, title: str) -> 
     left, right = figure.subplots(1, 2)
     figure.suptitle(title, fontsize=10)
 
-    left.plot([p["step"] for p in progress.steps], [p["loss"] for p in progress.steps], color=BLUE, label="training")
+    losses = [(entry["step"], entry["loss"]) for entry in progress.steps]
+    if progress.open_losses:
+        losses.append((progress.step, fmean(progress.open_losses)))
+    _line(left, losses, color=BLUE, label="training")
     steps = [entry["step"] for entry in progress.validations]
     left.plot(steps, [entry["loss"] for entry in progress.validations], "o-", color=RED, ms=3, label="validation")
     left.set(xlabel="step", ylabel="loss")
@@ -36,11 +45,19 @@ def write_curves(root: Path, spec: TaskSpec, progress: Progress, title: str) -> 
         right.axvline(progress.best_step, color=GREEN, lw=0.8, ls=":")
     right.set(xlabel="step", ylabel=spec.figure)
     right.grid(alpha=0.3)
-    rate = right.twinx()
-    rate.plot([p["step"] for p in progress.steps], [p["rate"] for p in progress.steps], color="0.6", lw=1)
-    rate.set_ylabel("learning rate", color="0.5")
-    rate.tick_params(colors="0.5")
+    if progress.steps:
+        rate = right.twinx()
+        rates = [(entry["step"], entry["rate"]) for entry in progress.steps]
+        _line(rate, rates, color="0.6", lw=1)
+        rate.set_ylabel("learning rate", color="0.5")
+        rate.tick_params(colors="0.5")
 
     data = io.BytesIO()
     figure.savefig(data, format="png", dpi=120, metadata={"Software": None})
     write_whole(root, FILE, data.getvalue())
+
+
+def _line(axis: Axes, points: Sequence[tuple[float, float]], **style: Any) -> None:
+    """A line through steps and values; of one point alone, where a line shows nothing, a dot."""
+    if points:
+        axis.plot(*zip(*points, strict=True), marker="" if len(points) > 1 else "o", ms=3, **style)
