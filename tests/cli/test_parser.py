@@ -34,6 +34,7 @@ def said(capsys: pytest.CaptureFixture[str], argv: list[str]) -> str:
         ("colect --task semseg", "gear: no command named 'colect'; did you mean collect?"),
         ("sheet data --jsn", "gear sheet: no flag --jsn"),
         ("evaluate --model m --data d --devcie=cpu", "gear evaluate: no flag --devcie; did you mean --device?"),
+        ("train --task t --model m --data d --out o --resume", "gear train: no flag --resume; gear train --help"),
         ("evaluate --data d", "gear evaluate: the following arguments are required: --model; gear evaluate --help"),
         ("sheet a b c", "gear sheet: does not know what to do with 'b c'"),
         ("plugins --kind modl", "gear plugins: argument --kind: invalid choice: 'modl'"),
