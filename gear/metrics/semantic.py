@@ -67,10 +67,13 @@ class SemanticEvaluator:
         """Takes (H, W) uint8 label ids; returns `miou` of this picture.
 
         Raises:
-            ValueError: the prediction has another shape or holds ids below 0 or above 33.
+            ValueError: the prediction has another shape, or holds what is no id: numbers with a fraction, below 0 or
+                above 33.
         """
         if prediction.shape != sample.label_ids.shape:
             raise ValueError(f"prediction must have shape {sample.label_ids.shape}, got {prediction.shape}")
+        if prediction.dtype.kind not in "biu":
+            raise ValueError(f"prediction must hold label ids as whole numbers, got {prediction.dtype}")
         for extreme in (prediction.min(), prediction.max()) if prediction.size else ():
             if not 0 <= extreme < COUNT:
                 raise ValueError(f"prediction must hold label ids 0..{COUNT - 1}, got {extreme}")

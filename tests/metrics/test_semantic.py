@@ -152,6 +152,8 @@ def test_wrong_predictions_are_refused() -> None:
         SemanticEvaluator().update(sample, np.zeros((2, 2), dtype=np.uint8))
     with pytest.raises(ValueError, match="label ids"):
         SemanticEvaluator().update(sample, np.full((120, 200), 255, dtype=np.uint8))
+    with pytest.raises(ValueError, match="whole numbers, got float32"):
+        SemanticEvaluator().update(sample, sample.label_ids.astype(np.float32))
 
 
 def test_an_id_below_0_is_no_pixel_of_the_class_before() -> None:
