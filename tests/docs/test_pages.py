@@ -48,6 +48,17 @@ def test_the_python_of_the_page_on_evaluating_runs(tmp_path: Path, monkeypatch: 
     assert runpy.run_path(str(module))["batch"].indices
 
 
+def test_a_folder_is_of_one_task_on_whatever_page_it_is_collected() -> None:
+    """Who follows the README and then a page would be told that the folder holds another task's dataset."""
+    tasks: dict[str, set[str]] = {}
+    for page in (DOCS.parent / "README.md", *sorted(DOCS.glob("*.md"))):
+        text = page.read_text().replace("\\\n", " ")
+        for task, folder in re.findall(r"gear collect --task (\w+)[^\n]*? --out (\S+)", text):
+            tasks.setdefault(folder, set()).add(task)
+    assert len(tasks) > 8
+    assert {folder: sorted(of) for folder, of in tasks.items() if len(of) > 1} == {}
+
+
 def test_the_contract_of_a_town_that_the_page_on_mjcf_shows_can_be_subclassed_as_shown(tmp_path: Path) -> None:
     (code,) = blocks(DOCS / "mjcf-conventions.md", "python")
     module = tmp_path / "test_mine.py"
