@@ -10,6 +10,7 @@ from typing import Any
 from gear.camera.develop import Darkroom
 from gear.contracts.rendering import RawView, Renderer
 from gear.contracts.tasks import Encoded, Sample, Task
+from gear.dataset.given import check_encoded
 from gear.formats.probes import AuxiliaryFiles, probe_files
 from gear.plugins.build import blamed, build, find
 from gear.plugins.catalogue import Found
@@ -81,7 +82,7 @@ class Session:
         frame = self.develop(shot)
         with blamed(self.plugin, f"sample {shot.record.index}"):
             sample = self.task.ground_truth(frame, shot.record)
-            encoded = self.task.encode(sample, self.job.plan.info)
+            encoded = check_encoded(self.task.encode(sample, self.job.plan.info), "encode")
         if shot.probes is None:
             return sample, encoded, {}
         probes = develop_probes(self.darkroom, shot.probes, shot.raw, shot.record, shot.geoms)

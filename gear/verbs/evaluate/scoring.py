@@ -11,6 +11,7 @@ from typing import Any
 from gear.contracts.evaluation import KeepsPredictions, Reports
 from gear.contracts.tasks import Sample
 from gear.dataset.files import explained, inside, read_bytes, sha256, write_whole
+from gear.dataset.given import check_encoded
 from gear.dataset.reading import Dataset
 from gear.dataset.sidecar import dump_json, load_json
 from gear.plugins.catalogue import Found, one_line
@@ -119,8 +120,8 @@ class Scorer:
         """What there is to say of an answer, with the files that say it."""
         with self._blamed(index):
             figures, parts = self._measure(sample, answer.prediction)
-            encoded = self._keeper and self._keeper.encode_prediction(
-                sample, answer.prediction, self._dataset.plan.info
+            encoded = self._keeper and check_encoded(
+                self._keeper.encode_prediction(sample, answer.prediction, self._dataset.plan.info), "encode_prediction"
             )
         files = encoded.files if encoded else {}
         note = Note(
