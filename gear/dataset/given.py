@@ -1,11 +1,14 @@
-"""What a task gives to be written, held to its contract before a byte of it is."""
+"""What a task gives to be written or looked at, held to its contract first."""
 
 from __future__ import annotations
 
 import json
 from typing import Any
 
+import numpy as np
+
 from gear.contracts.tasks import Encoded
+from gear.values.frames import UInt8Image
 
 
 def check_encoded(given: Any, method: str) -> Encoded:
@@ -25,3 +28,19 @@ def check_encoded(given: Any, method: str) -> Encoded:
     except (TypeError, ValueError) as error:
         raise type(error)(f"{method}: facts must be JSON: {error}") from error
     return given
+
+
+def check_previews(given: Any) -> dict[str, UInt8Image]:
+    """Takes what `preview` of a task returned, and gives it back by name.
+
+    Raises:
+        TypeError: one is no (H, W, 3) uint8 picture, or they are no mapping.
+        ValueError: they are no mapping.
+    """
+    pictures = dict(given)
+    for name, pixels in pictures.items():
+        good = isinstance(pixels, np.ndarray) and pixels.dtype == np.uint8 and pixels.ndim == 3
+        if not (good and pixels.shape[2] == 3 and pixels.size):
+            got = f"{pixels.dtype} {pixels.shape}" if isinstance(pixels, np.ndarray) else type(pixels).__name__
+            raise TypeError(f"preview {name!r} is no (H, W, 3) uint8 picture but {got}")
+    return {str(name): pixels for name, pixels in pictures.items()}

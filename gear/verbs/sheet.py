@@ -9,7 +9,9 @@ import numpy as np
 
 from gear.contracts.tasks import Sample
 from gear.dataset.files import refuse_folder, write_alone
+from gear.dataset.given import check_previews
 from gear.opening import open_dataset
+from gear.plugins.build import blamed, find, name_of_task
 from gear.values.frames import UInt8Image
 
 CELL_WIDTH_PX = 640
@@ -25,12 +27,17 @@ def contact_sheet(path: str | Path, *, split: str | None = None, samples: int = 
 
     Raises:
         DatasetError: there is no finished split to show.
+        PluginError: a third party's task failed, or gave no pictures to look at.
     """
     dataset = open_dataset(path, split)
+    found = find("task", name_of_task(dataset.plan.task))
     rows: list[UInt8Image] = []
     for sample in dataset[: min(samples, len(dataset))]:
-        previews = dataset.task.preview(sample).items()
-        rows.append(_beside([_cell(picture, caption(sample, name)) for name, picture in previews]))
+        with blamed(found, f"preview of sample {sample.record.index}"):
+            previews = check_previews(dataset.task.preview(sample))
+            if not previews:
+                raise ValueError("there is no picture")
+        rows.append(_beside([_cell(picture, caption(sample, name)) for name, picture in previews.items()]))
     width = max(row.shape[1] for row in rows)
     return np.concatenate([_widened(row, width) for row in rows])
 

@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-import numpy as np
-
 from gear.contracts.tasks import Sample, Task
+from gear.dataset.given import check_previews
 from gear.values.frames import UInt8Image
 
 
@@ -54,15 +53,10 @@ def previews(task: Task[Any, Any], sample: Sample) -> dict[Channel, Shown]:
         PreviewError: the task failed, which is no reason not to show the rest.
     """
     try:
-        pictures = dict(task.preview(sample))
+        pictures = check_previews(task.preview(sample))
     except Exception as error:  # a third party's code
         raise PreviewError(f"preview failed: {type(error).__name__}: {error}") from error
-    for name, pixels in pictures.items():
-        good = isinstance(pixels, np.ndarray) and pixels.dtype == np.uint8 and pixels.ndim == 3
-        if not (good and pixels.shape[2] == 3 and pixels.size):
-            got = f"{pixels.dtype} {pixels.shape}" if isinstance(pixels, np.ndarray) else type(pixels).__name__
-            raise PreviewError(f"preview {name!r} is no (H, W, 3) uint8 picture but {got}")
-    return {Channel("preview", str(name)): Shown(p, aligned_with(str(name), p, sample)) for name, p in pictures.items()}
+    return {Channel("preview", name): Shown(p, aligned_with(name, p, sample)) for name, p in pictures.items()}
 
 
 def aligned_with(name: str, pixels: UInt8Image, sample: Sample) -> str | None:

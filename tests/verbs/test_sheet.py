@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
 from gear.config.nodes import parse_text
+from gear.plugins import manager
 from gear.plugins.build import build_task
+from gear.plugins.catalogue import Catalogue, Owner
+from gear.plugins.tasks.depth import DepthTask
 from gear.testing.synthetic import synthetic_frame
-from gear.verbs.sheet import caption
+from gear.values.errors import PluginError
+from gear.verbs.sheet import caption, contact_sheet
 
 
 def test_a_picture_of_a_pair_says_what_its_own_camera_sees() -> None:
@@ -19,3 +30,24 @@ def test_a_picture_of_a_pair_says_what_its_own_camera_sees() -> None:
         assert said == (f"synthetic 000000  {camera}  street  {truth.name} {truth.visible_fraction:.0%} at "
                         f"{truth.distance_m:.0f} m").replace("synthetic", sample.record.split)  # fmt: skip
     assert caption(sample, "labels").endswith(caption(sample, "left").partition("street")[2])
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (3, "TypeError"),
+        ({}, "ValueError: there is no picture"),
+        ({"grey": np.zeros((4, 8), np.uint8)}, r"preview 'grey' is no \(H, W, 3\) uint8 picture but uint8 \(4, 8\)"),
+        ({"unit": np.zeros((4, 8, 3))}, "preview 'unit' is no .* but float64"),
+    ],
+)
+def test_a_third_partys_preview_that_is_no_picture_is_named(
+    tmp_path: Path, collect_small: Any, monkeypatch: pytest.MonkeyPatch, given: Any, message: str
+) -> None:
+    collect_small("depth", tmp_path, samples=1)
+    owner = Owner(plugin="their-depth", package="mujoco-gear-2", version="1.2")
+    found = tuple(dataclasses.replace(f, owner=owner) for f in manager.catalogue().of_kind("task"))
+    monkeypatch.setattr("gear.plugins.build.catalogue", lambda: Catalogue(found))
+    monkeypatch.setattr(DepthTask, "preview", lambda *_: given)
+    with pytest.raises(PluginError, match=r"depth \(mujoco-gear-2 1\.2\) failed at preview of sample 0: .*" + message):
+        contact_sheet(tmp_path)
