@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from gear.compositor.pasting import CACHE_BYTES, Pasting
+from gear.formats.probes import demand_probes
 from gear.values.errors import UnknownNameError
 
 if TYPE_CHECKING:
@@ -40,6 +41,7 @@ def open_compositor(
     if name == "transport":
         from gear.compositor.transport import TransportCompositor
 
+        demand_probes(dataset)
         return TransportCompositor(dataset, device=device, rounding=rounding, cache_bytes=cache_bytes)
     if name == "homography":
         from gear.compositor.homography import HomographyCompositor

@@ -94,12 +94,11 @@ def probe_files(probes: Sequence[Probe], split: str, index: int) -> AuxiliaryFil
     return files
 
 
-def probes_of(dataset: Dataset[Any], index: int, view: str) -> tuple[Probe, ...]:
-    """The probes of one sample in one view, in order of surfaces; a surface that does not reach the picture has none.
+def demand_probes(dataset: Dataset[Any]) -> None:
+    """Whether a split was collected with probes.
 
     Raises:
-        DatasetError: the split was collected without probes, or a file is missing or broken.
-        IndexError: there is no such sample.
+        DatasetError: it was not.
     """
     if KIND not in dataset.plan.auxiliary:
         raise DatasetError(
@@ -107,6 +106,16 @@ def probes_of(dataset: Dataset[Any], index: int, view: str) -> tuple[Probe, ...]
             f"split {dataset.plan.info.split!r} has no probes; collect it with --probes (into another --out,"
             " or with --force)",
         )
+
+
+def probes_of(dataset: Dataset[Any], index: int, view: str) -> tuple[Probe, ...]:
+    """The probes of one sample in one view, in order of surfaces; a surface that does not reach the picture has none.
+
+    Raises:
+        DatasetError: the split was collected without probes, or a file is missing or broken.
+        IndexError: there is no such sample.
+    """
+    demand_probes(dataset)
     sidecar = dataset.sidecar(index)
     found = []
     for surface in sidecar.record.surfaces:

@@ -113,6 +113,16 @@ def test_what_does_not_suit_is_said_before_anything_is_rendered(pair: tuple[Path
     assert not (tmp_path / "gap").exists()
 
 
+def test_a_split_without_probes_is_told_before_its_twin_is_rendered(tmp_path: Path, collect_small: Collect) -> None:
+    collect_small("semseg", tmp_path / "clean")
+    places: dict[str, Any] = {"town": TINY_TOWN, "scenes": TINY_SCENES, "out": tmp_path / "gap", "patch": "random"}
+    with pytest.raises(DatasetError, match="has no probes"):
+        gear.gap(tmp_path / "clean", **places)
+    assert not (tmp_path / "gap").exists()
+    report = gear.gap(tmp_path / "clean", **places, compositors=("homography",))
+    assert len(report.samples) == 2, "what needs none does without"
+
+
 def test_the_command_prints_a_table_or_json(pair: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
     clean, twin = pair
     assert main(["gap", str(clean), "--twin", str(twin), "--compositor", "transport"]) == 0
