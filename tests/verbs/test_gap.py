@@ -123,6 +123,12 @@ def test_a_split_without_probes_is_told_before_its_twin_is_rendered(tmp_path: Pa
     assert len(report.samples) == 2, "what needs none does without"
 
 
+def test_a_twin_that_is_refused_leaves_no_folder(pair: tuple[Path, Path], tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match="shows 0 patches"):
+        gear.gap(pair[0], twin=pair[0], out=tmp_path / "gap")
+    assert not (tmp_path / "gap").exists()
+
+
 def test_the_command_prints_a_table_or_json(pair: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
     clean, twin = pair
     assert main(["gap", str(clean), "--twin", str(twin), "--compositor", "transport"]) == 0

@@ -127,11 +127,11 @@ def gap(
     if patch is not None:
         collect_twin(clean, patch, root, samples=samples, town=town, scenes=scenes)
         pairs = pair_twins(clean, open_dataset(root, clean.plan.info.split))
+    count = min(len(pairs), samples or len(pairs))
+    images = shown_patches(pairs.second, len(clean.sidecar(0).record.surfaces))
     if out is not None:
         with explained(Path(out)):
             Path(out).mkdir(parents=True, exist_ok=True)
-    count = min(len(pairs), samples or len(pairs))
-    images = shown_patches(pairs.second, len(clean.sidecar(0).record.surfaces))
     found: list[SampleGap] = []
     if progress is not None:
         progress(0, count)
