@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import inspect
 import sys
 import threading
 import time
@@ -85,7 +86,9 @@ class Player:
             self._guard_name = defense.found.spec.name
             self._guard, self.model = self._guarded(defense, bare, calibration)
         many = getattr(self.model, "predict_many", None)
-        self._many = many if callable(many) else None
+        # What a wrapper hands on of the bare model by `__getattr__` would pass the defense by.
+        is_own = self.model is bare or inspect.getattr_static(self.model, "predict_many", None) is not None
+        self._many = many if callable(many) and is_own else None
         self._is_ours = model.found.owner.package == DISTRIBUTION and defense is None
         self.lanes = lanes_of(bare) if self._is_ours else 1
         self._at_work, self._counting = 0, threading.Lock()
