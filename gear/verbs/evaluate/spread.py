@@ -48,8 +48,12 @@ class Figures:
 
 
 def draw(count: int, resamples: int, seed: int) -> Draws:
-    """(resamples, count) numbers of samples; the same for every dataset of this size, so that twins stay paired."""
-    return derive_rng(seed, "bootstrap", count).integers(0, max(count, 1), (resamples, count), dtype=np.int64)
+    """(resamples, count) numbers of samples; the same for every dataset of this size, so that twins stay paired.
+
+    (0, count) of fewer than two samples: one does not say how far others lie from it.
+    """
+    rows = resamples if count > 1 else 0
+    return derive_rng(seed, "bootstrap", count).integers(0, max(count, 1), (rows, count), dtype=np.int64)
 
 
 def gather(fresh: Callable[[], AnyEvaluator], parts: Sequence[AnyEvaluator], draws: Draws) -> Figures:

@@ -13,6 +13,7 @@ import pytest
 import gear
 from gear.metrics.depth import DepthEvaluator
 from gear.plugins.tasks.depth import DepthTask
+from gear.testing.tiny_networks import tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import DatasetError, GearError
 from gear.verbs.collect.run import collect
@@ -160,6 +161,20 @@ class Boundless(DepthEvaluator):
 
     def resampled(self, draws: Any) -> Mapping[str, Any]:
         return {**super().resampled(draws), "psnr_db": np.full(len(draws), np.inf)}
+
+
+def test_one_sample_has_no_interval(tmp_path: Path, small: Small, install: Install) -> None:
+    """It was drawn again and again, and the figure seemed certain to the last digit."""
+    roots = [small("semseg", patch, samples=1) for patch in ("none", "random")]
+    install(tiny_segmenter)
+    report = evaluate(roots, model="tiny_segmenter", defense="lgs", out=tmp_path / "out")
+    (difference,) = report.differences
+    assert difference.auroc is not None and difference.auroc.interval is None
+    for figures in (report.rows[0].figures["task"], report.rows[1].figures["task"], difference.figures["task"]):
+        assert figures["pixel_accuracy"].value == figures["pixel_accuracy"].value
+        assert all(one.interval is None for one in figures.values())
+    assert "[" not in (tmp_path / "out/table.txt").read_text()
+    assert difference.paired["task"]["miou"].p == 1, "of one pair either sign is as far from 0"
 
 
 def test_what_is_infinite_is_nothing_in_json(
