@@ -18,7 +18,7 @@ BAR_IN, GAP_IN, EDGE_IN, WIDTH_IN = 0.16, 0.14, 0.9, 8.0
 
 
 def chart(task: TaskResult, form: Literal["svg", "pdf", "png"]) -> bytes:
-    """Draws it; bars carry their 95 % interval. The same results give the same bytes."""
+    """Draws it; bars carry their 95 % interval where they have one. The same results give the same bytes."""
     import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -32,10 +32,11 @@ def chart(task: TaskResult, form: Literal["svg", "pdf", "png"]) -> bytes:
     for one in results:
         begun = y_in
         for patch, value in _bars(task, one):
-            low, high = value.interval or (value.value, value.value)
-            whisker = [[max(0.0, value.value - low)], [max(0.0, high - value.value)]]
             axis.barh(y_in, value.value, BAR_IN * 0.92, color=colours[patch], label=patch)
-            axis.errorbar(value.value, y_in, xerr=whisker, color="0.15", lw=0.8, capsize=1.5)
+            if value.interval is not None:
+                low, high = value.interval
+                whisker = [[max(0.0, value.value - low)], [max(0.0, high - value.value)]]
+                axis.errorbar(value.value, y_in, xerr=whisker, color="0.15", lw=0.8, capsize=1.5)
             y_in += BAR_IN
         ticks.append(((begun + y_in - BAR_IN) / 2, one.model if one.defense is None else f"  + {one.defense}"))
         y_in += GAP_IN

@@ -1,0 +1,36 @@
+"""The bars of a bench: what they carry."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from gear.verbs.bench.chart import chart
+from gear.verbs.bench.report import Figure, Result, TaskResult
+from gear.verbs.evaluate.report import Estimate, EvaluateReport, Pool
+
+
+def task(*values: Estimate) -> TaskResult:
+    facts: dict[str, Any] = {"rows": (), "cost": {}, "defense": {}, "differences": ()}
+    pools = tuple(
+        Pool(name=name, samples=1, figures={"task": {"ap": value}}, **facts)
+        for name, value in zip(("none", "random"), values, strict=True)
+    )
+    evaluation = EvaluateReport(out=Path(), facts={}, rows=(), together=(), differences=(), pools=pools)
+    result = Result(model="net", defense=None, evaluation=evaluation, scenes=())
+    return TaskResult(name="detect2d", figure=Figure(report="task", name="ap"), results=(result,))
+
+
+def whiskers(*values: Estimate) -> int:
+    return chart(task(*values), "svg").count(b'id="LineCollection')
+
+
+def test_bars_without_an_interval_have_no_whisker() -> None:
+    """One of no length said that the figure is certain."""
+    sure, bare = Estimate(value=0.4, interval=(0.3, 0.5)), Estimate(value=0.2)
+    assert [whiskers(sure, sure), whiskers(sure, bare), whiskers(bare, bare)] == [2, 1, 0]
+
+
+def test_what_nobody_measured_is_a_chart_without_bars() -> None:
+    missing = Estimate(value=float("nan"))
+    assert whiskers(missing, missing) == 0
