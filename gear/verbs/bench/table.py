@@ -28,8 +28,9 @@ def title(task: TaskResult) -> str:
 def legend() -> str:
     """What the columns are, in a line."""
     return (
-        "in brackets 95 % intervals; change: of patches to a random one, of that to none; beside: mean change of a "
-        "picture, outside the patch where the task can tell, and p, how often chance alone changes as much"
+        "in brackets 95 % intervals; change and AUROC: of patches against a random one, that against none; beside: "
+        "mean change of a picture, outside the patch where the task can tell, and p, how often chance alone changes as "
+        "much"
     )
 
 

@@ -107,6 +107,8 @@ def _check_files(out: Path, report: BenchReport) -> None:
     assert {line["scene"] for line in lines} == {"all", "tiny-board", "tiny-double"}
     assert (out / "table.txt").read_text().startswith("semseg: miou (more is better)\n")
     page = (out / "report.html").read_text()
+    against = "change and AUROC: of patches against a random one, that against none"
+    assert all(against in shown for shown in (page, (out / "table.txt").read_text()))
     patched = 2 * 2  # against two networks, alone and behind a defense that is looked through
     assert page.count("<figure>") == (1 + patched * (1 + 1)) + (1 + patched * (1 + 2))  # scenes of one and two surfaces
     assert "http" not in page.replace("http-equiv", "")
