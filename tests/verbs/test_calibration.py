@@ -157,3 +157,22 @@ def test_learning_from_what_is_measured_is_noted(small: Small, learner: list[Lea
     assert any("learnt from scenes that it is measured on" in note for note in same.facts["notes"])
     other = evaluate(small(), calibration=small(split="val"), out=tmp_path / "other", **asked)
     assert not any("learnt" in note for note in other.facts["notes"])
+
+
+def test_calibration_the_wrong_way_round_is_told(
+    small: Small, collect_small: Callable[..., Any], learner: list[Learner], tmp_path: Path
+) -> None:
+    clean, patched = small(split="val"), tmp_path / "patched"
+    collect_small("semseg", patched, split="val", patch="random")
+    asked: dict[str, Any] = {"model": "tiny_segmenter", "defense": "learner", "resamples": 0}
+    with pytest.raises(GearError, match="--calibration and --calibration-patched are swapped"):
+        evaluate(small(), calibration=patched, calibration_patched=clean, out=tmp_path / "out", **asked)
+    assert not learner and not (tmp_path / "out").exists()
+    right = evaluate(small(), calibration=clean, calibration_patched=patched, out=tmp_path / "right", **asked)
+    assert not any("takes for clean" in note or "no twin" in note for note in right.facts["notes"])
+    bold = evaluate(small(), calibration=patched, calibration_patched=patched, out=tmp_path / "bold", **asked)
+    assert any("shows the patch random, which the defense takes for clean" in one for one in bold.facts["notes"])
+    other = tmp_path / "other"
+    collect_small("semseg", other, split="val", patch="random", seed=5)
+    mixed = evaluate(small(), calibration=clean, calibration_patched=other, out=tmp_path / "mixed", **asked)
+    assert any(f"{other}: is no twin of {clean}" in one for one in mixed.facts["notes"])

@@ -22,6 +22,9 @@ from gear.verbs.evaluate.choice import Chosen, check_model
 Views = Mapping[str, UInt8Image]
 Progress = Callable[[int, int], None]
 
+NO_PATCH = "none"
+"""Label of pictures without one."""
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Calibration:
@@ -68,6 +71,20 @@ class Calibration:
             return {}
         return {"calibration_samples": [None if one is None else len(one) for one in (self.clean, self.patched)]}
 
+    @property
+    def shows_patch(self) -> bool:
+        """Whether the pictures that are to be clean show one."""
+        return self.clean is not None and _label(self.clean) != NO_PATCH
+
+    def doubts(self) -> list[str]:
+        """A line for whatever the user may not have meant."""
+        clean, patched, lines = self.clean, self.patched, []
+        if clean is not None and self.shows_patch:
+            lines.append(f"{clean.root}: shows the patch {_label(clean)}, which the defense takes for clean")
+        if clean is not None and patched is not None and clean.plan.twin_key != patched.plan.twin_key:
+            lines.append(f"{patched.root}: is no twin of {clean.root}, so more than a patch differs in what was learnt")
+        return lines
+
     def note(self, measured: Dataset[Any]) -> str | None:
         """One line where a defense is measured on scenes that it learnt from."""
         if self.clean is None or scenes_of(self.clean) != scenes_of(measured):
@@ -97,7 +114,8 @@ def opened_calibration(
         told: of (samples that the defense has read for the first time, samples of both).
 
     Raises:
-        GearError: they cannot be read, models cannot look at them, or there is nothing to learn or nobody to.
+        GearError: they cannot be read or are swapped, models cannot look at them, or there is nothing to learn or
+            nobody to.
     """
     if clean is None and patched is None:
         return NOTHING
@@ -110,7 +128,14 @@ def opened_calibration(
         for model in models:
             if dataset is not None:
                 check_model(model, dataset, flag)
-    return Calibration(clean=opened[0], patched=opened[1], told=told)
+    pair = Calibration(clean=opened[0], patched=opened[1], told=told)
+    if pair.shows_patch and pair.patched is not None and _label(pair.patched) == NO_PATCH:
+        raise GearError(f"{clean} shows a patch, {patched} none: --calibration and --calibration-patched are swapped")
+    return pair
+
+
+def _label(dataset: Dataset[Any]) -> str:
+    return dataset.plan.info.patch_label
 
 
 class CalibrationViews(Sequence[Views]):

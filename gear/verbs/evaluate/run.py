@@ -122,7 +122,7 @@ def evaluate(
             Measured(name=name, dataset=dataset, scorer=scorer, notes=row.notes, made=row.made, damaged=row.damaged)
         )
     said = [note for one in datasets for note in (size_note(chosen, one), drive_note(one), learnt.note(one))]
-    notes = [note for note in said if note]
+    notes = [*learnt.doubts(), *(note for note in said if note)]
     more = {"reports": list(reports), "resamples": resamples, "versions": _versions(player), "notes": notes}
     found = EvaluateReport(
         out=root,
