@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -14,6 +15,7 @@ import pytest
 
 import gear
 from gear.cli.main import main
+from gear.compositor.opening import open_compositor
 from gear.testing.tiny_networks import tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import DatasetError, GearError
@@ -21,6 +23,7 @@ from gear.verbs.collect.patches import read_patch
 from gear.verbs.collect.run import CollectReport
 from gear.verbs.evaluate import choice
 from gear.verbs.gap.figures import PERFECT_DB, picture_gap
+from gear.verbs.gap.run import sample_gaps, shown_patches
 
 Collect = Callable[..., CollectReport]
 
@@ -95,6 +98,19 @@ def test_a_models_figures_are_taken_digitally_and_rendered(
         assert alone.clean[figure] == pytest.approx(report.effect["clean"][figure])
         assert change[figure] == pytest.approx(report.effect[way][figure] - report.effect["clean"][figure])
     assert f"{change[figure]:+.4f}" in report.table()
+
+
+def test_a_model_sees_what_is_pasted_over_a_hidden_board(pair: tuple[Path, Path]) -> None:
+    """The paper's compositor knows nothing of what stands before a board; there is no gap to measure inside of it."""
+    clean, twin = (gear.open_dataset(root) for root in pair)
+    hidden: Any = replace(twin[0], surfaces=tuple(replace(one, visible_px=0) for one in twin[0].surfaces))
+    shown: dict[str, Any] = {}
+    effect: Any = SimpleNamespace(update=lambda index, untouched, pictures: shown.update(pictures))
+    engines = {"homography": open_compositor("homography", clean, rounding=True)}
+    pairs: Any = [(clean[0], hidden)]
+    assert sample_gaps(pairs, engines, shown_patches(twin, 1), 0, effect) == []
+    pasted = (shown["homography"].images["left"] != clean[0].images["left"]).any(axis=2)
+    assert pasted.sum() > 0.9 * twin[0].surfaces[0].visible_px
 
 
 def test_what_does_not_suit_is_said_before_anything_is_rendered(pair: tuple[Path, Path], tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ from gear.values.errors import DatasetError
 from gear.values.frames import UInt8Image
 from gear.verbs.collect.patches import digest_of, read_patch
 from gear.verbs.gap.effect import RENDERED, Effect
-from gear.verbs.gap.figures import PictureGap, picture_gap, visible_mask
+from gear.verbs.gap.figures import picture_gap, visible_mask
 from gear.verbs.gap.report import GapReport, SampleGap
 from gear.verbs.gap.twin import check_clean, collect_twin
 
@@ -174,12 +174,12 @@ def sample_gaps(
     found = []
     for view, picture in rendered.images.items():
         mask = visible_mask(rendered.surfaces, view, *picture.shape[:2])
+        if mask.any() or effect is not None:  # `homography` pastes over what hides a patch, and a model sees that
+            for name, engine in engines.items():
+                composed[name][view] = composed_picture(engine, images, index, view)
         if not mask.any():
             continue
-        gaps: dict[str, PictureGap] = {}
-        for name, engine in engines.items():
-            composed[name][view] = composed_picture(engine, images, index, view)
-            gaps[name] = picture_gap(composed[name][view], picture, mask)
+        gaps = {name: picture_gap(pictures[view], picture, mask) for name, pictures in composed.items()}
         seen = [s for s in rendered.surfaces if s.camera == view and s.visible_px]
         found.append(
             SampleGap(
