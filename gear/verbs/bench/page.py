@@ -44,7 +44,7 @@ def page(report: BenchReport, plan: Plan) -> str:
     where = f"{len(facts['scenes'])} scene{'s' * (len(facts['scenes']) > 1)}, {', '.join(facts['weathers'])}"
     parts = [
         f"<p>{_safe(where)}; {counts.measure} pictures of each scene and weather for every kind of patch. Patches: "
-        f"{_safe(plan.config.attack.plugin)} on {counts.attack} other pictures.</p>",
+        f"{_safe(plan.config.attack.plugin)} on {counts.attack} other pictures of a scene in each weather.</p>",
         f'<p class="dim">{_safe(legend())}.</p>',
         *(f'<p class="dim">Note: {_safe(note)}</p>' for note in facts["notes"]),
     ]

@@ -109,6 +109,7 @@ def _check_files(out: Path, report: BenchReport) -> None:
     page = (out / "report.html").read_text()
     against = "change and AUROC: of patches against a random one, that against none"
     assert all(against in shown for shown in (page, (out / "table.txt").read_text()))
+    assert "other pictures of a scene in each weather" in page, "a patch is made on those of all weathers together"
     patched = 2 * 2  # against two networks, alone and behind a defense that is looked through
     assert page.count("<figure>") == (1 + patched * (1 + 1)) + (1 + patched * (1 + 2))  # scenes of one and two surfaces
     assert "http" not in page.replace("http-equiv", "")
