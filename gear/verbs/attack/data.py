@@ -14,6 +14,7 @@ from torch import Tensor
 from gear.contracts.attacks import Compositor
 from gear.dataset.reading import Dataset
 from gear.values.errors import DatasetError
+from gear.verbs.evaluate.compare import CONTROLS
 
 KEPT_BYTES = 2 << 30
 
@@ -80,13 +81,17 @@ def check_joined(datasets: Sequence[Dataset[Any]]) -> None:
     """Whether one set of patches fits them all.
 
     Raises:
-        DatasetError: they are of different tasks or pictures, or differ in their number of surfaces, or have none.
+        DatasetError: they are of different tasks or pictures, or differ in their number of surfaces, or have none, or
+            one shows patches already: what networks say of it is no clean answer to begin with.
     """
     first = datasets[0]
     facts = [_facts(dataset) for dataset in datasets]
     for dataset, found in zip(datasets, facts, strict=True):
         if not found["patch surfaces"]:
             raise DatasetError(dataset.root, "has no patch surface; attack a scene with a billboard or the truck")
+        if (label := dataset.plan.patch["label"]) not in CONTROLS:
+            problem = f"shows the patch {label} itself; collect the scene with --patch none or random, and name that"
+            raise DatasetError(dataset.root, problem)
         for name, value in found.items():
             if value != facts[0][name]:
                 raise DatasetError(dataset.root, f"has {name} {value}, but {first.root} has {facts[0][name]}")

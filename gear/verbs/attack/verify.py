@@ -14,12 +14,13 @@ from gear.verbs.attack.folder import VERIFY
 from gear.verbs.attack.job import TRAINING, VALIDATION
 from gear.verbs.gap.report import GapReport
 from gear.verbs.gap.run import gap
+from gear.verbs.gap.twin import check_clean
 from gear.verbs.train.data import open_all
 
 
 def check_held_out(data: Sequence[str | Path], held: str | Path, val: Sequence[str | Path] = ()) -> None:
-    """Whether a dataset is there, has probes, fits the patches, and shows none of the scenes that they are made on, or
-    chosen by.
+    """Whether a dataset is there, has probes and no patch, fits the patches, and shows none of the scenes that they are
+    made on, or chosen by.
 
     Raises:
         GearError: it is not.
@@ -27,6 +28,7 @@ def check_held_out(data: Sequence[str | Path], held: str | Path, val: Sequence[s
     wanted = open_dataset(*root_and_split(held))
     if not wanted.plan.auxiliary:
         raise DatasetError(wanted.root, "has no probes, which --verify needs; collect it with --probes")
+    check_clean(wanted)
     for flag, paths, names in (("--data", data, TRAINING), ("--val", val, VALIDATION)):
         try:
             found = open_all(paths, wanted.plan.task["name"], names=names, allow_tests=True)
