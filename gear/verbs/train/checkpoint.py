@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -36,6 +37,7 @@ class Progress:
         position: in the data.
         elapsed_s: time that steps and validations have taken.
         best_step: after which step the kept weights stood; -1 before the first validation.
+        best_sha256: of the file of those weights; "" in checkpoints of gears that did not note it.
         worse: validations since then.
         broken: steps in a row, up to the last one, that were left out.
         steps: `step`, `loss`, `rate` of stretches of the training.
@@ -47,6 +49,7 @@ class Progress:
     position: Position = field(default_factory=Position)
     elapsed_s: float = 0.0
     best_step: int = -1
+    best_sha256: str = ""
     worse: int = 0
     broken: int = 0
     steps: list[dict[str, float]] = field(default_factory=list)
@@ -68,6 +71,8 @@ class Progress:
         for name, kind in kinds.items():
             from_json(kind, value[name], name)
         from_json(int, value.get("broken", 0), "broken")
+        if not re.fullmatch("([0-9a-f]{64})?", from_json(str, value.get("best_sha256", ""), "best_sha256")):
+            raise FieldError("best_sha256", "is no digest")
         from_json(Position, value["position"], "position")
         from_json(tuple[float, ...], value["open_losses"], "open_losses")
         for name in ("steps", "validations"):

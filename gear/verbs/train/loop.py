@@ -15,6 +15,7 @@ from torch import nn
 
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Task
+from gear.dataset.files import sha256
 from gear.nn.runtime import autocast, device_of, seeded
 from gear.plugins.build import blamed
 from gear.plugins.catalogue import Found
@@ -28,6 +29,7 @@ from gear.verbs.train.checkpoint import Progress
 from gear.verbs.train.config import TrainConfig
 from gear.verbs.train.feed import Feed
 from gear.verbs.train.optimise import Buffers, RunningMean, clip_gradients, optimiser_of, rate_share
+from gear.verbs.train.results import is_kept, write_weights
 from gear.verbs.train.validate import rank, total, validate
 
 NOTE_EVERY = 10
@@ -79,15 +81,15 @@ class Parts:
 Watch = Callable[[Progress, float, dict[str, float] | None], None]
 """Told of the progress, the share that is over, and the figures where a validation has just ended, the task's first."""
 
-Keep = Callable[[dict[str, torch.Tensor], Progress], None]
-"""Told of the mean weights whenever they are the best so far."""
+Pack = Callable[[dict[str, torch.Tensor], Progress], bytes]
+"""The file of the mean weights, which are the best so far."""
 
 
 class Training:
     """One training, fresh or taken up again."""
 
-    def __init__(self, parts: Parts, config: TrainConfig, *, watch: Watch | None, keep: Keep) -> None:
-        self._parts, self._config, self._watch, self._keep = parts, config, watch, keep
+    def __init__(self, parts: Parts, config: TrainConfig, *, watch: Watch | None, pack: Pack) -> None:
+        self._parts, self._config, self._watch, self._pack = parts, config, watch, pack
         self._module: nn.Module = parts.model.module()
         self._memory = torch.channels_last if config.precision == "bfloat16" else torch.contiguous_format
         for parameter in self._module.parameters():
@@ -114,6 +116,8 @@ class Training:
         """Trains to the end."""
         _train_mode(self._parts.model, True)
         _train_mode(self._parts.twin, False)
+        if self.progress.best_step == self.progress.step and not is_kept(self._parts.root, self.progress):
+            self._keep_best()
         while not self._is_over:
             self._make_patches()
             with contextlib.closing(self._parts.feed.from_position(self.progress.position)) as batches:
@@ -227,11 +231,20 @@ class Training:
         progress.worse = 0 if is_better else progress.worse + 1
         if is_better:
             progress.best_step = progress.step
-            self._keep({key: value.detach().cpu().clone() for key, value in self._mean.state.items()}, progress)
-        self._save()
+            self._keep_best()
+        else:
+            self._save()
         if self._watch is not None:
             chosen = {name: figures[name] for name in (parts.spec.figure,) if name in figures}
             self._watch(progress, self.share, chosen | figures)
+
+    def _keep_best(self) -> None:
+        """The checkpoint goes first: of the step that it is of, it can make the weights again, and they not it."""
+        mean = {key: value.detach().cpu().clone() for key, value in self._mean.state.items()}
+        weights = self._pack(mean, self.progress)
+        self.progress.best_sha256 = sha256(weights)
+        self._save()
+        write_weights(self._parts.root, weights)
 
     def _save(self) -> None:
         extra = self._parts.adversary.state() if self._parts.adversary is not None else {}

@@ -17,7 +17,7 @@ from torch import Tensor
 from gear.config.dump import to_plain
 from gear.config.nodes import Mapping
 from gear.config.reader import read_node
-from gear.dataset.files import sha256, write_whole
+from gear.dataset.files import explained, read_bytes, sha256, write_whole
 from gear.nn.options import CIRCUMSTANCES
 from gear.nn.weights import serialised
 from gear.plugins.catalogue import Found
@@ -27,6 +27,7 @@ from gear.verbs.look import Look
 from gear.verbs.train.checkpoint import FILE as CHECKPOINT
 from gear.verbs.train.checkpoint import Progress
 from gear.verbs.train.config import TrainConfig
+from gear.verbs.train.curves import FILE as CURVES
 from gear.verbs.train.data import Samples
 from gear.verbs.train.starting import SCALE
 
@@ -108,10 +109,24 @@ def command_of(
     return shlex.join([*words, "--out", "DIR"])
 
 
-def keep_weights(root: Path, state: AnyMapping[str, Tensor], origin: Origin, progress: Progress) -> None:
-    """Writes the weights, matrices in float16."""
+def packed(state: AnyMapping[str, Tensor], origin: Origin, progress: Progress) -> bytes:
+    """The file of weights that were validated last, matrices in float16."""
     figures = figures_of(progress.validations[-1])
-    write_whole(root, WEIGHTS, serialised(state, origin.metadata(figures), halves=True))
+    return serialised(state, origin.metadata(figures), halves=True)
+
+
+def write_weights(root: Path, weights: bytes) -> None:
+    """Writes the file of the weights; what describes others goes first, and is written again in the end."""
+    with explained(root):
+        for name in (CARD, HISTORY, CURVES):
+            (root / name).unlink(missing_ok=True)
+    write_whole(root, WEIGHTS, weights)
+
+
+def is_kept(root: Path, progress: Progress) -> bool:
+    """Whether the file of the best weights is there, and no other; any, where an old checkpoint does not say which."""
+    path = root / WEIGHTS
+    return path.is_file() and progress.best_sha256 in ("", sha256(read_bytes(path)))
 
 
 def write_history(root: Path, origin: Origin, progress: Progress) -> None:
@@ -139,7 +154,9 @@ def card(root: Path, origin: Origin, progress: Progress) -> str:
     best = next(entry for entry in progress.validations if entry["step"] == progress.best_step)
     if not (root / WEIGHTS).is_file():
         raise DatasetError(root / WEIGHTS, f"is gone; delete {CHECKPOINT} beside it to train again")
-    weights = (root / WEIGHTS).read_bytes()
+    if not is_kept(root, progress):
+        raise DatasetError(root / WEIGHTS, f"is not what this training kept; delete {CHECKPOINT} to train again")
+    weights = read_bytes(root / WEIGHTS)
     config = origin.config
     spec: Any = origin.model.spec
     lines = [

@@ -28,7 +28,7 @@ from gear.verbs.train.curves import write_curves
 from gear.verbs.train.data import TRAINING, VALIDATION, Samples, all_of, keep_some, open_all, spread
 from gear.verbs.train.feed import Cache, Feed
 from gear.verbs.train.loop import Parts, Training, Watch
-from gear.verbs.train.results import WEIGHTS, Origin, command_of, figures_of, keep_weights, known, write_history
+from gear.verbs.train.results import WEIGHTS, Origin, command_of, figures_of, known, packed, write_history
 from gear.verbs.train.sizes import picture_scale, without_empty_margins
 from gear.verbs.train.starting import (
     begin_with,
@@ -173,7 +173,7 @@ def train(
         _parts(found, spec, origin, root, noted, begun),
         config,
         watch=watch,
-        keep=lambda state, progress: keep_weights(root, state, origin, progress),
+        pack=lambda state, progress: packed(state, origin, progress),
     )
     with explained(root):
         root.mkdir(parents=True, exist_ok=True)

@@ -155,9 +155,6 @@ def test_damaged_work_is_said_in_a_line(street: Street, tmp_path: Path, install:
     first = quick(street, tmp_path / "out")
     checkpoint = tmp_path / "out" / "checkpoint.safetensors"
     whole = checkpoint.read_bytes()
-    first.weights.unlink()
-    with pytest.raises(DatasetError, match=r"is gone; delete checkpoint.safetensors"):
-        quick(street, tmp_path / "out")
     for damaged in (whole[: len(whole) // 2], b"", b"\x02\0\0\0\0\0\0\0{}"):
         checkpoint.write_bytes(damaged)
         with pytest.raises(DatasetError, match=r"is damaged .*; delete it to train from the start"):
