@@ -1,4 +1,4 @@
-"""Which runs are at work on a dataset: locks of its folders, which the system lets go of when a run is killed.
+"""Which runs are at work on a dataset or on results: locks of folders, which the system lets go of with a killed run.
 
 Where a file system knows no locks, or the system has none of this kind, all runs are taken for lone ones.
 """
@@ -12,11 +12,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from gear.dataset.files import explained
+from gear.values.errors import DatasetError
 
 if sys.platform != "win32":
     import fcntl
 
-__all__ = ["at_work", "is_at_work", "turn"]
+__all__ = ["alone_at_work", "at_work", "is_at_work", "turn"]
 
 
 @contextlib.contextmanager
@@ -41,6 +42,24 @@ def turn(root: Path) -> Iterator[None]:
 def at_work(folder: Path) -> Iterator[None]:
     """While a run writes what belongs to a split; `folder` is gear's own of it. Several may, if they make the same."""
     with _locked(folder, alone=False, wait=True):
+        yield
+
+
+@contextlib.contextmanager
+def alone_at_work(root: Path) -> Iterator[None]:
+    """While a run writes results into a folder of its own, which is made where it is missing.
+
+    Raises:
+        DatasetError: another run is at work there, or the folder cannot be made.
+    """
+    with explained(root):
+        root.mkdir(parents=True, exist_ok=True)
+    with contextlib.ExitStack() as work:
+        try:
+            work.enter_context(_locked(root, alone=True, wait=False))
+        except BlockingIOError as error:
+            problem = "another run is at work there just now; wait for its end, or use another --out"
+            raise DatasetError(root, problem) from error
         yield
 
 

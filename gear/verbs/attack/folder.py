@@ -40,7 +40,7 @@ TOLD: Any = {
 
 
 def begin(root: Path, plan: Json, *, force: bool) -> Json | None:
-    """The notes of patches that are there already and whole, or nothing, and then the folder is there.
+    """The notes of patches that are there already and whole, or nothing.
 
     Raises:
         ReplaceableError: something else is there, or what is there is broken.
@@ -61,8 +61,6 @@ def begin(root: Path, plan: Json, *, force: bool) -> Json | None:
             raise ReplaceableError(root, f"holds patches that were made otherwise ({what})")
         _check_whole(root, there)
         return there
-    with explained(root):
-        root.mkdir(parents=True, exist_ok=True)
     return None
 
 

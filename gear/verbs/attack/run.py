@@ -18,6 +18,7 @@ from gear.contracts.attacks import Budget, Patch
 from gear.contracts.models import Model
 from gear.dataset.files import sha256
 from gear.dataset.sidecar import dump_json
+from gear.dataset.turns import alone_at_work
 from gear.plugins.build import blamed, build, traced
 from gear.plugins.catalogue import Found
 from gear.values.errors import GearError, PluginError
@@ -139,17 +140,18 @@ def attack(
     product, root = build(job.found, job.options), Path(out)
     network = build_model(job.models, job.defense, job.calibration, job.seed)
     plan = job.plan(weights_digest(network), product)
-    there = begin(root, plan, force=force)
-    if there is not None:
-        return AttackReport(out=root, patches=read_patches(root), facts=there, made=False)
-    with traced(_asked(job), "forward"):
-        made = _optimised(job, product, network, root, plan, progress)
-        facts = _facts(job, network, plan, made)
-    names = ", ".join(one.found.spec.name for one in job.models)
-    write_curves(root, f"{attack} on {names}", made.recorder.curves, made.recorder.judged)
-    write_samples(root, made.seen.pairs(made.patches))
-    write_patches(root, made.patches, facts)
-    tidy(root)
+    with alone_at_work(root):
+        there = begin(root, plan, force=force)
+        if there is not None:
+            return AttackReport(out=root, patches=read_patches(root), facts=there, made=False)
+        with traced(_asked(job), "forward"):
+            made = _optimised(job, product, network, root, plan, progress)
+            facts = _facts(job, network, plan, made)
+        names = ", ".join(one.found.spec.name for one in job.models)
+        write_curves(root, f"{attack} on {names}", made.recorder.curves, made.recorder.judged)
+        write_samples(root, made.seen.pairs(made.patches))
+        write_patches(root, made.patches, facts)
+        tidy(root)
     return AttackReport(out=root, patches=made.patches, facts=facts, made=True)
 
 

@@ -109,7 +109,7 @@ def command_of(
     return shlex.join([*words, "--out", "DIR"])
 
 
-def packed(state: AnyMapping[str, Tensor], origin: Origin, progress: Progress) -> bytes:
+def packed(origin: Origin, state: AnyMapping[str, Tensor], progress: Progress) -> bytes:
     """The file of weights that were validated last, matrices in float16."""
     figures = figures_of(progress.validations[-1])
     return serialised(state, origin.metadata(figures), halves=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,10 @@ import numpy as np
 
 from gear.config.dump import to_plain
 from gear.contracts.specs import ModelSpec, TaskSpec
-from gear.dataset.files import clear_scratch, explained
+from gear.dataset.files import clear_scratch
 from gear.dataset.reading import scenes_of
 from gear.dataset.store import refuse_dataset
+from gear.dataset.turns import alone_at_work
 from gear.nn.runtime import device_of, prepare
 from gear.plugins.build import blamed, find
 from gear.plugins.catalogue import Found
@@ -169,19 +171,13 @@ def train(
         look=look_of(dataset.plan for dataset in training.datasets),
         picture_share=share,
     )
-    training_run = Training(
-        _parts(found, spec, origin, root, noted, begun),
-        config,
-        watch=watch,
-        pack=lambda state, progress: packed(state, origin, progress),
-    )
-    with explained(root):
-        root.mkdir(parents=True, exist_ok=True)
-    clear_scratch(root)
-    progress = training_run.run()
-    write_curves(root, spec, progress, f"{found.spec.name} on {task}")
-    write_history(root, origin, progress)
-    clear_scratch(root)
+    parts = _parts(found, spec, origin, root, noted, begun)
+    with alone_at_work(root):
+        clear_scratch(root)
+        progress = Training(parts, config, watch=watch, pack=partial(packed, origin)).run()
+        write_curves(root, spec, progress, f"{found.spec.name} on {task}")
+        write_history(root, origin, progress)
+        clear_scratch(root)
     best = next(entry for entry in progress.validations if entry["step"] == progress.best_step)
     return TrainReport(
         root=root,
