@@ -12,7 +12,7 @@ from gear.contracts.tasks import SplitInfo
 from gear.dataset.files import inside, write_whole
 from gear.dataset.layout import GEAR, plan_path
 from gear.dataset.sidecar import dump_json, load_json
-from gear.values.errors import DatasetError, FieldError, ReplaceableError
+from gear.values.errors import DatasetError, FieldError, OutdatedError, ReplaceableError
 from gear.values.serial import Json, from_json, to_json
 
 
@@ -84,7 +84,8 @@ def begin(root: Path, plan: Plan) -> None:
     """Writes the plan, or checks that the one there is the same; more samples than before are welcome.
 
     Raises:
-        ReplaceableError: the split was begun with another configuration, or with more samples.
+        OutdatedError: the split was begun with another patch, and does not differ otherwise.
+        ReplaceableError: it was begun with another configuration, or with more samples.
         DatasetError: the root holds another task's dataset, or a plan there cannot be read.
     """
     split = plan.info.split
@@ -97,7 +98,10 @@ def begin(root: Path, plan: Plan) -> None:
     there = read_plan(root, split)
     if there is not None and there.content_key != plan.content_key:
         what = ", ".join(differences(there.as_json(), plan.as_json())[:4])
-        raise ReplaceableError(root, f"split {split!r} was made with another configuration ({what})")
+        is_same_otherwise = there.twin_key == plan.twin_key and there.auxiliary == plan.auxiliary
+        raise (OutdatedError if is_same_otherwise else ReplaceableError)(
+            root, f"split {split!r} was made with another configuration ({what})"
+        )
     if there is not None and there.samples > plan.samples:
         raise ReplaceableError(
             root, f"split {split!r} was begun with {there.samples} samples, {plan.samples} were asked for"

@@ -117,6 +117,10 @@ class ReplaceableError(DatasetError):
         return f"{super().__str__()}; use another --out, or --force to replace it"
 
 
+class OutdatedError(ReplaceableError):
+    """What lies there was made as is wanted now, but from something else: other pictures, or another patch."""
+
+
 class TownError(GearError):
     """A town, actor or surface whose MJCF does not keep gear's conventions."""
 

@@ -16,7 +16,7 @@ from gear.contracts.attacks import Patch, surface_of
 from gear.dataset.files import clear_scratch, explained, read_bytes, sha256
 from gear.dataset.plan import differences
 from gear.dataset.store import refuse_dataset
-from gear.values.errors import FieldError, ReplaceableError
+from gear.values.errors import FieldError, OutdatedError, ReplaceableError
 from gear.values.serial import Json, from_json
 from gear.verbs.attack.watch import CHECKPOINT, is_picture
 from gear.verbs.collect.patches import read_patch
@@ -25,6 +25,9 @@ VERIFY = "verify"
 """Folder of the rendered check, in that of the patches."""
 
 NOTES = "attack.json"
+
+FED = {"data", "validation", "calibration", "calibration_samples"}
+"""What of a plan says from what patches are made; the rest says how."""
 
 EXACT = "patch.safetensors"
 
@@ -43,6 +46,7 @@ def begin(root: Path, plan: Json, *, force: bool) -> Json | None:
     """The notes of patches that are there already and whole, or nothing.
 
     Raises:
+        OutdatedError: patches are there that were made in the same way from other samples.
         ReplaceableError: something else is there, or what is there is broken.
         DatasetError: the disk refuses.
     """
@@ -58,7 +62,10 @@ def begin(root: Path, plan: Json, *, force: bool) -> Json | None:
         wanted = json.loads(json.dumps(plan))
         what = ", ".join(differences({key: there.get(key) for key in wanted}, wanted)[:3])
         if what:
-            raise ReplaceableError(root, f"holds patches that were made otherwise ({what})")
+            is_same_way = {key for key in wanted if there.get(key) != wanted[key]} <= FED
+            raise (OutdatedError if is_same_way else ReplaceableError)(
+                root, f"holds patches that were made otherwise ({what})"
+            )
         _check_whole(root, there)
         return there
     return None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import shutil
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, Protocol
@@ -17,7 +18,7 @@ from gear.contracts.specs import AttackSpec
 from gear.dataset.files import clear_scratch, explained, write_whole
 from gear.dataset.sidecar import dump_json
 from gear.dataset.store import refuse_dataset
-from gear.values.errors import GearError, ReplaceableError
+from gear.values.errors import GearError, OutdatedError, ReplaceableError
 from gear.verbs.attack.run import attack
 from gear.verbs.bench.chart import chart
 from gear.verbs.bench.config import BenchConfig
@@ -32,7 +33,7 @@ from gear.verbs.collect.names import find_weather
 from gear.verbs.collect.run import collect
 from gear.verbs.evaluate.choice import check_optics
 from gear.verbs.evaluate.report import EvaluateReport
-from gear.verbs.evaluate.run import evaluate
+from gear.verbs.evaluate.run import OtherLessonsError, evaluate
 
 VERBS: dict[Verb, Callable[..., Any]] = {"collect": collect, "attack": attack, "evaluate": evaluate}
 
@@ -112,7 +113,7 @@ def bench(
         if step.verb == "collect":
             told["apart"] = apart
         try:
-            done = VERBS[step.verb](**step.arguments, **told)
+            done = _done(step, told, watching.noted)
         except ReplaceableError as error:
             raise GearError(f"{step.title}: {error.path}: {error.problem}; use another --out, or remove it") from error
         except GearError as error:
@@ -135,6 +136,21 @@ def bench(
     write_whole(root, "report.html", page(report, plan).encode())
     clear_scratch(root)
     return report
+
+
+def _done(step: Step, told: dict[str, Any], noted: Callable[[str], None]) -> Any:
+    """Carries a step out; what the bench made from pictures or patches that are others now, it makes again."""
+    verb, again = VERBS[step.verb], f"{step.title}: is made again, for what is there"
+    try:
+        return verb(**step.arguments, **told)
+    except OutdatedError as error:
+        noted(f"{again} {error.problem}")
+        return verb(**step.arguments, **told, force=True)
+    except OtherLessonsError as error:
+        noted(f"{again} {error.problem.partition(';')[0]}")
+        with explained(Path(error.path)):
+            shutil.rmtree(error.path)
+        return verb(**step.arguments, **told)
 
 
 def prepared(

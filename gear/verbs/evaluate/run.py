@@ -34,6 +34,13 @@ from gear.verbs.evaluate.table import table
 Progress = Callable[[int, int], None]
 """Called with (samples finished, samples of all datasets)."""
 
+LEARNT = {"calibration", "calibration_samples"}
+"""What of an evaluation's plan says from what its defense learnt."""
+
+
+class OtherLessonsError(DatasetError):
+    """An evaluation is there that differs in what the defense learnt from, and in nothing else."""
+
 
 def evaluate(
     data: str | Path | Sequence[str | Path],
@@ -154,7 +161,10 @@ def _begin(root: Path, facts: Json) -> None:
         write_whole(root, "plan.json", dump_json(plain))
     elif there != plain:
         what = ", ".join(differences(there, plain)[:3]) or "its plan.json has other keys"
-        raise DatasetError(root, f"holds an evaluation of something else ({what}); use another --out")
+        is_same_otherwise = is_ours and {key for key in plain if there[key] != plain[key]} <= LEARNT
+        raise (OtherLessonsError if is_same_otherwise else DatasetError)(
+            root, f"holds an evaluation of something else ({what}); use another --out"
+        )
 
 
 def _end(root: Path, found: EvaluateReport) -> None:

@@ -1,0 +1,79 @@
+"""A bench whose config asks for more pictures goes on: what was made from fewer is made again, the rest is kept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import gear
+from gear.values.errors import GearError
+from gear.verbs.bench.plan import Step
+from tests.verbs.bench.conftest import FEW
+
+pytestmark = pytest.mark.usefixtures("plugins")
+
+LEARNING = (*FEW[:1], ("      blur: {plugin: gaussian}\n", ""), *FEW[2:4])
+"""Changes that leave one network, one scene and a defense that must learn."""
+
+
+class Looks:
+    """Remembers what it is told."""
+
+    def __init__(self) -> None:
+        self.notes: list[str] = []
+
+    def began(self, step: Step, number: int, steps: int) -> None: ...
+
+    def progress(self, done: int, total: int) -> None: ...
+
+    def learning(self, done: int, total: int) -> None: ...
+
+    def noted(self, line: str) -> None:
+        self.notes.append(line)
+
+
+def times(root: Path, kind: str) -> dict[Path, int]:
+    return {path: path.stat().st_mtime_ns for path in root.glob(f"data/semseg/*/ClearNoon/{kind}/**/*.png")}
+
+
+def test_more_pictures_to_attack(tmp_path: Path, written: Callable[..., Path]) -> None:
+    out, looks = tmp_path / "out", Looks()
+    gear.bench(written(*LEARNING), out=out)
+    kept = {kind: times(out, kind) for kind in ("attack", "none", "random")}
+    patch = (out / "patches/semseg/small/tiny-board/patch_0.png").read_bytes()
+    more = (*LEARNING, ("attack: 2", "attack: 3"))
+    report = gear.bench(written(*more), out=out, watch=looks)
+    for kind, before in kept.items():
+        assert before and before.items() <= times(out, kind).items(), "what is there is not collected again"
+    assert len(times(out, "attack")) > len(kept["attack"])
+    assert (out / "patches/semseg/small/tiny-board/patch_0.png").read_bytes() != patch
+    fresh = gear.bench(written(*more), out=tmp_path / "fresh")
+    figures, wanted = (
+        [[row.figures for row in one.evaluation.rows] for one in bench.tasks[0].results] for bench in (report, fresh)
+    )
+    assert str(figures) == str(wanted), "the tables are those of a bench that was begun with so many"
+    assert [line.split()[0] for line in looks.notes] == ["attack", "collect", "attack", "collect", "evaluate"]
+    assert all("is made again, for what is there" in line for line in looks.notes)
+    again = Looks()
+    assert gear.bench(written(*more), out=out, watch=again).tasks[0].results[0].evaluation.rows[0].made == 0
+    assert not again.notes
+
+
+def test_more_pictures_to_learn_from(tmp_path: Path, written: Callable[..., Path]) -> None:
+    out, looks = tmp_path / "out", Looks()
+    gear.bench(written(*LEARNING), out=out)
+    report = gear.bench(written(*LEARNING, ("calibrate: 8", "calibrate: 9")), out=out, watch=looks)
+    alone, guarded = report.tasks[0].results
+    assert [row.made for row in alone.evaluation.rows] == [0, 0, 0]
+    assert [row.made for row in guarded.evaluation.rows] == [2, 2, 2]
+    (line,) = looks.notes
+    assert line.startswith("evaluate small+fpda in semseg: is made again") and "calibration_samples" in line
+
+
+def test_patches_that_are_wanted_otherwise_are_not_made_again(tmp_path: Path, written: Callable[..., Path]) -> None:
+    out = tmp_path / "out"
+    gear.bench(written(*FEW), out=out)
+    with pytest.raises(GearError, match=r"made otherwise \(steps: 2 there, 3 now\); use another --out, or remove it$"):
+        gear.bench(written(*FEW, ("steps: 2", "steps: 3")), out=out)
