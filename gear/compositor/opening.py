@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from gear.compositor.pasting import CACHE_BYTES, Pasting
+from gear.compositor.pasting import CACHE_BYTES, Pasting, Prepared
 from gear.formats.probes import demand_probes
 from gear.values.errors import UnknownNameError
 
 if TYPE_CHECKING:
     import torch
 
+    from gear.compositor.cache import Cache
     from gear.dataset.reading import Dataset
 
 COMPOSITORS = ("transport", "homography")
@@ -24,6 +25,7 @@ def open_compositor(
     device: str | torch.device = "cpu",
     rounding: bool = False,
     cache_bytes: int = CACHE_BYTES,
+    cache: Cache[Prepared] | None = None,
 ) -> Pasting:
     """A compositor for the samples of a dataset.
 
@@ -33,18 +35,20 @@ def open_compositor(
         device: where to compute.
         rounding: whether patches and pictures are rounded to bytes, as files are.
         cache_bytes: memory for what is worked out once a sample.
+        cache: that several compositors have in common, in place of one of `cache_bytes`.
 
     Raises:
         UnknownNameError: there is no such compositor.
         DatasetError: the dataset has no probes, and they are needed.
     """
+    more: dict[str, Any] = {"device": device, "rounding": rounding, "cache_bytes": cache_bytes, "cache": cache}
     if name == "transport":
         from gear.compositor.transport import TransportCompositor
 
         demand_probes(dataset)
-        return TransportCompositor(dataset, device=device, rounding=rounding, cache_bytes=cache_bytes)
+        return TransportCompositor(dataset, **more)
     if name == "homography":
         from gear.compositor.homography import HomographyCompositor
 
-        return HomographyCompositor(dataset, device=device, rounding=rounding, cache_bytes=cache_bytes)
+        return HomographyCompositor(dataset, **more)
     raise UnknownNameError("compositor", name, COMPOSITORS)

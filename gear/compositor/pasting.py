@@ -57,6 +57,7 @@ class Pasting:
         device: where to compute.
         rounding: whether patches and pictures are rounded to bytes, as files are; gradients pass straight through.
         cache_bytes: memory for what is worked out once a sample.
+        cache: that several compositors have in common, in place of one of `cache_bytes`.
     """
 
     def __init__(
@@ -66,11 +67,12 @@ class Pasting:
         device: str | torch.device = "cpu",
         rounding: bool = False,
         cache_bytes: int = CACHE_BYTES,
+        cache: Cache[Prepared] | None = None,
     ) -> None:
         self.dataset = dataset
         self.device = torch.device(device)
         self.rounding = rounding
-        self._cache: Cache[Prepared] = Cache(cache_bytes)
+        self._cache: Cache[Prepared] = Cache(cache_bytes) if cache is None else cache
 
     @property
     def surfaces(self) -> int:
@@ -93,7 +95,7 @@ class Pasting:
         """
         shown = [self._checked(patch, len(samples)) for patch in patches]
         sizes: Sizes = tuple((int(patch.shape[-2]), int(patch.shape[-1])) for patch in shown)
-        views = [self._cache.get((i, view, sizes), partial(self._load, i, view, sizes)) for i in samples]
+        views = [self._cache.get((self, i, view, sizes), partial(self._load, i, view, sizes)) for i in samples]
         columns = self._columns(shown)
         pictures = torch.stack([v.picture for v in views]).to(torch.float32).div_(255)
         pixels = pictures[0, 0].numel()

@@ -16,7 +16,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from gear.compositor.cache import Cache
 from gear.compositor.opening import open_compositor
+from gear.compositor.pasting import Prepared
 from gear.contracts.attacks import Budget
 from gear.contracts.specs import AttackSpec
 from gear.plugins.build import blamed, build, find
@@ -25,20 +27,30 @@ from gear.values.rng import derive_rng
 from gear.verbs.train.config import Adversarial
 from gear.verbs.train.data import Samples
 
-CACHE_BYTES = 256 << 20
-"""Of each scene's compositor."""
+CACHE_BYTES = 1 << 30
+"""Of the compositors of all scenes together."""
 
 
 class Adversary:
     """Makes patches against the network, and puts them into samples."""
 
-    def __init__(self, samples: Samples, config: Adversarial, *, task: str, seed: int, device: torch.device) -> None:
+    def __init__(
+        self,
+        samples: Samples,
+        config: Adversarial,
+        *,
+        task: str,
+        seed: int,
+        device: torch.device,
+        cache_bytes: int = CACHE_BYTES,
+    ) -> None:
         """Args:
             samples: to train on; those of scenes with surfaces (and probes, for `transport`) are attacked.
             config: which attack, how often, how long.
             task: that the attack must be able to attack.
             seed: of everything drawn here.
             device: of the compositor.
+            cache_bytes: memory of the compositors of all scenes together.
 
         Raises:
             GearError: the attack cannot attack the task, is counted in forward passes, makes fewer patches than a scene
@@ -69,8 +81,9 @@ class Adversary:
                     f"attack {spec.name!r} makes up to {spec.max_surfaces} patches; the scene of "
                     f"{samples.datasets[number].root} has {surfaces} surfaces"
                 )
+        cache: Cache[Prepared] = Cache(cache_bytes)
         self._compositors = {
-            number: open_compositor(config.compositor, samples.datasets[number], device=device, cache_bytes=CACHE_BYTES)
+            number: open_compositor(config.compositor, samples.datasets[number], device=device, cache=cache)
             for number in with_surfaces
         }
         self._indices = {number: [i for dataset, i in places if dataset == number] for number in with_surfaces}

@@ -75,7 +75,8 @@ class TrainConfig(Recipe):
         validation_samples: at most so many samples are validated on, spread over the data.
         patience: stops after so many validations without a better one; 0 never does.
         workers: threads that decode and augment; they change nothing but time.
-        cache_gb: memory for decoded samples; what does not fit is decoded again. Changes nothing but time.
+        cache_gb: memory for decoded samples, and a quarter as much for what compositors work out of them; what does not
+            fit is made again. Changes nothing but time.
         augmentation: of training samples.
         adversarial: patches that are made against the network while it learns.
         options: the network's own (`gear plugins show MODEL`).

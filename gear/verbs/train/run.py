@@ -229,6 +229,7 @@ def _parts(
             task=origin.task,
             seed=config.seed,
             device=device_of(config.device),
+            cache_bytes=int(limit / 4),
         )
     return Parts(
         spec=spec,

@@ -99,6 +99,33 @@ def test_patches_of_the_pool_are_put_on_the_board(probed: Path, painter: None) -
     assert never.change(sample, 0, derive_rng(0, "x")) is sample
 
 
+def test_memory_does_not_grow_with_scenes(probed: Path, painter: None, tmp_path: Path) -> None:
+    """Every scene, and every weather of it, is a dataset with a compositor of its own."""
+    roots = [probed]
+    for seed in (5, 6):
+        roots.append(tmp_path / f"{seed}")
+        collect(
+            "semseg", out=roots[-1], town=TINY_TOWN, scene="board", split="train", samples=2, seed=seed,
+            renderer="classic", quality="fast", probes=True,
+            settings=[f"scenes={TINY_SCENES}", "options.width_px=128", "options.height_px=64"],
+        )  # fmt: skip
+    samples = all_of(open_all(roots, "semseg", names=("train",)))
+
+    def shown(most: int) -> tuple[list[Any], int]:
+        config = Adversarial(attack="painter", share=1.0)
+        one = Adversary(samples, config, task="semseg", seed=0, device=torch.device("cpu"), cache_bytes=most)
+        one.refresh(Model(), 0)
+        rngs = (derive_rng(0, "x", i) for i in range(len(samples)))
+        pictures = [one.change(samples[i], i, rng).images["left"] for i, rng in enumerate(rngs)]
+        caches = {id(engine._cache): engine._cache.nbytes for engine in one._compositors.values()}
+        return pictures, sum(caches.values())
+
+    whole, needed = shown(1 << 30)
+    few, kept = shown(needed // 3)
+    assert 0 < kept <= needed // 3 and needed > len(samples) * 128 * 64 * 3
+    assert all(np.array_equal(one, other) for one, other in zip(few, whole, strict=True))
+
+
 class StopError(Exception):
     """A power cut."""
 
