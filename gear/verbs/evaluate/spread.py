@@ -108,8 +108,10 @@ def auroc(positives: Sequence[float], negatives: Sequence[float]) -> float:
     """Area under the ROC curve: how often a positive's score is above a negative's, ties half; NaN without either."""
     if not len(positives) or not len(negatives):
         return float("nan")
-    above = np.asarray(positives)[:, None] - np.asarray(negatives)[None]
-    return float((above > 0).mean() + 0.5 * (above == 0).mean())
+    ranked = np.sort(np.asarray(negatives))
+    below, not_above = (int(np.searchsorted(ranked, positives, side).sum()) for side in ("left", "right"))
+    pairs = len(positives) * len(negatives)
+    return below / pairs + 0.5 * ((not_above - below) / pairs)
 
 
 def auroc_interval(positives: Sequence[float], negatives: Sequence[float], draws: Draws) -> tuple[float, float] | None:
