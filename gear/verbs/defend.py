@@ -19,23 +19,19 @@ from gear.contracts.defenses import Defense, DefenseResult
 from gear.contracts.models import Model
 from gear.contracts.specs import DefenseSpec
 from gear.dataset.files import clear_scratch, explained, inside, write_whole
-from gear.dataset.reading import Dataset
 from gear.dataset.sidecar import dump_json, load_json
 from gear.dataset.store import refuse_dataset
-from gear.formats.png import encode_labels
 from gear.opening import open_dataset
 from gear.plugins.build import NO_OPTIONS, blamed, build, find
 from gear.plugins.catalogue import Found
-from gear.values.errors import DatasetError, FieldError, GearError, PluginError
+from gear.values.errors import DatasetError, GearError, PluginError
 from gear.values.frames import UInt8Image
 from gear.values.rng import derive_rng
-from gear.values.serial import Json, from_json
+from gear.values.serial import Json
+from gear.verbs.cleaned import FOLDER, kept_marker, marker_path, write_sample
 
 Progress = Callable[[int, int], None]
 """Called with (samples finished, samples of the split)."""
-
-FOLDER = "defense"
-"""Masks, scores and what the run was begun with lie under it, one folder a split."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,18 +43,22 @@ class DefendReport:
         split: its name.
         samples: how many of the split are cleaned now.
         made: how many of them this run cleaned.
+        outdated: how many of these had been cleaned before, of pictures that are others now, or into files that are
+            damaged.
     """
 
     root: Path
     split: str
     samples: int
     made: int
+    outdated: int = 0
 
     def summary(self) -> str:
         """One line for a person."""
         kept = self.samples - self.made
         resumed = f" ({kept} were there already)" if kept else ""
-        return f"{self.root}: {self.samples} samples of split {self.split!r} cleaned{resumed}"
+        again = f"; {self.outdated} were cleaned again: their pictures or files had changed" if self.outdated else ""
+        return f"{self.root}: {self.samples} samples of split {self.split!r} cleaned{resumed}{again}"
 
 
 def defend(
@@ -71,7 +71,8 @@ def defend(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> DefendReport:
-    """Writes a dataset's pictures as a defense cleans them; takes up again what was begun.
+    """Writes a dataset's pictures as a defense cleans them; takes up again what was begun, and cleans again what comes
+    of pictures that are others now, or was damaged.
 
     The cleaned pictures have the relative paths of the dataset's. Beside them lie, for each split,
     `defense/<split>/masks/<index>_<camera>.png` (16 bits, 65535 is 1) and `defense/<split>/scores.json`, as far as the
@@ -105,22 +106,24 @@ def defend(
     }
     begin(root, name, plan)
     guard = Guard(found, build(found, options))
-    missing = [i for i in range(len(opened)) if not inside(root, _marker(name, i)).exists()]
+    markers = {i: kept_marker(root, opened, i, spec) for i in range(len(opened))}
+    missing = [i for i, marker in markers.items() if marker is None]
+    outdated = sum(inside(root, marker_path(name, i)).exists() for i in missing)
     finished = len(opened) - len(missing)
     if progress is not None:
         progress(finished, len(opened))
     for index in missing:
         sample = opened[index]
         result = guard.apply(sample.images, derive_rng(seed, "defend", spec.name, index), index)
-        write_sample(root, opened, index, sample, spec, result)
+        markers[index] = write_sample(root, opened, index, sample, spec, result)
         finished += 1
         if progress is not None:
             progress(finished, len(opened))
     if "score" in spec.outputs:
-        scores = [_score(inside(root, _marker(name, i))) for i in range(len(opened))]
+        scores = [marker.score for marker in markers.values() if marker is not None]
         write_whole(root, f"{FOLDER}/{name}/scores.json", dump_json({"scores": scores}))
     clear_scratch(root)
-    return DefendReport(root=root, split=name, samples=len(opened), made=len(missing))
+    return DefendReport(root=root, split=name, samples=len(opened), made=len(missing), outdated=outdated)
 
 
 def suitable(found: Found, task: str) -> DefenseSpec[Any]:
@@ -237,50 +240,6 @@ class Guard:
         owner = self._found.owner
         name = f"{self._found.spec.name} ({owner.package} {owner.version})"
         return PluginError(name, f"apply on sample {index}", problem)
-
-
-def write_sample(
-    root: Path, dataset: Dataset[Any], index: int, sample: Any, spec: DefenseSpec[Any], result: DefenseResult
-) -> None:
-    """Writes what the defense gives of one sample, and last the marker that says it is whole."""
-    split = dataset.plan.info.split
-    if "images" in spec.outputs:
-        cleaned = dataset.task.encode(dataclasses.replace(sample, images=dict(result.views)), dataset.plan.info).files
-        for relative in picture_paths(dataset, sample):
-            write_whole(root, relative, cleaned[relative])
-    if "mask" in spec.outputs and result.mask is not None:
-        for camera, mask in result.mask.items():
-            levels = np.rint(np.clip(mask, 0, 1) * 65535).astype(np.uint16)
-            write_whole(root, f"{FOLDER}/{split}/masks/{index:06d}_{camera}.png", encode_labels(levels))
-    score = None if result.score is None else float(result.score)
-    write_whole(root, _marker(split, index), dump_json({"score": score}))
-
-
-def picture_paths(dataset: Dataset[Any], sample: Any) -> list[str]:
-    """The files of a sample that hold its pictures, whatever the task: those that change with them."""
-    info = dataset.plan.info
-    inverted = {name: np.subtract(255, picture, dtype=np.uint8) for name, picture in sample.images.items()}
-    other = dataset.task.encode(dataclasses.replace(sample, images=inverted), info).files
-    return [path for path, data in dataset.task.encode(sample, info).files.items() if other[path] != data]
-
-
-def _score(path: Path) -> float:
-    """What a marker of a sample says.
-
-    Raises:
-        DatasetError: nothing, because it is damaged.
-    """
-    remedy = "delete it and run the same command again"
-    try:
-        return from_json(float, load_json(path)["score"], "score")
-    except DatasetError as error:
-        raise DatasetError(path, f"{error.problem.partition(';')[0]}; {remedy}") from error
-    except (KeyError, TypeError, FieldError) as error:
-        raise DatasetError(path, f"does not say a sample's score; {remedy}") from error
-
-
-def _marker(split: str, index: int) -> str:
-    return f"{FOLDER}/{split}/samples/{index:06d}.json"
 
 
 def _of_camera(given: object, name: str) -> Any:

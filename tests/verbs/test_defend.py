@@ -105,10 +105,6 @@ def test_it_is_taken_up_again_and_gives_the_same(stereo: Path, tmp_path: Path) -
     with pytest.raises(DatasetError, match=r"cleaned in another way \(options differ\)"):
         defend(stereo, defense="lgs", out=tmp_path / "clean", settings=["strength=1.5"])
     folder = tmp_path / "clean/defense/debug"
-    for text in ("[]", "{}", '{"score": "high"}', "{"):
-        (folder / "samples/000000.json").write_text(text)
-        with pytest.raises(DatasetError, match=r"000000.json: .*; delete it and run the same command again$"):
-            defend(stereo, defense="lgs", out=tmp_path / "clean")
     (folder / "plan.json").write_text("{")
     with pytest.raises(DatasetError, match=r"plan.json: is not JSON .*; use another --out, or delete this folder$"):
         defend(stereo, defense="lgs", out=tmp_path / "clean")

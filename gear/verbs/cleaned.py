@@ -1,0 +1,95 @@
+"""What `gear defend` keeps of a sample: its files, and the marker that says from what they were made and that they are
+whole. Samples whose pictures are others since, or whose files were damaged, are cleaned again."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gear.contracts.defenses import DefenseResult
+from gear.contracts.specs import DefenseSpec
+from gear.dataset.files import inside, read_bytes, sha256, write_whole
+from gear.dataset.reading import Dataset
+from gear.dataset.sidecar import dump_json, load_json
+from gear.formats.png import encode_labels
+from gear.values.errors import DatasetError, FieldError
+from gear.values.serial import from_json, to_json
+
+FOLDER = "defense"
+"""Masks, scores and what the run was begun with lie under it, one folder a split."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Marker:
+    """Written last, beside a sample's files.
+
+    Attributes:
+        score: of the defense; None where it gives none.
+        source: sha256 of the dataset's pictures that were cleaned, by path in the dataset.
+        files: sha256 of what was written, by path in the folder of the cleaned pictures.
+    """
+
+    score: float | None
+    source: dict[str, str]
+    files: dict[str, str]
+
+
+def kept_marker(root: Path, dataset: Dataset[Any], index: int, spec: DefenseSpec[Any]) -> Marker | None:
+    """What was noted of a sample that is cleaned; None where it is not, where the dataset's pictures are others now, or
+    where what was written is damaged."""
+    path = inside(root, marker_path(dataset.plan.info.split, index))
+    if not path.is_file():
+        return None
+    try:
+        marker = from_json(Marker, load_json(path), "marker")
+        is_whole = _are_whole(dataset.root, marker.source) and _are_whole(root, marker.files)
+    except (DatasetError, FieldError):
+        return None
+    return None if not is_whole or ("score" in spec.outputs and marker.score is None) else marker
+
+
+def write_sample(
+    root: Path, dataset: Dataset[Any], index: int, sample: Any, spec: DefenseSpec[Any], result: DefenseResult
+) -> Marker:
+    """Writes what the defense gives of one sample, and last the marker that says it is whole."""
+    info = dataset.plan.info
+    pictures, files = _picture_paths(dataset, sample), dict[str, bytes]()
+    if "images" in spec.outputs:
+        cleaned = dataset.task.encode(dataclasses.replace(sample, images=dict(result.views)), info).files
+        files |= {relative: cleaned[relative] for relative in pictures}
+    if "mask" in spec.outputs and result.mask is not None:
+        for camera, mask in result.mask.items():
+            levels = np.rint(np.clip(mask, 0, 1) * 65535).astype(np.uint16)
+            files[f"{FOLDER}/{info.split}/masks/{index:06d}_{camera}.png"] = encode_labels(levels)
+    for relative, data in files.items():
+        write_whole(root, relative, data)
+    marker = Marker(
+        score=None if result.score is None else float(result.score),
+        source={relative: sha256(read_bytes(inside(dataset.root, relative))) for relative in pictures},
+        files={relative: sha256(data) for relative, data in files.items()},
+    )
+    write_whole(root, marker_path(info.split, index), dump_json(to_json(marker)))
+    return marker
+
+
+def marker_path(split: str, index: int) -> str:
+    """Of one sample."""
+    return f"{FOLDER}/{split}/samples/{index:06d}.json"
+
+
+def _picture_paths(dataset: Dataset[Any], sample: Any) -> list[str]:
+    """The files of a sample that hold its pictures, whatever the task: those that change with them."""
+    info = dataset.plan.info
+    inverted = {name: np.subtract(255, picture, dtype=np.uint8) for name, picture in sample.images.items()}
+    other = dataset.task.encode(dataclasses.replace(sample, images=inverted), info).files
+    return [path for path, data in dataset.task.encode(sample, info).files.items() if other[path] != data]
+
+
+def _are_whole(root: Path, digests: Mapping[str, str]) -> bool:
+    """Whether files are there and have these digests."""
+    return all(sha256(read_bytes(inside(root, relative))) == digest for relative, digest in digests.items())
