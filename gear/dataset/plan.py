@@ -64,6 +64,7 @@ def read_plan(root: Path, split: str) -> Plan | None:
     """The plan of a split that was begun, or None.
 
     Raises:
+        ReplaceableError: it is of another version of gear.
         DatasetError: it cannot be read.
     """
     path = inside(root, plan_path(split))
@@ -76,8 +77,8 @@ def read_plan(root: Path, split: str) -> Plan | None:
                 raise FieldError(f"plan.{field}", f"must have a {key}")
         return plan
     except FieldError as error:
-        remedy = f"use another --out, or replace split {split!r} with --force"
-        raise DatasetError(path, f"is not of this version of gear ({error}); {remedy}") from error
+        problem = f"{plan_path(split)}: is not of this version of gear ({error})"
+        raise ReplaceableError(root, problem, split=split) from error
 
 
 def begin(root: Path, plan: Plan) -> None:

@@ -298,9 +298,11 @@ def remove_split(root: Path, split: str) -> None:
     sidecars = sorted((folder / "samples").glob("*.json"))
     begun = sorted(inside(root, begun_path(split, "x")).parent.glob("*.json"))
     manifest = inside(root, manifest_path(split))
-    doomed = [(path, _files_named(root, path)) for path in (manifest, *sidecars)]
-    unfinished = [(path, _files_named(root, path)) for path in begun]
-    without_sidecar = _files_of_samples(root, manifest)
+    listed = _load_if_whole(manifest)
+    doomed = [(manifest, _files_named(root, listed))]
+    doomed += [(path, _files_named(root, _load_if_whole(path))) for path in sidecars]
+    unfinished = [(path, _files_named(root, _load_if_whole(path))) for path in begun]
+    without_sidecar = _files_of_samples(root, listed)
     label = _patch_label(root, split)
     with explained(root):
         for path, files in doomed:
@@ -324,24 +326,22 @@ def remove_split(root: Path, split: str) -> None:
                 copies.rmdir()
 
 
-def _files_named(root: Path, path: Path) -> list[Path]:
-    """What a sidecar, a manifest or a note of what was being written names; nothing where it is gone or damaged.
+def _files_named(root: Path, there: Json) -> list[Path]:
+    """What a sidecar, a manifest or a note of what was being written names; nothing where it is none.
 
     Raises:
         DatasetError: a path outside the root.
     """
-    there = _load_if_whole(path)
     named = there if isinstance(there, list) else _names(there, "files") + _names(there, "indexes")
     return [inside(root, name) for name in named if isinstance(name, str)]
 
 
-def _files_of_samples(root: Path, manifest: Path) -> list[Path]:
-    """What a manifest says that samples own; nothing where it is gone or damaged.
+def _files_of_samples(root: Path, there: Json) -> list[Path]:
+    """What a manifest says that samples own; nothing where it is none.
 
     Raises:
         DatasetError: a path outside the root.
     """
-    there = _load_if_whole(manifest)
     samples = there.get("samples") if isinstance(there, dict) else None
     return [
         inside(root, name) for one in (samples if isinstance(samples, list) else ()) for name in _names(one, "files")
@@ -349,6 +349,7 @@ def _files_of_samples(root: Path, manifest: Path) -> list[Path]:
 
 
 def _load_if_whole(path: Path) -> Json:
+    """What a JSON file says; None where it is gone or damaged."""
     try:
         return load_json(path)
     except DatasetError:

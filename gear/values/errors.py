@@ -113,8 +113,13 @@ class DatasetError(GearError):
 class ReplaceableError(DatasetError):
     """What lies there is in the way: it was made with other settings, or is broken. A `--force` replaces it."""
 
+    def __init__(self, path: Path | str, problem: str, *, split: str = "") -> None:
+        super().__init__(path, problem)
+        self.split = split
+
     def __str__(self) -> str:
-        return f"{super().__str__()}; use another --out, or --force to replace it"
+        remedy = f"replace split {self.split!r} with --force" if self.split else "--force to replace it"
+        return f"{super().__str__()}; use another --out, or {remedy}"
 
 
 class OutdatedError(ReplaceableError):

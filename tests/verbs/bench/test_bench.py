@@ -165,8 +165,9 @@ def test_a_step_that_fails_says_which(tmp_path: Path, written: Callable[..., Pat
     other = out / "data/semseg/tiny-board/ClearNoon/attack/gear/train/plan.json"
     other.parent.mkdir(parents=True)
     other.write_text("{}")
-    with pytest.raises(GearError, match=r"collect semseg in tiny-board ClearNoon to attack.*plan\.json"):
+    with pytest.raises(GearError, match=r"collect semseg in tiny-board ClearNoon to attack.*plan\.json") as caught:
         gear.bench(config, out=out)
+    assert str(caught.value).endswith("; use another --out, or remove it") and "--force" not in str(caught.value)
     assert not (out / "bench.json").exists()
 
 
