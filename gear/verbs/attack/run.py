@@ -28,9 +28,10 @@ from gear.verbs.attack.folder import begin, read_patches, tidy
 from gear.verbs.attack.job import Job, Paths, resolve
 from gear.verbs.attack.models import FLAG, build_model
 from gear.verbs.attack.outputs import as_picture, write_curves, write_patches, write_samples
+from gear.verbs.attack.promise import check_patches
 from gear.verbs.attack.report import AttackReport
 from gear.verbs.attack.scenes import Scenes
-from gear.verbs.attack.watch import Recorder, is_picture
+from gear.verbs.attack.watch import Recorder
 from gear.verbs.evaluate.player import weights_digest
 from gear.verbs.evaluate.shown_size import size_note
 
@@ -201,7 +202,7 @@ def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, p
             watch=recorder,
         )
     for patches in (last, recorder.best or last):
-        _check_patches(patches, job.surfaces, f"{job.spec.name} ({job.found.owner.package} {job.found.owner.version})")
+        check_patches(patches, job.surfaces, job.found)
     if weights_digest(network) != plan["weights_sha256"]:
         raise PluginError(job.spec.name, "optimise", "the attack changed the model; nothing was written")
     if job.queries is not None and recorder.is_asked and not recorder.done:
@@ -239,20 +240,6 @@ def _facts(job: Job, network: Model, plan: Json, made: _Made) -> Json:
         "curves": {name: [_plain(value) for value in curve] for name, curve in recorder.curves.items()},
         "validation_harm": [[step, _plain(harm)] for step, harm in recorder.judged],
     }
-
-
-def _check_patches(patches: Any, surfaces: int, owner: str) -> None:
-    """Raises `PluginError` where an attack returns something else than it promises."""
-    names = [f"patch_{n}" for n in range(surfaces)]
-    if not isinstance(patches, tuple) or not all(isinstance(patch, Patch) for patch in patches):
-        raise PluginError(owner, "optimise", "must return a tuple of Patch")
-    if [patch.name for patch in patches] != names:
-        raise PluginError(owner, "optimise", f"must return {', '.join(names)}")
-    for patch in patches:
-        if not is_picture(patch.rgb):
-            raise PluginError(owner, "optimise", f"{patch.name} must be (H, W, 3) float32 without NaN")
-        if patch.rgb.min() < 0 or patch.rgb.max() > 1:
-            raise PluginError(owner, "optimise", f"{patch.name} leaves 0..1")
 
 
 def _gradient_facts(norms: Sequence[float]) -> Json:

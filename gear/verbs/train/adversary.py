@@ -24,6 +24,7 @@ from gear.contracts.specs import AttackSpec
 from gear.plugins.build import blamed, build, find
 from gear.values.errors import GearError
 from gear.values.rng import derive_rng
+from gear.verbs.attack.promise import check_patches
 from gear.verbs.train.config import Adversarial
 from gear.verbs.train.data import Samples
 
@@ -105,6 +106,7 @@ class Adversary:
                 budget=Budget(steps=self._config.steps),
                 rng=rng,
             )
+        check_patches(patches, len(dataset.sidecar(0).record.surfaces), self._found)
         tensors = tuple(torch.from_numpy(patch.rgb).permute(2, 0, 1).contiguous() for patch in patches)
         self._pool = [*self._pool, tensors][-self._config.pool :]
 

@@ -18,7 +18,7 @@ from gear.contracts.specs import AttackSpec
 from gear.plugins import build as building
 from gear.plugins.catalogue import Catalogue, Found, Owner
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
-from gear.values.errors import GearError
+from gear.values.errors import GearError, PluginError
 from gear.values.rng import derive_rng
 from gear.verbs.collect.run import collect
 from gear.verbs.train import loop
@@ -172,6 +172,26 @@ def test_attacks_that_cannot_do_it_are_refused(
     monkeypatch.setattr(building, "catalogue", lambda: odd)
     with pytest.raises(GearError, match=message):
         adversary_of(probed)
+
+
+class Careless(Painter):
+    """Returns what it must not."""
+
+    def optimise(self, *given: Any, **named: Any) -> Any:
+        return [(), (Patch(name="poster", rgb=np.zeros((4, 8, 3), np.float32)),), None, (np.zeros((4, 8, 3)),)][
+            int(self.config.level)
+        ]
+
+
+@pytest.mark.parametrize("level", [0.0, 1.0, 2.0, 3.0])
+def test_an_attack_that_breaks_its_promise_is_named(
+    probed: Path, painter: None, monkeypatch: pytest.MonkeyPatch, level: float
+) -> None:
+    *others, found = building.catalogue().found
+    odd = Catalogue((*others, replace(found, spec=replace(found.spec, build=lambda _: Careless(Config(level=level))))))
+    monkeypatch.setattr(building, "catalogue", lambda: odd)
+    with pytest.raises(PluginError, match=r"plugin painter \(painter 1\) failed at optimise: must return"):
+        adversary_of(probed).refresh(Model(), 0)
 
 
 def test_what_is_missing_is_said(street: Callable[..., Path], painter: None, tmp_path: Path) -> None:
