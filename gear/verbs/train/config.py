@@ -18,6 +18,9 @@ from gear.values.errors import FieldError
 SCALES, CROPS_PX = (0.1, 100.0), (16, 8192)
 """Beyond these, windows and pictures need more memory than there is."""
 
+MOST_RATE = 1e6
+"""No network learns at it; optimisers fail at rates that single precision has not."""
+
 SHARES = ("warm_up", "final_rate", "validation_share")
 
 
@@ -112,8 +115,8 @@ class TrainConfig(Recipe):
                 raise FieldError(name, f"is a share, 0 or more and below 1, got {getattr(self, name):g}")
         if self.picture_scale is not None and not 0 < self.picture_scale <= 1:
             raise FieldError("picture_scale", f"is a share, above 0 and at most 1, got {self.picture_scale:g}")
-        if not self.learning_rate > 0:
-            raise FieldError("learning_rate", f"must be above 0, got {self.learning_rate:g}")
+        if not 0 < self.learning_rate <= MOST_RATE:
+            raise FieldError("learning_rate", f"must be above 0, at most {MOST_RATE:g}, got {self.learning_rate:g}")
         if not 0 <= self.ema < 1:
             raise FieldError("ema", f"must be 0 or more and below 1, got {self.ema:g}")
         if not SCALES[0] <= self.scales[0] <= self.scales[1] <= SCALES[1]:

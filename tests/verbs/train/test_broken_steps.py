@@ -110,6 +110,12 @@ def test_steps_that_are_left_out_are_counted_over_a_stop(
         quick(street, tmp_path / "out", epochs=30, batch=1)
 
 
+def test_a_rate_that_optimisers_have_no_number_for_is_refused(street: Street, tmp_path: Path, install: Any) -> None:
+    install(tiny_segmenter)
+    with pytest.raises(GearError, match="learning_rate: must be above 0, at most 1e"):
+        quick(street, tmp_path, settings=["learning_rate=1e39"])
+
+
 def test_answers_that_cannot_be_measured_end_it(street: Street, tmp_path: Path, install: Any) -> None:
     install(replace(tiny_segmenter, build=Cropping, recipe=Recipe(batch=1, epochs=9)))
     with pytest.raises(GearError, match=r"cannot be measured \(prediction must have shape .* lower --lr"):
