@@ -9,10 +9,11 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from gear.config.dump import to_plain
-from gear.dataset.files import clear_scratch, explained, inside, write_whole
+from gear.dataset.files import clear_scratch, inside, write_whole
 from gear.dataset.plan import differences
 from gear.dataset.sidecar import dump_json, load_json
 from gear.dataset.store import refuse_dataset
+from gear.dataset.turns import alone_at_work
 from gear.values.errors import DatasetError, GearError
 from gear.values.serial import Json
 from gear.verbs.evaluate.calibration import opened_calibration
@@ -117,36 +118,35 @@ def evaluate(
         **learnt.counted(),
         "seed": seed,
     }
-    _begin(root, facts)
-    told = _counter(progress, sum(len(one) for one in datasets))
-    rows = []
-    for dataset, name in zip(datasets, names, strict=True):
-        scorer = Scorer(dataset, root, name, tuple(reports), chosen.found)
-        size = batch or player.usual_batch(dataset)
-        row = evaluate_row(dataset, scorer, player, batch=size, workers=workers, told=told)
-        scorer.finish(row.notes)
-        rows.append(
-            Measured(name=name, dataset=dataset, scorer=scorer, notes=row.notes, made=row.made, damaged=row.damaged)
+    with alone_at_work(root):
+        _begin(root, facts)
+        told = _counter(progress, sum(len(one) for one in datasets))
+        rows = []
+        for dataset, name in zip(datasets, names, strict=True):
+            scorer = Scorer(dataset, root, name, tuple(reports), chosen.found)
+            size = batch or player.usual_batch(dataset)
+            row = evaluate_row(dataset, scorer, player, batch=size, workers=workers, told=told)
+            scorer.finish(row.notes)
+            rows.append(
+                Measured(name=name, dataset=dataset, scorer=scorer, notes=row.notes, made=row.made, damaged=row.damaged)
+            )
+        said = [note for one in datasets for note in (size_note(chosen, one), drive_note(one), learnt.note(one))]
+        notes = [*learnt.doubts(), *(note for note in said if note)]
+        more = {"reports": list(reports), "resamples": resamples, "versions": _versions(player), "notes": notes}
+        found = EvaluateReport(
+            out=root,
+            facts=facts | more,
+            rows=tuple(row_report(row, seed, resamples) for row in rows),
+            together=tuple(together(rows, seed, resamples)),
+            differences=tuple(compared(rows, seed, resamples)),
+            pools=tuple(pooled(rows, pools or {}, seed, resamples)),
         )
-    said = [note for one in datasets for note in (size_note(chosen, one), drive_note(one), learnt.note(one))]
-    notes = [*learnt.doubts(), *(note for note in said if note)]
-    more = {"reports": list(reports), "resamples": resamples, "versions": _versions(player), "notes": notes}
-    found = EvaluateReport(
-        out=root,
-        facts=facts | more,
-        rows=tuple(row_report(row, seed, resamples) for row in rows),
-        together=tuple(together(rows, seed, resamples)),
-        differences=tuple(compared(rows, seed, resamples)),
-        pools=tuple(pooled(rows, pools or {}, seed, resamples)),
-    )
-    _end(root, found)
+        _end(root, found)
     return found
 
 
 def _begin(root: Path, facts: Json) -> None:
     """Writes what the evaluation is of, or checks that what is there is of the same, as far as a sample is."""
-    with explained(root):
-        root.mkdir(parents=True, exist_ok=True)
     clear_scratch(root)
     path = inside(root, "plan.json")
     plain = to_plain(facts)
