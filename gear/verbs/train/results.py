@@ -180,7 +180,7 @@ def card(root: Path, origin: Origin, progress: Progress) -> str:
         "",
         "## Validation",
         "",
-        f"On {len(origin.validation)} held-out samples, whole pictures, float32:",
+        f"On {len(origin.validation)} held-out sample{'s' * (len(origin.validation) != 1)}, whole pictures, float32:",
         "",
         "| figure | value |",
         "|---|---|",
