@@ -58,10 +58,9 @@ def write_sample(
 ) -> Marker:
     """Writes what the defense gives of one sample, and last the marker that says it is whole."""
     info = dataset.plan.info
-    pictures, files = _picture_paths(dataset, sample), dict[str, bytes]()
-    if "images" in spec.outputs:
-        cleaned = dataset.task.encode(dataclasses.replace(sample, images=dict(result.views)), info).files
-        files |= {relative: cleaned[relative] for relative in pictures}
+    cleans = "images" in spec.outputs
+    pictures = _picture_files(dataset, dataclasses.replace(sample, images=dict(result.views)) if cleans else sample)
+    files = dict(pictures) if cleans else {}
     if "mask" in spec.outputs and result.mask is not None:
         for camera, mask in result.mask.items():
             levels = np.rint(np.clip(mask, 0, 1) * 65535).astype(np.uint16)
@@ -82,12 +81,12 @@ def marker_path(split: str, index: int) -> str:
     return f"{FOLDER}/{split}/samples/{index:06d}.json"
 
 
-def _picture_paths(dataset: Dataset[Any], sample: Any) -> list[str]:
-    """The files of a sample that hold its pictures, whatever the task: those that change with them."""
+def _picture_files(dataset: Dataset[Any], sample: Any) -> dict[str, bytes]:
+    """Of a sample's files those that hold its pictures, whatever the task: those that change with them."""
     info = dataset.plan.info
     inverted = {name: np.subtract(255, picture, dtype=np.uint8) for name, picture in sample.images.items()}
     other = dataset.task.encode(dataclasses.replace(sample, images=inverted), info).files
-    return [path for path, data in dataset.task.encode(sample, info).files.items() if other[path] != data]
+    return {path: data for path, data in dataset.task.encode(sample, info).files.items() if other[path] != data}
 
 
 def _are_whole(root: Path, digests: Mapping[str, str]) -> bool:
