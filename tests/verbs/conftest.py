@@ -3,6 +3,7 @@ from __future__ import annotations
 import sys
 import types
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,15 @@ from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_depth, ti
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.verbs.collect.run import CollectReport, collect
 
+Small = Callable[..., Path]
+Install = Callable[..., None]
+
 SMALL = {"semseg": "320x160", "detect2d": "320x192", "stereo3d": "320x96", "depth": "320x96"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Nothing:
+    """No options."""
 
 
 def size_settings(task: str) -> list[str]:

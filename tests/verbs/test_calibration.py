@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,14 +19,7 @@ from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import GearError
 from gear.verbs.attack.run import attack
 from gear.verbs.evaluate.run import evaluate
-
-Small = Callable[..., Path]
-Install = Callable[..., None]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Nothing:
-    """No options."""
+from tests.verbs.conftest import Install, Nothing, Small
 
 
 class Learner:

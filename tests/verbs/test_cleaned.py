@@ -13,12 +13,9 @@ import pytest
 from gear.cli.main import main
 from gear.verbs.collect.run import CollectReport
 from gear.verbs.defend import DefendReport, defend
+from tests.dataset.splits import tree
 
 Collect = Callable[..., CollectReport]
-
-
-def tree(root: Path) -> dict[str, bytes]:
-    return {p.relative_to(root).as_posix(): p.read_bytes() for p in sorted(root.rglob("*")) if p.is_file()}
 
 
 @pytest.fixture

@@ -34,13 +34,10 @@ from gear.values.errors import (
 )
 from gear.verbs.collect.job import resolve
 from gear.verbs.collect.run import CollectReport
+from tests.dataset.splits import tree
 
 Collect = Callable[..., CollectReport]
 TASKS = ("semseg", "detect2d", "stereo3d", "depth")
-
-
-def tree(root: Path) -> dict[str, bytes]:
-    return {p.relative_to(root).as_posix(): p.read_bytes() for p in sorted(root.rglob("*")) if p.is_file()}
 
 
 def reach(sample: Any, camera: str, margin_px: int = 2) -> np.ndarray:

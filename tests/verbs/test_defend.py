@@ -21,13 +21,10 @@ from gear.plugins.defenses.jpeg import Jpeg, JpegConfig
 from gear.values.errors import ConfigError, DatasetError, GearError, PluginError, UnknownNameError
 from gear.verbs.collect.run import CollectReport
 from gear.verbs.defend import defend
+from tests.dataset.splits import tree
 from tests.verbs.conftest import put_package
 
 Collect = Callable[..., CollectReport]
-
-
-def tree(root: Path) -> dict[str, bytes]:
-    return {p.relative_to(root).as_posix(): p.read_bytes() for p in sorted(root.rglob("*")) if p.is_file()}
 
 
 @pytest.fixture

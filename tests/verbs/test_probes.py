@@ -15,12 +15,9 @@ from gear.formats import rle
 from gear.formats.probes import probes_of
 from gear.values.errors import DatasetError
 from gear.verbs.collect.run import CollectReport
+from tests.dataset.splits import tree
 
 Collect = Callable[..., CollectReport]
-
-
-def tree(root: Path) -> dict[str, bytes]:
-    return {p.relative_to(root).as_posix(): p.read_bytes() for p in sorted(root.rglob("*")) if p.is_file()}
 
 
 def without_gear(root: Path) -> dict[str, bytes]:

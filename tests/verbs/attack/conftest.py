@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any
 
 import torch
 
 from gear.contracts.specs import DefenseSpec
 from gear.plugins.defenses.per_picture import PerPicture
+from tests.verbs.conftest import Nothing
 
 SMALL = ["height_px=12", "width_px=24", "batch=1"]
-Small = Callable[..., Path]
-Install = Callable[..., None]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Nothing:
-    """No options."""
 
 
 class Inverted:

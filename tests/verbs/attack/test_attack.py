@@ -33,7 +33,8 @@ from gear.verbs.attack.folder import read_patches
 from gear.verbs.attack.run import attack
 from gear.verbs.attack.scenes import Scenes
 from gear.verbs.attack.watch import CHECKPOINT, Recorder
-from tests.verbs.attack.conftest import SMALL, Install, Nothing, Small
+from tests.verbs.attack.conftest import SMALL
+from tests.verbs.conftest import Install, Nothing, Small
 
 
 class Bad:

@@ -9,7 +9,8 @@ import numpy as np
 
 from gear.testing.tiny_networks import tiny_segmenter
 from gear.verbs.attack.run import attack
-from tests.verbs.attack.conftest import SMALL, Install, Small, wrapping
+from tests.verbs.attack.conftest import SMALL, wrapping
+from tests.verbs.conftest import Install, Small
 
 
 def test_a_defense_is_looked_through(small: Small, install: Install, tmp_path: Path) -> None:

@@ -19,8 +19,8 @@ from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_segmenter
 from gear.values.errors import GearError
 from gear.verbs.attack import scenes
 from gear.verbs.attack.run import attack
-from tests.verbs.attack.conftest import SMALL, Install, Small, wrapping
-from tests.verbs.conftest import other_segmenter
+from tests.verbs.attack.conftest import SMALL, wrapping
+from tests.verbs.conftest import Install, Small, other_segmenter
 
 
 def test_networks_of_one_name_are_all_attacked(small: Small, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

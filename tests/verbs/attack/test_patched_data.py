@@ -13,8 +13,8 @@ from gear.values.errors import DatasetError
 from gear.verbs.attack.run import attack
 from gear.verbs.attack.verify import check_held_out
 from gear.verbs.collect.run import collect
-from tests.verbs.attack.conftest import SMALL, Install, Small
-from tests.verbs.conftest import TINY_SCENES, TINY_TOWN, size_settings
+from tests.verbs.attack.conftest import SMALL
+from tests.verbs.conftest import TINY_SCENES, TINY_TOWN, Install, Small, size_settings
 
 
 def shown(root: Path, patch: str | Path, split: str = "train") -> Path:

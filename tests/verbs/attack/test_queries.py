@@ -17,7 +17,8 @@ from gear.testing.tiny_networks import tiny_segmenter
 from gear.values.errors import GearError
 from gear.verbs.attack.run import attack
 from gear.verbs.attack.watch import Recorder
-from tests.verbs.attack.conftest import SMALL, Install, Nothing, Small
+from tests.verbs.attack.conftest import SMALL
+from tests.verbs.conftest import Install, Nothing, Small
 
 
 def test_too_few_queries_are_said(small: Small, install: Install, tmp_path: Path) -> None:

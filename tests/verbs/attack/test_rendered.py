@@ -14,8 +14,8 @@ from gear.values.errors import DatasetError, GearError
 from gear.verbs.attack.run import attack
 from gear.verbs.attack.verify import verify
 from gear.verbs.collect.run import collect
-from tests.verbs.attack.conftest import SMALL, Install, Small
-from tests.verbs.conftest import size_settings
+from tests.verbs.attack.conftest import SMALL
+from tests.verbs.conftest import Install, Small, size_settings
 
 
 def test_the_patch_goes_back_into_the_world(small: Small, install: Install, tmp_path: Path) -> None:

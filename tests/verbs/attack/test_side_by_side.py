@@ -8,7 +8,8 @@ import pytest
 
 from gear.values.errors import DatasetError
 from gear.verbs.attack.run import attack
-from tests.verbs.attack.conftest import SMALL, Install, Small
+from tests.verbs.attack.conftest import SMALL
+from tests.verbs.conftest import Install, Small
 
 
 @pytest.mark.parametrize("force", [False, True])

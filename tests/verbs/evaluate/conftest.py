@@ -14,10 +14,8 @@ import gear
 from gear.contracts.specs import ModelSpec
 from gear.values.frames import UInt8Image
 from gear.verbs.collect.run import CollectReport
-from tests.verbs.conftest import put_package
+from tests.verbs.conftest import Install, Small, put_package
 
-Small = Callable[..., Path]
-Install = Callable[..., None]
 Views = Mapping[str, UInt8Image]
 
 

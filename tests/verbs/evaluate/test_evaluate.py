@@ -30,7 +30,8 @@ from gear.testing.tiny_networks import tiny_depth, tiny_segmenter
 from gear.values.errors import ConfigError, DatasetError, FieldError, GearError, PluginError, UnknownNameError
 from gear.verbs.evaluate.patch_area import patch_masks
 from gear.verbs.evaluate.run import evaluate
-from tests.verbs.evaluate.conftest import Config, Install, Oracle, Small, Views, model_spec
+from tests.verbs.conftest import Install, Small
+from tests.verbs.evaluate.conftest import Config, Oracle, Views, model_spec
 
 HEADLINES = {"semseg": ("miou", 1), "depth": ("rmse_m", 0), "detect2d": ("ap", 1), "stereo3d": ("car_2d_easy_r40", 1)}
 

@@ -8,7 +8,8 @@ import pytest
 
 from gear.values.errors import DatasetError
 from gear.verbs.evaluate.run import evaluate
-from tests.verbs.evaluate.conftest import Install, Oracle, Small, model_spec
+from tests.verbs.conftest import Install, Small
+from tests.verbs.evaluate.conftest import Oracle, model_spec
 
 
 def test_the_second_is_refused_and_the_first_goes_on(small: Small, install: Install, tmp_path: Path) -> None:

@@ -17,7 +17,8 @@ from gear.plugins.tasks.depth import DepthTask
 from gear.plugins.tasks.semseg import SemsegTask
 from gear.values.errors import PluginError
 from gear.verbs.evaluate.run import evaluate
-from tests.verbs.evaluate.conftest import Install, Oracle, Small, model_spec
+from tests.verbs.conftest import Install, Small
+from tests.verbs.evaluate.conftest import Oracle, model_spec
 
 TEXT: Any = {"a.txt": "text"}
 PIXELS: Any = {"a.png": np.zeros((2, 2), np.uint8)}

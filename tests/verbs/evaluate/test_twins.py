@@ -20,8 +20,8 @@ from gear.verbs.collect.run import collect
 from gear.verbs.evaluate.patch_area import patch_masks
 from gear.verbs.evaluate.pools import check_pools
 from gear.verbs.evaluate.run import evaluate
-from tests.verbs.conftest import size_settings
-from tests.verbs.evaluate.conftest import Install, Oracle, Small, model_spec
+from tests.verbs.conftest import Install, Small, size_settings
+from tests.verbs.evaluate.conftest import Oracle, model_spec
 
 
 def test_twins_are_compared_and_the_patch_can_be_left_out(tmp_path: Path, small: Small, install: Install) -> None:

@@ -12,7 +12,8 @@ from gear.contracts.specs import DefenseSpec
 from gear.plugins.defenses.bit_depth import BitDepth, BitDepthConfig
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter
 from gear.verbs.evaluate.run import evaluate
-from tests.verbs.evaluate.conftest import Install, Small, Views, model_spec
+from tests.verbs.conftest import Install, Small
+from tests.verbs.evaluate.conftest import Views, model_spec
 
 
 class Passing:
