@@ -34,6 +34,10 @@ PredictionT = TypeVar("PredictionT")
 SampleT_contra = TypeVar("SampleT_contra", bound=Sample, contravariant=True)
 PredictionT_contra = TypeVar("PredictionT_contra", contravariant=True)
 
+NO_PATCH, RANDOM_PATCH = "none", "random"
+CONTROLS = (NO_PATCH, RANDOM_PATCH)
+"""Labels of patches that others are compared with."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SplitInfo:

@@ -12,9 +12,9 @@ import torch
 from torch import Tensor
 
 from gear.contracts.attacks import Compositor
+from gear.contracts.tasks import CONTROLS
 from gear.dataset.reading import Dataset
 from gear.values.errors import DatasetError
-from gear.verbs.evaluate.compare import CONTROLS
 
 KEPT_BYTES = 2 << 30
 

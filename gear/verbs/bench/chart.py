@@ -5,12 +5,12 @@ from __future__ import annotations
 import io
 from typing import Literal
 
+from gear.contracts.tasks import NO_PATCH
 from gear.verbs.bench.plan import ADAPTIVE, PATCH, RANDOM
 from gear.verbs.bench.report import Result, TaskResult
-from gear.verbs.evaluate.compare import NONE
 from gear.verbs.evaluate.report import Estimate
 
-COLOURS = {NONE: "#2f7d4f", RANDOM: "#8b95a1", PATCH: "#b3402a", ADAPTIVE: "#7a2d8c"}
+COLOURS = {NO_PATCH: "#2f7d4f", RANDOM: "#8b95a1", PATCH: "#b3402a", ADAPTIVE: "#7a2d8c"}
 FURTHER = ("#c98a2b", "#1f5fa8", "#5c6b7a", "#9a5b3c", "#3c8c8c", "#a05c8a", "#6b7a2b")
 """Of patches that were made against other networks."""
 

@@ -13,6 +13,7 @@ from gear.config.collection import WeatherConfig
 from gear.config.dump import node_to_json
 from gear.config.nodes import Mapping as MappingNode
 from gear.config.nodes import Node, Place, Scalar
+from gear.contracts.tasks import CONTROLS
 from gear.values.errors import FieldError
 
 LABEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
@@ -20,7 +21,7 @@ LABEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 WORD = re.compile(r"[-+]?[\w./](?:[\w./+=, -]*[\w./+=,-])?")
 """Texts that are the same to YAML without quotes, null apart: numbers, names and paths above all."""
 
-TAKEN = frozenset({"none", "random"})
+TAKEN = frozenset(CONTROLS)
 """Kinds of pictures: those with a network's patch have the network's name."""
 
 MOST_SAMPLES = 100_000

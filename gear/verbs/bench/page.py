@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 import cv2
 import numpy as np
 
+from gear.contracts.tasks import NO_PATCH
 from gear.formats.png import decode_rgb
 from gear.opening import open_dataset
 from gear.values.frames import UInt8Image
@@ -19,7 +20,6 @@ from gear.verbs.bench.places import Scene
 from gear.verbs.bench.plan import Plan, Weather
 from gear.verbs.bench.report import BenchReport, TaskResult
 from gear.verbs.bench.table import columns, legend, title
-from gear.verbs.evaluate.compare import NONE
 
 PICTURE_PX, PATCH_PX, QUALITY = 560, 220, 82
 """Widths that pictures are shown at, and their JPEG quality."""
@@ -101,10 +101,10 @@ def _rows(titles: Sequence[str], rows: Iterable[tuple[bool, Sequence[str]]]) -> 
 def _pictures(plan: Plan, contest: Contest) -> Iterable[str]:
     """Each scene without a patch and with each network's, in the picture that shows the most of it."""
     for scene, weather in plan.places():
-        clean = open_dataset(plan.pictures(contest, scene, weather, NONE))
+        clean = open_dataset(plan.pictures(contest, scene, weather, NO_PATCH))
         seen = [sum(one.visible_px for one in clean.sidecar(i).surfaces) for i in range(len(clean))]
         number = int(np.argmax(seen))
-        figures = [_shown(plan, contest, scene, weather, NONE, number, "without a patch")]
+        figures = [_shown(plan, contest, scene, weather, NO_PATCH, number, "without a patch")]
         for model, defense in itertools.product(contest.models, plan.looked_through(contest)):
             name = plan.name(model, defense)
             figures.append(_shown(plan, contest, scene, weather, name, number, f"with the patch against {name}"))

@@ -11,15 +11,15 @@ from gear.config.collection import WeatherConfig
 from gear.config.dump import to_plain
 from gear.contracts.evaluation import Maskable, Reports
 from gear.contracts.specs import AttackSpec
+from gear.contracts.tasks import NO_PATCH, RANDOM_PATCH
 from gear.plugins.build import build, find
 from gear.values.rng import derive_rng
 from gear.verbs.bench.config import BenchConfig, settings_of
 from gear.verbs.bench.contestants import Contest, Entrant
 from gear.verbs.bench.places import Scene
 from gear.verbs.evaluate.choice import OUTSIDE_PATCH
-from gear.verbs.evaluate.compare import NONE
 
-RANDOM, PATCH, ADAPTIVE = "random", "patch", "adaptive patch"
+RANDOM, PATCH, ADAPTIVE = RANDOM_PATCH, "patch", "adaptive patch"
 """Kinds of patches beside none: one against the network itself, and one made through the defense before it."""
 
 SPLITS = {"attack": "train", "choose": "val", "measure": "test", "calibrate": "finetuning"}
@@ -115,7 +115,7 @@ class Plan:
         """Every network of a task, alone and behind each defense."""
         for model in contest.models:
             for defense in contest.guards:
-                shown = {NONE: NONE, RANDOM: RANDOM, PATCH: model.label}
+                shown = {NO_PATCH: NO_PATCH, RANDOM: RANDOM, PATCH: model.label}
                 if defense is not None and self._is_adaptive(defense):
                     shown[ADAPTIVE] = self.name(model, defense)
                 if defense is None and self.config.transfer:
@@ -137,7 +137,7 @@ class Plan:
 
     def pictures(self, contest: Contest, scene: Scene, weather: Weather, patch: str) -> Path:
         """Root of the pictures that networks are measured on, with one patch; a patch has its network's name."""
-        kind = patch if patch in (NONE, RANDOM) else f"patch-{patch}"
+        kind = patch if patch in (NO_PATCH, RANDOM) else f"patch-{patch}"
         return self._place(contest, scene) / weather.label / kind
 
     def patch(self, contest: Contest, scene: Scene, name: str) -> Path:
@@ -170,7 +170,7 @@ class Plan:
     def _pictures(self, contest: Contest, scene: Scene) -> Iterator[Step]:
         for weather in self.weathers:
             yield from self._grounds(contest, scene, weather)
-            for patch in (NONE, RANDOM):
+            for patch in (NO_PATCH, RANDOM):
                 out = self.pictures(contest, scene, weather, patch)
                 yield self._collect(contest, scene, weather, "measure", out, patch=patch)
 
@@ -195,7 +195,7 @@ class Plan:
         """What defenses learn from: clean pictures of another scene, and for each network its patch in them."""
         weather = self.weathers[0]
         yield from self._grounds(contest, scene, weather)
-        yield self._collect(contest, scene, weather, "calibrate", self._lesson(contest, NONE))
+        yield self._collect(contest, scene, weather, "calibrate", self._lesson(contest, NO_PATCH))
         for model in contest.models:
             yield self._attacked(contest, scene, model, None, (weather,))
             out, patch = self._lesson(contest, model.label), self.patch(contest, scene, model.label)
@@ -203,13 +203,13 @@ class Plan:
 
     def _lesson(self, contest: Contest, patch: str) -> Path:
         assert self._calibration is not None
-        kind = NONE if patch == NONE else f"patch-{patch}"
+        kind = NO_PATCH if patch == NO_PATCH else f"patch-{patch}"
         return self._place(contest, self._calibration) / self.weathers[0].label / f"calibrate-{kind}"
 
     def _collect(
-        self, contest: Contest, scene: Scene, weather: Weather, purpose: str, out: Path, *, patch: str | Path = NONE
+        self, contest: Contest, scene: Scene, weather: Weather, purpose: str, out: Path, *, patch: str | Path = NO_PATCH
     ) -> Step:
-        shown = "" if patch == NONE else f", {patch if isinstance(patch, str) else patch.parent.name} patch"
+        shown = "" if patch == NO_PATCH else f", {patch if isinstance(patch, str) else patch.parent.name} patch"
         arguments = {
             "task": contest.name,
             "town": scene.town,
@@ -278,7 +278,7 @@ class Plan:
         if defense is None or not defense.learns:
             return {}
         return {
-            "calibration": str(self._lesson(contest, NONE)),
+            "calibration": str(self._lesson(contest, NO_PATCH)),
             "calibration_patched": str(self._lesson(contest, model.label)),
         }
 

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from gear.contracts.tasks import NO_PATCH
 from gear.values.serial import Json
 from gear.verbs.bench.plan import RANDOM
 from gear.verbs.evaluate.choice import OUTSIDE_PATCH
-from gear.verbs.evaluate.compare import NONE
 from gear.verbs.evaluate.report import Difference, Estimate, EvaluateReport, Figures, PairedTest, Pool
 from gear.verbs.evaluate.scoring import TASK
 from gear.verbs.evaluate.table import figure_title
@@ -111,7 +111,7 @@ class Result:
 
     def against(self, pool: Pool) -> Difference | None:
         """A patch's difference to a random one, the random one's to none."""
-        control = NONE if pool.name == RANDOM else RANDOM
+        control = NO_PATCH if pool.name == RANDOM else RANDOM
         return next((one for one in pool.differences if one.against == control), None)
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from gear.contracts.tasks import NO_PATCH, RANDOM_PATCH
 from gear.dataset.sidecar import load_json
 from gear.nn.shipped import shipped_patches
 from gear.values.errors import DatasetError, PatchError
@@ -70,11 +71,11 @@ def resolve_patch(patch: str, *, surfaces: int, seed: int) -> PatchSet:
 
 
 def _resolved(patch: str, surfaces: int, seed: int) -> PatchSet:
-    if patch in ("", "none"):
-        return PatchSet(label="none", images=(), digest="", source="none")
-    if patch == "random":
+    if patch in ("", NO_PATCH):
+        return PatchSet(label=NO_PATCH, images=(), digest="", source=NO_PATCH)
+    if patch == RANDOM_PATCH:
         images = tuple(random_patch(seed, i) for i in range(surfaces))
-        return _patch_set("random", images, "random", is_hashed=False)
+        return _patch_set(RANDOM_PATCH, images, RANDOM_PATCH, is_hashed=False)
     path = Path(patch)
     if not path.exists() and path.name == patch:
         path = shipped_patches().get(patch, path)

@@ -10,6 +10,7 @@ from typing import Any
 
 from gear.contracts.defenses import Defense
 from gear.contracts.models import Model
+from gear.contracts.tasks import NO_PATCH
 from gear.dataset.reading import Dataset, scenes_of
 from gear.opening import open_dataset
 from gear.plugins.build import blamed
@@ -21,9 +22,6 @@ from gear.verbs.evaluate.choice import Chosen, check_model
 
 Views = Mapping[str, UInt8Image]
 Progress = Callable[[int, int], None]
-
-NO_PATCH = "none"
-"""Label of pictures without one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -9,15 +9,12 @@ from typing import Any
 import numpy as np
 
 from gear.contracts.evaluation import Draws
+from gear.contracts.tasks import CONTROLS, NO_PATCH
 from gear.dataset.reading import Dataset
 from gear.values.errors import DatasetError
 from gear.verbs.evaluate.report import Difference, Estimate, PairedTest, RowReport, Together
 from gear.verbs.evaluate.scoring import Note, Scorer
 from gear.verbs.evaluate.spread import Figures, Values, auroc, auroc_interval, bounds, draw, gather, paired_p
-
-NONE = "none"
-CONTROLS = (NONE, "random")
-"""Patch labels that others are compared with."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -78,7 +75,7 @@ def row_report(row: Measured, seed: int, resamples: int) -> RowReport:
         damaged=tuple(str(error) for error in row.damaged),
         figures=figures_of(row, seed, resamples),
         cost=mean_cost(notes),
-        defense=mask_means(notes, has_patch=plan.info.patch_label != NONE),
+        defense=mask_means(notes, has_patch=plan.info.patch_label != NO_PATCH),
         per_sample=[{k: v for k, v in note.as_json().items() if k != "facts"} for note in notes],
     )
 

@@ -6,8 +6,9 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from gear.contracts.tasks import CONTROLS, NO_PATCH
 from gear.values.errors import GearError
-from gear.verbs.evaluate.compare import CONTROLS, Measured, as_one, difference, figures_of, mask_means, mean_cost
+from gear.verbs.evaluate.compare import Measured, as_one, difference, figures_of, mask_means, mean_cost
 from gear.verbs.evaluate.report import Pool
 
 Pools = Mapping[str, Sequence[str | Path]]
@@ -41,14 +42,14 @@ def pooled(rows: Sequence[Measured], pools: Pools, seed: int, resamples: int) ->
     wholes = {name: as_one(name, members) for name, members in found.items()}
     for name, members in found.items():
         one = wholes[name]
-        others = [control for control in CONTROLS if control in found and control != name and name != CONTROLS[0]]
+        others = [control for control in CONTROLS if control in found and control != name and name != NO_PATCH]
         yield Pool(
             name=name,
             rows=tuple(row.name for row in members),
             samples=len(one.notes),
             figures=figures_of(one, seed, resamples),
             cost=mean_cost(one.notes),
-            defense=mask_means(one.notes, has_patch=name != CONTROLS[0]),
+            defense=mask_means(one.notes, has_patch=name != NO_PATCH),
             differences=tuple(
                 difference(one, wholes[other], seed, resamples)
                 for other in others

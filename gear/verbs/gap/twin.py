@@ -10,6 +10,7 @@ import yaml
 from gear.config.collection import CollectionConfig
 from gear.config.nodes import Place, in_one_place, parse_text
 from gear.config.reader import read_node
+from gear.contracts.tasks import NO_PATCH
 from gear.dataset.plan import read_plan
 from gear.dataset.reading import Dataset
 from gear.dataset.store import Store
@@ -25,7 +26,7 @@ def check_clean(clean: Dataset[Any]) -> None:
         DatasetError: it shows one.
     """
     label = clean.plan.patch["label"]
-    if label != "none":
+    if label != NO_PATCH:
         raise DatasetError(clean.root, f"shows the patch {label} itself; name a dataset collected with --patch none")
 
 
