@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -44,3 +46,17 @@ def check_previews(given: Any) -> dict[str, UInt8Image]:
             got = f"{pixels.dtype} {pixels.shape}" if isinstance(pixels, np.ndarray) else type(pixels).__name__
             raise TypeError(f"preview {name!r} is no (H, W, 3) uint8 picture but {got}")
     return {str(name): pixels for name, pixels in pictures.items()}
+
+
+def check_figures(given: Any, method: str) -> dict[str, float]:
+    """Takes what `method` of a task's evaluator returned, and gives it back by name.
+
+    Raises:
+        TypeError: it is no mapping of names to numbers.
+    """
+    if not isinstance(given, Mapping):
+        raise TypeError(f"{method} must give figures by name, got {type(given).__name__}")
+    for name, value in given.items():
+        if not isinstance(name, str) or not isinstance(value, Real):
+            raise TypeError(f"{method}: figure {name!r} must be a number, got {type(value).__name__}")
+    return dict(given)

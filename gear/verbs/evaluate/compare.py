@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from gear.contracts.evaluation import Draws
 from gear.contracts.tasks import CONTROLS, NO_PATCH
 from gear.dataset.reading import Dataset
 from gear.values.errors import DatasetError
+from gear.verbs.evaluate.figures import said_of
 from gear.verbs.evaluate.report import Difference, Estimate, PairedTest, RowReport, Together
 from gear.verbs.evaluate.scoring import Note, Scorer
 from gear.verbs.evaluate.spread import Figures, Values, auroc, auroc_interval, bounds, draw, gather, paired_p
@@ -45,7 +47,8 @@ class Measured:
         key = (report, len(notes))
         if key not in self.spreads:
             parts = [note.parts[report] for note in notes]
-            self.spreads[key] = gather(self.scorer.makers[report], parts, draw(len(notes), resamples, seed))
+            held = partial(said_of, self.dataset.plan, method="result")
+            self.spreads[key] = gather(self.scorer.makers[report], parts, draw(len(notes), resamples, seed), held)
         return self.spreads[key]
 
     @property

@@ -19,6 +19,7 @@ from gear.plugins.manager import DISTRIBUTION
 from gear.values.errors import DatasetError, FieldError, GearError
 from gear.values.serial import Json, from_json
 from gear.verbs.evaluate.choice import OUTSIDE_PATCH
+from gear.verbs.evaluate.figures import said_of
 from gear.verbs.evaluate.patch_area import MASK_FIGURES, mask_figures, patch_masks, widened
 from gear.verbs.evaluate.player import Answer, accusation
 from gear.verbs.evaluate.report import known_json
@@ -196,7 +197,7 @@ class Scorer:
             seen = sample
             if name == OUTSIDE_PATCH:
                 seen = self._task.without(sample, widened(patch_masks(sample)))  # type: ignore[attr-defined]
-            figures[name] = dict(part.update(seen, prediction))
+            figures[name] = said_of(self._dataset.plan, part.update(seen, prediction), "update")
         return figures, parts
 
     @contextmanager

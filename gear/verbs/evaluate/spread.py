@@ -56,18 +56,24 @@ def draw(count: int, resamples: int, seed: int) -> Draws:
     return derive_rng(seed, "bootstrap", count).integers(0, max(count, 1), (rows, count), dtype=np.int64)
 
 
-def gather(fresh: Callable[[], AnyEvaluator], parts: Sequence[AnyEvaluator], draws: Draws) -> Figures:
+def gather(
+    fresh: Callable[[], AnyEvaluator],
+    parts: Sequence[AnyEvaluator],
+    draws: Draws,
+    held: Callable[[Any], dict[str, float]] = dict,
+) -> Figures:
     """Figures over evaluators that have seen one sample each.
 
     Args:
         fresh: makes an empty evaluator.
         parts: in order of samples.
         draws: (R, len(parts)).
+        held: takes what an evaluator says of all parts, and holds it to the contract.
     """
     whole = fresh()
     for part in parts:
         whole.merge(part)
-    overall = dict(whole.result())
+    overall = held(whole.result())
     ceilings = dict(whole.ceilings()) if isinstance(whole, Limited) else {}
     if not draws.size:
         return Figures(overall=overall, spread={}, ceilings=ceilings)

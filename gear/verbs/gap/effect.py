@@ -10,10 +10,12 @@ from typing import Any
 
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Evaluator
+from gear.dataset.plan import Plan
 from gear.dataset.reading import Dataset
 from gear.plugins.build import find, name_of_task
 from gear.verbs.evaluate.calibration import Progress, opened_calibration
 from gear.verbs.evaluate.choice import check_defense, check_model, chosen_defense, chosen_model
+from gear.verbs.evaluate.figures import said_of
 from gear.verbs.evaluate.player import Player
 from gear.verbs.evaluate.shown_size import size_note
 
@@ -44,6 +46,7 @@ class Effect:
 
     Attributes:
         player: the model, behind its defense if there is one.
+        plan: of the dataset.
         evaluators: by `clean`, a compositor's name, or `rendered`.
         figure: of the task, the one that is to be looked at first.
         note: that the model sees the pictures at another size than it learnt from, or None.
@@ -51,6 +54,7 @@ class Effect:
     """
 
     player: Player
+    plan: Plan
     evaluators: Mapping[str, Evaluator[Any, Any]]
     figure: str
     note: str | None = None
@@ -87,6 +91,7 @@ class Effect:
         names = (CLEAN, *compositors, RENDERED)
         return Effect(
             player=Player(chosen, guard, calibration=learnt),
+            plan=dataset.plan,
             evaluators={name: dataset.task.evaluator() for name in names},
             figure=spec.figure.rpartition(".")[2],
             note=size_note(chosen, dataset),
@@ -97,7 +102,7 @@ class Effect:
         alone: dict[str, Figures] = {}
         for name, sample in {CLEAN: clean, **shown}.items():
             (answer,) = self.player.play([sample.images], [index])
-            alone[name] = dict(self.evaluators[name].update(sample, answer.prediction))
+            alone[name] = said_of(self.plan, self.evaluators[name].update(sample, answer.prediction), "update")
         before = alone.pop(CLEAN)
         change = {
             name: {figure: figures.get(figure, math.nan) - value for figure, value in before.items()}
@@ -107,4 +112,4 @@ class Effect:
 
     def result(self) -> dict[str, Figures]:
         """The metric of each."""
-        return {name: dict(evaluator.result()) for name, evaluator in self.evaluators.items()}
+        return {name: said_of(self.plan, one.result(), "result") for name, one in self.evaluators.items()}

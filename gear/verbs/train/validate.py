@@ -11,6 +11,7 @@ import torch
 from gear.contracts.evaluation import Reports
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Task
+from gear.dataset.given import check_figures
 from gear.plugins.build import blamed
 from gear.plugins.catalogue import Found
 from gear.readers import as_pictures, picture_tensor
@@ -27,7 +28,7 @@ def validate(
     Those of the task's evaluator, those of its reports as `<report>.<figure>`, and `loss`, the mean of summed losses.
 
     Raises:
-        GearError: a prediction cannot be measured.
+        GearError: a prediction cannot be measured, or the task's figures are no numbers.
         PluginError: a third party's network failed, or gives something else than losses and the task's predictions.
     """
     evaluators = {"": task.evaluator()}
@@ -54,9 +55,16 @@ def validate(
     figures = {
         f"{prefix}{name}": value
         for prefix, evaluator in evaluators.items()
-        for name, value in evaluator.result().items()
+        for name, value in _said(evaluator.result()).items()
     }
     return {**figures, LOSS: math.fsum(losses) / len(losses)}
+
+
+def _said(given: Any) -> dict[str, float]:
+    try:
+        return check_figures(given, "result of the task's evaluator")
+    except TypeError as error:
+        raise GearError(str(error)) from error
 
 
 def total(losses: Mapping[str, torch.Tensor]) -> torch.Tensor:

@@ -1,4 +1,4 @@
-"""What a third party's task gives to be written and nobody can write: one line that names the method and the fault."""
+"""What a third party's task gives that nobody can write or reckon with: one line names the method and the fault."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import pytest
 
 from gear.contracts.tasks import Encoded
 from gear.dataset.given import check_encoded
+from gear.metrics.depth import DepthEvaluator
 from gear.plugins import manager
 from gear.plugins.catalogue import Catalogue, Owner
 from gear.plugins.tasks.depth import DepthTask
@@ -54,6 +55,26 @@ def test_of_a_prediction(
     monkeypatch.setattr(SemsegTask, "encode_prediction", lambda *_: given)
     with pytest.raises(PluginError, match=r"prediction of sample \d: .*" + message.format("encode_prediction")):
         evaluate(data, model="odd", out=tmp_path / "out", resamples=0)
+
+
+UNCOUNTABLE: list[tuple[Any, str]] = [
+    (None, "{} must give figures by name, got NoneType"),
+    ({"mae_m": "low"}, "{}: figure 'mae_m' must be a number, got str"),
+    ({3: 0.5}, "{}: figure 3 must be a number, got float"),
+]
+
+
+@pytest.mark.parametrize("method", ["update", "result"])
+@pytest.mark.parametrize(("given", "message"), UNCOUNTABLE)
+def test_of_figures(
+    tmp_path: Path, small: Small, install: Install, monkeypatch: pytest.MonkeyPatch, method: str, given: Any, message: str
+) -> None:
+    data = small("depth")
+    install(model_spec(lambda _: Oracle([data]), "depth"))
+    monkeypatch.setattr(DepthEvaluator, method, lambda *_: given)
+    with pytest.raises(PluginError, match=r"depth \(mujoco-gear .*\) failed at its evaluator: " + message.format(method)):
+        evaluate(data, model="odd", out=tmp_path / "out")
+    assert not (tmp_path / "out/results.json").exists()
 
 
 def test_what_can_be_written_is_given_back() -> None:
