@@ -13,6 +13,8 @@ import torch
 
 from gear.attacking.group import device_name
 from gear.attacking.objectives import Objective, default_objective
+from gear.compositor.cache import Cache
+from gear.compositor.pasting import CACHE_BYTES, Prepared
 from gear.config.dump import to_plain
 from gear.contracts.attacks import Budget, Patch
 from gear.contracts.models import Model
@@ -176,7 +178,8 @@ def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, p
         PluginError: it does not.
         GearError: it has nothing to begin with.
     """
-    seen, held = (Scenes(group, job.compositor, device_name(network)) for group in (job.datasets, job.validation))
+    cache, device = Cache[Prepared](CACHE_BYTES), device_name(network)
+    seen, held = (Scenes(group, job.compositor, device, cache) for group in (job.datasets, job.validation))
     # One each: an objective remembers the clean answers of its samples by their numbers.
     make = product.objective if hasattr(product, "objective") else default_objective
     settings = product.settings(seen.samples[0]) if hasattr(product, "settings") else job.config

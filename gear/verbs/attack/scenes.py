@@ -12,7 +12,9 @@ from torch import Tensor
 from gear.attacking.borrowed import frozen
 from gear.attacking.masking import promised_and_kept
 from gear.attacking.objectives import Objective, counted
+from gear.compositor.cache import Cache
 from gear.compositor.opening import open_compositor
+from gear.compositor.pasting import CACHE_BYTES, Prepared
 from gear.contracts.attacks import Patch
 from gear.contracts.models import Model
 from gear.dataset.reading import Dataset
@@ -26,10 +28,19 @@ SHOWN = 3
 class Scenes:
     """Samples with their compositor."""
 
-    def __init__(self, datasets: Sequence[Dataset[Any]], compositor: str, device: str) -> None:
+    def __init__(
+        self, datasets: Sequence[Dataset[Any]], compositor: str, device: str, cache: Cache[Prepared] | None = None
+    ) -> None:
+        """Args:
+        datasets: of the samples.
+        compositor: name of one.
+        device: where it computes.
+        cache: what it works out is kept in, for all datasets together; one of `CACHE_BYTES` unless given.
+        """
+        cache = Cache[Prepared](CACHE_BYTES) if cache is None else cache
         self.samples = Joined(datasets)
         self.compositor = JoinedCompositor(
-            self.samples, [open_compositor(compositor, dataset, device=device) for dataset in datasets]
+            self.samples, [open_compositor(compositor, dataset, device=device, cache=cache) for dataset in datasets]
         )
 
     def harm(self, model: Model, objective: Objective, patches: Sequence[Patch]) -> float:

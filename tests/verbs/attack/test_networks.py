@@ -57,7 +57,7 @@ def test_patches_are_put_into_pictures_where_the_network_runs(
     install(tiny_segmenter, other_segmenter, wrapping)
     asked: list[str] = []
 
-    def opened(name: str, dataset: Any, *, device: str) -> Any:
+    def opened(name: str, dataset: Any, *, device: str, cache: Any) -> Any:
         asked.append(device)
         return open_compositor(name, dataset)
 

@@ -67,12 +67,20 @@ UNCOUNTABLE: list[tuple[Any, str]] = [
 @pytest.mark.parametrize("method", ["update", "result"])
 @pytest.mark.parametrize(("given", "message"), UNCOUNTABLE)
 def test_of_figures(
-    tmp_path: Path, small: Small, install: Install, monkeypatch: pytest.MonkeyPatch, method: str, given: Any, message: str
+    tmp_path: Path,
+    small: Small,
+    install: Install,
+    monkeypatch: pytest.MonkeyPatch,
+    method: str,
+    given: Any,
+    message: str,
 ) -> None:
     data = small("depth")
     install(model_spec(lambda _: Oracle([data]), "depth"))
     monkeypatch.setattr(DepthEvaluator, method, lambda *_: given)
-    with pytest.raises(PluginError, match=r"depth \(mujoco-gear .*\) failed at its evaluator: " + message.format(method)):
+    with pytest.raises(
+        PluginError, match=r"depth \(mujoco-gear .*\) failed at its evaluator: " + message.format(method)
+    ):
         evaluate(data, model="odd", out=tmp_path / "out")
     assert not (tmp_path / "out/results.json").exists()
 
