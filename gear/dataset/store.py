@@ -14,7 +14,7 @@ from gear.dataset.layout import GEAR, begun_path, manifest_path, patch_path, pla
 from gear.dataset.plan import Plan, begin, read_plan
 from gear.dataset.sidecar import dump_json, load_json, no_sidecar, read_sidecar, sidecar_bytes
 from gear.dataset.turns import at_work, is_at_work, turn
-from gear.values.errors import DatasetError, FieldError
+from gear.values.errors import DatasetError, FieldError, ReplaceableError
 from gear.values.serial import Json
 
 
@@ -385,12 +385,15 @@ def splits_of(root: Path) -> Sequence[str]:
 
 
 def plan_of(root: Path, split: str) -> Plan:
-    """The plan of one split.
+    """The plan of one split, for those who read it.
 
     Raises:
-        DatasetError: there is no such split.
+        DatasetError: there is no such split, or it cannot be read.
     """
-    plan = read_plan(root, split)
+    try:
+        plan = read_plan(root, split)
+    except ReplaceableError as error:  # whose remedies are those of a collection
+        raise DatasetError(root, f"{error.problem}; collect the split again") from error
     if plan is None:
         raise DatasetError(root, f"has no split {split!r}; there are: {', '.join(splits_of(root))}")
     return plan

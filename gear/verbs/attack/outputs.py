@@ -6,6 +6,7 @@ import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import cv2
 import numpy as np
 from safetensors.numpy import save as to_bytes
 
@@ -15,6 +16,9 @@ from gear.dataset.sidecar import dump_json
 from gear.formats.png import encode_rgb
 from gear.values.frames import UInt8Image
 from gear.values.serial import Json
+
+SHOWN_PX = 1024
+"""Width of a picture in the figure at most: three pairs of 2048 pixels each were a file of 14 MB."""
 
 BLUE, RED, GREY = "#1f5fa8", "#b3402a", "0.55"
 
@@ -64,10 +68,18 @@ def write_curves(
 
 
 def write_samples(root: Path, pairs: Sequence[tuple[UInt8Image, UInt8Image]]) -> None:
-    """Writes `figures/samples.png`: pictures before and after, side by side, one pair a row."""
-    rows = [np.concatenate(pair, axis=1) for pair in pairs]
+    """Writes `figures/samples.png`: pictures before and after, side by side, one pair a row; large ones are shrunk."""
+    rows = [np.concatenate([_shown(picture) for picture in pair], axis=1) for pair in pairs]
     if rows:
         write_whole(root, "figures/samples.png", encode_rgb(np.ascontiguousarray(np.concatenate(rows))))
+
+
+def _shown(picture: UInt8Image) -> UInt8Image:
+    height, width = picture.shape[:2]
+    if width <= SHOWN_PX:
+        return picture
+    size = (SHOWN_PX, max(1, round(height * SHOWN_PX / width)))
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def _smoothed(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
