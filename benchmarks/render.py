@@ -59,11 +59,12 @@ def main() -> None:
 def passes(
     renderer: Renderer, stage: Stage, cameras: tuple[CameraRecord, ...], response: Response
 ) -> dict[str, Callable[[], object]]:
-    frame = renderer.render(stage, cameras)[0].linear_rgb
+    shapes = renderer.render(stage, cameras)
+    frame = shapes[0].linear_rgb
     assert frame is not None
     return {
         "all": lambda: renderer.render(stage, cameras),
-        "colour": lambda: renderer.render(stage, cameras, truth=False),
+        "colour": lambda: renderer.render(stage, cameras, shapes=shapes),
         "ids + depth": lambda: renderer.render(stage, cameras, colour=False),
         "camera response": lambda: response.apply(frame),
     }

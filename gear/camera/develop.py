@@ -77,9 +77,8 @@ class Darkroom:
             geoms: what each geom is.
             night_light: what the same view, whatever its surfaces show, gets of lamps; found anew unless given.
         """
-        assert raw.linear_rgb is not None and raw.depth_m is not None and raw.geom_id is not None
         seen = replace(raw, linear_rgb=self._weathered(raw, camera, record, geoms, night_light))
-        assert seen.linear_rgb is not None and seen.depth_m is not None and seen.geom_id is not None
+        assert seen.linear_rgb is not None
         if self.effects.shutter_s > 0:
             speed = record.ego.velocity_world_mps
             # What rides along, the ego car's own bonnet, stays as sharp as what is far away.
@@ -89,7 +88,7 @@ class Darkroom:
             seen = replace(seen, linear_rgb=blurred)
         if self.effects.lens.bends:
             seen = through_lens(seen, camera, self.effects.lens)
-        assert seen.linear_rgb is not None and seen.depth_m is not None and seen.geom_id is not None
+        assert seen.linear_rgb is not None
         linear_rgb = seen.linear_rgb
         if self.effects.vignette > 0:
             linear_rgb = vignetted(linear_rgb, self.effects.vignette)
@@ -107,7 +106,7 @@ class Darkroom:
     def _weathered(
         self, raw: RawView, camera: CameraRecord, record: SceneRecord, geoms: GeomTable, given: NightLight | None
     ) -> UInt16Image:
-        assert raw.linear_rgb is not None and raw.depth_m is not None and raw.geom_id is not None
+        assert raw.linear_rgb is not None
         linear_rgb = raw.linear_rgb
         lamps = given or self.night_light(raw, camera, record, geoms)
         if lamps is not None:

@@ -115,7 +115,6 @@ class Night:
             record: the scene, for who drives with lights.
             geoms: what each geom is.
         """
-        assert truth.depth_m is not None and truth.geom_id is not None
         kinds = {**self.lamps, "head": headlamps(record, self.vehicles)}
         share, glow = self._own(truth.geom_id, truth.depth_m, camera, record, geoms)
         streaks = np.zeros_like(glow) if self.wetness > 0 else None

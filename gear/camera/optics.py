@@ -93,7 +93,7 @@ def _fits(lens: Lens, width_px: int, height_px: int, focal_px: float, zoom: floa
 def through_lens(raw: RawView, camera: CameraRecord, lens: Lens) -> RawView:
     """Colour, depth and ids by one map: colour bilinear in linear light, truth from the nearest pixel."""
     found = lens_map(lens, camera.width_px, camera.height_px, camera.focal_px)
-    assert raw.linear_rgb is not None and raw.depth_m is not None and raw.geom_id is not None
+    assert raw.linear_rgb is not None
     row, column = np.rint(found.y).astype(np.intp), np.rint(found.x).astype(np.intp)
     return RawView(
         linear_rgb=np.asarray(cv2.remap(raw.linear_rgb, found.x, found.y, cv2.INTER_LINEAR), dtype=np.uint16),

@@ -59,13 +59,13 @@ class RawView:
     Attributes:
         linear_rgb: (H, W, 3) uint16, 0..`LINEAR_FULL_SCALE`, linear in every surface's albedo; None where colour was
             not asked for.
-        depth_m: (H, W) float32 planar z, NaN for nothing; None where truth was not asked for.
-        geom_id: (H, W) int32, -1 for nothing; None as above.
+        depth_m: (H, W) float32 planar z, NaN for nothing.
+        geom_id: (H, W) int32, -1 for nothing.
     """
 
     linear_rgb: UInt16Image | None
-    depth_m: FloatImage | None
-    geom_id: IdImage | None
+    depth_m: FloatImage
+    geom_id: IdImage
 
 
 class Renderer(Protocol):
@@ -80,9 +80,22 @@ class Renderer(Protocol):
         ...
 
     def render(
-        self, stage: Stage, cameras: Sequence[CameraRecord], *, colour: bool = True, truth: bool = True
+        self,
+        stage: Stage,
+        cameras: Sequence[CameraRecord],
+        *,
+        colour: bool = True,
+        shapes: Sequence[RawView] | None = None,
     ) -> tuple[RawView, ...]:
-        """One raw view a camera, in order, all of the same moment."""
+        """One raw view a camera, in order, all of the same moment.
+
+        Args:
+            stage: what is seen.
+            cameras: who looks.
+            colour: whether it is asked for.
+            shapes: views of these cameras of a stage that differs in paint and faces alone: their depth and ids are
+                taken over, which saves two passes.
+        """
         ...
 
     def close(self) -> None:

@@ -77,7 +77,12 @@ class ClassicRenderer:
         return self._info
 
     def render(
-        self, stage: Stage, cameras: Sequence[CameraRecord], *, colour: bool = True, truth: bool = True
+        self,
+        stage: Stage,
+        cameras: Sequence[CameraRecord],
+        *,
+        colour: bool = True,
+        shapes: Sequence[RawView] | None = None,
     ) -> tuple[RawView, ...]:
         """One raw view a camera; see `gear.contracts.rendering.Renderer`.
 
@@ -88,7 +93,10 @@ class ClassicRenderer:
             raise ValueError("the stage was compiled as another model than the renderer was opened for")
         self._gl.make_current()
         self._wear(dict(checked_faces(self._shared_model, stage.faces).values()))
-        return tuple(self._view(stage, camera, colour=colour, truth=truth) for camera in cameras)
+        known = [None] * len(cameras) if shapes is None else shapes
+        return tuple(
+            self._view(stage, camera, shape, colour=colour) for camera, shape in zip(cameras, known, strict=True)
+        )
 
     def close(self) -> None:
         """Frees the context; safe to call twice."""
@@ -119,7 +127,7 @@ class ClassicRenderer:
             texels[:] = content
             mujoco.mjr_uploadTexture(model, self._context, texture)
 
-    def _view(self, stage: Stage, camera: CameraRecord, *, colour: bool, truth: bool) -> RawView:
+    def _view(self, stage: Stage, camera: CameraRecord, shape: RawView | None, *, colour: bool) -> RawView:
         size = (camera.width_px, camera.height_px)
         if self._size != size:
             self._size = size
@@ -127,8 +135,11 @@ class ClassicRenderer:
         frustum = Frustum.of(camera)
         spheres = bounding_spheres(self._shared_model, stage.data)
         seen = in_frustum(frustum, *spheres)
-        self._fill_scene(stage, frustum, seen)
-        geom_id, depth_m = self._truth(camera)
+        if shape is None:
+            self._fill_scene(stage, frustum, seen)
+            geom_id, depth_m = self._truth(camera)
+        else:
+            geom_id, depth_m = shape.geom_id, shape.depth_m
         linear_rgb = None
         if colour:
             casts = self._casters(stage, frustum, *spheres)
@@ -137,7 +148,7 @@ class ClassicRenderer:
             linear_rgb = shade(four_times(self._colour(camera)), openness(depth_m, camera.focal_px))
             if self._quality == "fast":
                 linear_rgb = smooth_edges(linear_rgb, geom_id, depth_m)
-        return RawView(linear_rgb=linear_rgb, depth_m=depth_m if truth else None, geom_id=geom_id if truth else None)
+        return RawView(linear_rgb=linear_rgb, depth_m=depth_m, geom_id=geom_id)
 
     def _fill_scene(self, stage: Stage, frustum: Frustum, needed: Mask) -> None:
         """The scene anew, with the geoms that are needed, seen through the frustum."""

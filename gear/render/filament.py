@@ -98,7 +98,12 @@ class FilamentRenderer:
         return self._info
 
     def render(
-        self, stage: Stage, cameras: Sequence[CameraRecord], *, colour: bool = True, truth: bool = True
+        self,
+        stage: Stage,
+        cameras: Sequence[CameraRecord],
+        *,
+        colour: bool = True,
+        shapes: Sequence[RawView] | None = None,
     ) -> tuple[RawView, ...]:
         """One raw view a camera; see `gear.contracts.rendering.Renderer`.
 
@@ -110,7 +115,8 @@ class FilamentRenderer:
         self._lights.update(stage.data)
         self._renderables.update(stage.data)
         self._dress(stage)
-        return tuple(self._view(camera, colour=colour, truth=truth) for camera in cameras)
+        known = [None] * len(cameras) if shapes is None else shapes
+        return tuple(self._view(camera, shape, colour=colour) for camera, shape in zip(cameras, known, strict=True))
 
     def close(self) -> None:
         """Frees the context; safe to call twice."""
@@ -167,16 +173,15 @@ class FilamentRenderer:
             self._retired_textures.append(self._face_textures.popitem(last=False)[1])
         return texture
 
-    def _view(self, camera: CameraRecord, *, colour: bool, truth: bool) -> RawView:
-        smooths = colour and self._quality == "fast"
-        depth_m = self._depth_m(camera)
-        geom_id = self._geom_id(camera) if truth or smooths else None
+    def _view(self, camera: CameraRecord, shape: RawView | None, *, colour: bool) -> RawView:
+        depth_m = self._depth_m(camera) if shape is None else shape.depth_m
+        geom_id = self._geom_id(camera) if shape is None else shape.geom_id
         linear_rgb = None
         if colour:
             linear_rgb = shade(self._samples(camera), openness(depth_m, camera.focal_px))
-            if smooths and geom_id is not None:
+            if self._quality == "fast":
                 linear_rgb = smooth_edges(linear_rgb, geom_id, depth_m)
-        return RawView(linear_rgb=linear_rgb, depth_m=depth_m if truth else None, geom_id=geom_id if truth else None)
+        return RawView(linear_rgb=linear_rgb, depth_m=depth_m, geom_id=geom_id)
 
     def _samples(self, camera: CameraRecord) -> UInt16Image:
         if self._quality == "film":

@@ -81,7 +81,7 @@ def behind_lens(frame: Frame, lens: Lens) -> Frame:
         seen = through_lens(
             RawView(linear_rgb=view.linear_rgb, depth_m=view.depth_m, geom_id=view.geom_id), view.camera, lens
         )
-        assert seen.linear_rgb is not None and seen.depth_m is not None and seen.geom_id is not None
+        assert seen.linear_rgb is not None
         views[name] = View(
             camera=replace(view.camera, lens=LensRecord(k1=lens.k1, k2=lens.k2, focal_px=found.focal_px)),
             linear_rgb=seen.linear_rgb,

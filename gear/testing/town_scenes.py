@@ -141,7 +141,6 @@ def _truth(world: World, placed: PlacedStage, record: SceneRecord) -> _Truth:
         (view,) = renderer.render(placed.stage, record.cameras, colour=False)
     finally:
         renderer.close()
-    assert view.geom_id is not None and view.depth_m is not None
     return _Truth(view.geom_id, view.depth_m)
 
 

@@ -68,7 +68,6 @@ def overlap(a: np.ndarray, b: np.ndarray) -> float:
 
 def render(model: mujoco.MjModel, renderer: Renderer, data: mujoco.MjData, camera: CameraRecord) -> View:
     (raw,) = renderer.render(Stage(model=model, data=data), [camera], colour=False)
-    assert raw.depth_m is not None and raw.geom_id is not None
     blank = np.zeros((camera.height_px, camera.width_px, 3))
     return View(
         camera=camera,

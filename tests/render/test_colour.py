@@ -31,14 +31,13 @@ def dressed(stage: Stage, face: UInt8Image | None = None, paint: tuple[float, fl
 
 
 def colour(renderer: Renderer, stage: Stage) -> UInt16Image:
-    (view,) = renderer.render(stage, (camera(),), truth=False)
-    assert view.linear_rgb is not None and view.geom_id is None and view.depth_m is None
+    (view,) = renderer.render(stage, (camera(),))
+    assert view.linear_rgb is not None
     return view.linear_rgb
 
 
 def face_pixels(renderer: Renderer, stage: Stage) -> np.ndarray:
     (view,) = renderer.render(stage, (camera(),), colour=False)
-    assert view.geom_id is not None
     return view.geom_id == geom(stage.model, "face")
 
 
@@ -72,6 +71,21 @@ def test_cameras_of_one_call_are_like_cameras_alone(renderer: Renderer, stage: S
     alone = [renderer.render(stage, (record,))[0] for record in reversed(rig)]
     assert [digest(view) for view in together] == [digest(view) for view in reversed(alone)]
     assert len({digest(view) for view in together}) == 3
+
+
+def test_shapes_that_are_known_are_not_drawn_again(renderer: Renderer, stage: Stage) -> None:
+    rig = (camera(), camera(96, 64, yaw_deg=-20))
+    shapes = renderer.render(stage, rig, colour=False)
+    other = dressed(stage, grey_face(200), (0.0, 0.0, 0.9))
+    plain = renderer.render(other, rig)
+    taken = renderer.render(other, rig, shapes=shapes)
+    assert [digest(view) for view in taken] == [digest(view) for view in plain]
+    for view, shape in zip(taken, shapes, strict=True):
+        assert view.depth_m is shape.depth_m and view.geom_id is shape.geom_id
+    elsewhere = renderer.render(other, (camera(yaw_deg=9), rig[1]), colour=False)
+    assert digest(renderer.render(other, rig, shapes=elsewhere)[0]) != digest(plain[0]), "they are what shades it"
+    with pytest.raises(ValueError, match="zip"):
+        renderer.render(other, rig, shapes=shapes[:1])
 
 
 @pytest.mark.parametrize("name", ["filament", "classic"])
@@ -125,7 +139,6 @@ def test_a_face_is_the_right_way_round(renderer: Renderer, stage: Stage) -> None
 def test_paint_is_worn_and_taken_off(renderer: Renderer, stage: Stage) -> None:
     plain = colour(renderer, stage)
     (view,) = renderer.render(stage, (camera(),), colour=False)
-    assert view.geom_id is not None
     car = view.geom_id == geom(stage.model, "car")
     assert (plain[car][:, 0].mean()) > 2 * plain[car][:, 2].mean()
     blue = colour(renderer, dressed(stage, paint=(0.02, 0.02, 0.5)))
@@ -187,13 +200,13 @@ def test_the_shared_model_is_never_changed(renderer: Renderer, stage: Stage) -> 
 
 def test_shadows_fall_away_from_the_sun(renderer: Renderer, stage: Stage) -> None:
     (view,) = renderer.render(stage, (camera(320, 192),))
-    assert view.linear_rgb is not None and view.geom_id is not None
+    assert view.linear_rgb is not None
     record = camera(320, 192)
     camera_from_world = record.world_from_camera_transform.inverse()
 
     def road_at(x_m: float, y_m: float) -> float:
         column, row = np.round(record.intrinsics.project(camera_from_world.apply((x_m, y_m, 0.0)))).astype(int)
-        assert view.geom_id is not None and view.linear_rgb is not None
+        assert view.linear_rgb is not None
         assert view.geom_id[row, column] == geom(stage.model, "road")
         return float(view.linear_rgb[row, column].sum())
 

@@ -357,7 +357,6 @@ def test_the_ground_under_a_car_gets_less_of_the_sky_and_nothing_else_changes() 
         (raw,) = renderer.render(placed.stage, [camera])
     finally:
         renderer.close()
-    assert raw.geom_id is not None
     cloudy = PRESETS["CloudyNoon"]
     plain, shaded = (
         darkroom_of(cloudy, "classic", "t", shapes=shapes).view(raw, camera, shot, placed.geoms).linear_rgb.astype(int)

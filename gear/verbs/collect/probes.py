@@ -20,7 +20,7 @@ from gear.values.scene import SceneRecord
 from gear.world.world import PlacedStage, World
 
 Raws = tuple[RawView, ...]
-"""Colour alone, one a camera."""
+"""One a camera."""
 
 UNSURE = 8
 """Steps of a frame by which white that was worked out may miss white that was seen, for rounding alone."""
@@ -43,8 +43,16 @@ class ProbeShot:
     grey_weight: float
 
 
-def shoot_probes(world: World, renderer: Renderer, placed: PlacedStage, record: SceneRecord) -> ProbeShot:
-    """Renders what was placed last, once with all surfaces black and once a surface with it white."""
+def shoot_probes(world: World, renderer: Renderer, placed: PlacedStage, record: SceneRecord, shapes: Raws) -> ProbeShot:
+    """Renders what was placed last, once with all surfaces black and once a surface with it white.
+
+    Args:
+        world: that it was placed in.
+        renderer: of that world.
+        placed: the sample.
+        record: who looks, and at which surfaces.
+        shapes: the views of the sample itself, whose depth and ids are the same.
+    """
     names = [surface.name for surface in record.surfaces]
     weights = face_light(renderer.info.name, np.arange(256, dtype=np.uint8))
     half = int(np.searchsorted(weights, 0.5))
@@ -52,7 +60,7 @@ def shoot_probes(world: World, renderer: Renderer, placed: PlacedStage, record: 
     def seen(name: str | None, byte: int) -> Raws:
         shown = np.full((1, 1, 3), byte, np.uint8)
         stage = world.redressed(placed, {other: shown if other == name else "black" for other in names})
-        return renderer.render(stage, record.cameras, truth=False)
+        return renderer.render(stage, record.cameras, shapes=shapes)
 
     black = seen(None, 0) if names else ()
     white = {name: seen(name, 255) for name in names}
@@ -70,25 +78,17 @@ def _is_clipped(black: RawView, white: RawView) -> bool:
     return bool(((white.linear_rgb >= LINEAR_FULL_SCALE) & (white.linear_rgb != black.linear_rgb)).any())
 
 
-def develop_probes(
-    darkroom: Darkroom, shot: ProbeShot, truth: Raws, record: SceneRecord, geoms: GeomTable
-) -> list[Probe]:
-    """Crops of developed frames; `truth` holds the views of the sample itself, whose depth and ids are the same."""
+def develop_probes(darkroom: Darkroom, shot: ProbeShot, record: SceneRecord, geoms: GeomTable) -> list[Probe]:
+    """Crops of developed frames."""
     quiet = replace(darkroom, effects=replace(darkroom.effects, shot_noise=0.0, read_noise=0.0))
     probes = []
-    for number, camera in enumerate(record.cameras):
-
-        def developed(raws: Raws, number: int = number) -> RawView:
-            return replace(truth[number], linear_rgb=raws[number].linear_rgb)
-
-        if not shot.white:
-            break
-        lamps = quiet.night_light(truth[number], camera, record, geoms)
-        black = quiet.view(developed(shot.black), camera, record, geoms, lamps).linear_rgb
+    for number, camera in enumerate(record.cameras if shot.white else ()):
+        lamps = quiet.night_light(shot.black[number], camera, record, geoms)
+        black = quiet.view(shot.black[number], camera, record, geoms, lamps).linear_rgb
         for surface, raws in shot.white.items():
-            white = quiet.view(developed(raws), camera, record, geoms, lamps).linear_rgb
+            white = quiet.view(raws[number], camera, record, geoms, lamps).linear_rgb
             if surface in shot.grey:
-                grey = quiet.view(developed(shot.grey[surface]), camera, record, geoms, lamps).linear_rgb
+                grey = quiet.view(shot.grey[surface][number], camera, record, geoms, lamps).linear_rgb
                 white = _unclipped(black, white, grey, shot.grey_weight)
             probe = crop_probe(surface, camera.name, black, white, darkroom.response)
             if probe is not None:

@@ -66,7 +66,8 @@ class Session:
         names = tuple(surface.name for surface in record.surfaces)
         placed = self.world.place(record, self.job.patch.by_surface(names))
         raw = self.renderer.render(placed.stage, record.cameras)
-        probes = shoot_probes(self.world, self.renderer, placed, record) if self.job.config.probes else None
+        is_probed = self.job.config.probes
+        probes = shoot_probes(self.world, self.renderer, placed, record, raw) if is_probed else None
         return Shot(record=record, raw=raw, geoms=placed.geoms, objects=placed.objects, probes=probes)
 
     def develop(self, shot: Shot) -> Frame:
@@ -85,7 +86,7 @@ class Session:
             encoded = check_encoded(self.task.encode(sample, self.job.plan.info), "encode")
         if shot.probes is None:
             return sample, encoded, {}
-        probes = develop_probes(self.darkroom, shot.probes, shot.raw, shot.record, shot.geoms)
+        probes = develop_probes(self.darkroom, shot.probes, shot.record, shot.geoms)
         return sample, encoded, probe_files(probes, self.job.plan.info.split, shot.record.index)
 
 

@@ -85,7 +85,6 @@ def thumbnail(town: Town, name: str, scene: SceneSpec, options: SheetOptions) ->
         (view,) = renderer.render(placed.stage, record.cameras)
     finally:
         renderer.close()
-    assert view.geom_id is not None and view.depth_m is not None
     seen = []
     for face in world.faces:
         pixels = view.geom_id == face.geom_id
