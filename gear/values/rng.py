@@ -7,6 +7,18 @@ import json
 
 import numpy as np
 
+from gear.values.errors import GearError
+
+
+def check_seed(seed: int) -> None:
+    """Seeds count from 0, in configs and wherever else one is given.
+
+    Raises:
+        GearError: this one is below.
+    """
+    if seed < 0:
+        raise GearError(f"seed must not be negative, got {seed}")
+
 
 def derive_rng(seed: int, *path: str | int) -> np.random.Generator:
     """An independent generator for one named purpose, e.g. `derive_rng(7, "scene", 12)`.

@@ -26,7 +26,7 @@ from gear.plugins.build import NO_OPTIONS, blamed, build, find
 from gear.plugins.catalogue import Found
 from gear.values.errors import DatasetError, GearError, PluginError
 from gear.values.frames import UInt8Image
-from gear.values.rng import derive_rng
+from gear.values.rng import check_seed, derive_rng
 from gear.values.serial import Json
 from gear.verbs.cleaned import FOLDER, kept_marker, marker_path, write_sample
 
@@ -90,6 +90,7 @@ def defend(
     Raises:
         GearError: anything that the user can put right; its text is one line.
     """
+    check_seed(seed)
     found = find("defense", defense)
     options = with_overrides(NO_OPTIONS, settings)
     config = read_node(found.spec.config, options, "")

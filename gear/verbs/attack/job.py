@@ -20,6 +20,7 @@ from gear.opening import root_and_split, roots_of
 from gear.plugins.build import NO_OPTIONS, find
 from gear.plugins.catalogue import Found
 from gear.values.errors import DatasetError, GearError
+from gear.values.rng import check_seed
 from gear.values.serial import Json
 from gear.verbs.attack.data import check_joined
 from gear.verbs.attack.models import FLAG, check_attack, choose_defense, choose_models
@@ -126,6 +127,7 @@ def resolve(
     Raises:
         GearError: it is not there, or does not fit together.
     """
+    check_seed(seed)
     if (steps is not None and steps < 1) or every < 1 or patience < 0 or (queries is not None and queries < 1):
         raise GearError("steps, queries and every must be at least 1, patience at least 0")
     if patience and not _list(val):

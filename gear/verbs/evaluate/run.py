@@ -15,6 +15,7 @@ from gear.dataset.sidecar import dump_json, load_json
 from gear.dataset.store import refuse_dataset
 from gear.dataset.turns import alone_at_work
 from gear.values.errors import DatasetError, GearError
+from gear.values.rng import check_seed
 from gear.values.serial import Json
 from gear.verbs.evaluate.calibration import opened_calibration
 from gear.verbs.evaluate.choice import (
@@ -94,6 +95,7 @@ def evaluate(
     Raises:
         GearError: anything that the user can put right; its text is one line.
     """
+    check_seed(seed)
     if min(1 if batch is None else batch, workers) < 1 or resamples < 0:
         raise GearError(
             f"batch and workers must be at least 1, resamples at least 0; got {batch}, {workers}, {resamples}"
