@@ -44,6 +44,9 @@ TOLD: dict[Verb, tuple[str, ...]] = {
 }
 """What of a `Watch` each verb calls."""
 
+SAID = "bench.yml"
+"""The config that reports are of, whole."""
+
 
 class Watch(Protocol):
     """Who looks on."""
@@ -104,7 +107,9 @@ def bench(
     root, watching = Path(out), watch or _Nobody()
     with explained(root):
         root.mkdir(parents=True, exist_ok=True)
-    write_whole(root, "bench.yml", to_yaml(plan.config).encode())
+    said = to_yaml(plan.config).encode()
+    if not (root / SAID).exists():  # else it goes with the reports that are there until there are new ones
+        write_whole(root, SAID, said)
     evaluations: dict[str, EvaluateReport] = {}
     steps = list(plan.steps())
     for number, step in enumerate(steps, 1):
@@ -127,6 +132,7 @@ def bench(
     table = csv.DictWriter(written, COLUMNS, lineterminator="\n")
     table.writeheader()
     table.writerows(report.records())
+    write_whole(root, SAID, said)
     write_whole(root, "bench.csv", written.getvalue().encode())
     write_whole(root, "bench.json", dump_json(report.as_json()))
     write_whole(root, "table.txt", text(report).encode())

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import gear
 from gear.values.errors import GearError
 from gear.verbs.bench.plan import Step
+from gear.verbs.bench.run import VERBS
 from tests.verbs.bench.conftest import FEW
 
 pytestmark = pytest.mark.usefixtures("plugins")
@@ -59,6 +61,25 @@ def test_more_pictures_to_attack(tmp_path: Path, written: Callable[..., Path]) -
     again = Looks()
     assert gear.bench(written(*more), out=out, watch=again).tasks[0].results[0].evaluation.rows[0].made == 0
     assert not again.notes
+
+
+def test_a_bench_that_is_refused_leaves_the_config_of_its_reports(
+    tmp_path: Path, written: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out, more = tmp_path / "out", (*LEARNING, ("attack: 2", "attack: 3"))
+    gear.bench(written(*LEARNING), out=out)
+    before = (out / "bench.yml").read_bytes()
+
+    def refused(*given: Any, **more: Any) -> Any:
+        raise GearError("no")
+
+    with monkeypatch.context() as patched:
+        patched.setitem(VERBS, "collect", refused)
+        with pytest.raises(GearError, match=r"no$"):
+            gear.bench(written(*more), out=out)
+    assert (out / "bench.yml").read_bytes() == before
+    gear.bench(written(*more), out=out)
+    assert b"attack: 3" in (out / "bench.yml").read_bytes() and b"attack: 2" in before
 
 
 def test_more_pictures_to_learn_from(tmp_path: Path, written: Callable[..., Path]) -> None:
