@@ -14,7 +14,7 @@ from gear.attacking.masking import promised_and_kept
 from gear.attacking.objectives import Objective, counted
 from gear.compositor.cache import Cache
 from gear.compositor.opening import open_compositor
-from gear.compositor.pasting import CACHE_BYTES, Prepared
+from gear.compositor.pasting import Prepared
 from gear.contracts.attacks import Patch
 from gear.contracts.models import Model
 from gear.dataset.reading import Dataset
@@ -28,16 +28,13 @@ SHOWN = 3
 class Scenes:
     """Samples with their compositor."""
 
-    def __init__(
-        self, datasets: Sequence[Dataset[Any]], compositor: str, device: str, cache: Cache[Prepared] | None = None
-    ) -> None:
+    def __init__(self, datasets: Sequence[Dataset[Any]], compositor: str, device: str, cache: Cache[Prepared]) -> None:
         """Args:
         datasets: of the samples.
         compositor: name of one.
         device: where it computes.
-        cache: what it works out is kept in, for all datasets together; one of `CACHE_BYTES` unless given.
+        cache: what it works out is kept in, for all datasets together.
         """
-        cache = Cache[Prepared](CACHE_BYTES) if cache is None else cache
         self.samples = Joined(datasets)
         self.compositor = JoinedCompositor(
             self.samples, [open_compositor(compositor, dataset, device=device, cache=cache) for dataset in datasets]

@@ -19,6 +19,7 @@ from safetensors.numpy import save as to_bytes
 import gear
 from gear.attacking.objectives import SemsegObjective
 from gear.cli.main import main
+from gear.compositor.cache import Cache
 from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
 from gear.contracts.attacks import Patch
@@ -381,7 +382,7 @@ def test_validation_is_by_the_attacks_own_objective(small: Small, install: Insta
     assert paper.facts["settings"]["learning_rate"] == pytest.approx([0.1145, 0.112, 0.1125])
     assert gears.facts["settings"]["learning_rate"] == 0.06
     assert gears.facts["attack"]["options"]["learning_rate"] is None
-    scenes, network = Scenes([gear.open_dataset(val)], "transport", "cpu"), lucky(TinyConfig())
+    scenes, network = Scenes([gear.open_dataset(val)], "transport", "cpu", Cache(1 << 20)), lucky(TinyConfig())
     for report, objective in ((paper, SemsegObjective(gamma=1.0)), (gears, SemsegObjective())):
         wanted = scenes.harm(network, objective, report.patches)
         assert report.facts["validation_harm"][0][1] == pytest.approx(wanted, rel=1e-4)
