@@ -23,6 +23,8 @@ import torch
 
 from gear.attacking.borrowed import frozen
 from gear.attacking.loop import Problem, Seen, TextureOptimiser, batch_of, unit_gradients
+from gear.compositor.cache import Cache
+from gear.compositor.pasting import CACHE_BYTES, Prepared
 from gear.config.overrides import with_overrides
 from gear.contracts.models import Model
 from gear.plugins.attacks.scene_specific import SceneSpecific, SceneSpecificConfig
@@ -42,7 +44,8 @@ def main() -> None:
     parser.add_argument("--set", action="append", default=[], dest="settings")
     args = parser.parse_args()
     model: Model = build(find("model", args.model), with_overrides(NO_OPTIONS, args.settings))
-    scenes = Scenes(open_all([args.data], args.task, names=("train", "debug")), "transport", "cpu")
+    datasets = open_all([args.data], args.task, names=("train", "debug"))
+    scenes = Scenes(datasets, "transport", "cpu", Cache[Prepared](CACHE_BYTES))
     config = SceneSpecific(SceneSpecificConfig(batch=args.batch)).settings(scenes.samples[0])
     problem = Problem(model=model, dataset=scenes.samples, compositor=scenes.compositor, settings=config)
     objective = SceneSpecific(config).objective(scenes.samples[0])
