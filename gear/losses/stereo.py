@@ -229,7 +229,7 @@ def centre_losses(
     match. `heading` is a cross-entropy too.
 
     Args:
-        outputs: as `gear.nn.stereo_centre.StereoCentre` names them, lengths in pixels of the picture.
+        outputs: as `gear.nn.stereo_centre.CentreGraph` names them, lengths in pixels of the picture.
         targets: of the batch.
         bins_px: (D,) disparities of the bins, growing by equal factors.
         cell_px: width and height of a cell.

@@ -11,6 +11,8 @@ from torch import Tensor, nn
 
 from gear.nn import vision
 from gear.nn.detectors import OFFICIAL_CLASSES
+from gear.nn.lite0 import CHANNELS as LITE0_CHANNELS
+from gear.nn.lite0 import OnLite0, features_of_lite0
 
 TRAINABLE_STAGES = 3
 """Of the published detectors; the stem and the first stage stay as ImageNet left them."""
@@ -28,14 +30,8 @@ OCTAVES = (1.0, 2 ** (1 / 3), 2 ** (2 / 3))
 ASPECT_RATIOS = (0.5, 1.0, 2.0)
 """Height over width."""
 
-LITE0 = "tf_efficientnet_lite0"
-LITE0_STAGES = (2, 3, 4)
-"""Those that end at 1/8, 1/16 and 1/32."""
-
-LITE0_CHANNELS = (40, 112, 320)
-
-LITE0_FROZEN = ("conv_stem", "bn1", "blocks.0", "blocks.1")
-"""What stays as ImageNet left it: what looks at half and a quarter of the picture."""
+LITE0_LEVELS = (2, 3, 4)
+"""Of `gear.nn.lite0.LEVELS`, those at 1/8, 1/16 and 1/32."""
 
 LITE0_HEAD_DEPTH = 2
 """Convolutions in each of its heads; RetinaNet has four, in which CPUs would spend half of every step."""
@@ -113,42 +109,24 @@ def reference_retinanet(backbone: nn.Module, classes: int, least_score: float) -
     return graph
 
 
-class LitePyramid(nn.Module):
-    """EfficientNet-Lite0 (timm's) with a feature pyramid, as torchvision's `BackboneWithFPN`."""
+class LitePyramid(OnLite0):
+    """EfficientNet-Lite0 with a feature pyramid, as torchvision's `BackboneWithFPN`."""
 
     out_channels = CHANNELS
 
     def __init__(self) -> None:
         vision.need()
-        import timm
         from torchvision.ops import FeaturePyramidNetwork
         from torchvision.ops.feature_pyramid_network import LastLevelP6P7
 
         super().__init__()
-        self.body = timm.create_model(LITE0, pretrained=False, features_only=True, out_indices=LITE0_STAGES)
-        extra = LastLevelP6P7(CHANNELS, CHANNELS)
-        self.fpn = FeaturePyramidNetwork(LITE0_CHANNELS, CHANNELS, extra_blocks=extra)
-        self.is_frozen = False
+        self.body = features_of_lite0(LITE0_LEVELS)
+        channels = [LITE0_CHANNELS[level] for level in LITE0_LEVELS]
+        self.fpn = FeaturePyramidNetwork(channels, CHANNELS, extra_blocks=LastLevelP6P7(CHANNELS, CHANNELS))
 
-    def freeze(self) -> None:
-        """Keeps the early layers' weights, and ImageNet's statistics throughout the body, from here on.
-
-        Detectors train in small batches, whose statistics are worse than those that the body comes with.
-        """
-        self.is_frozen = True
-        for key, parameter in self.body.named_parameters():
-            if key.startswith(tuple(f"{part}." for part in LITE0_FROZEN)):
-                parameter.requires_grad_(False)
-        self.train(self.training)
-
-    def train(self, mode: bool = True) -> LitePyramid:
-        """As ever, but normalisation in a frozen body stays in eval mode."""
-        super().train(mode)
-        if self.is_frozen:
-            for layer in self.body.modules():
-                if isinstance(layer, nn.BatchNorm2d):
-                    layer.eval()
-        return self
+    def lite0(self) -> nn.Module:
+        """The body."""
+        return self.body
 
     def forward(self, pictures: Tensor) -> Mapping[str, Tensor]:
         """Feature maps by number."""

@@ -1,20 +1,22 @@
-"""A siamese network with a correlation volume that finds objects in a rectified pair by their centres.
+"""Siamese networks with a correlation volume that find objects in a rectified pair by their centres.
 
-Both pictures go through the same first layers (stem and one stage of a ResNet-18); their features are correlated over
-disparities at half the resolution (as DispNetC does, Mayer et al., CVPR 2016), and what comes out runs, with the left
-features, through the remaining stages of the ResNet and a feature pyramid. Every cell of the finest level then says
-whether an object's centre lies there and what the object is (CenterNet, Zhou et al., 2019; StereoCenterNet, Shi et al.,
-2021; RTS3D, Li et al., AAAI 2021). Which way it faces is a distribution over directions (as in Mousavian et al., CVPR
-2017): a car that may stand one way or the other is not taken to stand between them. The disparity of an object's centre
-is the expectation of a distribution over bins with equal steps of its logarithm, plus a correction, with its own
-uncertainty. No anchors, no boxes to be matched between the pictures; everything is differentiable to the pixels.
+Both pictures go through the same first layers of a trunk; their features are correlated over disparities at half the
+resolution (as DispNetC does, Mayer et al., CVPR 2016), and what comes out runs, with the left features, through the
+trunk's other layers and a feature pyramid. Every cell of the finest level then says whether an object's centre lies
+there and what the object is (CenterNet, Zhou et al., 2019; StereoCenterNet, Shi et al., 2021; RTS3D, Li et al., AAAI
+2021). Which way it faces is a distribution over directions (as in Mousavian et al., CVPR 2017): a car that may stand
+one way or the other is not taken to stand between them. The disparity of an object's centre is the expectation of a
+distribution over bins with equal steps of its logarithm, plus a correction, with its own uncertainty. No anchors, no
+boxes to be matched between the pictures; everything is differentiable to the pixels.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import torch
 from torch import Tensor, nn
@@ -51,38 +53,17 @@ class StereoCentreShape:
     disparity_px: tuple[float, float] = (1.5, 96.0)
 
 
-class Block(nn.Module):
-    """ResNet's basic block; its shortcut averages before it projects (ResNet-D, He et al., CVPR 2019)."""
-
-    def __init__(self, inputs: int, outputs: int, stride: int) -> None:
-        super().__init__()
-        self.conv1 = nn.Conv2d(inputs, outputs, 3, stride, 1, bias=False)
-        self.bn1 = nn.BatchNorm2d(outputs)
-        self.conv2 = nn.Conv2d(outputs, outputs, 3, 1, 1, bias=False)
-        self.bn2 = nn.BatchNorm2d(outputs)
-        self.skip: nn.Module = nn.Identity()
-        if stride != 1 or inputs != outputs:
-            self.skip = nn.Sequential(nn.AvgPool2d(stride), _conv(inputs, outputs, 1))
-
-    def forward(self, features: Tensor) -> Tensor:
-        """(B, C, H, W) to (B, C', H / stride, W / stride)."""
-        inner = functional.relu(self.bn1(self.conv1(features)))
-        return functional.relu(self.bn2(self.conv2(inner)) + self.skip(features))
-
-
-def _conv(inputs: int, outputs: int, size: int, stride: int = 1) -> nn.Sequential:
+def conv(inputs: int, outputs: int, size: int, stride: int = 1) -> nn.Sequential:
+    """Convolution and normalisation."""
     return nn.Sequential(
         nn.Conv2d(inputs, outputs, size, stride, size // 2, bias=False),
         nn.BatchNorm2d(outputs),
     )
 
 
-def _conv_relu(inputs: int, outputs: int, size: int, stride: int = 1) -> nn.Sequential:
-    return nn.Sequential(_conv(inputs, outputs, size, stride), nn.ReLU(inplace=True))
-
-
-def _stage(inputs: int, outputs: int) -> nn.Sequential:
-    return nn.Sequential(Block(inputs, outputs, 2), Block(outputs, outputs, 1))
+def conv_relu(inputs: int, outputs: int, size: int, stride: int = 1) -> nn.Sequential:
+    """Convolution, normalisation, ReLU."""
+    return nn.Sequential(conv(inputs, outputs, size, stride), nn.ReLU(inplace=True))
 
 
 def correlate(left: Tensor, right: Tensor, disparities: int) -> Tensor:
@@ -117,7 +98,7 @@ class Head(nn.Module):
 
     def __init__(self, inputs: int, hidden: int, outputs: int) -> None:
         super().__init__()
-        self.hidden = _conv_relu(inputs, hidden, 3)
+        self.hidden = conv_relu(inputs, hidden, 3)
         self.out = nn.Conv2d(hidden, outputs, 1)
         nn.init.normal_(self.out.weight, std=0.01)
         self.start_at(0.0)
@@ -133,30 +114,32 @@ class Head(nn.Module):
         return raw
 
 
-class StereoCentre(nn.Module):
-    """The graph: two normalised pictures in, one map an output name."""
+class CentreGraph(nn.Module, ABC):
+    """Matching, pyramid and heads, on a trunk that a subclass has: two normalised pictures in, a map an output name."""
 
     log_bins: Tensor
 
-    def __init__(self, shape: StereoCentreShape) -> None:
+    corrects_surface: ClassVar[bool] = False
+    """Whether the disparity of an object's middle is said as a change to what the volume says of the surface there."""
+
+    def __init__(self, shape: StereoCentreShape, channels: Sequence[int], pyramid: int) -> None:
+        """Everything behind the trunk.
+
+        Args:
+            shape: of the network.
+            channels: of the trunk's maps at 1/2 (both pictures), and at 1/4, 1/8, 1/16 and 1/32 (the left one).
+            pyramid: channels of the pyramid and the heads.
+        """
         super().__init__()
-        width = shape.width
-        stages = [width * factor for factor in (2, 4, 6, 8)]
-        pyramid = 3 * width
+        width, (fine, *stages) = shape.width, channels
         self.shape = shape
-        self.stem = nn.Sequential(_conv_relu(3, width, 3, 2), _conv_relu(width, width, 3))
-        self.layer1 = _stage(width, stages[0])
-        self.match_fine = nn.Conv2d(width, width, 1)
+        self.match_fine = nn.Conv2d(fine, width, 1)
         self.match_coarse = nn.Conv2d(stages[0], width, 1)
-        self.match = nn.Sequential(_conv_relu(width, width, 3), nn.Conv2d(width, width, 1))
-        self.volume = nn.Sequential(_conv_relu(shape.disparities, 2 * width, 3, 2), _conv_relu(2 * width, 2 * width, 3))
+        self.match = nn.Sequential(conv_relu(width, width, 3), nn.Conv2d(width, width, 1))
+        self.volume = nn.Sequential(conv_relu(shape.disparities, 2 * width, 3, 2), conv_relu(2 * width, 2 * width, 3))
         self.surface = nn.Conv2d(2 * width, shape.bins, 1)
-        self.fuse = _conv_relu(stages[0] + 2 * width, stages[0], 1)
-        self.layer2 = _stage(stages[0], stages[1])
-        self.layer3 = _stage(stages[1], stages[2])
-        self.layer4 = _stage(stages[2], stages[3])
-        self.lateral = nn.ModuleList(nn.Conv2d(channels, pyramid, 1) for channels in stages)
-        self.smooth = nn.ModuleList(_conv_relu(pyramid, pyramid, 3) for _ in stages[:-1])
+        self.lateral = nn.ModuleList(nn.Conv2d(each, pyramid, 1) for each in stages)
+        self.smooth = nn.ModuleList(conv_relu(pyramid, pyramid, 3) for _ in stages[:-1])
         self.heat = Head(pyramid, pyramid, len(KINDS))
         self.place = Head(pyramid, pyramid, 6)
         self.body = Head(pyramid, pyramid, 3 + HEADINGS + 1)
@@ -165,12 +148,13 @@ class StereoCentre(nn.Module):
         nearest, farthest = (math.log(value) for value in shape.disparity_px)
         self.register_buffer("log_bins", torch.linspace(nearest, farthest, shape.bins), persistent=False)
 
-    def features(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
-        """Features of single pictures at stride 4, and those to be matched at stride 2."""
-        fine = self.stem(pictures)
-        coarse = self.layer1(fine)
-        up = functional.interpolate(self.match_coarse(coarse), scale_factor=2, mode="bilinear", align_corners=False)
-        return coarse, self.match(self.match_fine(fine) + up)
+    @abstractmethod
+    def shared(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
+        """Features of single pictures at strides 2 and 4."""
+
+    @abstractmethod
+    def stages(self, coarse: Tensor, volume: Tensor) -> Sequence[Tensor]:
+        """Maps of the left pictures at strides 4, 8, 16 and 32, from their features and the volume's at stride 4."""
 
     def forward(self, left: Tensor, right: Tensor) -> dict[str, Tensor]:
         """Maps of (B, ..., H / 4, W / 4); lengths are in pixels of the pictures given.
@@ -190,21 +174,22 @@ class StereoCentre(nn.Module):
             `surface_logits`: a channel a bin, of the disparity of what is seen in the cell, from the volume alone.
             `disparity_spread`: 1, logarithm of the mean absolute error expected of the disparity's logarithm.
         """
-        coarse, matching = self.features(torch.cat([left, right]))
+        fine, coarse = self.shared(torch.cat([left, right]))
+        up = functional.interpolate(self.match_coarse(coarse), scale_factor=2, mode="bilinear", align_corners=False)
+        matching = self.match(self.match_fine(fine) + up)
         left_features, right_features = matching.chunk(2)
         volume = self.volume(correlate(left_features, right_features, self.shape.disparities))
-        stages = [self.fuse(torch.cat([coarse.chunk(2)[0], volume], dim=1))]
-        for layer in (self.layer2, self.layer3, self.layer4):
-            stages.append(layer(stages[-1]))
+        stages = self.stages(coarse.chunk(2)[0], volume)
         level = self.lateral[3](stages[3])
         for index in (2, 1, 0):
             up = functional.interpolate(level, scale_factor=2, mode="nearest")
             level = self.smooth[index](self.lateral[index](stages[index]) + up)
+        surface = self.surface(volume)
         return {
             "heat": self.heat(level),
             **self._where(level),
-            **self._disparity(torch.cat([level, volume], dim=1)),
-            "surface_logits": self.surface(volume),
+            **self._disparity(torch.cat([level, volume], dim=1), surface),
+            "surface_logits": surface,
         }
 
     def _where(self, level: Tensor) -> dict[str, Tensor]:
@@ -218,9 +203,11 @@ class StereoCentre(nn.Module):
             "hidden": body[:, -1:],
         }
 
-    def _disparity(self, features: Tensor) -> dict[str, Tensor]:
+    def _disparity(self, features: Tensor, surface: Tensor) -> dict[str, Tensor]:
         raw = self.disparity(features).float()
         logits = raw[:, : self.shape.bins]
+        if self.corrects_surface:
+            logits = logits + surface.float()
         expected = (logits.softmax(dim=1) * self.log_bins[:, None, None]).sum(dim=1, keepdim=True)
         return {
             "disparity_logits": logits,

@@ -1,8 +1,8 @@
-"""The network of centres behind the `Model` protocol."""
+"""The networks of centres behind the `Model` protocol."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import torch
 from torch import Tensor, nn
@@ -11,26 +11,41 @@ from gear.formats.kitti_object import KittiLabel
 from gear.losses.stereo import Grid, LabelledPair, centre_losses, centre_targets
 from gear.nn.input_scale import input_scale_of
 from gear.nn.network import Network, Normalise
-from gear.nn.stereo_centre import KINDS, STRIDE, StereoCentre, StereoCentreShape, fit_to_network, in_picture_px
+from gear.nn.stereo_centre import KINDS, STRIDE, CentreGraph, StereoCentreShape, fit_to_network, in_picture_px
 from gear.nn.stereo_decode import Peaks, decode
 from gear.nn.stereo_options import INPUT_SCALE, LEFT, RIGHT, StereoCentreOptions
 from gear.nn.weights import build_graph
 
-NAME = "stereo_centre"
-
 
 class StereoCentreNetwork(Network):
-    """Outputs as `gear.nn.stereo_centre.StereoCentre` names them, lengths in pixels of the pictures given."""
+    """Outputs as `gear.nn.stereo_centre.CentreGraph` names them, lengths in pixels of the pictures given."""
 
-    graph: StereoCentre
+    graph: CentreGraph
     options: StereoCentreOptions
     has_quick_copy = True
 
-    def __init__(self, options: StereoCentreOptions) -> None:
-        graph = build_graph(lambda: StereoCentre(StereoCentreShape(width=options.width)), options, NAME)
+    def __init__(
+        self,
+        options: StereoCentreOptions,
+        name: str,
+        make: Callable[[StereoCentreShape], CentreGraph],
+        normalise: Normalise,
+        taps: Mapping[str, str],
+    ) -> None:
+        """A network with the weights that its options ask for.
+
+        Args:
+            options: of the network.
+            name: of the model plugin.
+            make: its graph.
+            normalise: what the graph is shown of a picture.
+            taps: names of feature maps, and which of the graph's layers they are.
+        """
+        graph = build_graph(lambda: make(StereoCentreShape(width=options.width)), options, name)
         super().__init__(graph, options, views=(LEFT, RIGHT))
-        self.normalise = Normalise().to(self.device)
-        self.input_scale = input_scale_of(options, NAME, INPUT_SCALE)
+        self.normalise = normalise.to(self.device)
+        self.input_scale = input_scale_of(options, name, INPUT_SCALE)
+        self._taps = dict(taps)
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """The graph's maps."""
@@ -58,7 +73,7 @@ class StereoCentreNetwork(Network):
 
     def taps(self) -> Mapping[str, nn.Module]:
         """`layer1` of both pictures, the left ones first; `volume`; `layer2` to `layer4`."""
-        return {name: getattr(self.graph, name) for name in ("layer1", "volume", "layer2", "layer3", "layer4")}
+        return {name: self.graph.get_submodule(layer) for name, layer in self._taps.items()}
 
     def _ratio(self, size_px: tuple[int, ...]) -> tuple[float, float]:
         """How many pixels of a picture of (height, width) one of the network's input is, in x and in y."""

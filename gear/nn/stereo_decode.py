@@ -51,7 +51,7 @@ def decode(
     """The detections of each picture of a batch, the surest first.
 
     Args:
-        outputs: as `gear.nn.stereo_centre.StereoCentre` names them, lengths in pixels of the picture.
+        outputs: as `gear.nn.stereo_centre.CentreGraph` names them, lengths in pixels of the picture.
         kinds: KITTI's types in the order of the channels of `heat`.
         calibration: of the pair.
         cell_px: width and height of a cell.

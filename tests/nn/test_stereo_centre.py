@@ -3,25 +3,38 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 import torch
 
+from gear.contracts.specs import ModelSpec
 from gear.groundtruth.visibility import VisibilityLimits
 from gear.nn.network import as_batch
-from gear.nn.stereo_centre import HEADINGS, KINDS, STRIDE, StereoCentre, StereoCentreShape, correlate, fit_to_network
+from gear.nn.stereo_centre import HEADINGS, KINDS, STRIDE, CentreGraph, StereoCentreShape, correlate, fit_to_network
+from gear.nn.stereo_centre_lite0 import StereoCentreLite0
 from gear.nn.stereo_centre_network import StereoCentreNetwork
+from gear.nn.stereo_centre_resnet import StereoCentre
 from gear.nn.stereo_decode import Peaks, decode, heading_rad
 from gear.nn.stereo_options import StereoCentreOptions
-from gear.plugins.models.stereo_centre import stereo_centre
+from gear.plugins.models.stereo_centre import build_lite0, build_resnet, stereo_centre, stereo_centre_lite0
 from gear.plugins.tasks.stereo3d import Stereo3dConfig, Stereo3dSample, Stereo3dTask
 from gear.testing.synthetic import synthetic_frame
 from gear.values.errors import FieldError
 
+Build = Callable[[StereoCentreOptions], StereoCentreNetwork]
 
-def tiny() -> StereoCentreNetwork:
-    return StereoCentreNetwork(StereoCentreOptions(weights="none", device="cpu", width=8, input_scale=1.0))
+BUILDS = {"resnet": build_resnet, "lite0": build_lite0}
+
+
+@pytest.fixture(params=BUILDS)
+def build(request: pytest.FixtureRequest) -> Build:
+    return BUILDS[request.param]
+
+
+def tiny(build: Build = build_resnet, input_scale: float = 1.0) -> StereoCentreNetwork:
+    return build(StereoCentreOptions(weights="none", device="cpu", width=8, input_scale=input_scale))
 
 
 def street() -> Stereo3dSample:
@@ -49,10 +62,15 @@ def test_correlation_is_the_plain_sum() -> None:
     assert torch.allclose(volume[:, 2, :, 3:], cosine, atol=1e-5)
 
 
-def test_the_parameters_are_counted() -> None:
+@pytest.mark.parametrize(
+    ("make", "spec"), [(StereoCentre, stereo_centre), (StereoCentreLite0, stereo_centre_lite0)], ids=["resnet", "lite0"]
+)
+def test_the_parameters_are_counted(
+    make: Callable[[StereoCentreShape], CentreGraph], spec: ModelSpec[StereoCentreOptions]
+) -> None:
     with torch.device("meta"):
-        graph = StereoCentre(StereoCentreShape())
-    assert sum(parameter.numel() for parameter in graph.parameters()) == stereo_centre.parameters
+        graph = make(StereoCentreShape())
+    assert sum(parameter.numel() for parameter in graph.parameters()) == spec.parameters
 
 
 def test_pictures_are_shrunk_and_padded() -> None:
@@ -61,10 +79,9 @@ def test_pictures_are_shrunk_and_padded() -> None:
     assert not picture[..., 185:, :].any() and not picture[..., 612:].any()
 
 
-def test_lengths_are_in_pixels_of_the_picture() -> None:
+def test_lengths_are_in_pixels_of_the_picture(build: Build) -> None:
     """The same graph on a picture twice as large, shrunk by half: everything but lengths is the same."""
-    one = tiny()
-    two = StereoCentreNetwork(StereoCentreOptions(weights="none", device="cpu", width=8, input_scale=0.5))
+    one, two = tiny(build), tiny(build, input_scale=0.5)
     large = {name: torch.rand(1, 3, 64, 128, generator=torch.Generator().manual_seed(3)) for name in ("left", "right")}
     small = {name: fit_to_network(picture, 0.5)[0] for name, picture in large.items()}
     with torch.no_grad():
@@ -171,10 +188,10 @@ def test_options_are_checked(options: dict[str, float]) -> None:
 
 
 @pytest.mark.slow
-def test_it_learns_a_street_by_heart() -> None:
+def test_it_learns_a_street_by_heart(build: Build) -> None:
     """Each labelled object within 10 % of its depth after 150 steps on one pair, and surer than not; nothing else is.
     (Objects come to 0.74 and more, what is none to 0.25 at most, with one thread or two and from 150 to 250 steps.)"""
-    network, sample = tiny(), street()
+    network, sample = tiny(build), street()
     pictures = as_batch([sample.images], ("left", "right"))
     optimiser = torch.optim.AdamW(network.module().parameters(), lr=3e-3)
     network.train()

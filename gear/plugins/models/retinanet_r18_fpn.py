@@ -20,9 +20,6 @@ hydrant, stop sign, parking meter, bench."""
 
 INPUT_SCALE = 0.5
 
-LITE_MEAN, LITE_STD = (127 / 255,) * 3, (128 / 255,) * 3
-"""What EfficientNet-Lite0 was trained with."""
-
 RECIPE = Recipe(
     learning_rate=1e-3,
     weight_decay=1e-2,
@@ -54,12 +51,13 @@ def build_lite0(options: ReferenceDetectorOptions) -> RetinaNetDetector:
     from gear.nn.detectors import Sizing, scaled
     from gear.nn.detectors_graphs import retinanet_lite0_fpn
     from gear.nn.detectors_retinanet import LiteRetinaNetDetector
+    from gear.nn.lite0 import MEAN, STD
     from gear.nn.weights import build_graph
 
     return LiteRetinaNetDetector(
         build_graph(lambda: retinanet_lite0_fpn(len(CATEGORIES), options.least_score), options, LITE0),
         options,
-        sizing=Sizing(inner_px=scaled(scale_of(options, LITE0)), smooth=True, mean=LITE_MEAN, std=LITE_STD),
+        sizing=Sizing(inner_px=scaled(scale_of(options, LITE0)), smooth=True, mean=MEAN, std=STD),
         categories=CATEGORIES,
     )
 
@@ -72,10 +70,10 @@ def scale_of(options: ReferenceDetectorOptions, name: str) -> float:
 
 
 def start_from_imagenet(model: Any) -> None:
-    """See `gear.nn.detectors_official.start_from_imagenet`."""
-    from gear.nn.detectors_official import start_from_imagenet
+    """See `gear.nn.lite0.start_from_imagenet`."""
+    from gear.nn.lite0 import start_from_imagenet
 
-    start_from_imagenet(model)
+    start_from_imagenet(model.graph.get_submodule("backbone"))
 
 
 retinanet_r18: ModelSpec[ReferenceDetectorOptions] = ModelSpec(

@@ -1,36 +1,85 @@
-"""Objects by their centres in a rectified pair: gear's trainable reference for stereo 3D detection."""
+"""Objects by their centres in a rectified pair: gear's trainable references for stereo 3D detection."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 from gear.contracts.hookspecs import hookimpl
-from gear.contracts.models import Model, Recipe
+from gear.contracts.models import Recipe
 from gear.contracts.specs import ModelSpec
 from gear.nn.stereo_options import INPUT_SCALE, LEFT, RIGHT, StereoCentreOptions
 
-
-def build(options: StereoCentreOptions) -> Model:
-    """The network with its weights."""
+if TYPE_CHECKING:
     from gear.nn.stereo_centre_network import StereoCentreNetwork
 
-    return StereoCentreNetwork(options)
+RESNET, LITE0 = "stereo_centre", "stereo_centre_lite0"
+
+TAPS = ("layer1", "volume", "layer2", "layer3", "layer4")
+
+LITE0_TAPS = ("trunk.blocks.1", "volume", "trunk.blocks.2", "trunk.blocks.4", "trunk.blocks.6")
+
+RECIPE = Recipe(learning_rate=1e-3, weight_decay=1e-2, batch=4, epochs=20, gradient_norm=10.0)
+
+
+def build_resnet(options: StereoCentreOptions) -> StereoCentreNetwork:
+    """The network on its ResNet-18, with its weights."""
+    from gear.nn.network import Normalise
+    from gear.nn.stereo_centre_network import StereoCentreNetwork
+    from gear.nn.stereo_centre_resnet import StereoCentre
+
+    return StereoCentreNetwork(options, RESNET, StereoCentre, Normalise(), dict(zip(TAPS, TAPS, strict=True)))
+
+
+def build_lite0(options: StereoCentreOptions) -> StereoCentreNetwork:
+    """The network on EfficientNet-Lite0, with its weights."""
+    from gear.nn.lite0 import MEAN, STD
+    from gear.nn.network import Normalise
+    from gear.nn.stereo_centre_lite0 import StereoCentreLite0
+    from gear.nn.stereo_centre_network import StereoCentreNetwork
+
+    taps = dict(zip(TAPS, LITE0_TAPS, strict=True))
+    return StereoCentreNetwork(options, LITE0, StereoCentreLite0, Normalise(MEAN, STD), taps)
+
+
+def start_from_imagenet(model: Any) -> None:
+    """See `gear.nn.lite0.start_from_imagenet`."""
+    from gear.nn.lite0 import start_from_imagenet
+
+    start_from_imagenet(model.graph)
 
 
 stereo_centre: ModelSpec[StereoCentreOptions] = ModelSpec(
-    name="stereo_centre",
+    name=RESNET,
     summary="Siamese ResNet-18-FPN with a correlation volume and centre heads: trains on two cores.",
     config=StereoCentreOptions,
-    build=build,
+    build=build_resnet,
     tasks=("stereo3d",),
     views=(LEFT, RIGHT),
-    taps=("layer1", "volume", "layer2", "layer3", "layer4"),
-    recipe=Recipe(learning_rate=1e-3, weight_decay=1e-2, batch=4, epochs=20, gradient_norm=10.0),
+    taps=TAPS,
+    recipe=RECIPE,
     normalisation="ImageNet mean and deviation",
     parameters=4_962_314,
     input_scale=INPUT_SCALE,
 )
 
+stereo_centre_lite0: ModelSpec[StereoCentreOptions] = ModelSpec(
+    name=LITE0,
+    summary="The same heads on EfficientNet-Lite0, which `gear train --init imagenet` takes from an installed package.",
+    config=StereoCentreOptions,
+    build=build_lite0,
+    tasks=("stereo3d",),
+    views=(LEFT, RIGHT),
+    taps=TAPS,
+    recipe=RECIPE,
+    normalisation="RGB in 0..255, less 127, over 128",
+    parameters=3_364_394,
+    input_scale=INPUT_SCALE,
+    needs=("torchvision", "timm"),
+    starts={"imagenet": start_from_imagenet},
+)
+
 
 @hookimpl
 def gear_models() -> list[ModelSpec[StereoCentreOptions]]:
-    """This network."""
-    return [stereo_centre]
+    """These networks."""
+    return [stereo_centre, stereo_centre_lite0]

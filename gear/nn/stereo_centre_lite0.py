@@ -1,0 +1,50 @@
+"""The network of centres on EfficientNet-Lite0, which may begin with what ImageNet taught it.
+
+Both pictures go through the layers at a half and a quarter of their size, the left one's map there through the others.
+What the volume says is added to that map by a layer that begins small, so that the trunk at first sees little but what
+it knows. See `gear.nn.stereo_centre`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from torch import Tensor, nn
+
+from gear.nn.lite0 import CHANNELS, LEVELS, OnLite0, features_of_lite0
+from gear.nn.stereo_centre import CentreGraph, StereoCentreShape
+
+FUSE_STD = 0.01
+"""A twentieth of the map, about."""
+
+
+class StereoCentreLite0(CentreGraph, OnLite0):
+    """Key names of the trunk are timm's."""
+
+    corrects_surface = True
+
+    def __init__(self, shape: StereoCentreShape) -> None:
+        super().__init__(shape, CHANNELS, pyramid=2 * shape.width)
+        self.trunk = features_of_lite0(range(len(LEVELS)))
+        self.fuse = nn.Conv2d(2 * shape.width, CHANNELS[1], 1, bias=False)
+        nn.init.normal_(self.fuse.weight, std=FUSE_STD)
+
+    def lite0(self) -> nn.Module:
+        """The trunk."""
+        return self.trunk
+
+    def shared(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
+        """The first two stages'."""
+        trunk = self.trunk
+        fine = trunk.get_submodule("blocks.0")(trunk.get_submodule("bn1")(trunk.get_submodule("conv_stem")(pictures)))
+        return fine, trunk.get_submodule("blocks.1")(fine)
+
+    def stages(self, coarse: Tensor, volume: Tensor) -> Sequence[Tensor]:
+        """What goes into the third stage, and what each level ends with."""
+        maps = [coarse + self.fuse(volume)]
+        for level in LEVELS[2:]:
+            features = maps[-1]
+            for stage in level:
+                features = self.trunk.get_submodule(f"blocks.{stage}")(features)
+            maps.append(features)
+        return maps
