@@ -133,11 +133,13 @@ class CentreGraph(nn.Module, ABC):
         super().__init__()
         width, (fine, *stages) = shape.width, channels
         self.shape = shape
+        self._add(self.shared_layers())
         self.match_fine = nn.Conv2d(fine, width, 1)
         self.match_coarse = nn.Conv2d(stages[0], width, 1)
         self.match = nn.Sequential(conv_relu(width, width, 3), nn.Conv2d(width, width, 1))
         self.volume = nn.Sequential(conv_relu(shape.disparities, 2 * width, 3, 2), conv_relu(2 * width, 2 * width, 3))
         self.surface = nn.Conv2d(2 * width, shape.bins, 1)
+        self._add(self.left_layers())
         self.lateral = nn.ModuleList(nn.Conv2d(each, pyramid, 1) for each in stages)
         self.smooth = nn.ModuleList(conv_relu(pyramid, pyramid, 3) for _ in stages[:-1])
         self.heat = Head(pyramid, pyramid, len(KINDS))
@@ -147,6 +149,21 @@ class CentreGraph(nn.Module, ABC):
         self.heat.start_at(PRIOR_HEAT)
         nearest, farthest = (math.log(value) for value in shape.disparity_px)
         self.register_buffer("log_bins", torch.linspace(nearest, farthest, shape.bins), persistent=False)
+
+    def _add(self, layers: Mapping[str, nn.Module]) -> None:
+        for name, layer in layers.items():
+            self.add_module(name, layer)
+
+    @abstractmethod
+    def shared_layers(self) -> Mapping[str, nn.Module]:
+        """The trunk's layers that both pictures go through, by key name.
+
+        They come first, and `left_layers` after the volume's: digests of weights go by the order of their keys.
+        """
+
+    @abstractmethod
+    def left_layers(self) -> Mapping[str, nn.Module]:
+        """Those that the left picture and the volume go through."""
 
     @abstractmethod
     def shared(self, pictures: Tensor) -> tuple[Tensor, Tensor]:

@@ -7,7 +7,7 @@ it knows. See `gear.nn.stereo_centre`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from torch import Tensor, nn
 
@@ -23,11 +23,21 @@ class StereoCentreLite0(CentreGraph, OnLite0):
 
     corrects_surface = True
 
+    trunk: nn.Module
+    fuse: nn.Module
+
     def __init__(self, shape: StereoCentreShape) -> None:
         super().__init__(shape, CHANNELS, pyramid=2 * shape.width)
-        self.trunk = features_of_lite0(range(len(LEVELS)))
-        self.fuse = nn.Conv2d(2 * shape.width, CHANNELS[1], 1, bias=False)
-        nn.init.normal_(self.fuse.weight, std=FUSE_STD)
+
+    def shared_layers(self) -> Mapping[str, nn.Module]:
+        """`trunk`, all of it: timm's layers lie in one module."""
+        return {"trunk": features_of_lite0(range(len(LEVELS)))}
+
+    def left_layers(self) -> Mapping[str, nn.Module]:
+        """`fuse`."""
+        fuse = nn.Conv2d(2 * self.shape.width, CHANNELS[1], 1, bias=False)
+        nn.init.normal_(fuse.weight, std=FUSE_STD)
+        return {"fuse": fuse}
 
     def lite0(self) -> nn.Module:
         """The trunk."""

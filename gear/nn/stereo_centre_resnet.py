@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import torch
 from torch import Tensor, nn
@@ -34,19 +34,40 @@ def _stage(inputs: int, outputs: int) -> nn.Sequential:
     return nn.Sequential(Block(inputs, outputs, 2), Block(outputs, outputs, 1))
 
 
+def _channels(shape: StereoCentreShape) -> list[int]:
+    return [shape.width * factor for factor in (2, 4, 6, 8)]
+
+
 class StereoCentre(CentreGraph):
     """The first layers and one stage of the ResNet see both pictures, the other stages the left one and the volume."""
 
+    stem: nn.Module
+    layer1: nn.Module
+    fuse: nn.Module
+    layer2: nn.Module
+    layer3: nn.Module
+    layer4: nn.Module
+
     def __init__(self, shape: StereoCentreShape) -> None:
-        width = shape.width
-        stages = [width * factor for factor in (2, 4, 6, 8)]
-        super().__init__(shape, (width, *stages), pyramid=3 * width)
-        self.stem = nn.Sequential(conv_relu(3, width, 3, 2), conv_relu(width, width, 3))
-        self.layer1 = _stage(width, stages[0])
-        self.fuse = conv_relu(stages[0] + 2 * width, stages[0], 1)
-        self.layer2 = _stage(stages[0], stages[1])
-        self.layer3 = _stage(stages[1], stages[2])
-        self.layer4 = _stage(stages[2], stages[3])
+        super().__init__(shape, (shape.width, *_channels(shape)), pyramid=3 * shape.width)
+
+    def shared_layers(self) -> Mapping[str, nn.Module]:
+        """`stem` and `layer1`."""
+        width = self.shape.width
+        return {
+            "stem": nn.Sequential(conv_relu(3, width, 3, 2), conv_relu(width, width, 3)),
+            "layer1": _stage(width, _channels(self.shape)[0]),
+        }
+
+    def left_layers(self) -> Mapping[str, nn.Module]:
+        """`fuse` and `layer2` to `layer4`."""
+        one, two, three, four = _channels(self.shape)
+        return {
+            "fuse": conv_relu(one + 2 * self.shape.width, one, 1),
+            "layer2": _stage(one, two),
+            "layer3": _stage(two, three),
+            "layer4": _stage(three, four),
+        }
 
     def shared(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
         """The stem's and the first stage's."""
