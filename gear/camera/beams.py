@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -135,6 +136,20 @@ def headlamps(record: SceneRecord, vehicles: Mapping[str, Headlamps]) -> Lamps:
     )
 
 
+class Shadow(Protocol):
+    """What stops some of a lamp's light."""
+
+    def lay(
+        self,
+        light: FloatImage,
+        towards: tuple[FloatImage, FloatImage, FloatImage],
+        away_m: FloatImage,
+        facing: FloatImage,
+        up: FloatImage,
+    ) -> None:
+        """As `gear.camera.lamp_shadows.LampShadow.lay` says."""
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Spots:
     """The lamps of one kind that light something in a picture.
@@ -170,8 +185,19 @@ class Spots:
         boxes = np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=1).astype(np.int64)
         return Spots(lamps=lamps, sides=_sides(lamps.axis), boxes=boxes, origin_m=pose.translation_m)
 
-    def light(self, strip: Strip) -> FloatImage | None:
-        """(h, W) of what white surfaces would show of the lamps' light, but for its colour; None for darkness."""
+    def near(self, within_m: float) -> list[int]:
+        """Those that may light something in the picture and are within a distance of the camera."""
+        away_m = np.linalg.norm(self.lamps.position_m - self.origin_m, axis=1)
+        first, last, above, below = self.boxes.T
+        return np.flatnonzero((first < last) & (above < below) & (away_m < within_m)).tolist()
+
+    def light(self, strip: Strip, shadows: Mapping[int, Shadow] | None = None) -> FloatImage | None:
+        """(h, W) of what white surfaces would show of the lamps' light, but for its colour; None for darkness.
+
+        Args:
+            strip: of the picture.
+            shadows: what stops the light of some lamps, by their number.
+        """
         top, bottom = strip.rows.start, strip.rows.stop
         first, last, above, below = self.boxes.T
         chosen = np.flatnonzero((above < bottom) & (below > top) & (first < last))
@@ -180,10 +206,13 @@ class Spots:
         total = np.zeros(strip.normal.shape[1:], np.float32)
         for index in chosen.tolist():
             part = (slice(max(above[index] - top, 0), below[index] - top), slice(first[index], last[index]))
-            self._add(index, strip.position_m[:, *part], strip.normal[:, *part], total[part])
+            shadow = shadows.get(index) if shadows else None
+            self._add(index, strip.position_m[:, *part], strip.normal[:, *part], total[part], shadow)
         return total
 
-    def _add(self, index: int, position_m: FloatImage, normal: FloatImage, total: FloatImage) -> None:
+    def _add(
+        self, index: int, position_m: FloatImage, normal: FloatImage, total: FloatImage, shadow: Shadow | None
+    ) -> None:
         lamps = self.lamps
         place = (lamps.position_m[index] - self.origin_m).astype(np.float32)
         height = position_m[2] - place[2]
@@ -198,4 +227,7 @@ class Spots:
         along, across = axis[0] * x + axis[1] * y + axis[2] * z, side[0] * x + side[1] * y
         ends = np.maximum(1 - np.square(square * np.float32(lamps.reach_m**-2)), 0)
         light = lamps.beam(along, across, z) * facing * np.square(ends * inverse)
-        total += light * np.float32(lamps.intensity[index])
+        light *= np.float32(lamps.intensity[index])
+        if shadow is not None:
+            shadow.lay(light, (x, y, z), square * inverse, facing, normal[2])
+        total += light

@@ -19,6 +19,7 @@ Lights = npt.NDArray[np.float32]
 _NEAREST_M = 0.3
 _FRACTION_BITS = 4
 _LEAST_SIDE_PX = 0.7
+_BEHIND_M, _BEHIND_SHARE = 0.4, 0.03
 
 _LAMP_RADIUS_M = 0.16
 _LEAST_SIGMA_PX = 0.75
@@ -50,8 +51,11 @@ class Windows:
     light: Lights
     reach_m: float = 1200.0
 
-    def seen(self, geom_id: IdImage, camera: CameraRecord) -> npt.NDArray[np.int32]:
-        """(H, W) number of the pane that each pixel shows, -1 for none."""
+    def seen(self, geom_id: IdImage, depth_m: FloatImage, camera: CameraRecord) -> npt.NDArray[np.int32]:
+        """(H, W) number of the pane that each pixel shows, -1 for none: it is of the pane's geom, and as far away.
+
+        One geom may be many houses, of which one stands before another.
+        """
         pose = camera.world_from_camera_transform
         found = np.full(geom_id.shape, -1, np.int32)
         away_m = self.corners_m[:, 0] - pose.translation_m
@@ -70,7 +74,17 @@ class Windows:
         for index in np.argsort(-inside[..., 2].mean(axis=1), kind="stable"):
             cv2.fillConvexPoly(found, points[index], int(near[index]), cv2.LINE_8, _FRACTION_BITS)
         rows, columns = np.nonzero(found >= 0)
-        is_other = self.geom_id[found[rows, columns]] != geom_id[rows, columns]
+        pane = found[rows, columns]
+        rays = np.stack([
+            (columns + 0.5 - camera.width_px / 2) / camera.focal_px,
+            (rows + 0.5 - camera.height_px / 2) / camera.focal_px,
+            np.ones(len(rows)),
+        ])  # fmt: skip
+        facing = np.einsum("nd,dn->n", self.normal[pane] @ pose.rotation, rays)
+        away = np.einsum("nd,nd->n", self.normal[pane], self.corners_m[pane, 0] - pose.translation_m)
+        pane_m = away / np.minimum(facing, -1e-6)
+        is_other = self.geom_id[pane] != geom_id[rows, columns]
+        is_other |= np.abs(pane_m - depth_m[rows, columns]) > _BEHIND_M + _BEHIND_SHARE * pane_m
         found[rows[is_other], columns[is_other]] = -1
         return found
 

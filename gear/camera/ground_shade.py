@@ -23,6 +23,7 @@ import numpy.typing as npt
 
 from gear.camera.noise import smooth_step
 from gear.camera.response import DISPLAY_POWER
+from gear.camera.spread import longest_edges, points_on
 from gear.values.frames import FloatImage, Shape, UInt16Image
 from gear.values.geometry import Array
 from gear.values.scene import ActorRecord, CameraRecord, SceneRecord
@@ -124,17 +125,8 @@ def _slopes() -> Iterator[tuple[float, float]]:
 def _points(shape: Shape, per_m: float) -> Array:
     """(N, 3) points on all triangles, about so many to a metre along and across; the same every time."""
     corners = shape.vertices_m[shape.faces]
-    along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    longest_m = np.maximum(np.linalg.norm(along, axis=1), np.linalg.norm(across, axis=1))
-    longest_m = np.maximum(longest_m, np.linalg.norm(across - along, axis=1))
-    steps = np.maximum(np.ceil(longest_m * per_m).astype(np.int64), 1)
-    found = [np.unique(corners.reshape(-1, 3), axis=0)]
-    for step in np.unique(steps).tolist():
-        u, v = (grid.reshape(-1) / step for grid in np.mgrid[0 : step + 1, 0 : step + 1])
-        inside = u + v <= 1
-        chosen = steps == step
-        of_each = u[inside, None] * along[chosen, None] + v[inside, None] * across[chosen, None]
-        found.append((corners[chosen, None, 0] + of_each).reshape(-1, 3))
+    steps = np.maximum(np.ceil(longest_edges(corners) * per_m).astype(np.int64), 1)
+    found = [np.unique(corners.reshape(-1, 3), axis=0), *points_on(corners, steps)]
     points = np.concatenate(found)
     return points[:: 1 + len(points) // _MOST_POINTS]
 

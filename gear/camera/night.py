@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from gear.camera.beams import Headlamps, Lamps, Spots, headlamps
 from gear.camera.glow import Shine, Windows
+from gear.camera.lamp_shadows import SHADOWED_WITHIN_M, LampShadow, LampShadows
 from gear.camera.own_light import INSIDE_LIGHT, board_light, inside_light, lens_light
 from gear.camera.response import DISPLAY_POWER
 from gear.camera.slant import STRIP_ROWS, Strip, strips_of
@@ -91,6 +92,7 @@ class Night:
         is_lens: (ngeom,) the glass of vehicles' lamps.
         is_pane: (ngeom,) the panes of buses.
         is_display: whether frames hold display values instead of light.
+        shadows: what throws them; None for nothing.
     """
 
     level: float
@@ -105,6 +107,7 @@ class Night:
     is_lens: npt.NDArray[np.bool_]
     is_pane: npt.NDArray[np.bool_]
     is_display: bool
+    shadows: LampShadows | None = None
 
     def light(self, truth: RawView, camera: CameraRecord, record: SceneRecord, geoms: GeomTable) -> NightLight:
         """What a view gets of lamps.
@@ -126,7 +129,7 @@ class Night:
                 image = shine.streaks(camera, record.ego.world_from_actor.position_m[2])
                 image *= is_open * np.float32(STREAK_SHARE * self.wetness)
                 _add_colour(streaks, image, lamps.colour)
-        spots = [Spots.of(lamps, camera) for lamps in kinds.values()]
+        spots = self._spots(kinds, camera, record)
         for strip in strips_of(truth.depth_m, camera):
             rows = strip.rows
             part = np.float32(self.lit) * share[rows].astype(np.float32)
@@ -138,13 +141,30 @@ class Night:
                     light[rows] = lit * np.float32(LINEAR_FULL_SCALE)
         return NightLight(share=share, glow=glow, streaks=streaks)
 
+    def _spots(
+        self, kinds: Mapping[str, Lamps], camera: CameraRecord, record: SceneRecord
+    ) -> list[tuple[Spots, dict[int, LampShadow]]]:
+        """The lamps in a view by kind, and what is in the way of those that are near, by number."""
+        found = []
+        users = self.shadows.users(record) if self.shadows is not None else []
+        for kind, lamps in kinds.items():
+            spots = Spots.of(lamps, camera)
+            shadows = {}
+            if self.shadows is not None:
+                for index in spots.near(SHADOWED_WITHIN_M):
+                    shadows[index] = LampShadow(
+                        town=self.shadows, users=users, kind=kind, index=index, lamps=lamps, stands=kind in self.lamps
+                    )
+            found.append((spots, shadows))
+        return found
+
     def _shown(self, light: FloatImage) -> FloatImage:
         return light ** np.float32(DISPLAY_POWER) if self.is_display else light
 
-    def _add_lamps(self, strip: Strip, spots: Sequence[Spots], share: FloatImage) -> None:
+    def _add_lamps(self, strip: Strip, spots: Sequence[tuple[Spots, dict[int, LampShadow]]], share: FloatImage) -> None:
         """Adds k + E / A to some rows of shares."""
         share += np.where(strip.is_seen, np.float32(self.level), np.float32(self.sky_level))[..., None]
-        lit = [(spot.lamps.colour, spot.light(strip)) for spot in spots]
+        lit = [(spot.lamps.colour, spot.light(strip, shadows)) for spot, shadows in spots]
         above, aside, below = self.even.astype(np.float32)
         rise, sink = np.maximum(strip.normal[2], 0), np.maximum(-strip.normal[2], 0)
         for channel in range(3):
@@ -159,7 +179,7 @@ class Night:
         """(H, W, 3) shares of what has light of its own, and the light that it shows besides."""
         share = np.zeros((*geom_id.shape, 3), np.float16)
         glow = np.zeros_like(share)
-        panes = self.windows.seen(geom_id, camera)
+        panes = self.windows.seen(geom_id, depth_m, camera)
         where = np.nonzero(panes >= 0)
         share[where], glow[where] = self.windows.gain[panes[where]], self.windows.light[panes[where]]
         share[np.append(self.is_signal, False)[geom_id]] = SIGNAL_GAIN

@@ -7,11 +7,13 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.camera.beams import Headlamps
+from gear.camera.lamp_shadows import Casters, LampShadows
 from gear.camera.night import Night
 from gear.values.errors import TownError
 from gear.values.labels import LABEL_BY_NAME
 from gear.values.rng import derive_rng
 from gear.values.scene import Weather
+from gear.world.casters import find_casters
 from gear.world.lamps import find_lamps, find_windows
 from gear.world.light import even_light
 from gear.world.weather import wetness
@@ -68,6 +70,9 @@ def night_of(world: World, weather: Weather, renderer_name: str) -> Night | None
         is_lens=np.array([name == "lights" for name in material]),
         is_pane=panes_of_buses(material, world.classes.label_code),
         is_display=renderer_name == "classic",
+        shadows=LampShadows(
+            casters=Casters.of(find_casters(model, data, world.classes.label_code)), shapes=world.shapes
+        ),
     )
 
 

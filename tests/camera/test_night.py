@@ -10,6 +10,7 @@ import pytest
 
 from gear.camera.beams import Headlamps, Lamps, Spots, headlamps, low_beam, street_beam
 from gear.camera.glow import Shine, Windows
+from gear.camera.lamp_shadows import Casters, LampShadows
 from gear.camera.night import Night, NightLight
 from gear.camera.own_light import INSIDE_LIGHT
 from gear.camera.slant import strips_of
@@ -193,6 +194,24 @@ def test_frames_stay_linear_and_the_same() -> None:
     np.testing.assert_array_equal(light.lay(mixed), light.lay(mixed))
 
 
+def test_what_stands_in_a_lamps_light_darkens_what_lies_behind_it_and_nothing_else() -> None:
+    place = (6.0, 0.0, 8.0)
+    # A board across the road, with its middle 3 m above the ground.
+    board = np.array([[(8, -4, 1), (8, -4, 5), (8, 4, 5)], [(8, -4, 1), (8, 4, 5), (8, 4, 1)]], np.float32)
+    free = light_of(night(place)).share.astype(float)
+    stopped = light_of(night(place, shadows=LampShadows(casters=Casters.of(board), shapes={}))).share.astype(float)
+    depth_m, geom_id = street()
+    column = SIZE[1] // 2
+    x_m = depth_m[:, column]
+    # Its lower edge is 7 m below the lamp, its upper one 3 m: from 8.3 to 11.3 m the road is in its shadow.
+    in_shadow = (geom_id[:, column] == ROAD) & (x_m > 8.6) & (x_m < 10.9)
+    in_light = (geom_id[:, column] == ROAD) & ((x_m < 7.9) | (x_m > 12.0))
+    assert in_shadow.sum() >= 3 and in_light.sum() > 10
+    np.testing.assert_allclose(stopped[in_shadow, column], 0.05, rtol=1e-2)
+    np.testing.assert_array_equal(stopped[in_light, column], free[in_light, column])
+    assert (stopped <= free).all()
+
+
 def test_lit_panes_are_seen_where_they_are_and_only_from_outside() -> None:
     y, z = (-3.0, 2.0), (1.0, 4.0)
     corners = np.array([[[WALL_M, y[1], z[0]], [WALL_M, y[0], z[0]], [WALL_M, y[0], z[1]], [WALL_M, y[1], z[1]]]])
@@ -200,16 +219,17 @@ def test_lit_panes_are_seen_where_they_are_and_only_from_outside() -> None:
         NO_WINDOWS, corners_m=corners, normal=np.array([[-1.0, 0, 0]]), geom_id=np.array([WALL], np.int32),
         gain=np.full((1, 3), 2.0, np.float32), light=np.full((1, 3), 0.1, np.float32),
     )  # fmt: skip
-    _, geom_id = street()
-    seen = windows.seen(geom_id, camera())
+    depth_m, geom_id = street()
+    seen = windows.seen(geom_id, depth_m, camera())
     rows, columns = np.nonzero(seen == 0)
     left, right = (SIZE[1] / 2 - FOCAL_PX * value / WALL_M for value in (y[1], y[0]))
     top, bottom = (SIZE[0] / 2 + FOCAL_PX * (EYE_M - value) / WALL_M for value in (z[1], z[0]))
     assert abs(columns.min() - left) <= 1 and abs(columns.max() + 1 - right) <= 1
     assert abs(rows.min() - top) <= 1 and abs(rows.max() + 1 - bottom) <= 1
-    assert (windows.seen(geom_id, camera(yaw_rad=math.pi)) < 0).all()
-    assert (replace(windows, normal=-windows.normal).seen(geom_id, camera()) < 0).all()
-    assert (windows.seen(np.full_like(geom_id, ROAD), camera()) < 0).all(), "something else stands before it"
+    assert (windows.seen(geom_id, depth_m, camera(yaw_rad=math.pi)) < 0).all()
+    assert (replace(windows, normal=-windows.normal).seen(geom_id, depth_m, camera()) < 0).all()
+    assert (windows.seen(np.full_like(geom_id, ROAD), depth_m, camera()) < 0).all(), "something else stands before it"
+    assert (windows.seen(geom_id, depth_m - 4, camera()) < 0).all(), "another house of the same geom stands before it"
     lit = light_of(night(windows=windows))
     assert lit.share[rows[0], columns[0]] == pytest.approx(0.05 + 0.95 * 2, rel=1e-3)
     assert lit.glow[rows[0], columns[0]] == pytest.approx(0.95 * 0.1 * LINEAR_FULL_SCALE, rel=1e-3)

@@ -12,13 +12,15 @@ import pytest
 
 from gear.testing.tiny_town import CLEAR, TINY_TOWN, tiny_scenes, tiny_world
 from gear.values.errors import TownError
-from gear.values.labels import LABEL_BY_NAME
+from gear.values.labels import GROUND_CODES, LABEL_BY_NAME
 from gear.values.resources import data_dir
 from gear.values.rng import derive_rng
 from gear.values.scene import Weather
+from gear.world.casters import find_casters
 from gear.world.lamps import GLAZINGS, find_lamps, find_windows
 from gear.world.light import even_light, lighting_of
 from gear.world.night import materials_of, night_of, panes_of_buses
+from gear.world.shapes import geom_triangles
 from gear.world.world import World
 
 NIGHT = Weather(name="night", sun_altitude_deg=-90)
@@ -116,6 +118,31 @@ def test_lamp_glass_without_a_surface_is_one_line(tmp_path: Path) -> None:
     world = World.build(town=town, scene_name="board", scene=tiny_scenes().scenes["board"], weather=NIGHT)
     with pytest.raises(TownError, match=r"odd\.xml: geom 'pane' is a plane.*; make the glass of lamps of meshes"):
         night_of(world, NIGHT, "classic")
+
+
+def test_what_stands_throws_shadows_and_neither_the_ground_nor_what_drives_or_is_only_felt() -> None:
+    world = tiny_world()
+    model, codes = world.model, world.classes.label_code
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    corners = find_casters(model, data, codes)
+    assert corners.dtype == np.float32 and corners.shape[1:] == (3, 3) and len(corners)
+    (face,) = world.faces
+    board_m = data.geom_xpos[face.geom_id]
+    assert np.linalg.norm(corners.mean(axis=1) - board_m, axis=1).min() < 3.0, "the board is there"
+    data.mocap_pos[:, 2] = -500.0
+    mujoco.mj_kinematics(model, data)
+    np.testing.assert_array_equal(find_casters(model, data, codes), corners)
+    ground = np.isin(codes, GROUND_CODES) & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE)
+    flat = np.concatenate([np.zeros((0, 3, 3)), *(geom_corners(model, data, geom) for geom in np.flatnonzero(ground))])
+    middles = {tuple(np.round(middle, 3)) for middle in flat.mean(axis=1)}
+    assert not middles & {tuple(np.round(middle, 3)) for middle in corners.astype(float).mean(axis=1)}
+
+
+def geom_corners(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> np.ndarray:
+    """(N, 3, 3) triangles of a geom in the world."""
+    vertices, faces = geom_triangles(model, geom)
+    return np.asarray((vertices @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom])[faces])
 
 
 def test_there_is_a_night_only_without_the_sun() -> None:

@@ -1,0 +1,250 @@
+"""How far the light of one lamp comes in every direction, and the shadows of what stops it.
+
+Directions lie as on a paraboloid about the lamp's axis (Heidrich and Seidel 1998): one division finds them. The
+distances in nine cells around a direction are compared with a place's, not mixed (Reeves, Salesin and Cook 1987), so
+that edges are soft by about two cells.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from gear.camera.spread import longest_edges
+from gear.values.frames import FloatImage
+from gear.values.geometry import Array
+
+Floats = npt.NDArray[np.float32]
+Indices = npt.NDArray[np.int64]
+
+OWN_GLASS_M = 0.8
+"""What is as near as this to a lamp is part of it."""
+
+BORDER = 2
+"""Cells around a map in which nothing stops light."""
+
+_LEVEL, _EDGE_ON = 0.9, 1e-6
+_SLACK_M, _MOST_TILT, _STEEP = 0.15, 6.0, 2.5
+_SOLE_M, _CLOSED_CELLS = 0.1, 9
+_LARGEST, _FRACTION_BITS = 0.3, 4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Layout:
+    """How directions lie in a map.
+
+    Attributes:
+        cells: along each side.
+        zoom: 1 for all that is before the lamp; with larger ones only what lies about its axis, in finer cells.
+    """
+
+    cells: int
+    zoom: float
+
+    @property
+    def grain_rad(self) -> float:
+        """The finest angle between neighbouring cells."""
+        return 2 / (self.cells * self.zoom)
+
+    @property
+    def half_angle_rad(self) -> float:
+        """How far from the axis directions are in the map, at its corners."""
+        return 2 * math.atan(math.sqrt(2) / self.zoom)
+
+    def empty(self) -> Floats:
+        """(cells, cells) of light that nothing stops."""
+        return np.full((self.cells, self.cells), np.inf, np.float32)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Outlook:
+    """Where a lamp is, and how directions from it lie in its map.
+
+    Attributes:
+        place_m: (3,) float32 in the world.
+        frame: (3, 3) float32 unit vectors in its rows: across, up and along the lamp's axis.
+        layout: of its map.
+    """
+
+    place_m: Floats
+    frame: Floats
+    layout: Layout
+
+    @staticmethod
+    def of(place_m: Array, axis: Array, layout: Layout) -> Outlook:
+        """Of a lamp that shines along an axis."""
+        along = axis / np.linalg.norm(axis)
+        across = np.cross(along, (0.0, 0.0, 1.0) if abs(along[2]) < _LEVEL else (0.0, 1.0, 0.0))
+        across /= np.linalg.norm(across)
+        frame = np.stack([across, np.cross(across, along), along])
+        return Outlook(place_m=place_m.astype(np.float32), frame=frame.astype(np.float32), layout=layout)
+
+    def places(self, unit: Floats) -> tuple[Floats, Floats]:
+        """Columns and rows of (3, N) directions, whole numbers in the middle of cells; outside for what is behind."""
+        across, up, along = self.frame @ unit
+        scale = np.float32(self.layout.zoom * self.layout.cells / 2) / np.maximum(1 + along, np.float32(1e-3))
+        middle = np.float32(self.layout.cells / 2 - 0.5)
+        return across * scale + middle, up * scale + middle
+
+    def directions(self, column: Indices, row: Indices) -> Floats:
+        """(N, 3) unit vectors in the world through the middles of cells."""
+        across, up = ((2 * (cell + 0.5) / self.layout.cells - 1) / self.layout.zoom for cell in (column, row))
+        square = across * across + up * up
+        unit = np.stack([2 * across, 2 * up, 1 - square], axis=1) / (1 + square)[:, None]
+        return unit.astype(np.float32) @ self.frame
+
+
+def lengths(vectors: Floats) -> Floats:
+    """(N,) of (3, N) vectors."""
+    x, y, z = vectors
+    return np.asarray(np.sqrt(x * x + y * y + z * z))
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ShadowMap:
+    """A map (Williams 1978) of one lamp.
+
+    Attributes:
+        outlook: of the lamp.
+        comes_m: (cells, cells) float32, by direction the distance at which something stops its light; infinite where
+            nothing does, as in the border. It may not change any more.
+    """
+
+    outlook: Outlook
+    comes_m: Floats
+    _least_m: Floats = field(init=False, repr=False)
+    _most_m: Floats = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        nine = np.ones((3, 3), np.uint8)
+        object.__setattr__(self, "_least_m", cv2.erode(self.comes_m, nine))
+        object.__setattr__(self, "_most_m", cv2.dilate(self.comes_m, nine))
+
+    def through(self, unit: Floats, away_m: FloatImage, facing: FloatImage, up: FloatImage) -> Floats:
+        """(N,) how much of the light comes to places, 0..1.
+
+        Args:
+            unit: (3, N) directions of the places from the lamp.
+            away_m: (N,) how far they are from it.
+            facing: (N,) cosines between their surfaces' normals and the way back to the lamp.
+            up: (N,) upward parts of the normals. Level ground stops no light, not from itself either.
+        """
+        layout = self.outlook.layout
+        # What the map does not have lies at its border, where nothing stops light.
+        across, along = (np.clip(place, 1, layout.cells - 1.001) for place in self.outlook.places(unit))
+        column, row = across.astype(np.int32), along.astype(np.int32)
+        cosine = np.clip(facing, np.float32(1e-3), 1)
+        tilt = np.minimum(np.sqrt(1 - cosine * cosine) / cosine, np.float32(_MOST_TILT))
+        tilt[up > _LEVEL] = 0
+        reach_m = away_m * (1 - np.float32(_STEEP * layout.grain_rad) * tilt) - np.float32(_SLACK_M)
+        middle = row * layout.cells + column
+        is_free = (self._least_m.reshape(-1)[middle] >= reach_m) | (self.outlook.frame[2] @ unit <= 0)
+        through: Floats = is_free.astype(np.float32)
+        edge = np.flatnonzero(~is_free & (self._most_m.reshape(-1)[middle] >= reach_m))
+        through[edge] = self._at_edges(middle[edge], (across - column)[edge], (along - row)[edge], reach_m[edge])
+        return through
+
+    def _at_edges(self, middle: npt.NDArray[np.int32], x: Floats, y: Floats, reach_m: Floats) -> Floats:
+        """Where light comes through some of nine cells."""
+        cells, comes_m = self.outlook.layout.cells, self.comes_m.reshape(-1)
+        through = np.zeros_like(reach_m)
+        for down, high in zip((-cells, 0, cells), _weights(y), strict=True):
+            for aside, wide in zip((-1, 0, 1), _weights(x), strict=True):
+                through += high * wide * (comes_m[middle + (down + aside)] >= reach_m)
+        return through
+
+
+def _weights(share: Floats) -> tuple[Floats, Floats, Floats]:
+    """Of three cells in a box two cells wide; its middle is so far, 0..1, from that of the second one."""
+    half = np.full_like(share, 0.5)
+    return half - half * share, half, half * share
+
+
+def first_met(corners_m: Floats, outlook: Outlook) -> Floats:
+    """(cells, cells) float32, how far a lamp's light comes among (N, 3, 3) triangles that are seen from outside.
+
+    Triangles of which the lamp sees the back belong to bodies whose front is nearer.
+    """
+    layout = outlook.layout
+    corners = _split(corners_m - outlook.place_m, outlook.frame[2])
+    flat = np.ascontiguousarray(corners.reshape(-1, 3).T)
+    corner_m = lengths(flat)
+    unit = np.asarray(flat / np.maximum(corner_m, _EDGE_ON), np.float32)
+    places = np.stack(outlook.places(unit), axis=1).reshape(-1, 3, 2)
+    corner_m = corner_m.reshape(-1, 3)
+    away_m = corner_m.mean(axis=1)
+    shown = np.flatnonzero((np.abs(places) < 2 * layout.cells).all(axis=(1, 2)) & (away_m > OWN_GLASS_M))
+    # What is nearer is painted over what is farther away.
+    shown = shown[np.argsort(-away_m[shown], kind="stable")]
+    outlines = np.rint(places[shown] * (1 << _FRACTION_BITS)).astype(np.int32)
+    painted = np.full((layout.cells, layout.cells), -1, np.int32)
+    for number, outline in enumerate(outlines):
+        cv2.fillConvexPoly(painted, outline, number, cv2.LINE_8, _FRACTION_BITS)
+    row, column = (index + BORDER for index in np.nonzero(painted[BORDER:-BORDER, BORDER:-BORDER] >= 0))
+    met = shown[painted[row, column]]
+    first = corners[met, 0]
+    normal = _normals(corners[met])
+    slope = np.einsum("nd,nd->n", normal, outlook.directions(column, row))
+    plane_m = np.einsum("nd,nd->n", normal, first) / np.minimum(slope, np.float32(-_EDGE_ON))
+    comes_m = layout.empty()
+    comes_m[row, column] = np.clip(plane_m, corner_m[met].min(axis=1), corner_m[met].max(axis=1))
+    return comes_m
+
+
+def _split(corners: Floats, axis: Floats) -> Floats:
+    """What is before a lamp and faces it, in triangles so small, seen from there, that they do not bend in a map."""
+    left = corners[np.einsum("nd,nd->n", _normals(corners), corners[:, 0]) < 0]
+    small = [np.zeros((0, 3, 3), np.float32)]
+    while len(left):
+        middle, longest_m = left.mean(axis=1), longest_edges(left)
+        away_m = lengths(middle.T)
+        chosen = (middle @ axis + longest_m > 0) & (away_m + longest_m > OWN_GLASS_M)
+        large = chosen & (longest_m > _LARGEST * np.maximum(away_m, OWN_GLASS_M))
+        small.append(left[chosen & ~large])
+        left = _quartered(left[large])
+    return np.concatenate(small)
+
+
+def _normals(corners: Floats) -> Floats:
+    """(N, 3) out of triangles, twice as long as they are large."""
+    a, b, c = np.moveaxis(corners, 1, 0)
+    return np.cross(b - a, c - a)
+
+
+def _quartered(corners: Floats) -> Floats:
+    """Each triangle as four."""
+    a, b, c = np.moveaxis(corners, 1, 0)
+    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+    return np.concatenate([np.stack(three, axis=1) for three in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+
+
+def stop_behind(comes_m: Floats, points_m: Floats, spacing_m: float, outlook: Outlook) -> None:
+    """Ends light in a map where a body ends that is given by (N, 3) points so far apart, in place.
+
+    What it would throw on itself is left to slants, and its shadow begins at its soles.
+    """
+    layout = outlook.layout
+    away = np.ascontiguousarray(points_m.T) - outlook.place_m[:, None]
+    away_m = lengths(away)
+    keep = (away_m > OWN_GLASS_M) & (outlook.frame[2] @ away > 0)
+    away_m = away_m[keep]
+    unit: Floats = away[:, keep] / away_m
+    column, row = (np.rint(place).astype(np.int64) for place in outlook.places(unit))
+    inside = np.minimum(column, row) >= BORDER
+    inside &= np.maximum(column, row) < layout.cells - BORDER
+    if not inside.any():
+        return
+    column, row, away_m = column[inside], row[inside], away_m[inside]
+    top, left = int(row.min()), int(column.min())
+    size = int(row.max()) - top + 1, int(column.max()) - left + 1
+    ends_m = np.zeros(size, np.float32)
+    np.maximum.at(ends_m.reshape(-1), (row - top) * size[1] + column - left, away_m)
+    gap = min(math.ceil(spacing_m / (layout.grain_rad * float(away_m.min()))), _CLOSED_CELLS)
+    if gap > 1:
+        ends_m = cv2.morphologyEx(ends_m, cv2.MORPH_CLOSE, np.ones((gap, gap), np.uint8))
+    part = comes_m[top : top + size[0], left : left + size[1]]
+    np.minimum(part, np.where(ends_m > 0, ends_m - np.float32(_SOLE_M), np.float32(np.inf)), out=part)
