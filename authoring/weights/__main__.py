@@ -61,6 +61,12 @@ def main() -> int:
                 default=FIRST_HELD_OUT_SEED,
                 help=f"of the first collection ({FIRST_HELD_OUT_SEED}); another one checks the figures on new pictures",
             )
+            collections.add_argument(
+                "--crowd",
+                type=float,
+                default=1.0,
+                help="times the scenes' other road users (1); with more of them, rare ones say something",
+            )
         collections.add_argument("--jobs", type=int, default=2, help="collections at a time (2)")
         collections.add_argument("--list", action="store_true", help="print the commands and do nothing")
         collections.set_defaults(run=run)
@@ -91,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
     if args.part == "training":
         plan = training(args.task, args.samples or TRAINING_SAMPLES)
     else:
-        plan = held_out(args.task, args.samples or HELD_OUT_SAMPLES, first_seed=args.first_seed)
+        plan = held_out(args.task, args.samples or HELD_OUT_SAMPLES, first_seed=args.first_seed, crowd=args.crowd)
     root: Path = args.out / args.part / args.task
     if args.list:
         for collection in plan:

@@ -6,7 +6,7 @@ L is the frame under the night's even light, in which every surface shows its al
 surface of its slant gets; k is what is left of that light, E what lamps add to it, G the light of what glows. None of
 these depends on any albedo: frames stay linear, and a patch changes no pixel that it does not reach.
 
-Slants follow from depth. Lamps throw no shadows; walls that face away from them stay dark.
+Slants follow from depth, shadows from what stands in the town and from the scene's road users.
 """
 
 from __future__ import annotations
