@@ -19,6 +19,9 @@ from torch.nn.utils.fusion import fuse_conv_bn_eval
 
 Made = TypeVar("Made")
 
+_CONVOLVES, _NORMALISES = "Conv2dSame", "BatchNormAct2d"
+"""What timm's EfficientNets have besides torch's own layers."""
+
 _MAKING = threading.Lock()
 """Of several threads that predict, one makes what all of them use."""
 
@@ -61,7 +64,9 @@ def quick_copy(graph: nn.Module, run: Callable[[nn.Module], object]) -> nn.Modul
     quick = copy.deepcopy(graph)
     for convolution, normalisation in _pairs(quick, run):
         _replace(quick, convolution, fuse_conv_bn_eval(convolution, normalisation))
-        _replace(quick, normalisation, nn.Identity())
+        # timm's has the activation in it that follows.
+        following = normalisation.act if _is_timms(normalisation, _NORMALISES) else None
+        _replace(quick, normalisation, following if isinstance(following, nn.Module) else nn.Identity())
     return quick.to(memory_format=torch.channels_last)  # type: ignore[call-overload, no-any-return]
 
 
@@ -74,19 +79,31 @@ def _pairs(graph: nn.Module, run: Callable[[nn.Module], object]) -> list[tuple[n
 
     def after(module: nn.Module, inputs: tuple[Tensor, ...], output: Tensor) -> None:
         uses[module] = uses.get(module, 0) + 1
-        if type(module) is nn.Conv2d:
+        if isinstance(module, nn.Conv2d):
             made[id(output)] = module
-        elif type(module) is nn.BatchNorm2d and module.track_running_stats and id(inputs[0]) in made:
+        elif isinstance(module, nn.BatchNorm2d) and module.track_running_stats and id(inputs[0]) in made:
             found.append((made[id(inputs[0])], module))
         held.extend((*inputs, output))  # so that no other tensor gets an address that was seen
 
-    hooks = [m.register_forward_hook(after) for m in graph.modules() if type(m) in (nn.Conv2d, nn.BatchNorm2d)]
+    hooks = [m.register_forward_hook(after) for m in graph.modules() if _can_fold(m)]
     try:
         run(graph)
     finally:
         for hook in hooks:
             hook.remove()
     return [(first, second) for first, second in found if uses[first] == uses[second] == 1]
+
+
+def _can_fold(module: nn.Module) -> bool:
+    """Whether a layer is one of those of which it is known what they do: others may derive from them and do more."""
+    return (
+        type(module) in (nn.Conv2d, nn.BatchNorm2d) or _is_timms(module, _CONVOLVES) or _is_timms(module, _NORMALISES)
+    )
+
+
+def _is_timms(module: nn.Module, name: str) -> bool:
+    kind = type(module)
+    return kind.__name__ == name and kind.__module__.startswith("timm.layers.")
 
 
 def _replace(graph: nn.Module, old: nn.Module, new: nn.Module) -> None:

@@ -157,9 +157,11 @@ OURS = (
     pytest.param("fasterrcnn_r50_fpn", marks=pytest.mark.slow),
     "glpdepth",
     "glpn_b0",
+    "retinanet_lite0_fpn",
     "retinanet_r18_fpn",
     pytest.param("retinanet_r50_fpn", marks=pytest.mark.slow),
     "stereo_centre",
+    "stereo_centre_lite0",
 )
 
 
@@ -186,3 +188,21 @@ def test_networks_of_gears_say_the_same_with_and_without(name: str) -> None:
     for key in dense:
         scale = float(ours[key].abs().max()) + 1e-6
         assert float((theirs[key] - ours[key]).abs().max()) < 1e-4 * scale, key
+
+
+@pytest.mark.parametrize("name", ["retinanet_lite0_fpn", "stereo_centre_lite0"])
+def test_normalisations_of_timms_trunks_are_folded_and_their_activations_stay(name: str) -> None:
+    chosen = chosen_model(name, ["weights=none", "device=cpu"])
+    network = build(chosen.found, chosen.options)
+    assert isinstance(network, Network)
+    pictures = {view: derive_rng(4, view).integers(0, 256, (96, 160, 3), dtype=np.uint8) for view in ("left", "right")}
+    quick = network.for_predictions(as_batch([pictures], network._views))
+    left, all_of_them = (
+        [type(module).__name__ for module in graph.modules() if isinstance(module, nn.BatchNorm2d)]
+        for graph in (quick.graph, network.graph)
+    )
+    assert "BatchNormAct2d" in all_of_them and "BatchNormAct2d" not in left
+    activations = [
+        sum(isinstance(m, nn.ReLU6) for m in graph.modules()) for graph in (quick.graph, network.graph)
+    ]
+    assert activations[0] == activations[1] > 10
