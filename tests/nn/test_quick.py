@@ -202,7 +202,5 @@ def test_normalisations_of_timms_trunks_are_folded_and_their_activations_stay(na
         for graph in (quick.graph, network.graph)
     )
     assert "BatchNormAct2d" in all_of_them and "BatchNormAct2d" not in left
-    activations = [
-        sum(isinstance(m, nn.ReLU6) for m in graph.modules()) for graph in (quick.graph, network.graph)
-    ]
+    activations = [sum(isinstance(m, nn.ReLU6) for m in graph.modules()) for graph in (quick.graph, network.graph)]
     assert activations[0] == activations[1] > 10
