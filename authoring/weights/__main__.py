@@ -21,6 +21,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 from authoring.weights import renew, ship
@@ -61,12 +62,10 @@ def main() -> int:
                 default=FIRST_HELD_OUT_SEED,
                 help=f"of the first collection ({FIRST_HELD_OUT_SEED}); another one checks the figures on new pictures",
             )
-            collections.add_argument(
-                "--crowd",
-                type=float,
-                default=1.0,
-                help="times the scenes' other road users (1); with more of them, rare ones say something",
-            )
+        collections.add_argument(
+            "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings",
+            help="a key of all collections, such as crowd=5; repeatable",
+        )  # fmt: skip
         collections.add_argument("--jobs", type=int, default=2, help="collections at a time (2)")
         collections.add_argument("--list", action="store_true", help="print the commands and do nothing")
         collections.set_defaults(run=run)
@@ -97,7 +96,8 @@ def run(args: argparse.Namespace) -> int:
     if args.part == "training":
         plan = training(args.task, args.samples or TRAINING_SAMPLES)
     else:
-        plan = held_out(args.task, args.samples or HELD_OUT_SAMPLES, first_seed=args.first_seed, crowd=args.crowd)
+        plan = held_out(args.task, args.samples or HELD_OUT_SAMPLES, first_seed=args.first_seed)
+    plan = [replace(one, settings=(*one.settings, *args.settings)) for one in plan]
     root: Path = args.out / args.part / args.task
     if args.list:
         for collection in plan:

@@ -130,17 +130,8 @@ def training(task: str, samples: int) -> list[Collection]:
     return result
 
 
-def held_out(
-    task: str, samples: int = HELD_OUT_SAMPLES, *, first_seed: int = FIRST_HELD_OUT_SEED, crowd: float = 1.0
-) -> list[Collection]:
-    """What the weights are measured on, at the task's own size: both scenes, in a known weather and in the other.
-
-    Args:
-        task: a task plugin.
-        samples: in all.
-        first_seed: of the first collection.
-        crowd: how many times the scenes' other road users there are.
-    """
+def held_out(task: str, samples: int = HELD_OUT_SAMPLES, *, first_seed: int = FIRST_HELD_OUT_SEED) -> list[Collection]:
+    """What the weights are measured on, at the task's own size: both scenes, in a known weather and in the other."""
     pairs = [(place, weather) for place in HELD_OUT_SCENES for weather in ("ClearNoon", HELD_OUT_WEATHER)]
     return [
         Collection(
@@ -152,7 +143,7 @@ def held_out(
             patch="none",
             seed=first_seed + number,
             samples=max(1, round(samples / len(pairs))),
-            settings=() if crowd == 1 else (f"crowd={crowd:g}",),
+            settings=(),
         )
         for number, ((town, scene), weather) in enumerate(pairs)
     ]

@@ -9,6 +9,7 @@ from typing import ClassVar, Literal
 from gear.config.nodes import Mapping, Node, Place
 from gear.contracts.rendering import Quality
 from gear.values.errors import FieldError
+from gear.values.mix import check_mix
 from gear.values.optics import CameraEffects
 from gear.values.serial import PLACES
 
@@ -155,6 +156,7 @@ class CollectionConfig:
         camera: optional effects: `shot_noise`, `read_noise` (percent), `vignette`, `shutter_s`, `lens` (`k1`, `k2`).
         seed, samples: instead of the simulation config's.
         crowd: how many times the scene's numbers of other vehicles and people there are, their upper limits included.
+        mix: how often kinds of vehicles come, times their share in the scene: `{bus: 3}`.
         patch_seed: of random patches; not the split's, so that all splits show the same one.
         probes: also keep each surface's reach rendered black and white, from which compositors put patches in.
         simulation: name or path of the simulation config.
@@ -176,6 +178,7 @@ class CollectionConfig:
     seed: int | None = None
     samples: int | None = None
     crowd: float = 1.0
+    mix: dict[str, float] = field(default_factory=dict)
     patch_seed: int = 0
     probes: bool = False
     simulation: str = "default"
@@ -191,5 +194,6 @@ class CollectionConfig:
             raise FieldError("samples", f"must be 1 to 1000000, got {self.samples}")
         if not 0 <= self.crowd <= MOST_CROWDED:
             raise FieldError("crowd", f"must be 0 to {MOST_CROWDED:g}, got {self.crowd:g}")
+        check_mix("mix", self.mix)
         if not self.scene:
             raise FieldError("scene", "must be a scene's name, such as billboard01")

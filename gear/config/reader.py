@@ -124,6 +124,8 @@ def _read_dataclass(kind: Any, node: Node, key: str, default: Any) -> Any:
             raise place.error(join(key, name), f"unknown key ({hint})")
         given[name] = _read(hints[name], item, join(key, name), _usual(fields[name], default))
         places[name] = item.place
+        if get_origin(hints[name]) is dict and isinstance(item, Mapping):
+            places |= {join(name, each): value.place for each, (_, value) in item.entries.items()}
     for name, field in fields.items():
         has_default = field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING
         if name not in given and not has_default:

@@ -22,7 +22,7 @@ from gear.world.instances import FaceName
 from gear.world.light import Lighting
 from gear.world.mjb import read_model, write_model
 from gear.world.models import placement_model, render_model
-from gear.world.pool import plan_pool
+from gear.world.pool import plan_pool, vehicles_of
 from gear.world.scene_spec import SceneSpec
 from gear.world.trees import without_mesh_trees
 from gear.world.weather import wetness
@@ -133,4 +133,4 @@ def carrier_of(scene: SceneSpec, library: AssetLibrary) -> ActorFacts | None:
     if scene.truck is None:
         return None
     library.path("vehicle", scene.truck.asset)
-    return library.vehicles[scene.truck.asset]
+    return vehicles_of(scene, library)[scene.truck.asset]

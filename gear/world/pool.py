@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 from gear.values.errors import TownError
 from gear.world.assets import ActorFacts, AssetLibrary
@@ -26,12 +27,21 @@ def plan_pool(scene: SceneSpec, library: AssetLibrary) -> list[tuple[ActorFacts,
         problem = f"has the name of {library.pedestrians[name].path}, so records could not tell them apart; rename one"
         raise TownError(library.vehicles[name].path, problem)
     library.path("vehicle", EGO_ASSET)
-    pool = [(library.vehicles[EGO_ASSET], 1)]
+    vehicles = vehicles_of(scene, library)
+    pool = [(vehicles[EGO_ASSET], 1)]
     if scene.npc_vehicles.count[1]:
-        pool += _shares(library.vehicles, scene.npc_vehicles.count[1])
+        pool += _shares(vehicles, scene.npc_vehicles.count[1])
     if scene.pedestrians.count[1]:
         pool += _shares(library.pedestrians, scene.pedestrians.count[1])
     return pool
+
+
+def vehicles_of(scene: SceneSpec, library: AssetLibrary) -> dict[str, ActorFacts]:
+    """A library's vehicles by name, as common as a scene has them."""
+    mix = scene.npc_vehicles.mix
+    return {
+        name: replace(facts, weight=facts.weight * mix.get(facts.kind, 1.0)) for name, facts in library.vehicles.items()
+    }
 
 
 def _shares(actors: Mapping[str, ActorFacts], most: int) -> list[tuple[ActorFacts, int]]:

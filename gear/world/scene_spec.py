@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 from gear.config.nodes import Place
 from gear.config.reader import WHOLE
 from gear.values.errors import FieldError
+from gear.values.mix import check_mix, product_of
 from gear.values.scene import Vec3
 from gear.values.serial import PLACES
 
@@ -126,12 +128,15 @@ class VehicleLimits(NpcLimits):
 
     Attributes:
         parked_share: share of them that stands in parking bays, as far as there are free ones.
+        mix: how often kinds of vehicles (`car`, `bus`, …) come, times their usual share; 0 for never.
     """
 
     parked_share: float = 0.3
+    mix: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         NpcLimits.__post_init__(self)
+        check_mix("mix", self.mix)
         if not 0 <= self.parked_share <= 1:
             raise FieldError("parked_share", f"is a share, 0 to 1, got {self.parked_share:g}")
 
@@ -205,6 +210,12 @@ class SceneSpec:
         return replace(
             self, npc_vehicles=_multiplied(self.npc_vehicles, factor), pedestrians=_multiplied(self.pedestrians, factor)
         )
+
+    def mixed(self, mix: Mapping[str, float]) -> SceneSpec:
+        """The same scene with kinds of vehicles so many times as often as it has them."""
+        if not mix:
+            return self
+        return replace(self, npc_vehicles=replace(self.npc_vehicles, mix=product_of(self.npc_vehicles.mix, mix)))
 
 
 LimitsT = TypeVar("LimitsT", bound=NpcLimits)

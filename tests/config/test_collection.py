@@ -56,6 +56,8 @@ def test_a_setting_below_the_word_of_another_setting_keeps_the_word() -> None:
         ("task: semseg\nscen: a\n", r"c.yml:2:1: scen: unknown key \(did you mean 'scene'\?\)"),
         ("task: semseg\nweather: {cloudiness: 140}\n", r"c.yml:2:23: weather.cloudiness: is a percentage, 0 to 100"),
         ("task: semseg\nsplit: Test Split\n", r"c.yml:2:8: split: 'Test Split' is not a split's name"),
+        ("task: semseg\nmix:\n  bus: 3\n  tram: 2\n", r"c.yml:4:9: mix.tram: is no kind of vehicle; there are car"),
+        ("task: semseg\nmix: {bus: much}\n", r"c.yml:2:12: mix.bus: expected float, got 'much'"),
         ("task: semseg\nsamples: 0\n", r"c.yml:2:10: samples: must be 1 to 1000000, got 0"),
         ("task: semseg\nrenderer: filment\n", r"filament, classic, got 'filment'; did you mean filament\?"),
         ("scene: a\n", r"c.yml:1:1: task: missing"),

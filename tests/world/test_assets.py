@@ -1,12 +1,14 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from gear.testing.tiny_town import CLEAR, TINY_TOWN, tiny_scenes
 from gear.values.errors import TownError, UnknownNameError
+from gear.values.resources import data_dir
 from gear.world.assets import AssetLibrary, read_actor_facts
 from gear.world.compiled import carrier_of
 from gear.world.digest import _referred, asset_files, assets_digest
@@ -221,6 +223,25 @@ def test_the_pool_is_enough_for_the_largest_crowd() -> None:
     assert sum(count for facts, count in pool if facts.kind == "person") >= 30
     nobody = SceneSpec(npc_vehicles=VehicleLimits(count=(0, 0)), pedestrians=NpcLimits(count=(0, 0)))
     assert plan_pool(nobody, library) == [(library.vehicles["car_saloon"], 1)]
+
+
+def test_a_mix_makes_kinds_more_common_wherever_a_vehicle_is_drawn() -> None:
+    library = AssetLibrary.for_town(data_dir("mjcf") / "towns" / "town10.xml")
+    mix = {"bus": 4.0, "car": 0.0}
+    scene = SceneSpec(
+        npc_vehicles=VehicleLimits(count=(0, 12), mix=mix), pedestrians=NpcLimits(count=(0, 0)), truck=TruckSpec()
+    )
+    pool = plan_pool(scene, library)
+    usual = dict(plan_pool(replace(scene, npc_vehicles=VehicleLimits(count=(0, 12))), library)[1:])
+    carrier = carrier_of(scene, library)
+    assert carrier is not None
+    for facts in (*(facts for facts, _ in pool), carrier):
+        assert facts.weight == library.vehicles[facts.name].weight * mix.get(facts.kind, 1.0)
+    mixed = dict(pool[1:])
+    assert {facts.kind for facts in mixed} == {"van", "truck", "bus", "motorcycle", "bicycle"}
+    (bus,) = (facts for facts in mixed if facts.kind == "bus")
+    assert mixed[bus] > 2 * usual[library.vehicles[bus.name]]
+    assert pool[0][0].name == "car_saloon", "the ego car is there, whatever the mix"
 
 
 @pytest.mark.parametrize(

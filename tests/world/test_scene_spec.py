@@ -8,6 +8,7 @@ from gear.config.nodes import parse_file
 from gear.config.reader import read_node
 from gear.testing.tiny_town import tiny_scenes
 from gear.values.errors import ConfigError, FieldError
+from gear.values.mix import VEHICLE_KINDS
 from gear.values.serial import from_json, to_json
 from gear.world.scene_spec import BoardSpec, EgoLimits, NpcLimits, SceneLibrary, SceneSpec, TruckSpec, VehicleLimits
 
@@ -66,6 +67,23 @@ def test_caps_lower_both_ends() -> None:
     capped = SceneSpec(npc_vehicles=VehicleLimits(count=(3, 7)), pedestrians=NpcLimits(count=(6, 20))).capped(2, 10)
     assert capped.npc_vehicles.count == (2, 2)
     assert capped.pedestrians.count == (6, 10)
+
+
+def test_a_mix_goes_on_top_of_the_scenes_own() -> None:
+    scene = SceneSpec(
+        npc_vehicles=VehicleLimits(count=(3, 7), mix={"bus": 2.0, "car": 0.5}), pedestrians=NpcLimits(count=(0, 0))
+    )
+    assert scene.mixed({}) is scene
+    assert scene.mixed({"bus": 3.0, "van": 2.0}).npc_vehicles.mix == {"car": 0.5, "van": 2.0, "bus": 6.0}
+    for mix, told in (
+        ({"tram": 1.0}, r"mix\.tram: is no kind of vehicle; there are car, van"),
+        ({"person": 1.0}, r"mix\.person: is no kind"),
+        ({"bus": -1.0}, r"mix\.bus: must be 0 to 1000"),
+        ({"bus": 1e4}, r"mix\.bus: must be 0 to 1000"),
+        (dict.fromkeys(VEHICLE_KINDS, 0.0), r"mix: leaves no vehicle"),
+    ):
+        with pytest.raises(FieldError, match=told):
+            VehicleLimits(count=(3, 7), mix=mix)
 
 
 def test_a_crowd_multiplies_both_ends_up_to_the_most_there_may_be() -> None:

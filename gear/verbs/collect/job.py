@@ -93,7 +93,7 @@ def resolve(config: CollectionConfig) -> Job:
         "seed": split.seed,
         "frames": split.frames,
         "interval_s": split.interval_s,
-        "scene": to_json(named.scene),
+        "scene": _scene_content(named.scene),
         "weather": to_json(weather),
         "renderer": to_json(renderer),
         "quality": config.quality,
@@ -121,6 +121,14 @@ def resolve(config: CollectionConfig) -> Job:
         plan=plan,
         renderer=renderer,
     )
+
+
+def _scene_content(scene: SceneSpec) -> Json:
+    """Of a scene; a mix only where there is one, so that datasets from before there were any go on."""
+    content: Json = to_json(scene)
+    if not scene.npc_vehicles.mix:
+        del content["npc_vehicles"]["mix"]
+    return content
 
 
 def _check_lens(config: CollectionConfig, task: Found) -> None:

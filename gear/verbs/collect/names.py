@@ -75,7 +75,8 @@ def look_up(config: CollectionConfig) -> Named:
         scene = find_scene(config, scenes)
         check_assets(library, scene, f"scenes.{config.scene}")
     roomy = 1 if scene.boards else ROOMY_FACTOR
-    scene = scene.capped(simulation.max_vehicles * roomy, simulation.max_pedestrians).crowded(config.crowd)
+    scene = scene.capped(simulation.max_vehicles * roomy, simulation.max_pedestrians)
+    scene = scene.crowded(config.crowd).mixed(config.mix)
     with told_at(config.places, "split"):
         split = split_of(simulation, config.split)
     split = dataclasses.replace(
