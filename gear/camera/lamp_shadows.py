@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+import numpy.typing as npt
 
 from gear.camera.beams import Lamps
 from gear.camera.shadow_map import Floats, Layout, Outlook, ShadowMap, first_met, lengths, stop_behind
@@ -28,38 +29,53 @@ WORTH = 0.85
 """Share of a lamp's reach in which road users throw shadows; farther out little is left of its light."""
 
 STANDING = Layout(cells=384, zoom=1.0)
-DRIVING = Layout(cells=512, zoom=2.2)
+DRIVING = Layout(cells=384, zoom=2.2)
 """Headlamps throw shadows within 49 degrees of where they point; farther aside they only stray."""
 
+_PIECE_M = 24.0
 _SPACING_M = {"large": 0.07, "small": 0.035}
 _LARGE_M = 2.5
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Casters:
-    """What stands in a town, without the ground.
+    """What stands in a town, without the ground, in pieces that lie together.
 
     Attributes:
         corners_m: (N, 3, 3) float32 triangles in the world.
-        middle_m: (N, 3) float32, their middles.
-        radius_m: (N,) float32, of balls about these that hold them.
+        ends: (M,) where each piece ends among them.
+        low_m, high_m: (M, 3) float32 corners of boxes that hold the pieces.
     """
 
     corners_m: Floats
-    middle_m: Floats
-    radius_m: Floats
+    ends: npt.NDArray[np.int64]
+    low_m: Floats
+    high_m: Floats
 
     @staticmethod
     def of(corners_m: Floats) -> Casters:
-        """Triangles, looked over once."""
-        middle_m = corners_m.mean(axis=1)
-        radius_m = np.sqrt(np.square(corners_m - middle_m[:, None]).sum(axis=2).max(axis=1, initial=0))
-        return Casters(corners_m=corners_m, middle_m=middle_m, radius_m=radius_m)
+        """Triangles, put in order once."""
+        cells = np.floor(corners_m[:, 0, :2] / np.float32(_PIECE_M)).astype(np.int64)
+        keys = cells[:, 0] * (1 << 32) + cells[:, 1]
+        order = np.argsort(keys, kind="stable")
+        corners_m, keys = corners_m[order], keys[order]
+        starts = np.flatnonzero(np.diff(keys, prepend=keys[:1] - 1))
+        ends = np.append(starts[1:], len(keys)) if len(keys) else starts
+        low_m, high_m = (
+            each.reduceat(each.reduce(corners_m, axis=1), starts) if len(keys) else np.zeros((0, 3), np.float32)
+            for each in (np.minimum, np.maximum)
+        )
+        return Casters(corners_m=corners_m, ends=ends, low_m=low_m, high_m=high_m)
 
     def near(self, place_m: Floats, reach_m: float) -> Floats:
-        """(M, 3, 3) of which something is within reach of a place."""
-        away_m = lengths(self.middle_m.T - place_m[:, None])
-        return self.corners_m[away_m < self.radius_m + np.float32(reach_m)]
+        """(K, 3, 3) of which something may be within reach of a place."""
+        away = np.maximum(np.maximum(self.low_m - place_m, place_m - self.high_m), 0)
+        chosen = np.flatnonzero(lengths(away.T) < reach_m).tolist()
+        starts = np.append(0, self.ends)
+        parts = [self.corners_m[starts[piece] : self.ends[piece]] for piece in chosen]
+        near = np.concatenate([np.zeros((0, 3, 3), np.float32), *parts])
+        middle = near.mean(axis=1)
+        return near[lengths((middle - place_m).T) < longest_edges(near) + np.float32(reach_m)]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -102,10 +118,16 @@ class LampShadows:
     shapes: Mapping[str, Shape]
     _fixed: dict[tuple[str, int], Floats] = field(default_factory=dict, init=False, repr=False)
     _known: dict[str, Floats] = field(default_factory=dict, init=False, repr=False)
+    _scenes: list[SceneShadows] = field(default_factory=list, init=False, repr=False)
 
-    def users(self, record: SceneRecord) -> list[User]:
-        """Those of a scene."""
-        return [self._user(actor, self.shapes[actor.asset]) for actor in record.actors if actor.asset in self.shapes]
+    def scene(self, record: SceneRecord) -> SceneShadows:
+        """With the road users of a scene. All views of one that come one after the other share what is made for it."""
+        if not self._scenes or self._scenes[0].record is not record:
+            users = [
+                self._user(actor, self.shapes[actor.asset]) for actor in record.actors if actor.asset in self.shapes
+            ]
+            self._scenes[:] = [SceneShadows(town=self, record=record, users=users)]
+        return self._scenes[0]
 
     def _user(self, actor: ActorRecord, shape: Shape) -> User:
         spacing_m = _SPACING_M["large" if shape.box_size_m[:2].max() > _LARGE_M else "small"]
@@ -125,25 +147,53 @@ class LampShadows:
         return self._fixed[kind, index]
 
 
-@dataclass(slots=True, eq=False, kw_only=True)
-class LampShadow:
-    """What is in the way of one lamp in one scene. Its map is made when the first place in its light is seen.
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class SceneShadows:
+    """All that throws shadows in one scene.
 
     Attributes:
         town: what stands.
-        users: of the scene.
+        record: the scene.
+        users: its road users.
+    """
+
+    town: LampShadows
+    record: SceneRecord
+    users: list[User]
+    _maps: dict[tuple[str, int], ShadowMap] = field(default_factory=dict, init=False, repr=False)
+
+    def map(self, kind: str, index: int, lamps: Lamps, *, stands: bool) -> ShadowMap:
+        """Of one lamp of a kind; before those that do not stand only road users throw shadows."""
+        if (kind, index) not in self._maps:
+            place_m, axis = lamps.position_m[index], lamps.axis[index]
+            outlook = Outlook.of(place_m, axis, STANDING if stands else DRIVING)
+            if stands:
+                comes_m = self.town.standing(kind, index, outlook, lamps.reach_m).copy()
+            else:
+                comes_m = outlook.layout.empty()
+            for user in self.users:
+                if user.is_before(outlook, lamps.reach_m):
+                    stop_behind(comes_m, user.points_m, user.spacing_m, outlook)
+            self._maps[kind, index] = ShadowMap(outlook=outlook, comes_m=comes_m)
+        return self._maps[kind, index]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class LampShadow:
+    """What is in the way of one lamp. Its map is made when the first place in its light is seen.
+
+    Attributes:
+        scene: what throws shadows.
         kind, index: which lamp it is.
         lamps: of its kind.
         stands: whether it stands in the town.
     """
 
-    town: LampShadows
-    users: list[User]
+    scene: SceneShadows
     kind: str
     index: int
     lamps: Lamps
     stands: bool
-    _map: ShadowMap | None = field(default=None, init=False)
 
     def lay(
         self,
@@ -166,22 +216,9 @@ class LampShadow:
         where = np.flatnonzero(shown > LEAST_LIGHT)
         if not len(where):
             return
-        if self._map is None:
-            self._map = self._made()
+        found = self.scene.map(self.kind, self.index, self.lamps, stands=self.stands)
         unit = np.stack([part.reshape(-1)[where] for part in towards])
-        shown[where] *= self._map.through(unit, *(part.reshape(-1)[where] for part in (away_m, facing, up)))
-
-    def _made(self) -> ShadowMap:
-        place_m, axis, reach_m = self.lamps.position_m[self.index], self.lamps.axis[self.index], self.lamps.reach_m
-        outlook = Outlook.of(place_m, axis, STANDING if self.stands else DRIVING)
-        if self.stands:
-            comes_m = self.town.standing(self.kind, self.index, outlook, reach_m).copy()
-        else:
-            comes_m = outlook.layout.empty()
-        for user in self.users:
-            if user.is_before(outlook, reach_m):
-                stop_behind(comes_m, user.points_m, user.spacing_m, outlook)
-        return ShadowMap(outlook=outlook, comes_m=comes_m)
+        shown[where] *= found.through(unit, *(part.reshape(-1)[where] for part in (away_m, facing, up)))
 
 
 def _thinned(shape: Shape, spacing_m: float) -> Floats:

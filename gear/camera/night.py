@@ -146,14 +146,14 @@ class Night:
     ) -> list[tuple[Spots, dict[int, LampShadow]]]:
         """The lamps in a view by kind, and what is in the way of those that are near, by number."""
         found = []
-        users = self.shadows.users(record) if self.shadows is not None else []
+        scene = self.shadows.scene(record) if self.shadows is not None else None
         for kind, lamps in kinds.items():
             spots = Spots.of(lamps, camera)
             shadows = {}
-            if self.shadows is not None:
+            if scene is not None:
                 for index in spots.near(SHADOWED_WITHIN_M):
                     shadows[index] = LampShadow(
-                        town=self.shadows, users=users, kind=kind, index=index, lamps=lamps, stands=kind in self.lamps
+                        scene=scene, kind=kind, index=index, lamps=lamps, stands=kind in self.lamps
                     )
             found.append((spots, shadows))
         return found

@@ -77,3 +77,15 @@ def test_a_list_that_nobody_reads_to_its_end_is_no_error(unbuffered: str) -> Non
         env = os.environ | {"PYTHONUNBUFFERED": unbuffered}
         done = subprocess.run(command, stdout=closed, stderr=subprocess.PIPE, check=False, env=env, cwd=ROOT)
     assert (done.returncode, done.stderr) == (0, b"")
+
+
+def test_settings_go_into_every_command_behind_the_plans_own() -> None:
+    command = [sys.executable, "-m", "authoring.weights", "training", "--task", "detect2d", "--list"]
+    plain, crowded = (
+        subprocess.run([*command, *more], capture_output=True, text=True, check=True, cwd=ROOT).stdout.splitlines()
+        for more in ([], ["--set", "crowd=5"])
+    )
+    assert len(plain) == len(crowded) > 20
+    for one, other in zip(plain, crowded, strict=True):
+        assert "--set crowd=5" not in one
+        assert other.rindex("--set crowd=5") > max(other.find("--set crowd=3"), other.find("--set crowd=2"))

@@ -58,7 +58,7 @@ def one_lamp(place_m: np.ndarray = LAMP_M, axis: np.ndarray = DOWN) -> Lamps:
 
 
 def shadow(town: LampShadows, scene: SceneRecord, lamps: Lamps | None = None, *, stands: bool = True) -> LampShadow:
-    return LampShadow(town=town, users=town.users(scene), kind="k", index=0, lamps=lamps or one_lamp(), stands=stands)
+    return LampShadow(scene=town.scene(scene), kind="k", index=0, lamps=lamps or one_lamp(), stands=stands)
 
 
 def left(
@@ -213,6 +213,32 @@ def test_sparse_points_near_a_lamp_have_no_holes_between_them() -> None:
         away / away_m, away_m, -away[2] / away_m, np.ones(50, np.float32)
     )
     np.testing.assert_array_equal(through, 0)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_near_is_all_that_is_within_reach(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    middle = rng.uniform(-80, 80, (4000, 1, 3))
+    corners = (middle + rng.normal(0, 1, (4000, 3, 3)) * rng.choice([0.2, 1, 12], (4000, 1, 1))).astype(np.float32)
+    place_m = rng.uniform(-40, 40, 3).astype(np.float32)
+    found = {one.tobytes() for one in Casters.of(corners).near(place_m, 25.0)}
+    within = np.linalg.norm(corners - place_m, axis=2).min(axis=1) < 25.0
+    assert within.any() and {one.tobytes() for one in corners[within]} <= found
+    assert len(found) < 0.5 * len(corners)
+
+
+def test_views_of_one_scene_share_its_maps_and_another_scene_has_its_own() -> None:
+    town = LampShadows(casters=NOTHING, shapes=WALKER)
+    first, second = record(walker(6.0)), record(walker(-6.0))
+    scene = town.scene(first)
+    assert town.scene(first) is scene
+    one = scene.map("k", 0, one_lamp(), stands=True)
+    assert town.scene(first).map("k", 0, one_lamp(), stands=True) is one
+    other = town.scene(second).map("k", 0, one_lamp(), stands=True)
+    assert not np.array_equal(other.comes_m, one.comes_m)
+    np.testing.assert_array_equal(
+        town.scene(record(walker(6.0))).map("k", 0, one_lamp(), stands=True).comes_m, one.comes_m
+    )
 
 
 def test_layouts_say_how_far_they_reach() -> None:
