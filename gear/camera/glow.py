@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.camera.beams import Lamps
+from gear.camera.own_light import places
 from gear.values.frames import FloatImage, IdImage
 from gear.values.geometry import Array
 from gear.values.scene import CameraRecord
@@ -19,7 +20,7 @@ Lights = npt.NDArray[np.float32]
 _NEAREST_M = 0.3
 _FRACTION_BITS = 4
 _LEAST_SIDE_PX = 0.7
-_BEHIND_M, _BEHIND_SHARE = 0.4, 0.03
+_OFF_PLANE_M = 0.4
 
 _LAMP_RADIUS_M = 0.16
 _LEAST_SIGMA_PX = 0.75
@@ -52,7 +53,7 @@ class Windows:
     reach_m: float = 1200.0
 
     def seen(self, geom_id: IdImage, depth_m: FloatImage, camera: CameraRecord) -> npt.NDArray[np.int32]:
-        """(H, W) number of the pane that each pixel shows, -1 for none: it is of the pane's geom, and as far away.
+        """(H, W) number of the pane that each pixel shows, -1 for none: it is of the pane's geom, and in its plane.
 
         One geom may be many houses, of which one stands before another.
         """
@@ -65,26 +66,19 @@ class Windows:
         inside = (self.corners_m[near] - pose.translation_m) @ pose.rotation
         before = (inside[..., 2] > _NEAREST_M).all(axis=1)
         near, inside = near[before], inside[before]
-        places = _pixels(inside, camera)
-        low, high = places.min(axis=1), places.max(axis=1)
+        places_px = _pixels(inside, camera)
+        low, high = places_px.min(axis=1), places_px.max(axis=1)
         size = np.array([camera.width_px, camera.height_px])
         shown = ((high > 0) & (low < size) & (high - low > _LEAST_SIDE_PX)).all(axis=1)
-        near, inside, places = near[shown], inside[shown], places[shown]
-        points = np.round(np.clip(places, -1e4, 1e5) * (1 << _FRACTION_BITS)).astype(np.int32)
+        near, inside, places_px = near[shown], inside[shown], places_px[shown]
+        points = np.round(np.clip(places_px, -1e4, 1e5) * (1 << _FRACTION_BITS)).astype(np.int32)
         for index in np.argsort(-inside[..., 2].mean(axis=1), kind="stable"):
             cv2.fillConvexPoly(found, points[index], int(near[index]), cv2.LINE_8, _FRACTION_BITS)
         rows, columns = np.nonzero(found >= 0)
         pane = found[rows, columns]
-        rays = np.stack([
-            (columns + 0.5 - camera.width_px / 2) / camera.focal_px,
-            (rows + 0.5 - camera.height_px / 2) / camera.focal_px,
-            np.ones(len(rows)),
-        ])  # fmt: skip
-        facing = np.einsum("nd,dn->n", self.normal[pane] @ pose.rotation, rays)
-        away = np.einsum("nd,nd->n", self.normal[pane], self.corners_m[pane, 0] - pose.translation_m)
-        pane_m = away / np.minimum(facing, -1e-6)
+        from_pane_m = places(rows, columns, depth_m, camera) - self.corners_m[pane, 0]
         is_other = self.geom_id[pane] != geom_id[rows, columns]
-        is_other |= np.abs(pane_m - depth_m[rows, columns]) > _BEHIND_M + _BEHIND_SHARE * pane_m
+        is_other |= np.abs(np.einsum("nd,nd->n", from_pane_m, self.normal[pane])) > _OFF_PLANE_M
         found[rows[is_other], columns[is_other]] = -1
         return found
 
@@ -150,9 +144,9 @@ class Shine:
         out, towards who looks."""
         pose = camera.world_from_camera_transform
         below_m = self.position_m * (1, 1, -1) + (0, 0, 2 * ground_m)
-        places = _pixels((below_m - pose.translation_m) @ pose.rotation, camera)
+        places_px = _pixels((below_m - pose.translation_m) @ pose.rotation, camera)
         result = np.zeros((camera.height_px, camera.width_px), np.float32)
-        for place, size, strength in zip(places, self.size_px, self.strength, strict=True):
+        for place, size, strength in zip(places_px, self.size_px, self.strength, strict=True):
             across = max(_LEAST_SIGMA_PX, _STREAK_WIDTH * size)
             along = _STREAK_LENGTH * camera.height_px
             _add_spot(result, place, (across, along), strength * min(1.0, _STREAK_WIDTH * size / across))
