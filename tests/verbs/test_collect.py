@@ -333,26 +333,6 @@ def test_facts_that_somebody_changed_are_one_line(
     assert "\n" not in str(caught.value)
 
 
-def test_a_mix_is_in_the_content_where_there_is_one_and_in_the_pictures(tmp_path: Path, collect_small: Collect) -> None:
-    """Datasets from before there were mixes go on."""
-    crowd, mix = ["crowd=3"], ["mix.car=0", "mix.van=20"]
-    for name, settings in (("usual", crowd), ("mixed", crowd + mix)):
-        collect_small("depth", tmp_path / name, settings=settings, samples=4)
-    usual, mixed = (gear.open_dataset(tmp_path / name) for name in ("usual", "mixed"))
-    assert "mix" not in usual.plan.content["scene"]["npc_vehicles"]
-    assert mixed.plan.content["scene"]["npc_vehicles"]["mix"] == {"car": 0.0, "van": 20.0}
-    kinds = [
-        {
-            actor.asset.partition("_")[0]
-            for sample in dataset
-            for actor in sample.record.actors
-            if actor.role in ("npc", "parked")
-        }
-        for dataset in (usual, mixed)
-    ]
-    assert "car" in kinds[0] and "car" not in kinds[1] and "van" in kinds[1]
-
-
 def test_another_configuration_needs_force(tmp_path: Path, collect_small: Collect) -> None:
     collect_small("depth", tmp_path)
     before = tree(tmp_path)

@@ -13,7 +13,7 @@ from gear.config.nodes import Place, parse_file
 from gear.config.reader import read_node, told_at
 from gear.plugins.build import find
 from gear.plugins.catalogue import Found
-from gear.values.errors import ConfigError, UnknownNameError
+from gear.values.errors import ConfigError, FieldError, UnknownNameError
 from gear.values.resources import data_dir
 from gear.values.scene import Weather
 from gear.values.serial import holds_places
@@ -76,7 +76,7 @@ def look_up(config: CollectionConfig) -> Named:
         check_assets(library, scene, f"scenes.{config.scene}")
     roomy = 1 if scene.boards else ROOMY_FACTOR
     scene = scene.capped(simulation.max_vehicles * roomy, simulation.max_pedestrians)
-    scene = scene.crowded(config.crowd).mixed(config.mix)
+    scene = _mixed(scene.crowded(config.crowd), config)
     with told_at(config.places, "split"):
         split = split_of(simulation, config.split)
     split = dataclasses.replace(
@@ -99,6 +99,19 @@ def look_up(config: CollectionConfig) -> Named:
         weather=weather,
         patch=patch,
     )
+
+
+def _mixed(scene: SceneSpec, config: CollectionConfig) -> SceneSpec:
+    """A scene with the config's mix on top of its own.
+
+    Raises:
+        ConfigError: both together are too much, or leave nothing.
+    """
+    try:
+        return scene.mixed(config.mix)
+    except FieldError as error:
+        place = config.places.get(error.field) or config.places.get("mix") or Place("collection")
+        raise place.error(error.field, f"{error.problem} (with the scene's own mix)") from error
 
 
 def with_scene_file(config: CollectionConfig) -> CollectionConfig:
