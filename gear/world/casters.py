@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from gear.values.labels import GROUND_CODES
 from gear.world.classes import FIRST_HIDDEN_GROUP
-from gear.world.shapes import geom_triangles
+from gear.world.shapes import standing_geoms, world_corners
 
 _ENDLESS = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
 
@@ -23,11 +23,8 @@ def find_casters(
         data: kinematics up to date.
         label_code: (ngeom,) labels of all geoms.
     """
-    stands = model.body_mocapid[model.body_rootid[model.geom_bodyid]] < 0
-    chosen = stands & (model.geom_group < FIRST_HIDDEN_GROUP) & ~np.isin(label_code, GROUND_CODES)
+    chosen = standing_geoms(model) & (model.geom_group < FIRST_HIDDEN_GROUP) & ~np.isin(label_code, GROUND_CODES)
     found = [np.zeros((0, 3, 3), np.float32)]
     for geom in np.flatnonzero(chosen & ~np.isin(model.geom_type, _ENDLESS)).tolist():
-        vertices, faces = geom_triangles(model, geom)
-        at_m = vertices @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
-        found.append(at_m.astype(np.float32)[faces])
+        found.append(world_corners(model, data, geom).astype(np.float32))
     return np.concatenate(found)

@@ -8,12 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gear.camera.beams import Headlamps, Lamps, Spots, headlamps, low_beam, street_beam
+from gear.camera.beams import Headlamps, Lamps, headlamps, low_beam, street_beam
 from gear.camera.glow import Shine, Windows
 from gear.camera.lamp_shadows import Casters, LampShadows
 from gear.camera.night import Night, NightLight
 from gear.camera.own_light import INSIDE_LIGHT
 from gear.camera.slant import strips_of
+from gear.camera.spots import Spots
 from gear.contracts.rendering import RawView
 from gear.values.frames import LINEAR_FULL_SCALE, GeomTable
 from gear.values.geometry import CAMERA_FROM_ACTOR_AXES, RigidTransform

@@ -20,7 +20,7 @@ from gear.world.casters import find_casters
 from gear.world.lamps import GLAZINGS, find_lamps, find_windows
 from gear.world.light import even_light, lighting_of
 from gear.world.night import materials_of, night_of, panes_of_buses
-from gear.world.shapes import geom_triangles
+from gear.world.shapes import world_corners
 from gear.world.world import World
 
 NIGHT = Weather(name="night", sun_altitude_deg=-90)
@@ -134,15 +134,9 @@ def test_what_stands_throws_shadows_and_neither_the_ground_nor_what_drives_or_is
     mujoco.mj_kinematics(model, data)
     np.testing.assert_array_equal(find_casters(model, data, codes), corners)
     ground = np.isin(codes, GROUND_CODES) & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE)
-    flat = np.concatenate([np.zeros((0, 3, 3)), *(geom_corners(model, data, geom) for geom in np.flatnonzero(ground))])
+    flat = np.concatenate([np.zeros((0, 3, 3)), *(world_corners(model, data, geom) for geom in np.flatnonzero(ground))])
     middles = {tuple(np.round(middle, 3)) for middle in flat.mean(axis=1)}
     assert not middles & {tuple(np.round(middle, 3)) for middle in corners.astype(float).mean(axis=1)}
-
-
-def geom_corners(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> np.ndarray:
-    """(N, 3, 3) triangles of a geom in the world."""
-    vertices, faces = geom_triangles(model, geom)
-    return np.asarray((vertices @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom])[faces])
 
 
 def test_there_is_a_night_only_without_the_sun() -> None:

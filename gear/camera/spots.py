@@ -1,0 +1,101 @@
+"""The lamps in a picture, and the light that they throw on what it shows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.camera.beams import Lamps, sides_of
+from gear.camera.lamp_shadows import LampShadow
+from gear.camera.slant import Strip
+from gear.values.frames import FloatImage
+from gear.values.geometry import Array
+from gear.values.scene import CameraRecord
+
+_NEAREST_M = 0.5
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Spots:
+    """The lamps of one kind that light something in a picture.
+
+    Attributes:
+        lamps: all of the kind.
+        boxes: (N, 4) first and last column, first and last row of what each may light; empty boxes for none of it.
+        sides: (N, 3) level unit vectors to the left of their axes.
+        origin_m: (3,) the camera.
+    """
+
+    lamps: Lamps
+    sides: Array
+    boxes: npt.NDArray[np.int64]
+    origin_m: Array
+
+    @staticmethod
+    def of(lamps: Lamps, camera: CameraRecord) -> Spots:
+        """Those within a camera's view."""
+        pose = camera.world_from_camera_transform
+        sides = np.array([(x, y) for x in (-1, 1) for y in (-1, 1)]) * lamps.reach_m
+        corners = np.array([(*side, z) for side in sides for z in (-lamps.down_m, lamps.up_m)])
+        inside = (lamps.position_m[:, None] + corners - pose.translation_m) @ pose.rotation
+        size = np.array([camera.width_px, camera.height_px])
+        z = inside[..., 2:]
+        places = inside[..., :2] / np.maximum(z, _NEAREST_M) * camera.focal_px + size / 2
+        low, high = np.floor(places.min(axis=1)), np.ceil(places.max(axis=1))
+        # What reaches behind the camera may be anywhere in the picture.
+        behind = z.min(axis=1) <= _NEAREST_M
+        low, high = np.where(behind, 0, low), np.where(behind, size, high)
+        high[z.max(axis=(1, 2)) <= 0] = 0
+        low, high = np.clip(low, 0, size), np.clip(high, 0, size)
+        boxes = np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=1).astype(np.int64)
+        return Spots(lamps=lamps, sides=sides_of(lamps.axis), boxes=boxes, origin_m=pose.translation_m)
+
+    def near(self, within_m: float) -> list[int]:
+        """Those that may light something in the picture and are within a distance of the camera."""
+        away_m = np.linalg.norm(self.lamps.position_m - self.origin_m, axis=1)
+        first, last, above, below = self.boxes.T
+        return np.flatnonzero((first < last) & (above < below) & (away_m < within_m)).tolist()
+
+    def light(self, strip: Strip, shadows: Mapping[int, LampShadow] | None = None) -> FloatImage | None:
+        """(h, W) of what white surfaces would show of the lamps' light, but for its colour; None for darkness.
+
+        Args:
+            strip: of the picture.
+            shadows: what stops the light of some lamps, by their number.
+        """
+        top, bottom = strip.rows.start, strip.rows.stop
+        first, last, above, below = self.boxes.T
+        chosen = np.flatnonzero((above < bottom) & (below > top) & (first < last))
+        if not len(chosen):
+            return None
+        total = np.zeros(strip.normal.shape[1:], np.float32)
+        for index in chosen.tolist():
+            part = (slice(max(above[index] - top, 0), below[index] - top), slice(first[index], last[index]))
+            shadow = shadows.get(index) if shadows else None
+            self._add(index, strip.position_m[:, *part], strip.normal[:, *part], total[part], shadow)
+        return total
+
+    def _add(
+        self, index: int, position_m: FloatImage, normal: FloatImage, total: FloatImage, shadow: LampShadow | None
+    ) -> None:
+        lamps = self.lamps
+        place = (lamps.position_m[index] - self.origin_m).astype(np.float32)
+        height = position_m[2] - place[2]
+        x, y = position_m[0] - place[0], position_m[1] - place[1]
+        square = x * x + y * y + height * height
+        if float(square.min()) >= lamps.reach_m**2:
+            return
+        inverse = 1 / np.sqrt(square + np.float32(1e-4))
+        x, y, z = x * inverse, y * inverse, height * inverse
+        facing = np.maximum(-(normal[0] * x + normal[1] * y + normal[2] * z), 0)
+        axis, side = self.lamps.axis[index].astype(np.float32), self.sides[index].astype(np.float32)
+        along, across = axis[0] * x + axis[1] * y + axis[2] * z, side[0] * x + side[1] * y
+        ends = np.maximum(1 - np.square(square * np.float32(lamps.reach_m**-2)), 0)
+        light = lamps.beam(along, across, z) * facing * np.square(ends * inverse)
+        light *= np.float32(lamps.intensity[index])
+        if shadow is not None:
+            shadow.lay(light, (x, y, z), square * inverse, facing, normal[2])
+        total += light
