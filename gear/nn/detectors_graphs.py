@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
+import torch
 from torch import Tensor, nn
 
 from gear.nn import vision
@@ -129,8 +130,13 @@ class LitePyramid(OnLite0):
         return self.body
 
     def forward(self, pictures: Tensor) -> Mapping[str, Tensor]:
-        """Feature maps by number."""
-        maps: Mapping[str, Tensor] = self.fpn(OrderedDict((str(i), each) for i, each in enumerate(self.body(pictures))))
+        """Feature maps by number.
+
+        Their memory is ordered channels last: on the CPU, gradients of depthwise convolutions take ten times as long
+        in the other order, and a whole step of training 1.6 times.
+        """
+        stages = self.body(pictures.contiguous(memory_format=torch.channels_last))
+        maps: Mapping[str, Tensor] = self.fpn(OrderedDict((str(i), each) for i, each in enumerate(stages)))
         return maps
 
 

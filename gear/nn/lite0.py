@@ -31,7 +31,7 @@ CHANNELS = (16, 24, 40, 112, 320)
 """Of the last stage of each level."""
 
 FROZEN = ("conv_stem", "bn1", "blocks.0", "blocks.1")
-"""What stays as ImageNet left it: what looks at half and a quarter of the picture."""
+"""What stays as it was where weights are trained further: what looks at half and a quarter of the picture."""
 
 NAMES = {
     "_depthwise_conv": "conv_dw",
@@ -64,9 +64,10 @@ class OnLite0(nn.Module, ABC):
         """The trunk, under timm's key names."""
 
     def freeze(self) -> None:
-        """Keeps the early layers' weights, and ImageNet's statistics throughout the trunk, from here on.
+        """Keeps the early layers' weights, and the statistics throughout the trunk, from here on.
 
-        Detectors train in small batches, whose statistics are worse than those that the trunk comes with.
+        Detectors train in small batches, whose statistics are worse than those that the trunk comes with; that holds
+        for ImageNet's as for those of a detector that is trained further.
         """
         self.is_frozen = True
         for key, parameter in self.lite0().named_parameters():
@@ -84,8 +85,15 @@ class OnLite0(nn.Module, ABC):
         return self
 
 
+def freeze_trunks(network: nn.Module) -> None:
+    """Freezes the trunks of a network that was given its first weights, where it has any."""
+    for part in network.modules():
+        if isinstance(part, OnLite0):
+            part.freeze()
+
+
 def start_from_imagenet(network: OnLite0) -> None:
-    """Puts EfficientNet-Lite0's ImageNet weights of an installed package into a trunk, and freezes part of it.
+    """Puts EfficientNet-Lite0's ImageNet weights of an installed package into a trunk.
 
     Raises:
         GearError: the package is not installed, or holds other weights.
@@ -96,7 +104,6 @@ def start_from_imagenet(network: OnLite0) -> None:
     if problems:
         raise GearError(f"{PACKAGE}: not EfficientNet-Lite0's weights: {'; '.join(problems)}")
     trunk.load_state_dict(dict(state))
-    network.freeze()
 
 
 def published() -> Mapping[str, Tensor]:

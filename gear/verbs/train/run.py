@@ -36,6 +36,7 @@ from gear.verbs.train.starting import (
     begin_with,
     build_network,
     check_options,
+    go_on_from,
     goes_on_alone,
     picture_share,
     precision_of,
@@ -211,6 +212,7 @@ def _parts(
     config = origin.config
     model = build_network(found, config, precision=config.precision)
     told = "" if goes_on_alone(found, config.init, begun) else begin_with(found, model, config.init)
+    go_on_from(model, config.init)
     if told and noted is not None:
         noted(told)
     twin = build_network(found, config, precision="float32")

@@ -9,6 +9,7 @@ from typing import Any, Literal
 from gear.config.nodes import Mapping, Place, Scalar
 from gear.config.overrides import with_value
 from gear.contracts.specs import ModelSpec, TaskSpec
+from gear.nn.lite0 import freeze_trunks
 from gear.nn.options import NONE, SHIPPED
 from gear.nn.runtime import device_of, is_quick_in_half, seeded
 from gear.nn.shipped import resolve, shipped, shipped_networks, trained_option
@@ -143,6 +144,12 @@ def build_network(found: Found, config: TrainConfig, *, precision: str) -> Any:
             options = with_value(options, (name,), Scalar(text, False, place))
     with seeded(config.seed):  # for those that draw their weights from torch's own generator
         return build(found, options)
+
+
+def go_on_from(model: Any, init: str) -> None:
+    """Lets a network that does not begin with random weights train only what they leave to be trained."""
+    if init not in ("", NONE):
+        freeze_trunks(model.module())
 
 
 def begin_with(found: Found, model: Any, init: str) -> str:

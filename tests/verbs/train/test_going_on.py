@@ -1,0 +1,38 @@
+"""What of a network is trained that does not begin with random weights."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import torch
+
+from gear.nn.detectors_options import ReferenceDetectorOptions
+from gear.nn.weights import read, write
+from gear.plugins.models.retinanet_r18_fpn import build_lite0
+from gear.verbs.train.run import train
+
+BODY = "backbone.body."
+STATISTICS = ("running_mean", "running_var")
+
+
+@pytest.mark.parametrize("is_given", [True, False])
+def test_a_trunk_with_weights_keeps_its_statistics_and_first_layers(
+    street: Callable[..., Path], tmp_path: Path, is_given: bool
+) -> None:
+    """Like one that begins with ImageNet's: batches of detectors are too small to measure either anew."""
+    network = build_lite0(ReferenceDetectorOptions(weights="none", seed=0))
+    first = tmp_path / "first.safetensors"
+    write(first, network.module().state_dict(), {"model": "retinanet_lite0_fpn", "task": "detect2d"}, halves=True)
+    report = train(
+        "detect2d", "retinanet_lite0_fpn", street("detect2d"), out=tmp_path / "out", epochs=1, batch=2, lr=0.01,
+        init=first if is_given else "none", settings=["crop_px=[32, 64]", "ema=0", "validation_samples=1"],
+    )  # fmt: skip
+    (before, _), (after, _) = read(first), read(report.weights)
+    body = [key for key in before if key.startswith(BODY)]
+    kept = [key for key in body if key.startswith(f"{BODY}conv_stem") or key.endswith(STATISTICS)]
+    learnt = [key for key in body if key not in kept and key.endswith("conv_pw.weight") and ".blocks.4." in key]
+    assert len(kept) > 90 and learnt
+    assert {torch.equal(before[key], after[key]) for key in kept} == {is_given}
+    assert not any(torch.equal(before[key], after[key]) for key in learnt)
