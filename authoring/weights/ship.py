@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import shlex
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -42,11 +43,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--note", default="", help="what else there is to say of how they were made")
     parser.add_argument("--samples", type=int, help="of the training data, as their collection was told")
+    parser.add_argument(
+        "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings", help="likewise; repeatable"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Ships one network."""
-    print(ship(args.runs, args.evaluation, args.base, samples=args.samples, averaged=args.averaged, note=args.note))
+    target = ship(
+        args.runs, args.evaluation, args.base,
+        samples=args.samples, settings=args.settings, averaged=args.averaged, note=args.note,
+    )  # fmt: skip
+    print(target)
     return 0
 
 
@@ -57,6 +65,7 @@ def ship(
     models: Path = MODELS,
     *,
     samples: int | None = None,
+    settings: Sequence[str] = (),
     averaged: Path | None = None,
     note: str = "",
 ) -> Path:
@@ -68,6 +77,7 @@ def ship(
         base: commands name files below it by what follows it.
         models: the package's folder.
         samples: that the collection of the training data was told, if any.
+        settings: likewise; `KEY=VALUE` texts.
         averaged: a file of `gear weights average` that is shipped in place of the last run's weights.
         note: what else there is to say of how they were made.
 
@@ -82,8 +92,10 @@ def ship(
     histories = [_json(one / HISTORY) for one in runs]
     commands = [_without(base, history["command"]).replace("--out DIR", f"--out {_without(base, str(one))}")
                 for history, one in zip(histories, runs, strict=True)]  # fmt: skip
-    collected = f"python -m authoring.weights training --task {metadata['task']} --out ."
-    commands.insert(0, collected + (f" --samples {samples}" if samples else ""))
+    collected = ["python", "-m", "authoring.weights", "training", "--task", metadata["task"], "--out", "."]
+    told = ["--samples", str(samples)] if samples else []
+    told += [part for text in settings for part in ("--set", text)]
+    commands.insert(0, shlex.join(collected + told))
     if averaged is not None:
         commands.append(_without(base, metadata["command"]))
     metadata["command"] = " && ".join(commands)

@@ -63,13 +63,13 @@ def evaluation(run: Path, tmp_path: Path) -> Path:
 
 
 def test_the_file_has_the_same_numbers_and_says_what_was_measured(run: Path, evaluation: Path, tmp_path: Path) -> None:
-    path = ship([run], evaluation, run.parents[1], tmp_path / "models", samples=7)
+    path = ship([run], evaluation, run.parents[1], tmp_path / "models", samples=7, settings=["crowd=5"])
     assert path.name == f"{MODEL}.safetensors"
     facts = inspect(path).facts()
     assert facts["metrics"] == {"miou": 0.625} and facts["intervals"] == {"miou": [0.525, 0.725]}
     assert facts["options"] == {"input_scale": 0.5} and facts["look_hash"] == "ab12"
     collect, train = facts["command"].split(" && ")
-    assert collect == "python -m authoring.weights training --task semseg --out . --samples 7"
+    assert collect == "python -m authoring.weights training --task semseg --out . --samples 7 --set crowd=5"
     assert train == f"gear train --task semseg --model {MODEL} --data data --out runs/semseg"
     before, after = read(run / "model.safetensors")[0], read(path)[0]
     assert before.keys() == after.keys() and all(bool((before[key] == after[key]).all()) for key in before)
