@@ -278,7 +278,8 @@ def write_obj(path: Path, mesh: Mesh, *, is_patchwork: bool = False) -> None:
         full = np.zeros(len(values), dtype=np.int64)
         full[used] = inverse.reshape(-1) + 1
         index.append(full[faces])
-        texts.append([tag + " " + " ".join(_number(n / scale, digits) for n in row) for row in kept])
+        text = {number: _number(number / scale, digits) for number in np.unique(kept).tolist()}
+        texts.append([" ".join([tag, *(text[number] for number in row)]) for row in kept.tolist()])
     table = np.stack(index, -1).tolist()
     if is_patchwork:
         lines = list(_as_needed(texts, table))

@@ -43,9 +43,10 @@ class Facade:
 
     def at(self, u_m: float, v_m: float, d_m: float = 0.0) -> Array:
         """The point at (u, v, d) in the building's frame, shape (3,)."""
-        point: Array = self.origin + self.right * u_m + self.outward * d_m
-        point[2] += v_m
-        return point
+        (x_m, y_m, z_m), (right_x, right_y, right_z) = self.origin.tolist(), self.right.tolist()
+        return np.array(
+            [x_m + right_x * u_m + right_y * d_m, y_m + right_y * u_m - right_x * d_m, z_m + right_z * u_m + v_m]
+        )
 
     def panel(self, material: str, u0: float, v0: float, u1: float, v1: float, *, d_m: float = 0.0) -> None:
         """A flat rectangle of a tiling material that runs on seamlessly with its neighbours."""
