@@ -5,9 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from authoring.weights.patches.plan import EFFECT, OUTSIDE, TASK, PatchPlan
-from gear.contracts.specs import TaskSpec
 from gear.dataset.sidecar import load_json
-from gear.plugins.build import find
 from gear.values.serial import Json
 
 
@@ -30,10 +28,6 @@ def read_effect(plan: PatchPlan, root: Path, minutes: float) -> Json:
     """
     evaluation, gap = load_json(root / "evaluation/results.json"), load_json(root / "gap/gap.json")
     attack = load_json(root / plan.name / "attack.json")
-    rows = _rows(evaluation)
-    spec = find("task", plan.task).spec
-    assert isinstance(spec, TaskSpec)
-    report, _, figure = spec.figure.rpartition(".")
     return {
         "patch": plan.name,
         "task": plan.task,
@@ -44,23 +38,18 @@ def read_effect(plan: PatchPlan, root: Path, minutes: float) -> Json:
         "weights_sha256": attack["weights_sha256"],
         "steps": attack["steps_done"],
         "pictures_with_patch": len(gap["samples"]),
-        "metric": {
-            "figure": spec.figure,
-            **{
-                kind: rows[kind]["figures"][report or TASK].get(figure, {}).get("value")
-                for kind in ("none", "random", "patched")
-            },
-            "patched_minus_random": _change(evaluation)["figures"][report or TASK].get(figure),
-        },
+        "metric": _metric(plan, evaluation),
         "outside": _outside(plan, evaluation),
-        "effect": _effect(gap, EFFECT.get(plan.task, figure)),
+        "effect": _effect(gap, EFFECT.get(plan.task, plan.figure[1])),
         "psnr_db": gap["median_psnr_db"].get("transport"),
         "minutes": {"attack": round(attack["seconds"] / 60, 2), "all": round(minutes, 2)},
     }
 
 
 def read_again(plan: PatchPlan, root: Path) -> Json:
-    """What the patch does to the network of today, by `PatchPlan.commands_again`: its weights, and as `outside` above.
+    """What the patch does to the network of today, by `PatchPlan.commands_again`.
+
+    `metric` and `outside` are as above, less what there is without a patch.
 
     Raises:
         DatasetError: the results cannot be read.
@@ -70,6 +59,7 @@ def read_again(plan: PatchPlan, root: Path) -> Json:
         "weights_sha256": evaluation["model"]["weights_sha256"],
         "samples": plan.samples["test"],
         "seed": plan.seed("test"),
+        "metric": _metric(plan, evaluation),
         "outside": _outside(plan, evaluation),
     }
 
@@ -82,6 +72,16 @@ def _change(evaluation: Json) -> Json:
     """From the random patch to this one."""
     names = tuple(_rows(evaluation)[kind]["name"] for kind in ("patched", "random"))
     return next(one for one in evaluation["differences"] if (one["row"], one["against"]) == names)
+
+
+def _metric(plan: PatchPlan, evaluation: Json) -> Json:
+    """The task's own figure in each row, and its change from the random patch to this one."""
+    report, figure = plan.figure
+    return {
+        "figure": f"{report}.{figure}".removeprefix(f"{TASK}."),
+        **{kind: row["figures"][report].get(figure, {}).get("value") for kind, row in _rows(evaluation).items()},
+        "patched_minus_random": _change(evaluation)["figures"][report].get(figure),
+    }
 
 
 def _outside(plan: PatchPlan, evaluation: Json) -> Json:

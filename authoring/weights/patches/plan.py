@@ -126,6 +126,14 @@ class PatchPlan:
         """Of the patch: what `gear collect --patch` takes once it is installed."""
         return f"{self.model}-{self.place}"
 
+    @property
+    def figure(self) -> tuple[str, str]:
+        """The task's own figure: the report that it is of, and its name."""
+        spec = find("task", self.task).spec
+        assert isinstance(spec, TaskSpec)
+        report, _, name = spec.figure.rpartition(".")
+        return report or TASK, name
+
     def seed(self, split: str) -> int:
         """Of a split."""
         return FIRST_SEEDS[split] + self.number
@@ -159,13 +167,13 @@ class PatchPlan:
 
     def commands_again(self, root: Path) -> list[Step]:
         """What measures the installed patch on pictures that it was not made on, against a random one."""
-        where, _ = OUTSIDE[self.task]
+        reports = dict.fromkeys(name for name in (OUTSIDE[self.task][0], self.figure[0]) if name != TASK)
         return [
             self._collect("test", root / "random", patch="random"),
             self._collect("test", root / "patched", patch=self.name),
             _step(
                 "evaluate", "--model", self.model, *_repeated("--set", self.model_settings),
-                *_repeated("--report", () if where == TASK else (where,)), "--out", root / "evaluation",
+                *_repeated("--report", reports), "--out", root / "evaluation",
                 "--data", root / "random", root / "patched",
             ),
         ]  # fmt: skip
