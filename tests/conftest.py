@@ -6,8 +6,17 @@ NumPy is to multiply matrices as it does when assets are made.
 from __future__ import annotations
 
 import os
+from pathlib import Path
+
+import pytest
 
 import authoring
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 assert authoring.KERNELS in os.environ
+
+
+@pytest.fixture(scope="module")
+def mypy_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where mypy keeps what it knows of gear and NumPy from one package of a module's tests to the next."""
+    return tmp_path_factory.mktemp("mypy")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
+import os
 import subprocess
 import sys
 import venv
@@ -27,17 +29,34 @@ def call(*command: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.fixture(scope="module")
-def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An environment with gear and all examples from wheels, and an empty folder beside it."""
-    home = tmp_path_factory.mktemp("examples")
-    wheels = home / "wheels"
-    call(sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", wheels, ROOT, *EXAMPLES, cwd=home)
-    venv.create(home / "env", with_pip=True)
+def environment(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An environment with gear and all examples from wheels, which all of a run's processes share."""
+    run = tmp_path_factory.getbasetemp()
+    shared = (run.parent if "PYTEST_XDIST_WORKER" in os.environ else run) / "examples"
+    shared.mkdir(exist_ok=True)
+    with (shared / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not (shared / "whole").exists():
+            install(shared / "env", shared / "wheels")
+            (shared / "whole").touch()
+    return shared / "env"
+
+
+def install(env: Path, wheels: Path) -> None:
+    call(sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", wheels, ROOT, *EXAMPLES, cwd=wheels.parent)
+    venv.create(env, with_pip=True)
     # Bytecode of the few modules that are imported is made then; pip would make it of all of torch.
-    install = (home / "env/bin/python", "-m", "pip", "install", "-q", "--no-compile", "-c", ROOT / "constraints.txt")
-    call(*install, *sorted(wheels.glob("*.whl")), "pytest", "cityscapesScripts", cwd=home)
+    pip = (env / "bin/python", "-m", "pip", "install", "-q", "--no-compile", "-c", ROOT / "constraints.txt")
+    call(*pip, *sorted(wheels.glob("*.whl")), "pytest", "cityscapesScripts", cwd=wheels)
     if sys.version_info >= (3, 13):
-        call(*install, "--no-deps", "dm-control", cwd=home)  # pyproject.toml says why
+        call(*pip, "--no-deps", "dm-control", cwd=wheels)  # pyproject.toml says why
+
+
+@pytest.fixture(scope="module")
+def home(environment: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with that environment and an empty folder in it."""
+    home = tmp_path_factory.mktemp("home")
+    (home / "env").symlink_to(environment)
     (home / "empty").mkdir()
     return home
 
@@ -185,9 +204,11 @@ def test_each_passes_its_own_tests(home: Path, example: Path) -> None:
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.name)
-def test_each_is_typed_against_gears_published_types(home: Path, example: Path, tmp_path: Path) -> None:
+def test_each_is_typed_against_gears_published_types(
+    home: Path, example: Path, tmp_path: Path, mypy_cache: Path
+) -> None:
     call(sys.executable, "-m", "mypy", "--strict", "--python-executable", home / "env/bin/python", "--cache-dir",
-         tmp_path / "cache", "--config-file", example / "pyproject.toml", example / "src", cwd=tmp_path)  # fmt: skip
+         mypy_cache, "--config-file", example / "pyproject.toml", example / "src", cwd=tmp_path)  # fmt: skip
     call(sys.executable, "-m", "ruff", "check", "--no-cache", example, cwd=tmp_path)
 
 

@@ -111,12 +111,12 @@ def call(*command: str, cwd: Path, env: dict[str, str] | None = None) -> str:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
-def test_what_it_writes_installs_and_passes_everything(kind: str, tmp_path: Path) -> None:
+def test_what_it_writes_installs_and_passes_everything(kind: str, tmp_path: Path, mypy_cache: Path) -> None:
     folder = new_package(kind, "my_thing", out=tmp_path)
     site = tmp_path / "site"
     python = sys.executable
     call(python, "-m", "pip", "install", "-q", "--no-deps", "--target", str(site), str(folder), cwd=tmp_path)
-    env = os.environ | {"PYTHONPATH": str(site)}
+    env = os.environ | {"PYTHONPATH": str(site), "MYPY_CACHE_DIR": str(mypy_cache)}
     listed = call(python, "-m", "gear.cli.main", "plugins", "--kind", kind, "--strict-plugins", cwd=tmp_path, env=env)
     assert f"gear-{kind}-my-thing 0.1.0" in listed
     call(python, "-m", "pytest", "-q", "-p", "no:cacheprovider", cwd=folder, env=env)
