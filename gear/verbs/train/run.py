@@ -212,7 +212,8 @@ def _parts(
     config = origin.config
     model = build_network(found, config, precision=config.precision)
     told = "" if goes_on_alone(found, config.init, begun) else begin_with(found, model, config.init)
-    go_on_from(model, config.init)
+    with blamed(found, "module"):
+        go_on_from(model, config.init)
     if told and noted is not None:
         noted(told)
     twin = build_network(found, config, precision="float32")
