@@ -44,8 +44,11 @@ def named(network: nn.Module, trunk: nn.Module) -> list[tuple[str, str]]:
 
 def test_other_weights_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lite0, "from_official", lambda state: {"conv_stem.weight": torch.zeros(1)})
+    network = LitePyramid()
+    before = network.lite0().state_dict()["conv_stem.weight"].clone()
     with pytest.raises(GearError, match="not EfficientNet-Lite0's weights"):
-        lite0.start_from_imagenet(LitePyramid())
+        lite0.start_from_imagenet(network)
+    assert torch.equal(network.lite0().state_dict()["conv_stem.weight"], before)
 
 
 def test_without_the_package_its_name_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -147,8 +147,11 @@ def build_network(found: Found, config: TrainConfig, *, precision: str) -> Any:
 
 
 def go_on_from(model: Any, init: str) -> None:
-    """Lets a network that does not begin with random weights train only what they leave to be trained."""
-    if init not in ("", NONE):
+    """Lets a network that begins with weights train only what they leave to be trained.
+
+    Those of another network's trunk may be few: what stays random is to be trained.
+    """
+    if init not in ("", NONE) and not init.startswith(TRUNK):
         freeze_trunks(model.module())
 
 
