@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import subprocess
@@ -13,6 +12,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+
+from gear.dataset.turns import turn
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = sorted(path.parent for path in (ROOT / "examples").glob("gear-*/pyproject.toml"))
@@ -33,9 +34,7 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An environment with gear and all examples from wheels, which all of a run's processes share."""
     run = tmp_path_factory.getbasetemp()
     shared = (run.parent if "PYTEST_XDIST_WORKER" in os.environ else run) / "examples"
-    shared.mkdir(exist_ok=True)
-    with (shared / "lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    with turn(shared):
         if not (shared / "whole").exists():
             install(shared / "env", shared / "wheels")
             (shared / "whole").touch()
