@@ -94,6 +94,7 @@ def run(args: argparse.Namespace) -> int:
         return 0
     effects, failed = _made(chosen, root, args.jobs, measure_again if args.again else make_patch)
     if args.again:
+        print(table([effect | effect["again"] for effect in effects]), end="")
         return 1 if failed else 0
     if effects:
         write_alone(root / "summary.json", dump_json(effects))

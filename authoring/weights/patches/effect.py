@@ -10,13 +10,7 @@ from gear.values.serial import Json
 
 
 def read_effect(plan: PatchPlan, root: Path, minutes: float) -> Json:
-    """The figures of one scene's patch.
-
-    `metric` holds the task's own figure without a patch, with a random one and with this one; `outside` the mean change
-    of a sample's figure outside the patch against the random one, with its p; `effect` what the patch changes of a
-    figure of the task's own evaluator (the same one, or that of `EFFECT`), digitally and rendered, and the share of the
-    first that the second is (None where there is no effect or no such figure). Figures that have nothing to be measured
-    on are None.
+    """The figures of one scene's patch, and how it was made.
 
     Args:
         plan: of the scene.
@@ -26,7 +20,6 @@ def read_effect(plan: PatchPlan, root: Path, minutes: float) -> Json:
     Raises:
         DatasetError: a file cannot be read.
     """
-    evaluation, gap = load_json(root / "evaluation/results.json"), load_json(root / "gap/gap.json")
     attack = load_json(root / plan.name / "attack.json")
     return {
         "patch": plan.name,
@@ -37,30 +30,41 @@ def read_effect(plan: PatchPlan, root: Path, minutes: float) -> Json:
         "seeds": {split: plan.seed(split) for split in plan.samples},
         "weights_sha256": attack["weights_sha256"],
         "steps": attack["steps_done"],
-        "pictures_with_patch": len(gap["samples"]),
-        "metric": _metric(plan, evaluation),
-        "outside": _outside(plan, evaluation),
-        "effect": _effect(gap, EFFECT.get(plan.task, plan.figure[1])),
-        "psnr_db": gap["median_psnr_db"].get("transport"),
+        **_figures(plan, root),
         "minutes": {"attack": round(attack["seconds"] / 60, 2), "all": round(minutes, 2)},
     }
 
 
 def read_again(plan: PatchPlan, root: Path) -> Json:
-    """What the patch does to the network of today, by `PatchPlan.commands_again`.
-
-    `metric` and `outside` are as above, less what there is without a patch.
+    """The figures of the same patch with the network of today, by `PatchPlan.commands_again`.
 
     Raises:
-        DatasetError: the results cannot be read.
+        DatasetError: a file cannot be read.
     """
-    evaluation = load_json(root / "evaluation/results.json")
     return {
-        "weights_sha256": evaluation["model"]["weights_sha256"],
+        "weights_sha256": load_json(root / "evaluation/results.json")["model"]["weights_sha256"],
         "samples": plan.samples["test"],
         "seed": plan.seed("test"),
+        **_figures(plan, root),
+    }
+
+
+def _figures(plan: PatchPlan, root: Path) -> Json:
+    """What was measured.
+
+    `metric` holds the task's own figure without a patch, with a random one and with this one; `outside` the mean change
+    of a sample's figure outside the patch against the random one, with its p; `effect` what the patch changes of a
+    figure of the task's own evaluator (the same one, or that of `EFFECT`), digitally and rendered, and the share of the
+    first that the second is (None where there is no effect or no such figure). Figures that have nothing to be measured
+    on are None.
+    """
+    evaluation, gap = load_json(root / "evaluation/results.json"), load_json(root / "gap/gap.json")
+    return {
+        "pictures_with_patch": len(gap["samples"]),
         "metric": _metric(plan, evaluation),
         "outside": _outside(plan, evaluation),
+        "effect": _effect(gap, EFFECT.get(plan.task, plan.figure[1])),
+        "psnr_db": gap["median_psnr_db"].get("transport"),
     }
 
 
