@@ -62,6 +62,7 @@ UNSEEN: dict[str, tuple[str, dict[str, tuple[float, float]]]] = {
         {"iou_road": (0.85, 1), "iou_building": (0.75, 1), "iou_sky": (0.85, 1), "iou_car": (0.3, 1)},
     ),
     "stereo_centre": ("task", {"pedestrian_2d_moderate_r40": (0.05, 1)}),  # at most n of 40 where n stand
+    "stereo_centre_lite0": ("task", {"pedestrian_2d_moderate_r40": (0.05, 1)}),
     "retinanet_lite0_fpn": ("task", {"ap50": (0.25, 1)}),  # there are too few of everything for the other report
 }
 """Between what each network's figures must lie on two pictures of a street and weather that it never saw; it does far
