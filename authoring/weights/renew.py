@@ -10,7 +10,6 @@ from authoring.weights.ship import MADE_BY, MODELS, TRAINING, Measured, head, wr
 from gear.dataset.files import write_alone
 from gear.nn.weights import read, write
 from gear.values.errors import GearError
-from gear.values.serial import to_json
 from gear.verbs.look import look_now, read_look
 
 
@@ -30,9 +29,13 @@ def run(args: argparse.Namespace) -> int:
 
 
 def renew(model: str, evaluation: Path, note: str, models: Path = MODELS) -> Path:
-    """Writes today's look and figures into `<model>.safetensors` and `<model>.md`; returns the former.
+    """Writes today's figures, and of which look they are, into `<model>.safetensors` and `<model>.md`.
 
-    The numbers stay as they are, and so do the card's words on how they were made; the note comes after them.
+    The numbers stay as they are, and so does the look that they were trained on: `gear models` goes on saying what has
+    changed since. The card's words on how they were made stay, too; the note comes after them.
+
+    Returns:
+        The former file.
 
     Raises:
         GearError: the evaluation is of other weights, or the files do not say what is to be renewed.
@@ -45,8 +48,7 @@ def renew(model: str, evaluation: Path, note: str, models: Path = MODELS) -> Pat
     how, training, data = rest.partition(f"{TRAINING}\n")
     if trained is None or not (made and heading and training):
         raise GearError(f"{target}: it or its card does not say what look it knows or how it was made")
-    look = look_now(trained)
-    metadata |= measured.texts() | {"look": json.dumps(to_json(look), sort_keys=True), "look_hash": look.hash}
+    metadata |= measured.texts() | {"measured_look_hash": look_now(trained).hash}
     write(target, state, metadata, halves=True)
     lines = [*head(target, metadata, measured), f"{MADE_BY}\n{how}" + "\n".join([*wrapped(note), f"{training}{data}"])]
     write_alone(target.with_suffix(".md"), "\n".join(lines).encode())

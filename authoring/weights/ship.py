@@ -150,11 +150,14 @@ def head(target: Path, metadata: Mapping[str, str], measured: Measured) -> list[
     """Lines of a card: what the file is, and what was measured with it."""
     data, figures = target.read_bytes(), measured.figures
     absent = [key for key, one in figures.items() if one["value"] is None]
+    measured_on = metadata.get("measured_look_hash", metadata["look_hash"])
     return [
         f"# {metadata['model']} for {metadata['task']}",
         "",
         f"`{target.name}`, {len(data) / 1e6:.1f} MB, matrices in float16, sha256 `{sha256(data)}`. MIT licence.",
-        f"Made with gear {metadata['gear']}; the look that it knows is `{metadata['look_hash']}`.",
+        f"Made with gear {metadata['gear']}, seed {metadata['seed']}; the look that it knows is"
+        f" `{metadata['look_hash']}`.",
+        *([f"Measured on pictures of the look `{measured_on}`."] if measured_on != metadata["look_hash"] else []),
         "",
         "## Measured",
         "",

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.contracts.evaluation import Draws, Spread
-from gear.formats.kitti_depth import MAX_PNG_DEPTH_M
+from gear.formats.kitti_depth import MAX_PNG_DEPTH_M, UNITS_PER_M
 from gear.values.frames import FloatImage
 from gear.values.geometry import Array
 
@@ -27,6 +27,9 @@ CROPS: dict[str, tuple[float, float, float, float]] = {
 """First and last row and column as shares of the picture."""
 
 MIN_DEPTH_M = 1e-3
+
+LEAST_TOLD_M = 1 / UNITS_PER_M
+"""The least depth that the devkit's pictures can say."""
 
 PIECE = 1 << 16
 """Pixels at a time: few enough that what is worked out of them stays in the processor's cache."""
@@ -50,7 +53,8 @@ class DepthTruth(Protocol):
 class DepthEvaluator:
     """Gathers the figures of every picture.
 
-    Plain names are the devkit's, over every pixel whose ground truth its 16-bit pictures can say, which end at 256 m;
+    Plain names are the devkit's, over every pixel whose ground truth its 16-bit pictures can say, which end at 256 m,
+    with predictions as far as those pictures can say them;
     `eigen_` names look at ground truth between 1 mm and `max_depth_m` inside the crop, with predictions clipped to the
     same range.
     """
@@ -74,7 +78,8 @@ class DepthEvaluator:
         near = (truth_m > MIN_DEPTH_M) & (truth_m < self.max_depth_m)
         if self.crop != "none":
             near &= self._window(truth_m.shape)
-        both = near & (prediction >= MIN_DEPTH_M) & (prediction <= self.max_depth_m) & (truth_m <= MAX_PNG_DEPTH_M)
+        most_m = min(self.max_depth_m, MAX_PNG_DEPTH_M)
+        both = near & (prediction >= LEAST_TOLD_M) & (prediction <= most_m) & (truth_m <= MAX_PNG_DEPTH_M)
         others = np.isfinite(truth_m) & ~both
         other_truth_m, other_found_m = truth_m[others], prediction[others]
         if not np.isfinite(other_found_m).all() or (other_found_m <= 0).any():
@@ -83,7 +88,8 @@ class DepthEvaluator:
         found = {}
         if self._wants_devkit:
             told = other_truth_m <= MAX_PNG_DEPTH_M
-            found = _devkit(shared + _summed(other_truth_m[told], other_found_m[told]))
+            kept_m = other_found_m[told].clip(LEAST_TOLD_M, MAX_PNG_DEPTH_M)
+            found = _devkit(shared + _summed(other_truth_m[told], kept_m))
         strays = near[others]
         clipped_m = other_found_m[strays].clip(MIN_DEPTH_M, self.max_depth_m)
         found |= _eigen(shared + _summed(other_truth_m[strays], clipped_m))

@@ -18,7 +18,7 @@ from gear.plugins.models.ddrnet23_slim import build
 from gear.values.errors import GearError
 from gear.values.serial import to_json
 from gear.verbs.evaluate.player import weights_digest
-from gear.verbs.look import Look, light_digest
+from gear.verbs.look import Look, look_now
 from gear.verbs.weights.average import average_weights
 
 MODEL = "ddrnet23_slim"
@@ -33,7 +33,10 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder as `gear train` leaves it, of a network that has learnt nothing."""
     root = tmp_path_factory.mktemp("base") / "runs" / "semseg"
     root.mkdir(parents=True)
-    texts = {"model": MODEL, "task": "semseg", "gear": "0.1.0", "look_hash": "ab12", "options": '{"input_scale": 0.5}'}
+    texts = {
+        "model": MODEL, "task": "semseg", "gear": "0.1.0", "seed": "3", "look_hash": "ab12",
+        "options": '{"input_scale": 0.5}',
+    }  # fmt: skip
     network = build(SegmentationOptions(weights="none", device="cpu"))
     write(root / "model.safetensors", network.module().state_dict(), texts | {"metrics": '{"miou": 0.9}'}, halves=True)
     base = root.parents[1]
@@ -101,6 +104,7 @@ def test_the_card_says_how_they_came_and_how_good_they_are(run: Path, evaluation
     card = ship([run, run], evaluation, run.parents[1], tmp_path / "models").with_suffix(".md").read_text()
     assert "| miou | 0.625 | 0.525 | 0.725 |" in card and "Nothing to measure for: iou_train." in card
     assert "On 6 pictures" in card and "| suburb-billboard05 | 3 | 0.625 |" in card
+    assert "Made with gear 0.1.0, seed 3; the look that it knows is `ab12`." in card
     assert card.count("--data data --out runs/semseg") == 2 and str(run.parents[1]) not in card
     assert "| town10/truck | ClearNoon | train | 1 | - | 7 |" in card and "after step 11" in card
 
@@ -129,11 +133,13 @@ def test_what_is_measured_again_keeps_its_numbers_and_its_history(run: Path, eva
     first = path.with_suffix(".md").read_text()
     assert renew(MODEL, evaluation, "Then the light changed.", models) == path
     facts, again = inspect(path).facts(), read(path)[0]
-    assert facts["metrics"] == {"miou": 0.7} and facts["look"]["light"] == light_digest()
-    assert facts["look_hash"] not in ("ab12", "") and facts["command"] == texts["command"]
+    assert facts["metrics"] == {"miou": 0.7} and facts["look"] == to_json(trained), "it was trained on no other"
+    assert facts["look_hash"] == "ab12" and facts["command"] == texts["command"]
+    assert facts["measured_look_hash"] == look_now(trained).hash != trained.hash
     assert all(bool((state[key] == again[key]).all()) for key in state)
     card = path.with_suffix(".md").read_text()
-    assert "| miou | 0.700 | 0.600 | 0.800 |" in card and f"`{facts['look_hash']}`" in card
+    assert "| miou | 0.700 | 0.600 | 0.800 |" in card
+    assert "knows is `ab12`.\nMeasured on pictures of the look `" in card and f"`{facts['measured_look_hash']}`" in card
     assert "First.\n\nThen the light changed.\n\n## Training data\n" in card
     assert (
         card[card.index("## Made by") :].replace("Then the light changed.\n\n", "")

@@ -5,7 +5,7 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from gear.formats.kitti_depth import MAX_PNG_DEPTH_M, to_units
+from gear.formats.kitti_depth import MAX_PNG_DEPTH_M, to_predicted_units, to_units
 from gear.metrics.depth import CROPS, PIECE, DepthEvaluator
 
 
@@ -56,9 +56,11 @@ def test_far_things_count_in_the_devkits_figures_alone() -> None:
 def test_the_devkits_figures_are_those_of_its_own_pictures() -> None:
     rng = np.random.default_rng(11)
     truth = rng.uniform(2, 900, (40, 60)).astype(np.float32)
-    found = (truth * rng.uniform(0.7, 1.2, truth.shape)).clip(0, 250).astype(np.float32)
-    t, p = (to_units(each).astype(float) / 256 for each in (truth, found))  # as `evaluate_depth.cpp` reads the files
+    found = (truth * rng.uniform(0.7, 1.2, truth.shape)).astype(np.float32)
+    found[0, :9], found[1, :9] = 2e-3, 1e-5  # nearer than a file can say
+    t, p = to_units(truth) / 256, to_predicted_units(found) / 256  # as `evaluate_depth.cpp` reads the files
     t, p = t[t > 0], p[t > 0]
+    assert (p > 255).any() and (p < 0.004).any(), "some of what is said is beyond what a file says"
     result = DepthEvaluator().update(Deep(truth), found)
     assert 0.1 < len(t) / truth.size < 0.5
     assert result["mae_m"] == pytest.approx(np.mean(np.abs(t - p)), rel=1e-3)
@@ -154,7 +156,7 @@ def test_many_pieces_are_one_picture(crop: Literal["none", "garg"]) -> None:
     window[int(top * rows) : int(bottom * rows), int(left * columns) : int(right * columns)] = True
     known = np.isfinite(truth)
     told = known & (truth <= MAX_PNG_DEPTH_M)
-    t, p = truth[told].astype(float), found[told].astype(float)
+    t, p = truth[told].astype(float), found[told].astype(float).clip(1 / 256, MAX_PNG_DEPTH_M)
     assert result["rmse_m"] == pytest.approx(np.sqrt(np.mean((t - p) ** 2)), rel=1e-8)
     assert result["irmse_per_km"] == pytest.approx(1000 * np.sqrt(np.mean((1 / t - 1 / p) ** 2)), rel=1e-8)
     assert result["silog"] == pytest.approx(100 * np.std(np.log(p) - np.log(t)), rel=1e-8)
@@ -175,9 +177,9 @@ def test_shares_are_those_of_double_precision_even_at_the_bound(ratio: float) ->
         assert result[name] == np.mean(np.maximum(t / p, p / t) < bound)
 
 
-def test_absurd_depths_are_measured_as_in_double_precision() -> None:
+def test_absurd_depths_are_measured_as_files_say_them() -> None:
     truth, found = Deep(np.array([[10.0, 40.0]], dtype=np.float32)), np.array([[1e-38, 3e38]], dtype=np.float32)
-    t, p = truth.depth_m.astype(float), found.astype(float)
+    t, p = truth.depth_m.astype(float), np.array([[1 / 256, MAX_PNG_DEPTH_M]])
     result = DepthEvaluator().update(truth, found)
     assert result["rmse_m"] == pytest.approx(np.sqrt(np.mean((t - p) ** 2)))
     assert result["irmse_per_km"] == pytest.approx(1000 * np.sqrt(np.mean((1 / t - 1 / p) ** 2)))

@@ -10,7 +10,7 @@ import pytest
 import shapely
 
 from gear.formats.kitti_object import KittiLabel, dont_care, label_corners
-from gear.metrics.kitti_ap import KittiEvaluator, recall_thresholds
+from gear.metrics.kitti_ap import KittiEvaluator
 from gear.metrics.kitti_reference import NearCars
 
 LEVELS = {"easy": (40, 0, 0.15), "moderate": (25, 1, 0.3), "hard": (25, 2, 0.5)}
@@ -30,6 +30,18 @@ def overlap_of(a: KittiLabel, b: KittiLabel, kind: str) -> float:
     height = min(a.location_m[1], b.location_m[1]) - max(a.location_m[1] - a.height_m, b.location_m[1] - b.height_m)
     volume = shared * max(0.0, height)
     return float(volume / (first.area * a.height_m + second.area * b.height_m - volume))
+
+
+def steps_of_recall(scores: Sequence[float], wanted: int) -> list[float]:
+    """The scores at which recall is as near to the next of 41 steps as it comes; `scores` falls."""
+    steps: list[float] = []
+    for i, score in enumerate(scores):
+        here, last = (i + 1) / wanted, i == len(scores) - 1
+        after = here if last else (i + 2) / wanted
+        step = len(steps) / 40
+        if last or after - step >= step - here:
+            steps.append(score)
+    return steps
 
 
 class BruteForce:
@@ -104,7 +116,7 @@ class BruteForce:
             return [math.nan] * 41, [math.nan] * 41
         scores = sorted((s for p in self.pictures for s in self.match(*p, None)["scores"]), reverse=True)
         precision, orientation = [0.0] * 41, [0.0] * 41
-        for t, threshold in enumerate(recall_thresholds(scores, wanted)):
+        for t, threshold in enumerate(steps_of_recall(scores, wanted)):
             counts = [self.match(*p, threshold) for p in self.pictures]
             total = sum(c["tp"] + c["fp"] for c in counts)
             precision[t] = sum(c["tp"] for c in counts) / total

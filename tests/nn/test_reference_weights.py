@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 import pytest
+import shapely
 
+import gear
 from gear.contracts.models import Model
 from gear.dataset.files import sha256
+from gear.formats.kitti_object import KittiLabel
 from gear.nn.ddrnet import DDRNet23Slim
 from gear.nn.shipped import CHECKOUT, inspect
 from gear.nn.weights import load_trunk, mismatches, read
@@ -69,6 +74,28 @@ UNSEEN: dict[str, tuple[str, dict[str, tuple[float, float]]]] = {
 better than the worse of them."""
 
 
+FARTHEST_OFF = 0.05
+"""Median of how far objects that a stereo network finds are off, as a share of their distance."""
+
+
+def found_pairs(data: Path, name: str) -> list[tuple[KittiLabel, KittiLabel]]:
+    """Labels of a stereo dataset with what the network finds where they are in the picture."""
+    model: Model = build(find("model", name), NO_OPTIONS)
+    return [
+        (label, found)
+        for sample in gear.open_dataset(data)
+        for predicted in [model.predict(sample.images)]  # type: ignore[attr-defined]
+        for label in (thing.label() for thing in sample.objects)
+        for found in predicted
+        if label.type == found.type and overlap(label.box_px, found.box_px) > 0.5
+    ]
+
+
+def overlap(one: Sequence[float], other: Sequence[float]) -> float:
+    first, second = shapely.box(*one), shapely.box(*other)
+    return float(first.intersection(second).area / first.union(second).area)
+
+
 @pytest.mark.slow
 @named
 def test_on_a_street_that_nobody_has_seen_before(path: Path, tmp_path: Path) -> None:
@@ -81,6 +108,11 @@ def test_on_a_street_that_nobody_has_seen_before(path: Path, tmp_path: Path) -> 
     name, bounds = UNSEEN[path.stem]
     figures = report.rows[0].figures[name]
     assert all(low < figures[key].value < high for key, (low, high) in bounds.items()), figures
+    if task == "stereo3d":
+        pairs = found_pairs(tmp_path / "data", path.stem)
+        off = [abs(found.location_m[2] / label.location_m[2] - 1) for label, found in pairs]
+        taller_m = [abs(found.height_m - label.height_m) for label, found in pairs]
+        assert len(pairs) >= 8 and np.median(off) < FARTHEST_OFF and np.median(taller_m) < 0.2, pairs
 
 
 def test_depth_has_a_trunk_for_segmentation() -> None:

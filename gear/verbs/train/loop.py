@@ -29,7 +29,7 @@ from gear.verbs.train.checkpoint import Progress
 from gear.verbs.train.config import TrainConfig
 from gear.verbs.train.feed import Feed
 from gear.verbs.train.optimise import Buffers, RunningMean, clip_gradients, optimiser_of, rate_share
-from gear.verbs.train.results import is_kept, write_weights
+from gear.verbs.train.results import check_kept, is_kept, write_weights
 from gear.verbs.train.validate import rank, total, validate
 
 NOTE_EVERY = 10
@@ -113,11 +113,17 @@ class Training:
         return min(1.0, self.progress.step / (self._config.epochs * self._parts.feed.batches))
 
     def run(self) -> Progress:
-        """Trains to the end."""
+        """Trains to the end.
+
+        Raises:
+            DatasetError: the best weights of a training that goes on are gone; told now, not when it has ended.
+        """
         _train_mode(self._parts.model, True)
         _train_mode(self._parts.twin, False)
         if self.progress.best_step == self.progress.step and not is_kept(self._parts.root, self.progress):
             self._keep_best()
+        if self.progress.best_step >= 0:
+            check_kept(self._parts.root, self.progress)
         while not self._is_over:
             self._make_patches()
             with contextlib.closing(self._parts.feed.from_position(self.progress.position)) as batches:

@@ -129,6 +129,20 @@ def is_kept(root: Path, progress: Progress) -> bool:
     return path.is_file() and progress.best_sha256 in ("", sha256(read_bytes(path)))
 
 
+def check_kept(root: Path, progress: Progress) -> None:
+    """Whether the file of the best weights is there.
+
+    Raises:
+        DatasetError: it is not, or is another one.
+    """
+    if not (root / WEIGHTS).is_file():
+        raise DatasetError(root / WEIGHTS, f"is gone; put it back, or delete {CHECKPOINT} beside it to train again")
+    if not is_kept(root, progress):
+        raise DatasetError(
+            root / WEIGHTS, f"is not what this training kept; put that back, or delete {CHECKPOINT} to train again"
+        )
+
+
 def write_history(root: Path, origin: Origin, progress: Progress) -> None:
     """Writes `train.json` and `card.md`."""
     config: Any = to_plain(origin.config)
@@ -152,10 +166,7 @@ def write_history(root: Path, origin: Origin, progress: Progress) -> None:
 def card(root: Path, origin: Origin, progress: Progress) -> str:
     """The model card, in Markdown."""
     best = next(entry for entry in progress.validations if entry["step"] == progress.best_step)
-    if not (root / WEIGHTS).is_file():
-        raise DatasetError(root / WEIGHTS, f"is gone; delete {CHECKPOINT} beside it to train again")
-    if not is_kept(root, progress):
-        raise DatasetError(root / WEIGHTS, f"is not what this training kept; delete {CHECKPOINT} to train again")
+    check_kept(root, progress)
     weights = read_bytes(root / WEIGHTS)
     config = origin.config
     spec: Any = origin.model.spec

@@ -40,6 +40,7 @@ from gear.verbs.train.starting import (
     goes_on_alone,
     picture_share,
     precision_of,
+    sizes_note,
     with_scale,
 )
 
@@ -155,6 +156,8 @@ def train(
         noted(
             f"pictures are shown at {scale:g} of their size; --set picture_scale=1 shows them whole, and takes longer"
         )
+    if noted is not None and (mixed := sizes_note(found, config, training)):
+        noted(mixed)
     share = scale * picture_share(training, spec)
     root = Path(out)
     begun = begun_config(root)

@@ -45,6 +45,19 @@ def check_options(found: Found, config: TrainConfig) -> None:
             raise GearError(f"options.{name} is set by the training; say it with {flag}")
 
 
+def sizes_note(found: Found, config: TrainConfig, samples: Samples) -> str:
+    """What to know where pictures have several sizes and the network would have noted one; nothing elsewhere."""
+    widths = sorted({dataset.sidecar(0).record.cameras[0].width_px for dataset in samples.datasets})
+    by_itself = getattr(found.spec.config(), SCALE, 1.0)
+    is_given = isinstance(config.options, Mapping) and SCALE in config.options.entries
+    if len(widths) == 1 or by_itself is not None or is_given:
+        return ""
+    return (
+        f"pictures are {', '.join(map(str, widths))} px wide: the network sees each as it is, and its weights will be"
+        f" used on pictures of the task's own size; --set options.{SCALE}=SHARE says otherwise"
+    )
+
+
 def picture_share(samples: Samples, spec: TaskSpec[Any]) -> float:
     """Width of the pictures as a share of the width that the task has by itself; 1 where there is no saying."""
     usual = getattr(spec.config(), "width_px", None)
@@ -169,7 +182,7 @@ def begin_with(found: Found, model: Any, init: str) -> str:
     spec = found.spec
     assert isinstance(spec, ModelSpec)
     if not init or init == NONE:
-        return ""
+        return _kept_at_random(spec, model)
     if init in spec.starts:
         with blamed(found, f"starts[{init!r}]"):
             spec.starts[init](model)
@@ -188,6 +201,18 @@ def begin_with(found: Found, model: Any, init: str) -> str:
     else:
         raise UnknownNameError("start", init, (SHIPPED, *spec.starts), f"for {spec.name}; or give a safetensors file")
     return ""
+
+
+def _kept_at_random(spec: ModelSpec[Any], model: Any) -> str:
+    """What to know of a network of which part is never trained, since published weights are what it begins with."""
+    kept = sum(one.numel() for one in model.module().parameters() if not one.requires_grad)
+    if not kept:
+        return ""
+    ways = " or ".join(spec.starts) or "FILE"
+    return (
+        f"{spec.name} leaves a part as it begins, which is at random ({kept / 1e6:.2g} M numbers are never trained):"
+        f" it learns little so; begin with --init {ways}"
+    )
 
 
 def _trunk(source: str) -> Path:

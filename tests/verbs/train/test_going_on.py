@@ -8,10 +8,14 @@ from pathlib import Path
 import pytest
 import torch
 
+from gear.contracts.specs import ModelSpec
 from gear.nn.detectors_options import ReferenceDetectorOptions
 from gear.nn.weights import read, write
+from gear.plugins.build import find
 from gear.plugins.models.retinanet_r18_fpn import build_lite0
+from gear.verbs.train.config import read_config
 from gear.verbs.train.run import train
+from gear.verbs.train.starting import begin_with, build_network
 
 BODY = "backbone.body."
 STATISTICS = ("running_mean", "running_var")
@@ -39,3 +43,13 @@ def test_a_trunk_with_whole_weights_keeps_its_statistics_and_first_layers(
     assert len(kept) > 90 and learnt
     assert {torch.equal(before[key], after[key]) for key in kept} == {is_kept}
     assert not any(torch.equal(before[key], after[key]) for key in learnt)
+
+
+@pytest.mark.parametrize(("name", "is_told"), [("retinanet_r50_fpn", True), ("retinanet_r18_fpn", False)])
+def test_a_part_that_would_stay_random_for_ever_is_told_of(name: str, is_told: bool) -> None:
+    found = find("model", name)
+    assert isinstance(found.spec, ModelSpec)
+    model = build_network(found, read_config(found.spec.recipe, {}, ()), precision="float32")
+    told = begin_with(found, model, "")
+    assert told.startswith(f"{name} leaves a part as it begins, which is at random (0.2") == is_told
+    assert told.endswith("begin with --init FILE") == is_told and bool(told) == is_told

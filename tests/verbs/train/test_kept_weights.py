@@ -16,6 +16,7 @@ from gear.dataset.files import sha256
 from gear.values.errors import DatasetError
 from gear.verbs.train import loop
 from gear.verbs.train.checkpoint import FILE as CHECKPOINT
+from gear.verbs.train.checkpoint import Progress
 from gear.verbs.train.run import TrainReport, train
 
 Street = Callable[..., Path]
@@ -96,11 +97,33 @@ def test_weights_of_another_training_are_not_taken_for_its_own(
     ranked(monkeypatch, 0.2, 0.1, 0.1, 0.3)
     report = quick(street, out)
     report.weights.write_bytes(quick(street, tmp_path / "other", epochs=1, seed=5).weights.read_bytes())
-    with pytest.raises(DatasetError, match=r"model\.safetensors: is not what this training kept; delete checkpoint"):
+    with pytest.raises(DatasetError, match=r"model\.safetensors: is not what this training kept; put that back, or"):
         quick(street, out)
     report.weights.unlink()
-    with pytest.raises(DatasetError, match=r"is gone; delete checkpoint.safetensors"):
+    with pytest.raises(DatasetError, match=r"is gone; put it back, or delete checkpoint.safetensors"):
         quick(street, out)
+
+
+def test_that_the_best_weights_are_gone_is_told_before_the_training_goes_on(
+    street: Street, tmp_path: Path, install: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out, told = tmp_path / "out", list[int]()
+    ranked(monkeypatch, 0.1, 0.3, 0.2, 0.4)
+
+    class StoppedError(Exception): ...
+
+    def stop(progress: Progress, share: float, figures: Any) -> None:
+        told.append(progress.step)
+        if len(progress.validations) == 3:
+            raise StoppedError
+
+    with pytest.raises(StoppedError):
+        quick(street, out, epochs=4, watch=stop)
+    (out / "model.safetensors").unlink()
+    told.clear()
+    with pytest.raises(DatasetError, match=r"model\.safetensors: is gone; put it back, or delete"):
+        quick(street, out, epochs=4, watch=stop)
+    assert not told
 
 
 def test_the_weights_of_the_last_step_are_made_again(

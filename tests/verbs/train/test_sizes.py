@@ -117,6 +117,21 @@ def test_validation_and_weights_know_of_smaller_pictures(street: Street, scaled:
     assert len(said) == 1 and "0.5 of their size; --set picture_scale=1" in said[0]
 
 
+def test_pictures_of_several_sizes_are_told_of(scaled: None) -> None:
+    """Weights of one size say at which share they are to be used; of several, there is no such share."""
+
+    def note(name: str, *widths: int, settings: tuple[str, ...] = ()) -> str:
+        records = [SimpleNamespace(cameras=[SimpleNamespace(width_px=width)]) for width in widths]
+        datasets = [SimpleNamespace(sidecar=lambda _, r=record: SimpleNamespace(record=r)) for record in records]
+        samples: Any = SimpleNamespace(datasets=datasets)
+        return starting.sizes_note(find("model", name), config_of(*settings), samples)
+
+    told = note("tiny_segmenter", 1024, 512, 512)
+    assert told.startswith("pictures are 512, 1024 px wide") and "--set options.input_scale=SHARE" in told
+    assert not note("tiny_segmenter", 512, 512)
+    assert not note("tiny_segmenter", 1024, 512, settings=("options.input_scale=0.5",))
+
+
 def test_crops_are_never_larger_than_what_is_shown(street: Street) -> None:
     samples = samples_of(street)
 

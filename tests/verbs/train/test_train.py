@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import shlex
@@ -11,6 +12,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -214,9 +216,21 @@ def test_depth_in_half_precision_with_validation_data_of_its_own(street: Street,
 def test_a_time_budget_ends_it(street: Street, tmp_path: Path, install: Any) -> None:
     report = quick(street, tmp_path / "out", epochs=None, time_budget_s=0.5)
     assert report.elapsed_s >= 0.5
+
+
+def test_with_a_time_budget_the_rate_follows_the_clock(
+    street: Street, tmp_path: Path, install: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = itertools.count()
+    monkeypatch.setattr(loop, "time", SimpleNamespace(perf_counter=lambda: next(clock) / 100))
+    monkeypatch.setattr(loop, "NOTE_EVERY", 1)
+    quick(street, tmp_path / "out", epochs=None, time_budget_s=0.5)
     history = json.loads((tmp_path / "out" / "train.json").read_text())
     rates = [point["rate"] for point in history["steps"]]
-    assert rates == [] or rates[-1] <= max(rates)
+    highest = rates.index(max(rates))
+    falling = rates[highest:]
+    assert len(rates) > 20 and highest < 5 and falling == sorted(falling, reverse=True)
+    assert falling[-1] < 0.05 * falling[0]
 
 
 def test_the_noted_command_has_the_whole_time_budget(street: Street, tmp_path: Path, install: Any) -> None:
