@@ -39,6 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--compositor", action="append", dest="compositors", help="transport, homography (both)")
     parser.add_argument("--samples", type=positive, metavar="N", help="the first N samples only")
     parser.add_argument("--out", metavar="DIR", help="folder for gap.json and gap.txt")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the defense's draws (0)")
     add_device(parser, "settings")
     parser.add_argument("--json", action="store_true", help="print the report as JSON")
 
@@ -72,6 +73,7 @@ def run(args: argparse.Namespace) -> int:
             town=args.town,
             scenes=args.scenes,
             out=args.out,
+            seed=args.seed,
             progress=progress,
             learning=learning,
             noted=lambda text: print(f"gear: note: {text}", file=sys.stderr),

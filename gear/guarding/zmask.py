@@ -92,7 +92,7 @@ class ZMask:
             raise GearError("no patch is seen in the patched calibration data: Z-Mask has nothing to learn from")
         block = learn(examples, self._settings.steps, rng)
         scores = [
-            block.score(*self._seen(model, looks(sample)[0], layers, statistics))
+            max(block.score(*self._seen(model, look, layers, statistics)) for look in looks(sample))
             for sample in spread(clean, self._settings.learning_pictures)
         ]
         level = alarm_level(scores, self._settings.false_alarms)

@@ -18,6 +18,7 @@ from gear.testing.tiny_networks import tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import GearError
 from gear.verbs.attack.run import attack
+from gear.verbs.attack.verify import verify
 from gear.verbs.evaluate.run import evaluate
 from tests.verbs.conftest import Install, Nothing, Small
 
@@ -27,9 +28,11 @@ class Learner:
 
     def __init__(self, config: Nothing) -> None:
         self.fits: list[tuple[int, int]] = []
+        self.drawn: list[int] = []
 
     def fit(self, clean: Any, patched: Any, model: Any, rng: np.random.Generator) -> float:
         self.fits.append((len(clean), len(patched)))
+        self.drawn.append(int(rng.integers(2**31)))
         return float(np.mean([views["left"].mean() for views in clean]))
 
     def apply(self, views: Any, model: Any, state: float, rng: np.random.Generator) -> DefenseResult:
@@ -119,6 +122,40 @@ def test_a_gap_stands_behind_what_has_learnt(small: Small, learner: list[Learner
     assert learner[0].fits == [(2, 2)] and report.defense == "learner"
     with pytest.raises(GearError, match="a defense guards a model"):
         gear.gap(small(), twin=tmp_path / "gap/twin", calibration=small(split="val"))
+
+
+def test_a_patch_is_checked_behind_the_defense_that_it_was_made_through(
+    small: Small, learner: list[Learner], tmp_path: Path
+) -> None:
+    """What a defense draws while it learns comes of the attack's seed there, too."""
+    behind: dict[str, Any] = {"defense": "learner", "calibration": small(split="val")}
+    attack(
+        small(), model="tiny_segmenter", out=tmp_path / "p", attack="square", queries=4, seed=5,
+        settings=["height_px=12", "width_px=24"], **behind,
+    )  # fmt: skip
+    verify(
+        tmp_path / "p", small(split="val", seed=5), models=["tiny_segmenter"], samples=1, town=TINY_TOWN,
+        scenes=f"{TINY_SCENES}:board", **behind,
+    )  # fmt: skip
+    twin = next((tmp_path / "p").glob("verify/*/tiny_segmenter/twin"))
+    report = gear.gap(small(split="val", seed=5), twin=twin, model="tiny_segmenter", samples=1, **behind)
+    drawn = [one.drawn for one in learner if one.drawn]
+    assert len(drawn) == 3 and drawn[0] == drawn[1] != drawn[2] and report.as_json()["seed"] == 0
+
+
+def test_doubtful_calibration_is_told_by_attacks_and_gaps(
+    small: Small, collect_small: Callable[..., Any], learner: list[Learner], tmp_path: Path
+) -> None:
+    patched, told = tmp_path / "patched", list[str]()
+    collect_small("semseg", patched, split="val", patch="random")
+    behind: dict[str, Any] = {"defense": "learner", "calibration": patched, "noted": told.append}
+    attack(
+        small(), model="tiny_segmenter", out=tmp_path / "p", attack="square", queries=4,
+        settings=["height_px=12", "width_px=24"], **behind,
+    )  # fmt: skip
+    assert len(told) == 1 and "shows the patch random, which the defense takes for clean" in told.pop()
+    gear.gap(small(split="val"), twin=patched, model="tiny_segmenter", compositors=("transport",), **behind)
+    assert len(told) == 2 and "takes for clean" in told[0] and "learnt from scenes that it is measured on" in told[1]
 
 
 def test_what_learnt_from_more_samples_is_another_defense(small: Small, learner: list[Learner], tmp_path: Path) -> None:

@@ -92,7 +92,7 @@ class CarlaGear:
             return SemsegObjective(gamma=1.0)
         if task == "depth":
             return DepthObjective(gamma=0.8)
-        return LossObjective(signs=dict.fromkeys(STEREO_LOSSES_LEFT_OUT, 0.0))
+        return LossObjective(signs=dict.fromkeys(STEREO_LOSSES_LEFT_OUT if task == "stereo3d" else (), 0.0))
 
 
 LEARNING_RATES: dict[PaperTask, float | tuple[float, float, float]] = {

@@ -114,7 +114,8 @@ def attack(
         force: start afresh where something else is.
         progress: told after every step.
         learning: told after every calibration sample that the defense reads for the first time.
-        noted: told, before anything is made, of a model that sees these pictures at another size than it learnt from.
+        noted: told, before anything is made, of what the user may not have meant: a model that sees these pictures at
+            another size than it learnt from, doubtful data for the defense to learn from.
 
     Raises:
         GearError: anything that the user can put right; its text is one line.
@@ -139,7 +140,7 @@ def attack(
         seed=seed,
         allow_tests=allow_tests,
     )
-    _note_sizes(job, noted)
+    _note_doubts(job, noted)
     product, root = build(job.found, job.options), Path(out)
     network = build_model(job.models, job.defense, job.calibration, job.seed)
     plan = job.plan(weights_digest(network), product)
@@ -158,10 +159,12 @@ def attack(
     return AttackReport(out=root, patches=made.patches, facts=facts, made=True)
 
 
-def _note_sizes(job: Job, noted: Callable[[str], None] | None) -> None:
-    """Tells of every model that sees the pictures, which are all of one size, larger or smaller than it knows them."""
+def _note_doubts(job: Job, noted: Callable[[str], None] | None) -> None:
+    """Tells of every model that sees the pictures, which are all of one size, larger or smaller than it knows them, and
+    of what may not have been meant in the data that the defense learns from."""
     if noted is not None:
-        for note in (size_note(model, job.datasets[0], FLAG) for model in job.models):
+        sizes = (size_note(model, job.datasets[0], FLAG) for model in job.models)
+        for note in (*sizes, *job.calibration.doubts()):
             if note is not None:
                 noted(note)
 

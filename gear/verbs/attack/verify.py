@@ -59,6 +59,8 @@ def verify(
 ) -> dict[str, GapReport]:
     """Renders a patch folder on a held-out dataset, and compares pictures and effect, digital and rendered.
 
+    A defense draws what it draws from the attack's seed: one that learns is the one that was looked through.
+
     Under `out/verify/<scene>-<split>-<hash>`, one for each dataset, lie for each model `<model>/gap.json` and
     `gap.txt`, and beside those of the first the rendered twin.
 
@@ -105,9 +107,10 @@ def verify(
             calibration=calibration,
             calibration_patched=calibration_patched,
             samples=samples,
-            town=town,
-            scenes=scenes,
+            town=town if number == 0 else None,
+            scenes=scenes if number == 0 else None,
             out=place / model.replace("/", "-"),
+            seed=notes["seed"],
             progress=progress,
             learning=learning,
         )

@@ -49,7 +49,8 @@ class Effect:
         plan: of the dataset.
         evaluators: by `clean`, a compositor's name, or `rendered`.
         figure: of the task, the one that is to be looked at first.
-        note: that the model sees the pictures at another size than it learnt from, or None.
+        notes: what the user may not have meant: that the model sees the pictures at another size than it learnt from,
+            or what there is to say of the data that the defense learns from.
         samples: of those taken in so far.
     """
 
@@ -57,7 +58,7 @@ class Effect:
     plan: Plan
     evaluators: Mapping[str, Evaluator[Any, Any]]
     figure: str
-    note: str | None = None
+    notes: tuple[str, ...] = ()
     samples: list[SampleEffect] = field(default_factory=list)
 
     @staticmethod
@@ -70,9 +71,11 @@ class Effect:
         defense: str | None = None,
         defense_settings: Iterable[str] = (),
         calibration: tuple[str | Path | None, str | Path | None] = (None, None),
+        seed: int = 0,
         learning: Progress | None = None,
     ) -> Effect:
-        """For a model plugin, behind a defense plugin if one is named, which learns from `calibration`.
+        """For a model plugin, behind a defense plugin if one is named, which learns from `calibration`; `seed` is of
+        what the defense draws.
 
         Raises:
             UnknownNameError: there is no such model or defense.
@@ -90,11 +93,15 @@ class Effect:
         assert isinstance(spec, TaskSpec)
         names = (CLEAN, *compositors, RENDERED)
         return Effect(
-            player=Player(chosen, guard, calibration=learnt),
+            player=Player(chosen, guard, calibration=learnt, seed=seed),
             plan=dataset.plan,
             evaluators={name: dataset.task.evaluator() for name in names},
             figure=spec.figure.rpartition(".")[2],
-            note=size_note(chosen, dataset),
+            notes=tuple(
+                line
+                for line in (size_note(chosen, dataset), *learnt.doubts(), learnt.note(dataset))
+                if line is not None
+            ),
         )
 
     def update(self, index: int, clean: Any, shown: Mapping[str, Any]) -> None:

@@ -49,6 +49,7 @@ class GapReport:
         figure: the task's own, that a table shows by sample, or another where single samples do not have it.
         model: whose effect it is.
         defense: that it stands behind.
+        seed: of what the defense draws.
     """
 
     dataset: str
@@ -63,6 +64,7 @@ class GapReport:
     figure: str = ""
     model: str | None
     defense: str | None = None
+    seed: int = 0
 
     def median_db(self, compositor: str) -> float:
         """Over all pictures; NaN where none shows a patch."""

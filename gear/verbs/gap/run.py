@@ -21,6 +21,7 @@ from gear.dataset.store import refuse_dataset
 from gear.opening import open_dataset
 from gear.values.errors import DatasetError
 from gear.values.frames import UInt8Image
+from gear.values.rng import check_seed
 from gear.verbs.collect.patches import digest_of, read_patch
 from gear.verbs.gap.effect import RENDERED, Effect
 from gear.verbs.gap.figures import picture_gap, visible_mask
@@ -54,6 +55,7 @@ def gap(
     town: str | Path | None = None,
     scenes: str | Path | None = None,
     out: str | Path | None = None,
+    seed: int = 0,
     progress: Progress | None = None,
     learning: Progress | None = None,
     noted: Callable[[str], None] | None = None,
@@ -75,16 +77,18 @@ def gap(
         samples: so many of the split's first samples, of which alone a twin is collected then; all unless given.
         town, scenes: with `patch`, files of the town and of its scene library, where they are none of gear's own.
         out: folder for `gap.json` and `gap.txt`; needed with `patch`.
+        seed: of what the defense draws.
         progress: told after every sample.
         learning: told after every calibration sample that the defense reads for the first time.
-        noted: told, before anything is rendered, of a model that sees these pictures at another size than it learnt
-            from.
+        noted: told, before anything is rendered, of what the user may not have meant: a model that sees these pictures
+            at another size than it learnt from, doubtful data for the defense to learn from.
 
     Raises:
         GearError: anything that the user can put right; its text is one line.
     """
     from gear.compositor.opening import open_compositor
 
+    check_seed(seed)
     clean = open_dataset(dataset, split)
     if (patch is None) == (twin is None):
         raise DatasetError(clean.root, "say one of: --twin DIR, a rendered twin; or --patch PATCH, to render one")
@@ -119,11 +123,13 @@ def gap(
             defense=defense,
             defense_settings=defense_settings,
             calibration=learns_from,
+            seed=seed,
             learning=learning,
         )
     )
-    if noted is not None and effect is not None and effect.note is not None:
-        noted(effect.note)
+    if noted is not None and effect is not None:
+        for line in effect.notes:
+            noted(line)
     if patch is not None:
         collect_twin(clean, patch, root, samples=samples, town=town, scenes=scenes)
         pairs = pair_twins(clean, open_dataset(root, clean.plan.info.split))
@@ -152,6 +158,7 @@ def gap(
         figure="" if effect is None else effect.figure,
         model=model,
         defense=defense,
+        seed=seed,
     )
     if out is not None:
         folder = Path(out)

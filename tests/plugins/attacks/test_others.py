@@ -24,7 +24,7 @@ from gear.config.reader import read_node
 from gear.contracts.attacks import Budget, Patch
 from gear.formats import rle
 from gear.nn.stereo_rcnn_graph import LOSSES
-from gear.plugins.attacks.carla_gear import STEREO_LOSSES_LEFT_OUT
+from gear.plugins.attacks.carla_gear import STEREO_LOSSES_LEFT_OUT, carla_gear
 from gear.plugins.attacks.control import ControlConfig, control, matched, read_exact
 from gear.plugins.attacks.eot import EotConfig, eot
 from gear.plugins.attacks.nes import NesConfig, nes
@@ -330,6 +330,15 @@ def test_classes_are_for_segmentation() -> None:
 def test_the_papers_stereo_attack_leaves_classification_out() -> None:
     assert set(STEREO_LOSSES_LEFT_OUT) < set(LOSSES)
     assert all("class" in name for name in STEREO_LOSSES_LEFT_OUT)
+
+
+@pytest.mark.parametrize(("task", "is_left_out"), [("stereo3d", True), ("detect2d", False)])
+def test_the_papers_attack_leaves_losses_out_in_stereo_alone(
+    task: str, is_left_out: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gear.plugins.attacks.carla_gear.task_of", lambda sample: task)
+    objective = carla_gear.build(carla_gear.config()).objective(None)
+    assert {objective.signs.get(name, 1.0) == 0 for name in STEREO_LOSSES_LEFT_OUT} == {is_left_out}
 
 
 @pytest.mark.parametrize("arrays", [{}, {"bias": np.zeros(3, np.float32)}])

@@ -177,6 +177,17 @@ def test_a_patch_in_the_right_picture_is_covered_there() -> None:
     assert (mask["left"] > 0.5).mean() < 0.05
 
 
+def test_clean_pairs_are_taken_for_attacked_as_often_as_they_may_be() -> None:
+    """The score of a pair is that of the picture that shows most of it, and so is its level."""
+    model = Siamese(TinyConfig())
+    defense = zmask.build(zmask.ZMaskConfig(**ON_TRUNK, false_alarms=0.25))  # type: ignore[arg-type]
+    clean = [{"left": street(number), "right": street(number + 50)} for number in range(16)]
+    patched = [{name: noisy_patch(picture, 7)[0] for name, picture in sample.items()} for sample in clean]
+    state = defense.fit(clean, patched, model, derive_rng(SEED, "fit"))
+    scores = [defense.apply(sample, model, state, derive_rng(SEED, "apply")).score for sample in clean]
+    assert 0 < sum(score is not None and score > 0.5 for score in scores) <= 4
+
+
 def test_calibration_data_that_do_not_do_are_refused() -> None:
     model, rng = TinySegmenter(TinyConfig()), derive_rng(SEED, "fit")
     clean, patched = samples(4, is_patched=False), samples(4, is_patched=True)

@@ -51,6 +51,11 @@ def test_the_rendered_check(small: Small, install: Install, tmp_path: Path, caps
     assert len(list((tmp_path / "p" / "verify").glob("board-val-*"))) == 2, "every dataset has a check of its own"
     assert other.defense == "median" and "tiny_segmenter behind median" in other.table()
     assert json.loads(written.read_text()) == report
+    both = verify(
+        tmp_path / "p", small(split="val", seed=6), models=["tiny_segmenter", "other_segmenter"], samples=1,
+        town=TINY_TOWN, scenes=f"{TINY_SCENES}:board",
+    )  # fmt: skip
+    assert both["other_segmenter"].twin == both["tiny_segmenter"].twin, "rendered once for all of them"
 
 
 def test_checks_want_other_samples_than_patches_are_made_on(
