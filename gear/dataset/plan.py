@@ -81,6 +81,25 @@ def read_plan(root: Path, split: str) -> Plan | None:
         raise ReplaceableError(root, problem, split=split) from error
 
 
+def refuse_other_tasks(root: Path, plan: Plan, *, besides: str = "") -> None:
+    """A root holds splits of one task.
+
+    Args:
+        root: of the dataset.
+        plan: what is to be collected into it.
+        besides: a split that is not looked at.
+
+    Raises:
+        DatasetError: the root holds another task's dataset, or a plan there cannot be read.
+    """
+    for path in sorted((root / GEAR).glob("*/plan.json")):
+        other = None if path.parent.name == besides else read_plan(root, path.parent.name)
+        if other is not None and other.task["name"] != plan.task["name"]:
+            raise DatasetError(
+                root, f"holds a {other.task['name']} dataset, {plan.task['name']} was asked for; use another --out"
+            )
+
+
 def begin(root: Path, plan: Plan) -> None:
     """Writes the plan, or checks that the one there is the same; more samples than before are welcome.
 
@@ -90,12 +109,7 @@ def begin(root: Path, plan: Plan) -> None:
         DatasetError: the root holds another task's dataset, or a plan there cannot be read.
     """
     split = plan.info.split
-    for path in sorted((root / GEAR).glob("*/plan.json")):
-        other = read_plan(root, path.parent.name)
-        if other is not None and other.task["name"] != plan.task["name"]:
-            raise DatasetError(
-                root, f"holds a {other.task['name']} dataset, {plan.task['name']} was asked for; use another --out"
-            )
+    refuse_other_tasks(root, plan)
     there = read_plan(root, split)
     if there is not None and there.content_key != plan.content_key:
         what = ", ".join(differences(there.as_json(), plan.as_json())[:4])

@@ -11,7 +11,7 @@ from typing import Any
 from gear.contracts.tasks import Auxiliary, Encoded, Sample, Sidecar, Task
 from gear.dataset.files import clear_scratch, explained, inside, read_bytes, sha256, sync_folder, write_whole
 from gear.dataset.layout import GEAR, begun_path, manifest_path, patch_path, plan_path, sidecar_path, split_folder
-from gear.dataset.plan import Plan, begin, read_plan
+from gear.dataset.plan import Plan, begin, read_plan, refuse_other_tasks
 from gear.dataset.sidecar import dump_json, load_json, no_sidecar, read_sidecar, sidecar_bytes
 from gear.dataset.turns import at_work, is_at_work, turn
 from gear.values.errors import DatasetError, FieldError, ReplaceableError
@@ -73,16 +73,30 @@ class Store:
 
     def _keep_patch(self, relative: str, data: bytes) -> None:
         """Copies a patch into the dataset, unless another split shows another one of the same name."""
+        self._refuse_other_patch(relative, data)
         target = inside(self.root, relative)
-        if target.exists() and target.read_bytes() == data:
+        if not (target.exists() and target.read_bytes() == data):
+            write_whole(self.root, relative, data)
+
+    def _refuse_other_patch(self, relative: str, data: bytes) -> None:
+        target = inside(self.root, relative)
+        if not target.exists() or target.read_bytes() == data:
             return
         label, digest = self.plan.patch["label"], self.plan.patch["sha256"]
-        for split in splits_of(self.root):
+        others = {path.parent.name for path in (self.root / GEAR).glob("*/plan.json")} - {self.split}
+        for split in sorted(others):
             other = plan_of(self.root, split).patch
-            if target.exists() and other["label"] == label and other.get("sha256") != digest:
+            if other["label"] == label and other.get("sha256") != digest:
                 problem = f"split {split!r} shows other patches of the name {label!r}; use another --out"
                 raise DatasetError(self.root, problem)
-        write_whole(self.root, relative, data)
+
+    def _replace(self, patch_files: Mapping[str, bytes]) -> None:
+        """Removes the split, once nothing in the splits beside it can refuse the new one."""
+        _forget_empty(self.root, self.plan, besides=self.split)
+        refuse_other_tasks(self.root, self.plan, besides=self.split)
+        for name, data in patch_files.items():
+            self._refuse_other_patch(patch_path(self.plan.info.patch_label, name), data)
+        _remove_idle(self.root, self.split)
 
     @contextlib.contextmanager
     def begun(self, patch_files: Mapping[str, bytes], *, force: bool = False) -> Iterator[None]:
@@ -91,7 +105,7 @@ class Store:
 
         Args:
             patch_files: as of `open`.
-            force: removes the split that is there first.
+            force: removes the split that is there first, unless another one refuses what would take its place.
 
         Raises:
             DatasetError: as `open`, or another run is at work on what would have to be removed.
@@ -102,7 +116,7 @@ class Store:
             try:
                 with turn(self.root):
                     if force:
-                        _remove_idle(self.root, self.split)
+                        self._replace(patch_files)
                     is_new = not self._is_begun()  # others may have begun it, or taken it back, while this one waited
                     self.open(patch_files)
                     work.enter_context(at_work(inside(self.root, split_folder(self.split))))
@@ -254,12 +268,13 @@ class Store:
         return no_sidecar(self.root / sidecar_path(self.split, sidecar.record.index), error)
 
 
-def _forget_empty(root: Path, plan: Plan) -> None:
+def _forget_empty(root: Path, plan: Plan, *, besides: str = "") -> None:
     """Removes splits that were begun otherwise and hold no sample, where they stand in the way of a plan."""
     for path in sorted((root / GEAR).glob("*/plan.json")):
         split = path.parent.name
         if (
-            any(inside(root, f"{split_folder(split)}/samples").glob("*.json"))
+            split == besides
+            or any(inside(root, f"{split_folder(split)}/samples").glob("*.json"))
             or (path.parent / "manifest.json").exists()
         ):
             continue

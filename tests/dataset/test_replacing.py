@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
+import json
 from pathlib import Path
 
 import pytest
 
 from gear.dataset import store
-from gear.dataset.plan import read_plan
-from gear.dataset.store import remove_split
-from gear.values.errors import ReplaceableError
+from gear.dataset.plan import Plan, read_plan
+from gear.dataset.store import Store, remove_split
+from gear.values.errors import DatasetError, ReplaceableError
 from tests.dataset.test_store import fill, plan, tree
 
 
@@ -39,3 +41,59 @@ def test_a_plan_of_another_version_may_be_replaced(tmp_path: Path) -> None:
         str(tmp_path), "gear/test/plan.json: is not of this version of gear"
     )  # fmt: skip
     assert str(caught.value).endswith("; use another --out, or replace split 'test' with --force")
+
+
+def patched(split: str, digest: str) -> Plan:
+    given = plan(split, patch={"label": "random", "sha256": digest})
+    return dataclasses.replace(given, info=dataclasses.replace(given.info, patch_label="random"))
+
+
+def test_what_another_split_refuses_is_refused_before_anything_is_replaced(tmp_path: Path) -> None:
+    pictures = {"patch_0.png": b"1"}
+    for split in ("test", "train"):
+        fill(tmp_path, patched(split, "1"))
+        Store(tmp_path, patched(split, "1")).open(pictures)
+    before = tree(tmp_path)
+    semseg = patched("test", "1")
+    semseg = dataclasses.replace(semseg, task={**semseg.task, "name": "semseg"})
+    with (
+        pytest.raises(DatasetError, match="holds a depth dataset, semseg was asked for; use another --out"),
+        Store(tmp_path, semseg).begun(pictures, force=True),
+    ):
+        pass
+    assert tree(tmp_path) == before
+    with (
+        pytest.raises(DatasetError, match="split 'train' shows other patches of the name 'random'; use another --out"),
+        Store(tmp_path, patched("test", "2")).begun({"patch_0.png": b"2"}, force=True),
+    ):
+        pass
+    assert tree(tmp_path) == before
+    for split in ("test", "train"):
+        path = tmp_path / f"gear/{split}/plan.json"
+        path.write_text(json.dumps(json.loads(path.read_text()) | {"colour": "blue"}))
+    before = tree(tmp_path)
+    with (
+        pytest.raises(DatasetError, match="or replace split 'test' with --force"),
+        Store(tmp_path, patched("train", "1")).begun(pictures, force=True),
+    ):
+        pass
+    assert tree(tmp_path) == before
+
+
+@pytest.mark.parametrize("digest", ["1", "2"])
+def test_what_no_other_split_refuses_is_replaced(tmp_path: Path, digest: str) -> None:
+    """Its own plan may be unreadable, its copy of the patches another one or nobody's."""
+    fill(tmp_path, plan("train"))
+    fill(tmp_path, patched("test", "1"))
+    Store(tmp_path, patched("test", "1")).open({"patch_0.png": b"1"})
+    (tmp_path / "gear/test/plan.json").write_text("{}")
+    with Store(tmp_path, patched("test", digest)).begun({"patch_0.png": digest.encode()}, force=True):
+        assert (tmp_path / "gear/patches/random/patch_0.png").read_bytes() == digest.encode()
+        assert Store(tmp_path, patched("test", digest)).missing() == [0, 1, 2]
+    remove_split(tmp_path, "train")
+    remove_split(tmp_path, "test")
+    stray = tmp_path / "gear/patches/random/patch_0.png"
+    stray.parent.mkdir(parents=True)
+    stray.write_bytes(b"stray")
+    with Store(tmp_path, patched("test", digest)).begun({"patch_0.png": digest.encode()}, force=True):
+        assert stray.read_bytes() == digest.encode()
