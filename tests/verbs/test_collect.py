@@ -119,9 +119,9 @@ def test_double_boards_take_two_patches(tmp_path: Path, collect_small: Collect) 
     assert info["info"]["num_billboards"] == 2
 
 
-@pytest.mark.parametrize("scene", ["truck", "no_billboard"])
-def test_scenes_without_boards(scene: str, tmp_path: Path, collect_small: Collect) -> None:
-    collect_small("stereo3d", tmp_path, scene=scene, patch="random")
+@pytest.mark.parametrize(("scene", "patch"), [("truck", "random"), ("no_billboard", "none")])
+def test_scenes_without_boards(scene: str, patch: str, tmp_path: Path, collect_small: Collect) -> None:
+    collect_small("stereo3d", tmp_path, scene=scene, patch=patch)
     for sample in gear.open_dataset(tmp_path):
         carriers = [a for a in sample.record.actors if a.role == "carrier"]
         assert len(carriers) == len(sample.record.surfaces) == (scene == "truck")
@@ -231,6 +231,7 @@ def test_ctrl_c_while_workers_start_is_one_line(tmp_path: Path) -> None:
         ({"weather": "ClearNon"}, UnknownNameError, "no weather named 'ClearNon'; did you mean ClearNoon"),
         ({"split": "tset"}, UnknownNameError, "no split named 'tset'; did you mean test"),
         ({"patch": "nowhere.png"}, PatchError, "is not there"),
+        ({"patch": "random", "scene": "no_billboard"}, PatchError, "random: the scene has no surface for a patch"),
         ({"settings": ["optoins.width_px=3"]}, ConfigError, r"optoins: unknown key \(did you mean 'options'\?\)"),
         ({"settings": ["options.width=3"]}, ConfigError, r"options.width: unknown key \(did you mean 'width_px'\?\)"),
         ({"settings": ["options.width_px=3cm"]}, ConfigError, "options.width_px: expected int, got '3cm'"),

@@ -128,6 +128,23 @@ def test_what_is_no_patch_is_refused_in_one_line(tmp_path: Path, picture: np.nda
         resolve_patch(str(tmp_path / "bare"), surfaces=2, seed=0)
 
 
+def test_a_patch_that_would_not_be_shown_is_refused(tmp_path: Path, picture: np.ndarray) -> None:
+    """The split would say that it shows one."""
+    one = save(tmp_path / "patch_0.png", picture)
+    for patch in ("random", str(one), str(tmp_path)):
+        with pytest.raises(PatchError, match="the scene has no surface for a patch; say none"):
+            resolve_patch(patch, surfaces=0, seed=0)
+    for patch in (str(one), str(tmp_path)):
+        needs = r"has 1 of the 2 pictures that the scene needs.*; give a folder with patch_0\.png to patch_1\.png"
+        with pytest.raises(PatchError, match=needs):
+            resolve_patch(patch, surfaces=2, seed=0)
+    assert resolve_patch("none", surfaces=0, seed=0).by_surface(()) == {}
+    assert resolve_patch("none", surfaces=2, seed=0).by_surface(("surface_0", "surface_1")) == {}
+    for scene, message in (("no_billboard", "no surface for a patch"), ("billboard05", "has 1 of the 2 pictures")):
+        with pytest.raises(PatchError, match=message):
+            resolve(CollectionConfig(task="semseg", scene=scene, patch=str(one), root=str(tmp_path / "out")))
+
+
 def test_a_patch_that_nobody_can_look_at_is_one_line(
     tmp_path: Path, picture: np.ndarray, monkeypatch: pytest.MonkeyPatch
 ) -> None:

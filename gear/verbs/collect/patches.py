@@ -33,7 +33,7 @@ class PatchSet:
 
     Attributes:
         label: `none`, `random`, or name and hash: the name of its folder in a dataset.
-        images: sRGB pictures, (H, W, 3) uint8, in surface order; may be fewer than there are surfaces.
+        images: sRGB pictures, (H, W, 3) uint8, in surface order: none, or one for each surface.
         digest: sha256 of the pictures.
         files: what is copied into the dataset, by name.
         source: what the user said.
@@ -48,8 +48,8 @@ class PatchSet:
     made_for: tuple[str, ...] = ()
 
     def by_surface(self, names: tuple[str, ...]) -> dict[str, UInt8Image]:
-        """The picture of each surface that has one."""
-        return dict(zip(names, self.images, strict=False))
+        """The picture of each surface; nothing where there is no patch."""
+        return dict(zip(names, self.images, strict=True)) if self.images else {}
 
 
 def resolve_patch(patch: str, *, surfaces: int, seed: int) -> PatchSet:
@@ -62,12 +62,19 @@ def resolve_patch(patch: str, *, surfaces: int, seed: int) -> PatchSet:
         seed: of random patches.
 
     Raises:
-        PatchError: it is not there, cannot be read, is not a picture, of an absurd size, or numbered with a gap.
+        PatchError: it is not there, cannot be read, is not a picture, of an absurd size, or numbered with a gap; or
+            the scene has nothing to show it on, or more surfaces than there are pictures.
     """
     try:
-        return _resolved(patch, surfaces, seed)
+        found = _resolved(patch, surfaces, seed)
     except OSError as error:
         raise PatchError(patch, f"cannot be read: {error.strerror}") from error
+    if found.label != NO_PATCH and not surfaces:
+        raise PatchError(patch, "the scene has no surface for a patch; say none, or name a scene with a board or truck")
+    if found.label != NO_PATCH and len(found.images) < surfaces:
+        problem = f"has {len(found.images)} of the {surfaces} pictures that the scene needs, one for each surface"
+        raise PatchError(patch, f"{problem}; give a folder with patch_0.png to patch_{surfaces - 1}.png")
+    return found
 
 
 def _resolved(patch: str, surfaces: int, seed: int) -> PatchSet:
