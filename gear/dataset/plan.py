@@ -60,18 +60,41 @@ def _digest(value: Json) -> str:
     return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
 
 
+def refuse_copy(root: Path, split: str) -> None:
+    """A split is that of its folder: a copied or renamed one names the files of the split that it was.
+
+    Raises:
+        DatasetError: its plan, however old, is that of another split.
+    """
+    try:
+        there = load_json(inside(root, plan_path(split)))
+    except DatasetError:  # gone or damaged
+        return
+    _refuse_copy(root, split, there)
+
+
+def _refuse_copy(root: Path, split: str, there: Json) -> None:
+    info = there.get("info") if isinstance(there, dict) else None
+    name = info.get("split") if isinstance(info, dict) else None
+    if isinstance(name, str) and name != split:
+        remedy = f"a split cannot be copied or renamed; delete {GEAR}/{split}, or name it {GEAR}/{name} again"
+        raise DatasetError(root, f"{plan_path(split)}: is the plan of split {name!r}; {remedy}")
+
+
 def read_plan(root: Path, split: str) -> Plan | None:
     """The plan of a split that was begun, or None.
 
     Raises:
         ReplaceableError: it is of another version of gear.
-        DatasetError: it cannot be read.
+        DatasetError: it cannot be read, or is another split's.
     """
     path = inside(root, plan_path(split))
     if not path.exists():
         return None
+    content = load_json(path)
+    _refuse_copy(root, split, content)
     try:
-        plan: Plan = from_json(Plan, load_json(path), "plan")
+        plan: Plan = from_json(Plan, content, "plan")
         for field, key in (("task", "name"), ("patch", "label")):
             if not isinstance(there := getattr(plan, field), dict) or key not in there:
                 raise FieldError(f"plan.{field}", f"must have a {key}")

@@ -11,7 +11,7 @@ from typing import Any
 from gear.contracts.tasks import Auxiliary, Encoded, Sample, Sidecar, Task
 from gear.dataset.files import clear_scratch, explained, inside, read_bytes, sha256, sync_folder, write_whole
 from gear.dataset.layout import GEAR, begun_path, manifest_path, patch_path, plan_path, sidecar_path, split_folder
-from gear.dataset.plan import Plan, begin, read_plan, refuse_other_tasks
+from gear.dataset.plan import Plan, begin, read_plan, refuse_copy, refuse_other_tasks
 from gear.dataset.sidecar import dump_json, load_json, no_sidecar, read_sidecar, sidecar_bytes
 from gear.dataset.turns import at_work, is_at_work, turn
 from gear.values.errors import DatasetError, FieldError, ReplaceableError
@@ -305,11 +305,13 @@ def remove_split(root: Path, split: str) -> None:
     whose sidecar is gone or damaged, the manifest knows the files.
 
     Raises:
-        DatasetError: a file cannot be deleted, or names a path outside the root.
+        DatasetError: a file cannot be deleted, or names a path outside the root; or it is a copy of another split and
+            names that one's files.
     """
     folder = inside(root, split_folder(split))
     if not folder.is_dir():
         return
+    refuse_copy(root, split)
     sidecars = sorted((folder / "samples").glob("*.json"))
     begun = sorted(inside(root, begun_path(split, "x")).parent.glob("*.json"))
     manifest = inside(root, manifest_path(split))

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from gear.dataset import store
 from gear.dataset.plan import Plan, read_plan
 from gear.dataset.store import Store, remove_split
+from gear.formats.png import encode_rgb
+from gear.opening import open_dataset
+from gear.plugins.tasks.common import read_plain, read_rgb
 from gear.values.errors import DatasetError, ReplaceableError
 from tests.dataset.test_store import fill, plan, tree
 
@@ -97,3 +102,35 @@ def test_what_no_other_split_refuses_is_replaced(tmp_path: Path, digest: str) ->
     stray.write_bytes(b"stray")
     with Store(tmp_path, patched("test", digest)).begun({"patch_0.png": digest.encode()}, force=True):
         assert stray.read_bytes() == digest.encode()
+
+
+@pytest.mark.parametrize("damage", [{}, {"colour": "blue"}])
+def test_a_copied_split_is_refused_and_takes_nothing_of_the_first_ones_with_it(
+    tmp_path: Path, damage: dict[str, str]
+) -> None:
+    """What it names are the first one's files."""
+    fill(tmp_path, plan("train"))
+    shutil.copytree(tmp_path / "gear/train", tmp_path / "gear/val")
+    path = tmp_path / "gear/val/plan.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | damage))
+    before = tree(tmp_path)
+    refusal = "gear/val/plan.json: is the plan of split 'train'; a split cannot be copied .*; delete gear/val, or"
+    with pytest.raises(DatasetError, match=refusal):
+        open_dataset(tmp_path, "val")
+    for force in (False, True):
+        with pytest.raises(DatasetError, match=refusal), Store(tmp_path, plan("val")).begun({}, force=force):
+            pass
+    assert tree(tmp_path) == before
+    shutil.rmtree(tmp_path / "gear/val")
+    assert open_dataset(tmp_path, "train").verify() == []
+
+
+@pytest.mark.parametrize("relative", ["../secret.png", "linked/secret.png"])
+def test_no_picture_is_read_from_outside_of_a_dataset(tmp_path: Path, relative: str) -> None:
+    """Whatever its plan and sidecars were edited to say."""
+    (tmp_path / "secret.png").write_bytes(encode_rgb(np.zeros((4, 8, 3), np.uint8)))
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data/linked").symlink_to(tmp_path)
+    for read in (read_rgb, read_plain):
+        with pytest.raises(DatasetError, match=r"is not a path inside a dataset|leads outside the dataset"):
+            read(tmp_path / "data", relative)

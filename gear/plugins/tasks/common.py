@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.contracts.tasks import Sample
+from gear.dataset.files import inside
 from gear.dataset.plausible import check_numbers
 from gear.formats.png import decode_plain, decode_rgb
 from gear.groundtruth.surfaces import observe_surfaces
@@ -81,7 +82,7 @@ def read_rgb(root: Path, relative: str, record: SceneRecord | None = None, view:
     """A colour picture of a dataset: of one view of a record, where that is named, and of its size then.
 
     Raises:
-        DatasetError: it is not there, damaged, or of another size than the view.
+        DatasetError: it is not there, outside of the dataset, damaged, or of another size than the view.
     """
     picture = _read(root, relative, decode_rgb)
     if record is not None:
@@ -109,7 +110,7 @@ def read_plain(root: Path, relative: str) -> npt.NDArray[Any]:
     """A label or depth picture of whatever size.
 
     Raises:
-        DatasetError: it is not there, or damaged.
+        DatasetError: it is not there, outside of the dataset, or damaged.
     """
     return _read(root, relative, decode_plain)
 
@@ -122,14 +123,15 @@ def _check_size(path: Path, picture: npt.NDArray[Any], record: SceneRecord, view
 
 
 def _read(root: Path, relative: str, decode: Callable[[bytes], npt.NDArray[Any]]) -> npt.NDArray[Any]:
+    path = inside(root, relative)
     try:
-        return decode((root / relative).read_bytes())
+        return decode(path.read_bytes())
     except FileNotFoundError as error:
-        raise DatasetError(root / relative, f"is gone; {REPAIR}") from error
+        raise DatasetError(path, f"is gone; {REPAIR}") from error
     except OSError as error:
-        raise DatasetError(root / relative, error.strerror or str(error)) from error
+        raise DatasetError(path, error.strerror or str(error)) from error
     except ValueError as error:
-        raise DatasetError(root / relative, f"{error}; {REPAIR}") from error
+        raise DatasetError(path, f"{error}; {REPAIR}") from error
 
 
 def draw_surfaces(picture: UInt8Image, sample: Sample, camera: str) -> None:
