@@ -40,7 +40,7 @@ def open_dataset(path: str | Path, split: str | None = None) -> Dataset[Any]:
             raise DatasetError(root, f"holds several splits ({', '.join(names)}); say which")
         split = names[0]
     plan = plan_of(root, split)
-    manifest = read_manifest(root, split)
+    manifest = read_manifest(root, plan)
     _, task = build_task(name_of_task(plan.task), parse_text(_as_yaml(plan.options), f"{root} options"))
     return Dataset(root=root, plan=plan, task=task, manifest=manifest)
 

@@ -106,15 +106,18 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
         return path.is_file() and sha256(read_bytes(path)) == digest
 
 
-def read_manifest(root: Path, split: str) -> Json:
+def read_manifest(root: Path, plan: Plan) -> Json:
     """The manifest of a finished split.
 
     Raises:
-        DatasetError: it is not there, because the split is not finished, or does not say which files there are.
+        DatasetError: it is not there or has not the samples of the plan, because the split is not finished, or
+            does not say which files there are.
     """
+    split = plan.info.split
     path = inside(root, manifest_path(split))
+    finish = "run its `gear collect` again to complete it"
     if not path.exists():
-        raise DatasetError(root, f"split {split!r} is not finished; run its `gear collect` again to complete it")
+        raise DatasetError(root, f"split {split!r} is not finished; {finish}")
     manifest = load_json(path)
     remedy = "delete it and run the same collection again"
     try:
@@ -130,6 +133,9 @@ def read_manifest(root: Path, split: str) -> Json:
             from_json(dict[str, str], one, key)
         except FieldError as error:
             raise DatasetError(path, f"is no manifest of this version of gear ({error}); {remedy}") from error
+    if len(samples) != plan.samples:
+        problem = f"split {split!r} is not finished: {plan.samples} samples were begun, its manifest has {len(samples)}"
+        raise DatasetError(root, f"{problem}; {finish}")
     return manifest
 
 

@@ -64,6 +64,11 @@ def test_more_samples_are_added_and_fewer_are_refused(tmp_path: Path) -> None:
     store = Store(tmp_path, plan(samples=3))
     store.open({})
     assert store.missing() == [2]
+    refusal = "split 'test' is not finished: 3 samples were begun, its manifest has 2; run its `gear collect` again"
+    with pytest.raises(DatasetError, match=refusal):
+        open_dataset(tmp_path)
+    with pytest.raises(DatasetError, match=refusal):
+        export(tmp_path, layout="kitti-depth", out=tmp_path / "tree")
     fill(tmp_path, plan(samples=3))
     assert len(open_dataset(tmp_path)) == 3
     with pytest.raises(DatasetError, match="was begun with 3 samples, 2 were asked for; use another --out, or --force"):

@@ -164,6 +164,8 @@ def test_what_learnt_from_more_samples_is_another_defense(small: Small, learner:
     (path,) = fewer.glob("gear/*/manifest.json")
     manifest = json.loads(path.read_text())
     path.write_text(json.dumps(manifest | {"samples": manifest["samples"][:1]}))
+    plan = path.with_name("plan.json")
+    plan.write_text(json.dumps(json.loads(plan.read_text()) | {"samples": 1}))
     facts: dict[str, Any] = {"model": "tiny_segmenter", "defense": "learner"}
     evaluate(small(), calibration=fewer, out=tmp_path / "figures", resamples=0, **facts)
     with pytest.raises(GearError, match=r"something else \(calibration_samples.*1.*2.*use another --out"):
