@@ -29,6 +29,11 @@ ORIGINAL_KEYS = frozenset(
 )
 ORIGINAL_ONLY = frozenset(("basepath", "town_name", "billboard", "patch_folder"))
 SIMULATION_NAMES = ("SEED_VALUES", "ITERATION_VALUES", "MAX_VEHICLE_NPC", "MAX_WALKER_NPC")
+TABLES = SIMULATION_NAMES[:2]
+LOOKS = frozenset(("copy", "get", "items", "keys", "values"))
+READERS = frozenset(("dict", "len", "list", "max", "min", "print", "repr", "set", "sorted", "str", "sum", "tuple"))
+"""Methods of dictionaries and functions that leave what they are given as it is."""
+
 COMPUTED = "is computed, and gear runs no configs; write it as YAML: `splits: {test: {seed: 363, samples: 50}}`"
 TASKS = {"ss": "semseg", "2dod": "detect2d", "3dod": "stereo3d", "depth": "depth"}
 TOWNS = {"Town10HD": "town10", "Town10HD_Opt": "town10"}
@@ -101,11 +106,11 @@ def simulation_from_python(path: Path) -> Mapping:
     """The original's `simulation_configs.py` as gear's simulation config. Nothing of it is run.
 
     Only plain assignments of literals are understood (`SEED_VALUES`, `ITERATION_VALUES`, `MAX_VEHICLE_NPC`,
-    `MAX_WALKER_NPC`); everything else in the file is passed over.
+    `MAX_WALKER_NPC`); everything else in the file is passed over, unless it may change one of those four.
 
     Raises:
-        ConfigError: the file is not Python, or one of those four is computed instead of written; the text to write in
-            its place is in the message.
+        ConfigError: the file is not Python, or one of those four is computed instead of written or may be changed
+            elsewhere, of which the message says what to write in its place; or a seed has no count.
     """
     try:
         tree = ast.parse(text_of(path))
@@ -113,19 +118,47 @@ def simulation_from_python(path: Path) -> Mapping:
         line = getattr(error, "lineno", None) or 0
         raise ConfigError(path, line, 1, "", "is not Python; write a YAML simulation config instead") from error
     wanted: dict[str, Node] = {}
+    plain: set[ast.AST] = set()
     for statement in tree.body:
-        if isinstance(statement, ast.Assign):
-            target, value = statement.targets[0], statement.value
-        elif isinstance(statement, ast.AnnAssign) and statement.value is not None:
-            target, value = statement.target, statement.value
+        if isinstance(statement, ast.Assign) and len(statement.targets) == 1:
+            target = statement.targets[0]
+        elif isinstance(statement, ast.AnnAssign):
+            target = statement.target
         else:
             continue
-        if isinstance(target, ast.Name) and target.id in SIMULATION_NAMES:
+        plain.add(target)
+        if isinstance(target, ast.Name) and target.id in SIMULATION_NAMES and statement.value is not None:
             try:
-                wanted[target.id] = _node_of(value, path)
+                wanted[target.id] = _node_of(statement.value, path)
             except (ValueError, TypeError, SyntaxError, MemoryError, RecursionError) as error:
                 raise _place(statement, path).error(target.id, COMPUTED) from error
+    for parent in ast.walk(tree):
+        for node in ast.iter_child_nodes(parent):
+            if node in plain:
+                continue
+            if isinstance(node, ast.Name) and node.id in SIMULATION_NAMES and _may_change(node, parent):
+                raise _place(node, path).error(node.id, COMPUTED)
+            if isinstance(node, ast.alias) and (node.asname or node.name) in SIMULATION_NAMES:
+                raise _place(node, path).error(node.asname or node.name, COMPUTED)
     return _simulation(path, wanted)
+
+
+def _may_change(name: ast.Name, parent: ast.AST) -> bool:
+    """Whether what a name stands for may be another after it is mentioned there."""
+    if not isinstance(name.ctx, ast.Load):
+        return True
+    if name.id not in TABLES:
+        return False
+    match parent:
+        case ast.Subscript(value=held):
+            return held is not name or not isinstance(parent.ctx, ast.Load)
+        case ast.Attribute(attr=method):
+            return method not in LOOKS
+        case ast.Call(func=ast.Name(id=function)):
+            return function not in READERS
+        case ast.For(iter=held) | ast.comprehension(iter=held):
+            return held is not name
+    return not isinstance(parent, ast.BinOp | ast.Compare | ast.FormattedValue)
 
 
 def _node_of(expression: ast.expr, path: Path) -> Node:
@@ -144,7 +177,7 @@ def _node_of(expression: ast.expr, path: Path) -> Node:
     return Mapping(entries, _place(expression, path))
 
 
-def _place(found: ast.expr | ast.stmt, path: Path) -> Place:
+def _place(found: ast.expr | ast.stmt | ast.alias, path: Path) -> Place:
     return Place(str(path), found.lineno, found.col_offset + 1)
 
 
@@ -157,7 +190,7 @@ def _simulation(path: Path, wanted: dict[str, Node]) -> Mapping:
     splits: dict[str, tuple[Place, Node]] = {}
     for split, (place, seed) in seeds.entries.items():
         if split not in counts.entries:
-            continue
+            raise place.error(f"SEED_VALUES.{split}", "has no count in ITERATION_VALUES; add one, or take the seed out")
         entries = {"seed": (place, seed), "samples": counts.entries[split]}
         if split == "video":
             entries["frames"] = (place, Scalar("105", False, place))

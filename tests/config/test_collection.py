@@ -183,6 +183,55 @@ def test_mistakes_in_the_original_simulation_config_stand_in_its_own_lines(tmp_p
         load_simulation(str(file))
 
 
+@pytest.mark.parametrize(
+    ("more", "where"),
+    [
+        ("ITERATION_VALUES['test'] = 10", "3:1: ITERATION_VALUES"),
+        ("ITERATION_VALUES['test'] += 10", "3:1: ITERATION_VALUES"),
+        ("del SEED_VALUES['test']", "3:5: SEED_VALUES"),
+        ("ITERATION_VALUES.update(test=10)", "3:1: ITERATION_VALUES"),
+        ("ITERATION_VALUES |= {'test': 10}", "3:1: ITERATION_VALUES"),
+        ("if True:\n    ITERATION_VALUES = {'test': 10}", "4:5: ITERATION_VALUES"),
+        ("X = ITERATION_VALUES = {'test': 10}", "3:5: ITERATION_VALUES"),
+        ("ITERATION_VALUES = X = {'test': 10}", "3:1: ITERATION_VALUES"),
+        ("X, SEED_VALUES = 1, {'test': 10}", "3:4: SEED_VALUES"),
+        ("X = ITERATION_VALUES\nX['test'] = 10", "3:5: ITERATION_VALUES"),
+        ("dict.update(ITERATION_VALUES, test=10)", "3:13: ITERATION_VALUES"),
+        ("halve(ITERATION_VALUES)", "3:7: ITERATION_VALUES"),
+        ("for MAX_VEHICLE_NPC in (1, 2):\n    pass", "3:5: MAX_VEHICLE_NPC"),
+        ("from others import counts as ITERATION_VALUES", "3:20: ITERATION_VALUES"),
+    ],
+)
+def test_an_original_simulation_config_that_changes_what_it_says_is_refused(
+    tmp_path: Path, more: str, where: str
+) -> None:
+    """Counts would be others than CARLA-GeAR's, and nobody would be told."""
+    file = tmp_path / "sim.py"
+    file.write_text(f"SEED_VALUES = {{'test': 5}}\nITERATION_VALUES = {{'test': 50}}\n{more}\n")
+    with pytest.raises(ConfigError, match=f"sim.py:{where}: is computed.*write it as YAML"):
+        load_simulation(str(file))
+
+
+def test_an_original_simulation_config_may_look_at_what_it_says(tmp_path: Path) -> None:
+    file = tmp_path / "sim.py"
+    file.write_text(
+        "SEED_VALUES: dict\nSEED_VALUES = {'test': 5}\nITERATION_VALUES = {'test': 4}\n"
+        "ITERATION_VALUES = {'test': 50}\nMAX_VEHICLE_NPC = 3\nN = ITERATION_VALUES['test']\n"
+        "print(SEED_VALUES, f'{ITERATION_VALUES}', MAX_VEHICLE_NPC)\n"
+        "for split in SEED_VALUES:\n    assert split in ITERATION_VALUES and ITERATION_VALUES.get(split)\n"
+        "MORE = ITERATION_VALUES | {'test': 7}\nMOST = [2 * n for n in ITERATION_VALUES.values()] + [MAX_VEHICLE_NPC]\n"
+    )
+    simulation = load_simulation(str(file))
+    assert simulation.splits == {"test": SplitConfig(seed=5, samples=50)} and simulation.max_vehicles == 3
+
+
+def test_a_seed_without_a_count_is_told(tmp_path: Path) -> None:
+    file = tmp_path / "sim.py"
+    file.write_text("SEED_VALUES = {\n    'test': 5,\n    'val': 6,\n}\nITERATION_VALUES = {'test': 50}\n")
+    with pytest.raises(ConfigError, match=r"sim.py:3:5: SEED_VALUES.val: has no count in ITERATION_VALUES; add one"):
+        load_simulation(str(file))
+
+
 def test_a_config_that_nobody_can_look_at_is_one_line() -> None:
     for name in ("a" * 300, f"{'a' * 300}.yml"):
         with pytest.raises(ConfigError, match=f"^{name}: cannot read it: File name too long"):
