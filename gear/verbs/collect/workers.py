@@ -24,6 +24,9 @@ from gear.verbs.collect.session import open_session
 SILENCE_S = 600.0
 """A pool that finishes nothing for so long is taken for hung (drivers do hang); slow machines need seconds a sample."""
 
+INTERRUPTED = 130
+"""What a worker that was interrupted ends with: its sample is missing."""
+
 
 def collect_in_processes(job: Job, indices: Sequence[int], workers: int, done: Callable[[int], None]) -> None:
     """As `collect_samples`, shared out among processes. Who makes which sample changes nothing in its bytes.
@@ -72,11 +75,12 @@ def _listen(
 ) -> None:
     finished, silent_s = 0, 0.0
     while finished < total:
+        have_ended = all(p.exitcode is not None for p in processes)  # asked first: all that they said is there by now
         try:
             kind, content = reports.get(timeout=1.0)
         except queue.Empty:
             silent_s += 1.0
-            dead = [p for p in processes if p.exitcode not in (None, 0)]
+            dead = [p for p in processes if have_ended or p.exitcode not in (None, 0)]
             if dead:
                 raise BackendError(
                     job.config.renderer,
@@ -115,7 +119,7 @@ def _work(job: Job, indices: list[int], position: Any, reports: Queue[tuple[str,
         with open_session(job) as session:
             collect_samples(session, Store(job.root, job.plan), remaining(), lambda i: reports.put(("done", i)))
     except KeyboardInterrupt:
-        return
+        sys.exit(INTERRUPTED)  # nobody hears it where the parent is interrupted, too
     except GearError as error:
         reports.put(("error", _portable(error)))
 
