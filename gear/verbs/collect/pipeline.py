@@ -17,14 +17,15 @@ def collect_samples(session: Session, store: Store, indices: Iterable[int], done
     """Makes and writes the samples; `done` hears of each one when its last file is in place.
 
     Raises:
-        GearError: the first one that comes up; what was finished before it stays.
+        GearError: the first one that comes up; what was finished before it stays. Of two at once, the earlier sample's.
     """
     waiting: deque[tuple[int, Future[None]]] = deque()
 
     def settle(most: int) -> None:
         while len(waiting) > most:
-            index, future = waiting.popleft()
+            index, future = waiting[0]
             future.result()
+            waiting.popleft()
             done(index)
 
     with ThreadPoolExecutor(max_workers=1, thread_name_prefix="gear-writer") as writer:
@@ -34,8 +35,12 @@ def collect_samples(session: Session, store: Store, indices: Iterable[int], done
                 settle(IN_FLIGHT - 1)
                 waiting.append((index, writer.submit(_write, session, store, shot)))
             settle(0)
-        except BaseException:
+        except BaseException as error:
             writer.shutdown(wait=True, cancel_futures=True)
+            if isinstance(error, Exception):  # an interrupt stays one
+                for _, future in waiting:
+                    if not future.cancelled():
+                        future.result()
             raise
 
 
