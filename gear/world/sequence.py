@@ -18,9 +18,6 @@ from gear.world.routes import Route, drive_on, driven_pose, vehicle_pose
 from gear.world.spawn import Draft
 from gear.world.traffic import Driver, Traffic, Walker, vehicle_discs
 
-REHEARSALS = 8
-"""A sequence is driven, who overlaps is taken out, and it is driven again, at most so many times."""
-
 ROOM_M = 80.0
 SLOWEST_MPS = 1.5
 CYCLING_MPS = 5.5
@@ -52,21 +49,24 @@ class Director:
         self._junctions = Junctions(lanes)
 
     def drive(self, cast: Cast, seed: int, sequence: int, frames: int, interval_s: float) -> list[Moment]:
-        """All frames of a sequence; who would overlap is taken out of the cast.
+        """All frames of a sequence.
+
+        It is driven, who overlaps is taken out of the cast, and it is driven again, until nobody does. So there may be
+        fewer on the road than the least count of the scene's limits, which holds for who is placed.
 
         Raises:
             PlacementError: the ego car itself cannot drive without an overlap.
         """
-        for _ in range(REHEARSALS):
+        while True:
             moments, offender = self._rehearse(cast, seed, sequence, frames, interval_s)
             if offender is None:
                 return moments
             if offender in cast.leads:
-                break
+                raise PlacementError(
+                    self._scene_name,
+                    f"sequence {sequence}: the ego car cannot drive {frames} frames without an overlap",
+                )
             cast.drop(offender)
-        raise PlacementError(
-            self._scene_name, f"sequence {sequence}: the ego car cannot drive {frames} frames without an overlap"
-        )
 
     def _rehearse(
         self, cast: Cast, seed: int, sequence: int, frames: int, interval_s: float

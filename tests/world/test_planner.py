@@ -6,6 +6,7 @@ import dataclasses
 import itertools
 import math
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import mujoco
@@ -19,8 +20,10 @@ from gear.values.geometry import wrap_angle_rad
 from gear.values.scene import ActorRecord, SceneRecord
 from gear.values.serial import from_json, to_json
 from gear.world import spawn
+from gear.world.cast import Cast
 from gear.world.planner import ScenePlanner
 from gear.world.scene_spec import EgoLimits, NpcLimits, SceneSpec, VehicleLimits
+from gear.world.sequence import Director
 from gear.world.world import World
 
 SCENES = ("board", "double", "truck", "no_billboard")
@@ -357,6 +360,31 @@ def test_sequences_drive_without_overlaps(scene: str) -> None:
         assert centre_m[2] > 0
         assert 0 < u < camera.width_px
         assert 0 < v < camera.height_px
+
+
+def test_a_busy_sequence_is_driven_until_nobody_overlaps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After the eighth who was in the way, it was the ego car that could not drive."""
+    rehearse, clashes = Director._rehearse, 0
+
+    def clash(self: Director, cast: Cast, *rest: Any) -> Any:
+        nonlocal clashes
+        others = [body for body in cast.drafts if body not in cast.leads]
+        if len(others) == 1:
+            return rehearse(self, cast, *rest)
+        clashes += 1
+        return [], others[-1]
+
+    scene = tiny_scenes().scenes["no_billboard"]
+    busy = dataclasses.replace(
+        scene, npc_vehicles=VehicleLimits(count=(5, 5)), pedestrians=NpcLimits(count=(12, 12), radius_m=(0.0, 60.0))
+    )
+    world = World.build(town=TINY_TOWN, scene_name="busy", scene=busy, weather=CLEAR)
+    monkeypatch.setattr(Director, "_rehearse", clash)
+    assert len(ScenePlanner(world, SMALL_RIG, DRIVE, split_name="video").plan(59).actors) == 2
+    assert clashes == 16
+    monkeypatch.setattr(Director, "_rehearse", lambda self, cast, *_: ([], next(iter(cast.leads))))
+    with pytest.raises(PlacementError, match="sequence 0: the ego car cannot drive 60 frames without an overlap"):
+        ScenePlanner(world, SMALL_RIG, DRIVE, split_name="video").plan(0)
 
 
 def test_who_drives_beside_the_middle_of_a_lane_drives_evenly() -> None:
