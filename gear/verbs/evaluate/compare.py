@@ -11,12 +11,25 @@ import numpy as np
 
 from gear.contracts.evaluation import Draws
 from gear.contracts.tasks import CONTROLS, NO_PATCH
-from gear.dataset.reading import Dataset
+from gear.dataset.reading import Dataset, scenes_of
 from gear.values.errors import DatasetError
 from gear.verbs.evaluate.figures import said_of
 from gear.verbs.evaluate.report import Difference, Estimate, PairedTest, RowReport, Together
 from gear.verbs.evaluate.scoring import Note, Scorer
-from gear.verbs.evaluate.spread import Figures, Values, auroc, auroc_interval, bounds, draw, gather, paired_p
+from gear.verbs.evaluate.spread import (
+    Figures,
+    Values,
+    auroc,
+    auroc_interval,
+    bounds,
+    clustered,
+    draw_clusters,
+    gather,
+    paired_p,
+)
+
+Street = tuple[str, int, int]
+"""What a sample shows, in whatever weather: `town/scene`, the seed, the sample's number."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -28,6 +41,7 @@ class Measured:
         dataset: itself.
         scorer: that measured it.
         notes: of its samples, in order.
+        streets: that they show. Samples of one street are no independent ones.
         made: how many of them were predicted now.
         damaged: what was kept of some of them and could not be read.
         spreads: figures that were gathered before, by report and number of samples: resampling takes long.
@@ -37,6 +51,7 @@ class Measured:
     dataset: Dataset[Any]
     scorer: Scorer
     notes: list[Note]
+    streets: list[Street]
     made: int
     damaged: tuple[DatasetError, ...]
     spreads: dict[tuple[str, int], Figures] = field(default_factory=dict, repr=False)
@@ -48,13 +63,19 @@ class Measured:
         if key not in self.spreads:
             parts = [note.parts[report] for note in notes]
             held = partial(said_of, self.dataset.plan, method="result")
-            self.spreads[key] = gather(self.scorer.makers[report], parts, draw(len(notes), resamples, seed), held)
+            draws = draw_clusters(self.streets[:count], resamples, seed)
+            self.spreads[key] = gather(self.scorer.makers[report], parts, draws, held)
         return self.spreads[key]
 
     @property
     def patch(self) -> str:
         """Label of what its surfaces show."""
         return self.dataset.plan.info.patch_label
+
+
+def streets_of(dataset: Dataset[Any]) -> list[Street]:
+    """Of each sample: no weather, renderer or patch decides where the cars are."""
+    return [(*scenes_of(dataset), number) for number in range(len(dataset))]
 
 
 def row_report(row: Measured, seed: int, resamples: int) -> RowReport:
@@ -142,7 +163,8 @@ def figures_of(row: Measured, seed: int, resamples: int) -> dict[str, dict[str, 
 def as_one(name: str, members: Sequence[Measured]) -> Measured:
     """Several datasets as if they were one of this name; what is not a sample's is the first one's."""
     notes = [note for row in members for note in row.notes]
-    return replace(members[0], name=name, notes=notes, spreads={})
+    streets = [street for row in members for street in row.streets]
+    return replace(members[0], name=name, notes=notes, streets=streets, spreads={})
 
 
 def compared(rows: Sequence[Measured], seed: int, resamples: int) -> Iterable[Difference]:
@@ -157,7 +179,7 @@ def compared(rows: Sequence[Measured], seed: int, resamples: int) -> Iterable[Di
 def difference(row: Measured, other: Measured, seed: int, resamples: int) -> Difference:
     """What samples of one become in their twins, as far as both have them."""
     count = min(len(row.notes), len(other.notes))
-    here, there = row.notes[:count], other.notes[:count]
+    here, there, streets = row.notes[:count], other.notes[:count], row.streets[:count]
     return Difference(
         row=row.name,
         against=other.name,
@@ -167,8 +189,8 @@ def difference(row: Measured, other: Measured, seed: int, resamples: int) -> Dif
             )
             for report in row.scorer.makers
         },
-        auroc=_auroc(here, there, draw(count, resamples, seed)),
-        paired={report: _tested(here, there, report, seed) for report in row.scorer.makers},
+        auroc=_auroc(here, there, draw_clusters(streets, resamples, seed)),
+        paired={report: _tested(here, there, streets, report, seed) for report in row.scorer.makers},
     )
 
 
@@ -182,7 +204,9 @@ def _paired(one: Figures, other: Figures) -> dict[str, Estimate]:
     return found
 
 
-def _tested(here: list[Note], there: list[Note], report: str, seed: int) -> dict[str, PairedTest]:
+def _tested(
+    here: list[Note], there: list[Note], streets: list[Street], report: str, seed: int
+) -> dict[str, PairedTest]:
     """Of every figure that a single sample of the report has."""
     names = list(dict.fromkeys(name for note in here for name in note.figures[report]))
     ours, theirs = (
@@ -190,9 +214,10 @@ def _tested(here: list[Note], there: list[Note], report: str, seed: int) -> dict
         for notes in (here, there)
     )
     differences = _finite(ours) - _finite(theirs)
+    found = paired_p(clustered(differences, streets), seed)
     return {
         name: PairedTest(mean=_known_mean(values), p=float(p), pairs=int(np.isfinite(values).sum()))
-        for name, values, p in zip(names, differences.T, paired_p(differences, seed), strict=True)
+        for name, values, p in zip(names, differences.T, found, strict=True)
     }
 
 

@@ -23,7 +23,7 @@ from gear.verbs.evaluate.choice import (
     chosen_defense,
     chosen_model,
 )
-from gear.verbs.evaluate.compare import Measured, compared, drive_note, row_report, together
+from gear.verbs.evaluate.compare import Measured, compared, drive_note, row_report, streets_of, together
 from gear.verbs.evaluate.opened import opened, row_names
 from gear.verbs.evaluate.player import Player
 from gear.verbs.evaluate.pools import Pools, check_pools, pooled
@@ -69,7 +69,7 @@ def evaluate(
     Under `out` lie results.json, table.txt, and for each dataset a folder with the predictions in the format's own
     result layout and a note of each sample. Samples that have one are never predicted again, unless what was kept of
     them is damaged (`RowReport.damaged`). Datasets that differ in nothing but their patch are compared sample by
-    sample. Intervals are of 95 %, by bootstrap over samples.
+    sample. Intervals are of 95 %, by bootstrap over samples; those that show one street are drawn together.
 
     Args:
         data: roots of datasets, or folders of roots, all of one task; `DIR:SPLIT` says which split of one.
@@ -130,7 +130,15 @@ def evaluate(
             row = evaluate_row(dataset, scorer, player, batch=size, workers=workers, told=told)
             scorer.finish(row.notes)
             rows.append(
-                Measured(name=name, dataset=dataset, scorer=scorer, notes=row.notes, made=row.made, damaged=row.damaged)
+                Measured(
+                    name=name,
+                    dataset=dataset,
+                    scorer=scorer,
+                    notes=row.notes,
+                    streets=streets_of(dataset),
+                    made=row.made,
+                    damaged=row.damaged,
+                )
             )
         said = [note for one in datasets for note in (size_note(chosen, one), drive_note(one), learnt.note(one))]
         notes = [*learnt.doubts(), *(note for note in said if note)]

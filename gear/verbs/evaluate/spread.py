@@ -1,8 +1,11 @@
-"""How sure a figure is: bootstrap over samples (Efron 1979), 95 % by percentiles; sign flips for pairs of samples."""
+"""How sure a figure is: bootstrap over samples (Efron 1979), 95 % by percentiles; sign flips for pairs of samples.
+
+Samples that show the same street are a cluster: they are drawn, and their differences flipped, together.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,6 +26,9 @@ FLIPS_AT_ONCE = 1_000
 
 ROUNDING = 1e-9
 """Sums that differ by less than this share of what they are made of are equal."""
+
+FILLED = -1
+"""Where a draw of clusters comes to fewer samples than another one, in place of a sample's number."""
 
 AnyEvaluator = Evaluator[Any, Any]
 Values = npt.NDArray[np.float64]
@@ -56,6 +62,31 @@ def draw(count: int, resamples: int, seed: int) -> Draws:
     return derive_rng(seed, "bootstrap", count).integers(0, max(count, 1), (rows, count), dtype=np.int64)
 
 
+def draw_clusters(clusters: Sequence[Hashable], resamples: int, seed: int) -> Draws:
+    """(resamples, N) numbers of samples: clusters are drawn, and with each all of its samples (Field and Welsh 2007).
+
+    Where no two samples are of one cluster, this is `draw`. Where clusters differ in size, so do draws: `FILLED` is not
+    a sample.
+
+    Args:
+        clusters: of each sample, the one that it belongs to.
+        resamples: so many draws.
+        seed: of them.
+    """
+    owners = _numbered(clusters)
+    sizes = np.bincount(owners)
+    members = np.full((len(sizes), sizes.max(initial=0)), FILLED, np.int64)
+    members[np.arange(members.shape[1]) < sizes[:, None]] = np.argsort(owners, kind="stable")
+    drawn = draw(len(members), resamples, seed)
+    return members[drawn].reshape(len(drawn), members.size)
+
+
+def _numbered(clusters: Sequence[Hashable]) -> npt.NDArray[np.int64]:
+    """Their numbers, in the order in which they first occur."""
+    known: dict[Hashable, int] = {}
+    return np.array([known.setdefault(one, len(known)) for one in clusters], np.int64)
+
+
 def gather(
     fresh: Callable[[], AnyEvaluator],
     parts: Sequence[AnyEvaluator],
@@ -67,7 +98,7 @@ def gather(
     Args:
         fresh: makes an empty evaluator.
         parts: in order of samples.
-        draws: (R, len(parts)).
+        draws: (R, N), as drawn.
         held: takes what an evaluator says of all parts, and holds it to the contract.
     """
     whole = fresh()
@@ -77,18 +108,36 @@ def gather(
     ceilings = dict(whole.ceilings()) if isinstance(whole, Limited) else {}
     if not draws.size:
         return Figures(overall=overall, spread={}, ceilings=ceilings)
+    spread: dict[str, Values] = {}
+    counts = (draws != FILLED).sum(axis=1)
+    for count in np.unique(counts):  # evaluators want as many samples in every draw
+        rows = np.flatnonzero(counts == count)
+        block = draws[rows]
+        block = block[block != FILLED].reshape(len(rows), count)
+        for name, values in _spread(fresh, whole, parts, block, overall).items():
+            spread.setdefault(name, np.full(len(draws), np.nan))[rows] = values
+    return Figures(overall=overall, spread=spread, ceilings=ceilings)
+
+
+def _spread(
+    fresh: Callable[[], AnyEvaluator],
+    whole: AnyEvaluator,
+    parts: Sequence[AnyEvaluator],
+    draws: Draws,
+    names: Iterable[str],
+) -> Mapping[str, Values]:
+    """(R,) figures over each draw, by the quickest way that the evaluator of all parts has."""
     if isinstance(whole, Resampled):
-        return Figures(overall=overall, spread=dict(whole.resampled(draws)), ceilings=ceilings)
+        return whole.resampled(draws)
     if isinstance(whole, Additive):
-        return Figures(overall=overall, spread=dict(whole.figures(_added(parts, draws))), ceilings=ceilings)
+        return whole.figures(_added(parts, draws))
     rows = []
     for drawn in draws:
         one = fresh()
         for index in drawn:
             one.merge(parts[index])
         rows.append(one.result())
-    spread = {name: np.array([row.get(name, np.nan) for row in rows]) for name in overall}
-    return Figures(overall=overall, spread=spread, ceilings=ceilings)
+    return {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
 
 
 def _added(parts: Sequence[Any], draws: Draws) -> dict[str, npt.NDArray[Any]]:
@@ -123,7 +172,21 @@ def auroc(positives: Sequence[float], negatives: Sequence[float]) -> float:
 def auroc_interval(positives: Sequence[float], negatives: Sequence[float], draws: Draws) -> tuple[float, float] | None:
     """Its bounds over the pairs of twins that `draws` chooses."""
     high, low = np.asarray(positives), np.asarray(negatives)
-    return bounds(np.array([auroc(high[drawn], low[drawn]) for drawn in draws]))
+    known = [drawn[drawn != FILLED] for drawn in draws]
+    return bounds(np.array([auroc(high[drawn], low[drawn]) for drawn in known]))
+
+
+def clustered(differences: Values, clusters: Sequence[Hashable]) -> Values:
+    """(C, F) sums over the clusters of (N, F) differences, for `paired_p`: the signs of one cluster flip together.
+
+    NaN where no difference of a cluster is known; what only rounding keeps from 0 is 0.
+    """
+    owners = _numbered(clusters)
+    known = np.where(np.isnan(differences), 0.0, differences)
+    sums, sizes, counts = (np.zeros((owners.max(initial=-1) + 1, differences.shape[1])) for _ in range(3))
+    for total, values in ((sums, known), (sizes, np.abs(known)), (counts, ~np.isnan(differences))):
+        np.add.at(total, owners, values)
+    return np.where(counts > 0, np.where(np.abs(sums) > ROUNDING * sizes, sums, 0.0), np.nan)
 
 
 def paired_p(differences: Values, seed: int) -> Values:
@@ -136,7 +199,8 @@ def paired_p(differences: Values, seed: int) -> Values:
     Unlike Wilcoxon's test this looks at the mean, which is what is reported, and has no trouble with ties.
 
     Args:
-        differences: (N, F), a column a figure; NaN where a sample has no value and does not count.
+        differences: (N, F), a column a figure; NaN where a sample has no value and does not count. Where some of them
+            are not independent, of clusters (`clustered`).
         seed: of the drawn patterns.
 
     Returns:

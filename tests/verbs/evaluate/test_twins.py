@@ -83,6 +83,37 @@ def test_pools_are_datasets_that_count_as_one(tmp_path: Path, small: Small, inst
             evaluate(every, model="odd", out=tmp_path / "wrong", pools=wrong)
 
 
+def test_a_street_in_two_weathers_is_no_two_streets(tmp_path: Path, install: Install) -> None:
+    """The network errs by the street, whatever the weather: the second weather says nothing that the first does not."""
+    roots: dict[tuple[str, str], Path] = {}
+    for weather in ("ClearNoon", "CloudyNoon"):
+        for patch in ("none", "random"):
+            roots[weather, patch] = tmp_path / f"{weather}-{patch}"
+            collect(
+                "depth", town=TINY_TOWN, scene="board", split="debug", samples=4, seed=3, renderer="classic",
+                quality="fast", patch=patch, out=roots[weather, patch],
+                settings=[f"scenes={TINY_SCENES}", f"weather={weather}", *size_settings("depth")],
+            )  # fmt: skip
+    every = list(roots.values())
+    patched = {Oracle.key(s.images) for (_, patch), r in roots.items() if patch != "none" for s in gear.open_dataset(r)}
+
+    def by_street(sample: Any, prediction: Any) -> Any:
+        return prediction + 1 + (2 + sample.record.index**2) * (Oracle.key(sample.images) in patched)
+
+    install(model_spec(lambda _: Oracle(every, by_street), "depth"))
+    pools = {patch: [roots[weather, patch] for weather in ("ClearNoon", "CloudyNoon")] for patch in ("none", "random")}
+    report = evaluate(every, model="odd", out=tmp_path / "out", resamples=200, pools=pools)
+    one, whole = report.differences[0], report.pools[1].differences[0]
+    assert one.paired["task"]["mae_m"].p == whole.paired["task"]["mae_m"].p == 2 / 2**4
+    assert whole.paired["task"]["mae_m"].pairs == 8
+    together = next(row for row in report.together if row.patch == "random")
+    alone = report.rows[1].figures["task"]["mae_m"].interval
+    assert alone is not None and alone[0] < alone[1] - 1
+    for figures in (report.pools[1].figures, together.figures, whole.figures):
+        wanted = one.figures["task"]["mae_m"].interval if figures is whole.figures else alone
+        assert figures["task"]["mae_m"].interval == pytest.approx(wanted, rel=1e-3)
+
+
 def test_a_pool_counts_nothing_twice_and_leaves_nothing_out(tmp_path: Path) -> None:
     """Samples that count twice make intervals too narrow, and of two splits in one root the last one alone counted."""
     one, other = tmp_path / "one", tmp_path / "other"
