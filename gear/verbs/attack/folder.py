@@ -13,10 +13,11 @@ from safetensors import SafetensorError
 from safetensors.numpy import load as from_bytes
 
 from gear.contracts.attacks import Patch, surface_of
-from gear.dataset.files import clear_scratch, explained, read_bytes, sha256
+from gear.dataset.files import clear_scratch, explained, read_bytes, sha256, write_whole
 from gear.dataset.plan import differences
+from gear.dataset.sidecar import dump_json
 from gear.dataset.store import refuse_dataset
-from gear.values.errors import FieldError, OutdatedError, ReplaceableError
+from gear.values.errors import DatasetError, FieldError, OutdatedError, ReplaceableError
 from gear.values.serial import Json, from_json
 from gear.verbs.attack.watch import CHECKPOINT, is_picture
 from gear.verbs.collect.patches import read_patch
@@ -25,6 +26,9 @@ VERIFY = "verify"
 """Folder of the rendered check, in that of the patches."""
 
 NOTES = "attack.json"
+
+BEGUN = "begun.json"
+"""The plan of an attack that is not finished: its checkpoint has no more than the hash."""
 
 FED = {"data", "validation", "calibration", "calibration_samples"}
 """What of a plan says from what patches are made; the rest says how."""
@@ -43,15 +47,15 @@ TOLD: Any = {
 
 
 def begin(root: Path, plan: Json, *, force: bool) -> Json | None:
-    """The notes of patches that are there already and whole, or nothing.
+    """The notes of patches that are there already and whole, or nothing: then the plan is noted as begun.
 
     Raises:
-        OutdatedError: patches are there that were made in the same way from other samples.
+        OutdatedError: patches are there that were made, or begun, in the same way from other samples.
         ReplaceableError: something else is there, or what is there is broken.
         DatasetError: the disk refuses.
     """
     refuse_dataset(root, "make patches in a folder of their own")
-    finished = root / NOTES
+    finished, wanted = root / NOTES, json.loads(json.dumps(plan))
     if force:
         with explained(root):
             for path in (finished, root / CHECKPOINT, *root.glob("patch_*.png")):
@@ -59,7 +63,6 @@ def begin(root: Path, plan: Json, *, force: bool) -> Json | None:
         shutil.rmtree(root / VERIFY, ignore_errors=True)  # what the patches that go did in the world
     if finished.exists():
         there = _read_notes(finished)
-        wanted = json.loads(json.dumps(plan))
         what = ", ".join(differences({key: there.get(key) for key in wanted}, wanted)[:3])
         if what:
             is_same_way = {key for key in wanted if there.get(key) != wanted[key]} <= FED
@@ -68,6 +71,10 @@ def begin(root: Path, plan: Json, *, force: bool) -> Json | None:
             )
         _check_whole(root, there)
         return there
+    if (root / CHECKPOINT).exists():
+        _check_begun(root, wanted)
+    else:
+        write_whole(root, BEGUN, dump_json(plan))
     return None
 
 
@@ -89,9 +96,30 @@ def read_patches(root: Path) -> tuple[Patch, ...]:
 
 def tidy(root: Path) -> None:
     """Takes away what only an unfinished attack needs."""
-    with contextlib.suppress(FileNotFoundError):
-        (root / CHECKPOINT).unlink()
+    for name in (CHECKPOINT, BEGUN):
+        with contextlib.suppress(FileNotFoundError):
+            (root / name).unlink()
     clear_scratch(root)
+
+
+def _check_begun(root: Path, wanted: Json) -> None:
+    """Whether the checkpoint is not of patches that were begun in the same way from other samples.
+
+    What else it may be of is the checkpoint's to say: it has the hash of its plan.
+
+    Raises:
+        OutdatedError: it is.
+    """
+    try:
+        there = json.loads(read_bytes(root / BEGUN))
+    except (DatasetError, ValueError, RecursionError):
+        return
+    if not isinstance(there, dict):
+        return
+    others = {key for key in there.keys() | wanted.keys() if there.get(key) != wanted.get(key)}
+    if others and others <= FED:
+        what = ", ".join(differences(there, wanted)[:3])
+        raise OutdatedError(root, f"holds an unfinished attack from other samples ({what})")
 
 
 def _read_notes(path: Path) -> Json:

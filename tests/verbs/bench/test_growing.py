@@ -63,6 +63,39 @@ def test_more_pictures_to_attack(tmp_path: Path, written: Callable[..., Path]) -
     assert not again.notes
 
 
+class Leaves(Looks):
+    """Goes away after so many steps of the first attack; 0 for as soon as it is done."""
+
+    def __init__(self, after: int) -> None:
+        super().__init__()
+        self.after, self.attacks = after, False
+
+    def began(self, step: Step, number: int, steps: int) -> None:
+        if self.attacks:
+            raise KeyboardInterrupt
+        self.attacks = step.verb == "attack"
+
+    def progress(self, done: int, total: int) -> None:
+        if self.attacks and done == self.after > 0:
+            raise KeyboardInterrupt
+
+
+def test_more_pictures_to_an_attack_that_was_stopped(
+    tmp_path: Path, written: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gear.verbs.attack.watch.SECONDS_BETWEEN", 0.0)
+    out, looks = tmp_path / "out", Leaves(0)
+    with pytest.raises(KeyboardInterrupt):
+        gear.bench(written(*FEW), out=out, watch=Leaves(1))
+    patch = out / "patches/semseg/small/tiny-board"
+    assert (patch / "checkpoint.safetensors").exists()
+    with pytest.raises(KeyboardInterrupt):
+        gear.bench(written(*FEW, ("attack: 2", "attack: 3")), out=out, watch=looks)
+    (line,) = looks.notes
+    assert line.startswith("attack small of semseg") and "is made again, for what is there holds an unfinished" in line
+    assert (patch / "attack.json").exists() and not (patch / "checkpoint.safetensors").exists()
+
+
 def test_a_bench_that_is_refused_leaves_the_config_of_its_reports(
     tmp_path: Path, written: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
