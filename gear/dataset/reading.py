@@ -110,8 +110,8 @@ def read_manifest(root: Path, plan: Plan) -> Json:
     """The manifest of a finished split.
 
     Raises:
-        DatasetError: it is not there or has not the samples of the plan, because the split is not finished, or
-            does not say which files there are.
+        DatasetError: it is not there, or further samples were begun, so that the split is not finished; or it does
+            not say which files there are.
     """
     split = plan.info.split
     path = inside(root, manifest_path(split))
@@ -133,10 +133,18 @@ def read_manifest(root: Path, plan: Plan) -> Json:
             from_json(dict[str, str], one, key)
         except FieldError as error:
             raise DatasetError(path, f"is no manifest of this version of gear ({error}); {remedy}") from error
-    if len(samples) != plan.samples:
+    if len(samples) != plan.samples and _holds_more(root, split, len(samples)):
         problem = f"split {split!r} is not finished: {plan.samples} samples were begun, its manifest has {len(samples)}"
         raise DatasetError(root, f"{problem}; {finish}")
     return manifest
+
+
+def _holds_more(root: Path, split: str, count: int) -> bool:
+    """Whether there are samples that a manifest of so many does not have: where more were asked for and none was made,
+    a split is as whole as before.
+    """
+    samples = inside(root, sidecar_path(split, 0)).parent
+    return sum(1 for _ in samples.glob("*.json")) > count
 
 
 def scenes_of(dataset: Dataset[Any]) -> tuple[str, int]:

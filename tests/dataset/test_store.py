@@ -64,14 +64,16 @@ def test_more_samples_are_added_and_fewer_are_refused(tmp_path: Path) -> None:
     store = Store(tmp_path, plan(samples=3))
     store.open({})
     assert store.missing() == [2]
-    refusal = "split 'test' is not finished: 3 samples were begun, its manifest has 2; run its `gear collect` again"
+    assert len(open_dataset(tmp_path)) == 2, "nothing has come yet: it is as whole as before"
+    fill(tmp_path, plan(samples=4), [3], is_closed=False)
+    refusal = "split 'test' is not finished: 4 samples were begun, its manifest has 2; run its `gear collect` again"
     with pytest.raises(DatasetError, match=refusal):
         open_dataset(tmp_path)
     with pytest.raises(DatasetError, match=refusal):
         export(tmp_path, layout="kitti-depth", out=tmp_path / "tree")
-    fill(tmp_path, plan(samples=3))
-    assert len(open_dataset(tmp_path)) == 3
-    with pytest.raises(DatasetError, match="was begun with 3 samples, 2 were asked for; use another --out, or --force"):
+    fill(tmp_path, plan(samples=4))
+    assert len(open_dataset(tmp_path)) == 4
+    with pytest.raises(DatasetError, match="was begun with 4 samples, 2 were asked for; use another --out, or --force"):
         Store(tmp_path, plan(samples=2)).open({})
 
 
