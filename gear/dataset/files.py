@@ -77,7 +77,7 @@ def write_whole(root: Path, relative: str, data: bytes) -> None:
                 target.parent.mkdir(parents=True, exist_ok=True)
                 scratch.mkdir(parents=True, exist_ok=True)
                 _write_and_rename(scratch / f"{_host()}-{os.getpid()}-{threading.get_ident()}", target, data)
-            except FileNotFoundError:
+            except (FileNotFoundError, FileExistsError):  # there while it was made, and gone when it was looked at
                 if not left:
                     raise
             else:

@@ -104,6 +104,20 @@ def test_tidying_up_beside_a_writer_costs_nothing(tmp_path: Path) -> None:
     assert len(list(tmp_path.glob("*.bin"))) == 150
 
 
+def test_a_folder_that_goes_while_it_is_made_is_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    mkdir = os.mkdir
+
+    def there_for_a_moment(path: Path, mode: int = 0o777) -> None:
+        if Path(path).name == "scratch":
+            monkeypatch.setattr("os.mkdir", mkdir)
+            raise FileExistsError(errno.EEXIST, "File exists", str(path))
+        mkdir(path, mode)
+
+    monkeypatch.setattr("os.mkdir", there_for_a_moment)
+    write_whole(tmp_path, "a.bin", b"1")
+    assert os.mkdir is mkdir and (tmp_path / "a.bin").read_bytes() == b"1"
+
+
 def test_a_folder_that_another_run_tidies_up_is_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run that closes a split removes its folder of notes; one beside it may just be writing into that."""
     fsync, notes = os.fsync, tmp_path / "gear/test/begun"
