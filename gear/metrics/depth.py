@@ -54,9 +54,8 @@ class DepthEvaluator:
     """Gathers the figures of every picture.
 
     Plain names are the devkit's, over every pixel whose ground truth its 16-bit pictures can say, which end at 256 m,
-    with predictions as far as those pictures can say them;
-    `eigen_` names look at ground truth between 1 mm and `max_depth_m` inside the crop, with predictions clipped to the
-    same range.
+    with predictions as far as those pictures can say them; `eigen_` names look at ground truth between 1 mm and
+    `max_depth_m` inside the crop, with predictions clipped to the same range.
     """
 
     _wants_devkit = True

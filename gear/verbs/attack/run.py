@@ -161,7 +161,8 @@ def attack(
 
 def _note_doubts(job: Job, noted: Callable[[str], None] | None) -> None:
     """Tells of every model that sees the pictures, which are all of one size, larger or smaller than it knows them, and
-    of what may not have been meant in the data that the defense learns from."""
+    of what may not have been meant in the data that the defense learns from.
+    """
     if noted is not None:
         sizes = (size_note(model, job.datasets[0], FLAG) for model in job.models)
         for note in (*sizes, *job.calibration.doubts()):

@@ -47,22 +47,30 @@ def check_options(found: Found, config: TrainConfig) -> None:
 
 def sizes_note(found: Found, config: TrainConfig, samples: Samples) -> str:
     """What to know where pictures have several sizes and the network would have noted one; nothing elsewhere."""
-    widths = sorted({dataset.sidecar(0).record.cameras[0].width_px for dataset in samples.datasets})
-    by_itself = getattr(found.spec.config(), SCALE, 1.0)
-    is_given = isinstance(config.options, Mapping) and SCALE in config.options.entries
-    if len(widths) == 1 or by_itself is not None or is_given:
+    widths_px = _widths_px(samples)
+    if len(widths_px) == 1 or not _notes_share(found, config):
         return ""
     return (
-        f"pictures are {', '.join(map(str, widths))} px wide: the network sees each as it is, and its weights will be"
-        f" used on pictures of the task's own size; --set options.{SCALE}=SHARE says otherwise"
+        f"pictures are {', '.join(map(str, sorted(widths_px)))} px wide: the network sees each as it is, and its"
+        f" weights will be used on pictures of the task's own size; --set options.{SCALE}=SHARE says otherwise"
     )
 
 
 def picture_share(samples: Samples, spec: TaskSpec[Any]) -> float:
     """Width of the pictures as a share of the width that the task has by itself; 1 where there is no saying."""
     usual = getattr(spec.config(), "width_px", None)
-    widths = {dataset.sidecar(0).record.cameras[0].width_px for dataset in samples.datasets}
-    return widths.pop() / usual if usual and len(widths) == 1 else 1.0
+    widths_px = _widths_px(samples)
+    return widths_px.pop() / usual if usual and len(widths_px) == 1 else 1.0
+
+
+def _widths_px(samples: Samples) -> set[int]:
+    return {dataset.sidecar(0).record.cameras[0].width_px for dataset in samples.datasets}
+
+
+def _notes_share(found: Found, config: TrainConfig) -> bool:
+    """Whether the network's weights say at which share of the task's own pictures they are used, and nobody said it."""
+    is_given = isinstance(config.options, Mapping) and SCALE in config.options.entries
+    return getattr(found.spec.config(), SCALE, 1.0) is None and not is_given
 
 
 def with_scale(found: Found, config: TrainConfig, share: float, begun: Json = None) -> TrainConfig:
@@ -77,9 +85,7 @@ def with_scale(found: Found, config: TrainConfig, share: float, begun: Json = No
         share: as of `picture_share`.
         begun: config of the training that is taken up again, which knows what weights said that are gone since.
     """
-    by_itself = getattr(found.spec.config(), SCALE, 1.0)
-    is_given = isinstance(config.options, Mapping) and SCALE in config.options.entries
-    if by_itself is not None or is_given:
+    if not _notes_share(found, config):
         return config
     known = _given_scale(begun) if goes_on_alone(found, config.init, begun) else None
     scale = (known or _scale_of_start(found, config.init)) if share == 1 else 1
