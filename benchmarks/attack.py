@@ -29,9 +29,9 @@ from gear.config.overrides import with_overrides
 from gear.contracts.models import Model
 from gear.plugins.attacks.scene_specific import SceneSpecific, SceneSpecificConfig
 from gear.plugins.build import NO_OPTIONS, build, find
+from gear.readers import open_all
 from gear.values.rng import derive_rng
 from gear.verbs.attack.scenes import Scenes
-from gear.verbs.train.data import open_all
 
 
 def main() -> None:

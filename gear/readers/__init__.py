@@ -1,7 +1,27 @@
 """Readers: datasets of any task as torch wants them. Needs torch; opening a dataset without it is `gear.opening`."""
 
-from gear.readers.batches import Batch, as_pictures, batches, collate
+from gear.readers.ahead import read_ahead
+from gear.readers.batches import Batch, as_pictures, batches, collate, stacked
+from gear.readers.finding import open_all
+from gear.readers.kept import Kept
 from gear.readers.order import order
-from gear.readers.torch_dataset import Item, TorchDataset, picture_tensor
+from gear.readers.samples import Samples, all_of
+from gear.readers.torch_dataset import Change, Item, TorchDataset, picture_tensor
 
-__all__ = ["Batch", "Item", "TorchDataset", "as_pictures", "batches", "collate", "order", "picture_tensor"]
+__all__ = [
+    "Batch",
+    "Change",
+    "Item",
+    "Kept",
+    "Samples",
+    "TorchDataset",
+    "all_of",
+    "as_pictures",
+    "batches",
+    "collate",
+    "open_all",
+    "order",
+    "picture_tensor",
+    "read_ahead",
+    "stacked",
+]

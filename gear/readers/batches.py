@@ -71,7 +71,7 @@ def batches(
         dataset,
         batch_sampler=chosen,
         num_workers=workers,
-        collate_fn=_collate,
+        collate_fn=stacked,
         prefetch_factor=AHEAD if workers else None,
         multiprocessing_context="spawn" if workers else None,
         generator=torch.Generator(),  # torch would draw from its global one
@@ -86,7 +86,7 @@ def collate(items: Sequence[Item]) -> Batch:
     Raises:
         ValueError: their pictures differ in size.
     """
-    return _finished(_collate(items))
+    return _finished(stacked(items))
 
 
 def as_pictures(views: Mapping[str, Tensor]) -> dict[str, Tensor]:
@@ -94,16 +94,21 @@ def as_pictures(views: Mapping[str, Tensor]) -> dict[str, Tensor]:
     return {name: tensor.float() / 255 for name, tensor in views.items()}
 
 
-def _collate(items: Sequence[Item]) -> Batch:
-    """Still uint8: a quarter of the bytes to send between processes."""
-    stacked = {name: _stack(name, items) for name in items[0].views}
+def stacked(items: Sequence[Item]) -> Batch:
+    """A batch whose pictures are uint8 still: a quarter of the bytes to send between processes, or to a GPU.
+
+    Raises:
+        ValueError: their pictures differ in size.
+    """
+    views = [item.views for item in items]
     return Batch(
-        views=stacked, samples=tuple(item.sample for item in items), indices=tuple(item.index for item in items)
+        views={name: _stack(name, [one[name] for one in views]) for name in views[0]},
+        samples=tuple(item.sample for item in items),
+        indices=tuple(item.index for item in items),
     )
 
 
-def _stack(name: str, items: Sequence[Item]) -> Tensor:
-    tensors = [item.views[name] for item in items]
+def _stack(name: str, tensors: list[Tensor]) -> Tensor:
     sizes = {tuple(tensor.shape[1:]) for tensor in tensors}
     if len(sizes) > 1:
         raise ValueError(f"pictures {name!r} of a batch must have one size, got {sorted(sizes)}")

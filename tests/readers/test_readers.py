@@ -41,8 +41,9 @@ def collect_into(task: str, out: Path) -> CollectReport:
     )  # fmt: skip
 
 
-def upside_down(sample: Any, rng: np.random.Generator) -> Any:
-    """An augmentation that draws."""
+def rolled(sample: Any, index: int, rng: np.random.Generator) -> Any:
+    """An augmentation that draws, and is told which sample it changes."""
+    assert sample.record.index == index
     shift = int(rng.integers(1, 50))
     return dataclasses.replace(
         sample,
@@ -84,7 +85,7 @@ def test_the_order_follows_from_seed_and_epoch() -> None:
 
 
 def test_passes_repeat_can_be_taken_up_and_leave_torch_alone(roots: Callable[[str], Path]) -> None:
-    dataset = TorchDataset(roots("semseg"), change=upside_down, seed=4)
+    dataset = TorchDataset(roots("semseg"), change=rolled, seed=4)
     state = torch.random.get_rng_state()
     first = list(batches(dataset, size=2, seed=9, epoch=1))
     again = list(batches(dataset, size=2, seed=9, epoch=1))
@@ -107,7 +108,7 @@ def test_passes_repeat_can_be_taken_up_and_leave_torch_alone(roots: Callable[[st
 
 
 def test_change_keeps_ground_truth_and_pictures_together(roots: Callable[[str], Path]) -> None:
-    changed = TorchDataset(roots("semseg"), change=upside_down)[0]
+    changed = TorchDataset(roots("semseg"), change=rolled)[0]
     plain = TorchDataset(roots("semseg"))[0]
     shifts = [
         s for s in range(1, 50) if np.array_equal(np.roll(plain.sample.label_ids, s, 1), changed.sample.label_ids)
@@ -118,7 +119,7 @@ def test_change_keeps_ground_truth_and_pictures_together(roots: Callable[[str], 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:This DataLoader will create")  # on a machine of one core
 def test_worker_processes_change_nothing(roots: Callable[[str], Path]) -> None:
-    dataset = TorchDataset(roots("semseg"), change=upside_down, seed=4)
+    dataset = TorchDataset(roots("semseg"), change=rolled, seed=4)
     here = list(batches(dataset, size=2, seed=9, epoch=3))
     there = list(batches(dataset, size=2, seed=9, epoch=3, workers=2))
     assert [b.indices for b in here] == [b.indices for b in there]

@@ -18,9 +18,11 @@ from gear.compositor.pasting import Prepared
 from gear.contracts.attacks import Patch
 from gear.contracts.models import Model
 from gear.dataset.reading import Dataset
+from gear.readers import Kept, all_of
 from gear.values.frames import UInt8Image
-from gear.verbs.attack.data import Joined, JoinedCompositor
+from gear.verbs.attack.data import JoinedCompositor
 
+KEPT_BYTES = 2 << 30
 SHOWN = 3
 """Samples of the figure, and of the look at masking."""
 
@@ -35,9 +37,10 @@ class Scenes:
         device: where it computes.
         cache: what it works out is kept in, for all datasets together.
         """
-        self.samples = Joined(datasets)
+        samples = all_of(tuple(datasets))
+        self.samples = Kept(samples, KEPT_BYTES)
         self.compositor = JoinedCompositor(
-            self.samples, [open_compositor(compositor, dataset, device=device, cache=cache) for dataset in datasets]
+            samples, [open_compositor(compositor, dataset, device=device, cache=cache) for dataset in datasets]
         )
 
     def harm(self, model: Model, objective: Objective, patches: Sequence[Patch]) -> float:

@@ -8,6 +8,7 @@ from pathlib import Path
 from gear.dataset.reading import scenes_of
 from gear.dataset.sidecar import load_json
 from gear.opening import open_dataset, root_and_split
+from gear.readers import open_all
 from gear.values.errors import DatasetError, GearError
 from gear.verbs.attack.data import check_joined
 from gear.verbs.attack.folder import VERIFY
@@ -15,7 +16,6 @@ from gear.verbs.attack.job import TRAINING, VALIDATION
 from gear.verbs.gap.report import GapReport
 from gear.verbs.gap.run import gap
 from gear.verbs.gap.twin import check_clean
-from gear.verbs.train.data import open_all
 
 
 def check_held_out(data: Sequence[str | Path], held: str | Path, val: Sequence[str | Path] = ()) -> None:

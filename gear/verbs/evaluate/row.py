@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import itertools
+import contextlib
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence, Set
+from collections.abc import Callable, Sequence, Set
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
 from gear.dataset.reading import Dataset
+from gear.readers import TorchDataset, read_ahead
 from gear.values.errors import DatasetError
 from gear.verbs.evaluate.lanes import lanes
 from gear.verbs.evaluate.player import Player
@@ -46,33 +47,31 @@ def evaluate_row(dataset: Dataset[Any], scorer: Scorer, player: Player, *, batch
     memory does not grow with the dataset.
     """
     desk = _Desk(2 * batch + workers, told)
-    with ThreadPoolExecutor(workers) as readers, ThreadPoolExecutor(workers) as scorers:
-        try:
-            notes, damaged = _taken_up(scorer, scorers, desk)
-            every = [range(begin, min(begin + batch, len(dataset))) for begin in range(0, len(dataset), batch)]
-            blocks = [block for block in every if not notes.keys() >= set(block)]
-            made = len(dataset) - len(notes)
-            count = min(player.lanes, len(every))
-            if count > 1:
-                scored = _in_lanes(dataset, scorer, player, blocks, notes.keys(), count, desk, scorers)
-            else:
-                scored = {}
-                for indices, samples in _batches(dataset, blocks, readers, workers):
-                    answers = player.play([sample.images for sample in samples], indices)
-                    for index, sample, answer in zip(indices, samples, answers, strict=True):
-                        if index not in notes:
-                            scored[index] = desk.submit(scorers, scorer.first, index, sample, answer)
+    items = TorchDataset(dataset)
+    with ThreadPoolExecutor(workers) as scorers:
+        notes, damaged = _taken_up(scorer, scorers, desk)
+        every = [range(begin, min(begin + batch, len(dataset))) for begin in range(0, len(dataset), batch)]
+        blocks = [block for block in every if not notes.keys() >= set(block)]
+        made = len(dataset) - len(notes)
+        count = min(player.lanes, len(every))
+        if count > 1:
+            scored = _in_lanes(items, scorer, player, blocks, notes.keys(), count, desk, scorers)
+        else:
+            scored = {}
+            with contextlib.closing(read_ahead(items, blocks, workers=workers)) as reading:
+                for found in reading:
+                    answers = player.play([item.sample.images for item in found], [item.index for item in found])
+                    for item, answer in zip(found, answers, strict=True):
+                        if item.index not in notes:
+                            scored[item.index] = desk.submit(scorers, scorer.first, item.index, item.sample, answer)
                     desk.check()
-            notes |= {index: future.result() for index, future in scored.items()}
-        except BaseException:
-            readers.shutdown(wait=False, cancel_futures=True)
-            raise  # once the few samples that have their predictions are written
+        notes |= {index: future.result() for index, future in scored.items()}
     desk.check()  # looked at again now that every callback has ended: that of the last sample may fail too
     return Row(notes=[notes[index] for index in range(len(dataset))], made=made, damaged=tuple(damaged))
 
 
 def _in_lanes(
-    dataset: Dataset[Any],
+    items: TorchDataset,
     scorer: Scorer,
     player: Player,
     blocks: Sequence[range],
@@ -84,12 +83,12 @@ def _in_lanes(
     """Batches side by side, each in one thread until there is nothing left to do but to wait for the disk."""
 
     def worked_out(indices: Sequence[int]) -> dict[int, Future[Note]]:
-        samples = [dataset[index] for index in indices]
-        answers = player.play([sample.images for sample in samples], indices)
+        found = [items[index] for index in indices]
+        answers = player.play([item.sample.images for item in found], indices)
         return {
-            index: desk.submit(writers, scorer.write, scorer.measured(index, sample, answer))
-            for index, sample, answer in zip(indices, samples, answers, strict=True)
-            if index not in finished
+            item.index: desk.submit(writers, scorer.write, scorer.measured(item.index, item.sample, answer))
+            for item, answer in zip(found, answers, strict=True)
+            if item.index not in finished
         }
 
     written: dict[int, Future[Note]] = {}
@@ -151,22 +150,3 @@ def _taken_up(scorer: Scorer, scorers: ThreadPoolExecutor, desk: _Desk) -> tuple
         else:
             damaged.append(found)
     return notes, damaged
-
-
-def _batches(
-    dataset: Dataset[Any], blocks: Sequence[range], readers: ThreadPoolExecutor, ahead: int
-) -> Iterator[tuple[range, list[Any]]]:
-    """Batches of samples in order, the next one being read while this one is worked on."""
-    coming = (index for block in blocks for index in block)
-    queue: deque[Future[Any]] = deque()
-
-    def read_on(count: int) -> None:
-        for index in itertools.islice(coming, count):
-            queue.append(readers.submit(dataset.__getitem__, index))
-
-    most = max(map(len, blocks), default=0)
-    read_on(most + max(most, ahead))
-    for block in blocks:
-        samples = [queue.popleft().result() for _ in block]
-        read_on(len(block))
-        yield block, samples

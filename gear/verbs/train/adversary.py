@@ -22,11 +22,11 @@ from gear.compositor.pasting import Prepared
 from gear.contracts.attacks import Budget
 from gear.contracts.specs import AttackSpec
 from gear.plugins.build import blamed, build, find
+from gear.readers import Samples
 from gear.values.errors import GearError
 from gear.values.rng import derive_rng
 from gear.verbs.attack.promise import check_patches
 from gear.verbs.train.config import Adversarial
-from gear.verbs.train.data import Samples
 
 CACHE_BYTES = 1 << 30
 """Of the compositors of all scenes together."""

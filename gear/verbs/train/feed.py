@@ -2,63 +2,22 @@
 
 from __future__ import annotations
 
-import dataclasses
-import threading
 from collections import deque
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Generator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
 import torch
 
 from gear.augment.apply import augment
-from gear.readers import Batch, as_pictures, order, picture_tensor
+from gear.readers import Batch, Change, Item, TorchDataset, as_pictures, order, stacked
 from gear.values.errors import GearError
 from gear.values.rng import derive_rng
 from gear.verbs.train.config import TrainConfig
 
 BATCHES_AHEAD = 3
 """Made while the network is busy with an earlier one."""
-
-Change = Callable[[Any, int, np.random.Generator], Any]
-"""Changes a decoded sample of a given number before it is augmented, such as by putting a patch into its pictures."""
-
-
-class Cache(Sequence[Any]):
-    """Samples that stay in memory once they were decoded, up to a limit. Threads may share it."""
-
-    def __init__(self, samples: Sequence[Any], limit_bytes: float) -> None:
-        self._samples = samples
-        self._left = limit_bytes
-        self._kept: dict[int, Any] = {}
-        self._lock = threading.Lock()
-
-    def __len__(self) -> int:
-        return len(self._samples)
-
-    def __getitem__(self, index: Any) -> Any:
-        kept = self._kept.get(index)
-        if kept is not None:
-            return kept
-        sample = self._samples[index]
-        size = bytes_of(sample)
-        with self._lock:
-            if size <= self._left and index not in self._kept:
-                self._kept[index] = sample
-                self._left -= size
-        return sample
-
-
-def bytes_of(sample: Any) -> int:
-    """Memory of the arrays of a sample."""
-    total = 0
-    for field in dataclasses.fields(sample):
-        value = getattr(sample, field.name)
-        items = value.values() if isinstance(value, Mapping) else (value,)
-        total += sum(item.nbytes for item in items if isinstance(item, np.ndarray))
-    return total
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +61,8 @@ class Feed:
         """
         if not len(samples):
             raise GearError("there is no sample to train on")
-        self._samples, self._config, self._views, self._change = samples, config, tuple(views), change
+        self._items = TorchDataset(samples, views=views, change=change, seed=config.seed)
+        self._config = config
         self._device = torch.device(device)
         self._size = min(config.batch, len(samples))
         self.batches = len(samples) // self._size
@@ -116,8 +76,8 @@ class Feed:
             while True:
                 while len(ahead) < BATCHES_AHEAD:
                     indices = self._indices(position)
-                    made = [pool.submit(self._sample, position.epoch, index) for index in indices]
-                    ahead.append(joining.submit(self._batch, indices, made))
+                    made = [pool.submit(self._item, position.epoch, index) for index in indices]
+                    ahead.append(joining.submit(self._batch, made))
                     position = position.following(self.batches)
                 yield ahead.popleft().result()
         finally:
@@ -126,30 +86,29 @@ class Feed:
 
     def _indices(self, position: Position) -> tuple[int, ...]:
         """A last batch that would not be full is left out."""
-        shuffled = order(len(self._samples), seed=self._config.seed, epoch=position.epoch)
+        shuffled = order(len(self._items), seed=self._config.seed, epoch=position.epoch)
         start = position.batch * self._size
         return tuple(shuffled[start : start + self._size])
 
-    def _sample(self, epoch: int, index: int) -> tuple[Any, dict[str, torch.Tensor]]:
-        """An augmented sample, and its pictures as tensors of uint8."""
-        sample = self._samples[index]
-        if self._change is not None:
-            sample = self._change(sample, index, derive_rng(self._config.seed, "change", epoch, index))
+    def _item(self, epoch: int, index: int) -> Item:
+        """An augmented sample, its pictures as tensors of uint8."""
+        item = self._items.item(index, epoch)
         rng = derive_rng(self._config.seed, "augment", epoch, index)
-        shown = augment(sample, self._config.augmentation, self._config.framing, rng)
-        return shown, {name: picture_tensor(shown.images[name]) for name in self._views}
+        shown = replace(item, sample=augment(item.sample, self._config.augmentation, self._config.framing, rng))
+        _ = shown.views  # made in this thread: one alone makes batches
+        return shown
 
-    def _batch(self, indices: tuple[int, ...], making: Sequence[Future[tuple[Any, dict[str, torch.Tensor]]]]) -> Batch:
+    def _batch(self, making: Sequence[Future[Item]]) -> Batch:
         """A whole batch, where the network is; the thread that steps does not wait for a copy to a GPU."""
-        made = [future.result() for future in making]
-        tensors = {}
-        for name in self._views:
-            pictures = [views[name] for _, views in made]
-            sizes = sorted({tuple(picture.shape[1:]) for picture in pictures})
-            if len(sizes) > 1:
-                raise GearError(f"training pictures differ in size ({sizes}); say --set crop_px=[HEIGHT, WIDTH]")
-            stacked = torch.stack(pictures)
-            if self._device.type == "cuda":
-                stacked = stacked.pin_memory()
-            tensors[name] = stacked.to(self._device, non_blocking=True)
-        return Batch(views=as_pictures(tensors), samples=tuple(sample for sample, _ in made), indices=indices)
+        items = [future.result() for future in making]
+        try:
+            batch = stacked(items)
+        except ValueError as error:
+            raise GearError(f"{error}; say --set crop_px=[HEIGHT, WIDTH]") from error
+        views = {name: self._there(pictures) for name, pictures in batch.views.items()}
+        return replace(batch, views=as_pictures(views))
+
+    def _there(self, pictures: torch.Tensor) -> torch.Tensor:
+        if self._device.type == "cuda":
+            pictures = pictures.pin_memory()
+        return pictures.to(self._device, non_blocking=True)

@@ -21,6 +21,7 @@ from gear.dataset.files import explained, read_bytes, sha256, write_whole
 from gear.nn.options import CIRCUMSTANCES
 from gear.nn.weights import serialised
 from gear.plugins.catalogue import Found
+from gear.readers import Samples
 from gear.values.errors import DatasetError
 from gear.values.serial import to_json
 from gear.verbs.look import Look
@@ -28,7 +29,6 @@ from gear.verbs.train.checkpoint import FILE as CHECKPOINT
 from gear.verbs.train.checkpoint import Progress
 from gear.verbs.train.config import TrainConfig
 from gear.verbs.train.curves import FILE as CURVES
-from gear.verbs.train.data import Samples
 from gear.verbs.train.starting import SCALE
 
 WEIGHTS = "model.safetensors"

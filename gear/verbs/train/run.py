@@ -19,6 +19,7 @@ from gear.dataset.turns import alone_at_work
 from gear.nn.runtime import device_of, prepare
 from gear.plugins.build import blamed, find
 from gear.plugins.catalogue import Found
+from gear.readers import Kept, Samples, all_of, open_all
 from gear.values.errors import GearError
 from gear.values.serial import Json
 from gear.verbs.evaluate.choice import Chosen, check_camera
@@ -27,8 +28,8 @@ from gear.verbs.train.adversary import Adversary
 from gear.verbs.train.checkpoint import begun_config
 from gear.verbs.train.config import TrainConfig, read_config
 from gear.verbs.train.curves import write_curves
-from gear.verbs.train.data import TRAINING, VALIDATION, Samples, all_of, keep_some, open_all, spread
-from gear.verbs.train.feed import Cache, Feed
+from gear.verbs.train.data import TRAINING, VALIDATION, keep_some, spread
+from gear.verbs.train.feed import Feed
 from gear.verbs.train.loop import Parts, Training, Watch
 from gear.verbs.train.results import WEIGHTS, Origin, command_of, figures_of, known, packed, write_history
 from gear.verbs.train.sizes import picture_scale, without_empty_margins
@@ -222,8 +223,8 @@ def _parts(
     twin = build_network(found, config, precision="float32")
     views = found.spec.views  # type: ignore[attr-defined]
     limit = config.cache_gb * GIGABYTE
-    validation = Cache(origin.validation, limit / 4)
-    training = Cache(origin.training, limit)
+    validation = Kept(origin.validation, limit / 4)
+    training = Kept(origin.training, limit)
     with blamed(found, "module"):
         twin.module()
         weights = next(iter(model.module().parameters()), None)

@@ -11,9 +11,9 @@ from gear.contracts.specs import ModelSpec
 from gear.nn.input_scale import OPTION
 from gear.nn.runtime import device_of
 from gear.plugins.catalogue import Found
+from gear.readers import Samples
 from gear.values.errors import GearError
 from gear.verbs.train.config import CROPS_PX, TrainConfig
-from gear.verbs.train.data import Samples
 
 PIXELS_A_SECOND = (1 << 18) / 600
 """Pixels of a picture for each second of the budget: 724 x 362 for ten minutes, in which two cores make some 700 steps

@@ -16,10 +16,10 @@ from gear.nn.shipped import resolve, shipped, shipped_networks, trained_option
 from gear.nn.weights import load_into, load_trunk
 from gear.plugins.build import blamed, build
 from gear.plugins.catalogue import Found
+from gear.readers import Samples
 from gear.values.errors import GearError, UnknownNameError
 from gear.values.serial import Json
 from gear.verbs.train.config import TrainConfig
-from gear.verbs.train.data import Samples
 
 SCALE = "input_scale"
 """Option of many networks: at which share of the picture's size they run; null leaves it to the weights."""

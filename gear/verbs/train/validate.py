@@ -14,7 +14,7 @@ from gear.contracts.tasks import Task
 from gear.dataset.given import check_figures
 from gear.plugins.build import blamed
 from gear.plugins.catalogue import Found
-from gear.readers import as_pictures, picture_tensor
+from gear.readers import TorchDataset, as_pictures
 from gear.values.errors import GearError
 
 LOSS = "loss"
@@ -35,10 +35,11 @@ def validate(
     if isinstance(task, Reports):
         evaluators |= {f"{name}.": evaluator for name, evaluator in task.reports().items()}
     losses = []
-    for index in range(len(samples)):
-        sample = samples[index]
+    items = TorchDataset(samples, views=views)
+    for item in (items[index] for index in range(len(items))):
+        sample = item.sample
         pictures = {name: sample.images[name] for name in views}
-        batch = as_pictures({name: picture_tensor(picture)[None] for name, picture in pictures.items()})
+        batch = as_pictures({name: picture[None] for name, picture in item.views.items()})
         with blamed(found, "forward"), torch.no_grad():
             losses.append(float(total(model.forward(batch, [sample]))))
         with blamed(found, "predict"):

@@ -17,6 +17,7 @@ from gear.contracts.attacks import Budget, Patch
 from gear.contracts.specs import AttackSpec
 from gear.plugins import build as building
 from gear.plugins.catalogue import Catalogue, Found, Owner
+from gear.readers import all_of, open_all
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import GearError, PluginError
 from gear.values.rng import derive_rng
@@ -25,7 +26,6 @@ from gear.verbs.train import loop
 from gear.verbs.train.adversary import Adversary
 from gear.verbs.train.checkpoint import Progress
 from gear.verbs.train.config import Adversarial
-from gear.verbs.train.data import all_of, open_all
 from gear.verbs.train.run import train
 
 

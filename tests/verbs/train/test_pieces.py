@@ -19,10 +19,11 @@ from gear.cli.train import budget
 from gear.config.nodes import Mapping, Place
 from gear.config.reader import read_node
 from gear.contracts.models import Recipe
+from gear.readers import Samples, all_of, open_all
 from gear.values.errors import ConfigError, GearError
 from gear.verbs.train.config import TrainConfig, read_config
-from gear.verbs.train.data import Samples, all_of, keep_some, open_all, spread
-from gear.verbs.train.feed import Cache, Feed, Position
+from gear.verbs.train.data import keep_some, spread
+from gear.verbs.train.feed import Feed, Position
 from gear.verbs.train.optimise import Buffers, RunningMean, optimiser_of, rate_share
 from gear.verbs.train.validate import rank
 
@@ -165,13 +166,16 @@ def test_pictures_become_numbers_where_they_are_wanted() -> None:
     assert batch.views["left"].shape == (3, 3, 32, 32)
 
 
-def test_what_fits_is_decoded_once() -> None:
-    numbers, tight = Numbers(6), Numbers(6)
-    for cache in (Cache(numbers, 1e9), Cache(tight, 3 * 32 * 32 * 3)):
-        for _ in range(3):
-            assert [cache[i].number for i in range(6)] == list(range(6))
-    assert numbers.reads == [1] * 6
-    assert tight.reads == [1, 1, 1, 3, 3, 3]
+class Growing(Numbers):
+    """Pictures of several sizes."""
+
+    def __getitem__(self, index: int) -> Numbered:
+        return Numbered(images={"left": np.zeros((32, 32 + index, 3), np.uint8)}, number=index)
+
+
+def test_pictures_that_make_no_batch_are_told_with_what_helps() -> None:
+    with pytest.raises(GearError, match=r"'left' of a batch must have one size, got .*; say --set crop_px=\[HEIGHT"):
+        next(Feed(Growing(3), plain(), ("left",)).from_position(Position()))
 
 
 def test_folders_of_roots_and_single_splits(street: Callable[..., Path], tmp_path: Path) -> None:

@@ -13,11 +13,11 @@ import pytest
 from safetensors import safe_open
 
 from gear.plugins.build import find
+from gear.readers import Samples, all_of, open_all
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_segmenter
 from gear.values.errors import ConfigError, GearError
 from gear.verbs.train import sizes, starting
 from gear.verbs.train.config import TrainConfig, read_config
-from gear.verbs.train.data import Samples, all_of, open_all
 from gear.verbs.train.run import train
 
 Street = Callable[..., Path]

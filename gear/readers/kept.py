@@ -1,0 +1,54 @@
+"""Samples that stay in memory."""
+
+from __future__ import annotations
+
+import dataclasses
+import threading
+from collections.abc import Mapping, Sequence
+from typing import Any, overload
+
+import numpy as np
+
+
+class Kept(Sequence[Any]):
+    """Samples that stay in memory once they were decoded, the first ones up to a limit: a pass in another order then
+    finds as many of them again as fit. Threads may share it.
+    """
+
+    def __init__(self, samples: Sequence[Any], limit_bytes: float) -> None:
+        self._samples = samples
+        self._left = limit_bytes
+        self._kept: dict[int, Any] = {}
+        self._lock = threading.Lock()
+
+    def __len__(self) -> int:
+        return len(self._samples)
+
+    @overload
+    def __getitem__(self, index: int) -> Any: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Any]: ...
+    def __getitem__(self, index: int | slice) -> Any:
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        index = range(len(self))[index]
+        kept = self._kept.get(index)
+        if kept is not None:
+            return kept
+        sample = self._samples[index]
+        size = bytes_of(sample)
+        with self._lock:
+            if size <= self._left and index not in self._kept:
+                self._kept[index] = sample
+                self._left -= size
+        return sample
+
+
+def bytes_of(sample: Any) -> int:
+    """Memory of the arrays of a sample."""
+    total = 0
+    for field in dataclasses.fields(sample):
+        value = getattr(sample, field.name)
+        items = value.values() if isinstance(value, Mapping) else (value,)
+        total += sum(item.nbytes for item in items if isinstance(item, np.ndarray))
+    return total

@@ -1,0 +1,61 @@
+"""Samples of several splits as one sequence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, overload
+
+from gear.augment.apply import shrunk
+from gear.dataset.reading import Dataset
+from gear.values.serial import Json
+
+
+@dataclass(frozen=True, slots=True)
+class Samples(Sequence[Any]):
+    """Samples of several splits, read when they are asked for.
+
+    Attributes:
+        datasets: where they come from.
+        places: (number of the dataset, index in it) of each.
+        scale: share of their size at which their pictures are shown.
+    """
+
+    datasets: tuple[Dataset[Any], ...]
+    places: tuple[tuple[int, int], ...]
+    scale: float = 1.0
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    @overload
+    def __getitem__(self, index: int) -> Any: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Any]: ...
+    def __getitem__(self, index: int | slice) -> Any:
+        if isinstance(index, slice):
+            return replace(self, places=self.places[index])
+        dataset, place = self.places[index]
+        return shrunk(self.datasets[dataset][place], self.scale)
+
+    def facts(self) -> list[Json]:
+        """What it is made of, without the machine's paths; JSON."""
+        numbers = [dataset for dataset, _ in self.places]
+        return [
+            {
+                "scene": f"{dataset.plan.info.town}/{dataset.plan.info.scene}",
+                "weather": dataset.named("weather"),
+                "split": dataset.plan.info.split,
+                "seed": dataset.plan.info.seed,
+                "patch": dataset.plan.info.patch_label,
+                "samples": numbers.count(number),
+                "content": dataset.plan.content_key,
+            }
+            for number, dataset in enumerate(self.datasets)
+            if number in numbers
+        ]
+
+
+def all_of(datasets: tuple[Dataset[Any], ...]) -> Samples:
+    """Every sample, in order."""
+    return Samples(datasets, tuple((i, k) for i, dataset in enumerate(datasets) for k in range(len(dataset))))
