@@ -6,6 +6,7 @@ import hashlib
 import math
 import time
 from dataclasses import dataclass
+from functools import cache
 
 import mujoco
 import numpy as np
@@ -96,8 +97,9 @@ _CAMERA = CameraRecord(
 )
 
 
+@cache
 def renderer_info(name: str) -> RendererInfo:
-    """Who would render, without a frame.
+    """Who would render, without a frame; asked once in a process, since one has to be started to say it.
 
     Raises:
         UnknownNameError: there is no such renderer.
