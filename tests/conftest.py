@@ -5,6 +5,7 @@ NumPy is to multiply matrices as it does when assets are made.
 
 from __future__ import annotations
 
+import gc
 import os
 from pathlib import Path
 
@@ -20,3 +21,9 @@ assert authoring.KERNELS in os.environ
 def mypy_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Where mypy keeps what it knows of gear and NumPy from one package of a module's tests to the next."""
     return tmp_path_factory.mktemp("mypy")
+
+
+def pytest_collection_finish() -> None:
+    """What is imported by now stays: garbage collections, such as that of every world, need not go through it."""
+    gc.collect()
+    gc.freeze()

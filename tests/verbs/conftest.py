@@ -1,5 +1,9 @@
 from __future__ import annotations
 
+import hashlib
+import json
+import os
+import shutil
 import sys
 import types
 from collections.abc import Callable, Sequence
@@ -12,12 +16,15 @@ import pytest
 
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import AttackSpec, DefenseSpec, ModelSpec
+from gear.dataset.turns import turn
 from gear.plugins import build as building
 from gear.plugins.manager import discover
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_depth, tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.verbs.collect.run import CollectReport, collect
 
+Collected = Callable[..., Path]
+Copy = Callable[..., Path]
 Small = Callable[..., Path]
 Install = Callable[..., None]
 
@@ -80,18 +87,46 @@ def install(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     return put
 
 
-@pytest.fixture(scope="module")
-def small(tmp_path_factory: pytest.TempPathFactory, collect_small: Callable[..., CollectReport]) -> Callable[..., Path]:
+def shared_folder(tmp_path_factory: pytest.TempPathFactory, name: str) -> Path:
+    """A place that all processes of a run have together; who writes there takes its `turn`."""
+    run = tmp_path_factory.getbasetemp()
+    return (run.parent if "PYTEST_XDIST_WORKER" in os.environ else run) / name
+
+
+@pytest.fixture(scope="session")
+def collected(tmp_path_factory: pytest.TempPathFactory, collect_small: Callable[..., CollectReport]) -> Collected:
+    """Datasets that all tests of a run share, in all its processes, and only read: `collected(task, **changes)`."""
+
+    def root(task: str, name: str = "data", **changes: Any) -> Path:
+        asked = json.dumps([task, name, changes], sort_keys=True, default=str)
+        folder = shared_folder(tmp_path_factory, f"collected/{hashlib.sha256(asked.encode()).hexdigest()[:16]}")
+        with turn(folder):
+            if not (folder / "whole").exists():
+                collect_small(task, folder / name, **changes)
+                (folder / "whole").touch()
+        return folder / name
+
+    return root
+
+
+@pytest.fixture(scope="session")
+def copy_small(collected: Collected) -> Copy:
+    """As `collect_small`, where what is tested is not the collection: a copy of a dataset that others have, too."""
+
+    def copied(task: str, out: Path, **changes: Any) -> Path:
+        return Path(shutil.copytree(collected(task, **changes), out, dirs_exist_ok=True))
+
+    return copied
+
+
+@pytest.fixture(scope="session")
+def small(collected: Collected) -> Small:
     """Datasets with probes, which tests share and only read."""
-    made: dict[tuple[Any, ...], Path] = {}
 
     def root(
         task: str = "semseg", scene: str = "board", split: str = "train", probes: bool = True, seed: int | None = None
     ) -> Path:
-        key = (task, scene, split, probes, seed)
-        if key not in made:
-            made[key] = tmp_path_factory.mktemp("data") / f"{task}-{scene}-{split}-{seed}"
-            collect_small(task, made[key], scene=scene, split=split, probes=probes, seed=seed)
-        return made[key]
+        name = f"{task}-{scene}-{split}-{seed}"
+        return collected(task, name, scene=scene, split=split, probes=probes, seed=seed)
 
     return root

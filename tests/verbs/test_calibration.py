@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ from gear.values.errors import GearError
 from gear.verbs.attack.run import attack
 from gear.verbs.attack.verify import verify
 from gear.verbs.evaluate.run import evaluate
-from tests.verbs.conftest import Install, Nothing, Small
+from tests.verbs.conftest import Copy, Install, Nothing, Small
 
 
 class Learner:
@@ -144,10 +143,10 @@ def test_a_patch_is_checked_behind_the_defense_that_it_was_made_through(
 
 
 def test_doubtful_calibration_is_told_by_attacks_and_gaps(
-    small: Small, collect_small: Callable[..., Any], learner: list[Learner], tmp_path: Path
+    small: Small, copy_small: Copy, learner: list[Learner], tmp_path: Path
 ) -> None:
     patched, told = tmp_path / "patched", list[str]()
-    collect_small("semseg", patched, split="val", patch="random")
+    copy_small("semseg", patched, split="val", patch="random")
     behind: dict[str, Any] = {"defense": "learner", "calibration": patched, "noted": told.append}
     attack(
         small(), model="tiny_segmenter", out=tmp_path / "p", attack="square", queries=4,
@@ -191,10 +190,10 @@ def test_learning_from_what_is_measured_is_noted(small: Small, learner: list[Lea
 
 
 def test_calibration_the_wrong_way_round_is_told(
-    small: Small, collect_small: Callable[..., Any], learner: list[Learner], tmp_path: Path
+    small: Small, copy_small: Copy, learner: list[Learner], tmp_path: Path
 ) -> None:
     clean, patched = small(split="val"), tmp_path / "patched"
-    collect_small("semseg", patched, split="val", patch="random")
+    copy_small("semseg", patched, split="val", patch="random")
     asked: dict[str, Any] = {"model": "tiny_segmenter", "defense": "learner", "resamples": 0}
     with pytest.raises(GearError, match="--calibration and --calibration-patched are swapped"):
         evaluate(small(), calibration=patched, calibration_patched=clean, out=tmp_path / "out", **asked)
@@ -204,6 +203,6 @@ def test_calibration_the_wrong_way_round_is_told(
     bold = evaluate(small(), calibration=patched, calibration_patched=patched, out=tmp_path / "bold", **asked)
     assert any("shows the patch random, which the defense takes for clean" in one for one in bold.facts["notes"])
     other = tmp_path / "other"
-    collect_small("semseg", other, split="val", patch="random", seed=5)
+    copy_small("semseg", other, split="val", patch="random", seed=5)
     mixed = evaluate(small(), calibration=clean, calibration_patched=other, out=tmp_path / "mixed", **asked)
     assert any(f"{other}: is no twin of {clean}" in one for one in mixed.facts["notes"])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -11,16 +10,14 @@ import numpy as np
 import pytest
 
 from gear.cli.main import main
-from gear.verbs.collect.run import CollectReport
 from gear.verbs.defend import DefendReport, defend
 from tests.dataset.splits import tree
-
-Collect = Callable[..., CollectReport]
+from tests.verbs.conftest import Copy
 
 
 @pytest.fixture
-def data(tmp_path: Path, collect_small: Collect) -> Path:
-    collect_small("semseg", tmp_path / "data", patch="random")
+def data(tmp_path: Path, copy_small: Copy) -> Path:
+    copy_small("semseg", tmp_path / "data", patch="random")
     return tmp_path / "data"
 
 

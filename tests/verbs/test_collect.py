@@ -35,6 +35,7 @@ from gear.values.errors import (
 from gear.verbs.collect.job import resolve
 from gear.verbs.collect.run import CollectReport
 from tests.dataset.splits import tree
+from tests.verbs.conftest import Copy
 
 Collect = Callable[..., CollectReport]
 TASKS = ("semseg", "detect2d", "stereo3d", "depth")
@@ -277,8 +278,10 @@ def test_a_name_in_a_file_is_told_with_its_line(line: str, message: str, tmp_pat
         resolve(load_collection(str(file), others, [f"{key}=nonsense"]))
 
 
-def test_a_file_that_is_gone_or_damaged_is_named_with_its_remedy(tmp_path: Path, collect_small: Collect) -> None:
-    collect_small("semseg", tmp_path)
+def test_a_file_that_is_gone_or_damaged_is_named_with_its_remedy(
+    tmp_path: Path, collect_small: Collect, copy_small: Copy
+) -> None:
+    copy_small("semseg", tmp_path)
     dataset = gear.open_dataset(tmp_path)
     picture = next(iter(tmp_path.glob("leftImg8bit/*/*/*.png")))
     whole = picture.read_bytes()
@@ -296,9 +299,9 @@ def test_a_file_that_is_gone_or_damaged_is_named_with_its_remedy(tmp_path: Path,
 
 @pytest.mark.parametrize("task", ["semseg", "depth", "stereo3d", "detect2d"])
 def test_a_picture_of_another_size_or_kind_is_named_with_its_remedy(
-    task: str, tmp_path: Path, collect_small: Collect
+    task: str, tmp_path: Path, copy_small: Copy
 ) -> None:
-    collect_small(task, tmp_path)
+    copy_small(task, tmp_path)
     dataset = gear.open_dataset(tmp_path)
     camera = dataset.sidecar(0).record.cameras[0]
     width, height = camera.width_px, camera.height_px
@@ -321,10 +324,8 @@ def test_a_picture_of_another_size_or_kind_is_named_with_its_remedy(
 
 @pytest.mark.parametrize("task", ["stereo3d", "detect2d"])
 @pytest.mark.parametrize("objects", [None, 3, "x", [{}], [None], float("nan")])
-def test_facts_that_somebody_changed_are_one_line(
-    task: str, objects: Any, tmp_path: Path, collect_small: Collect
-) -> None:
-    collect_small(task, tmp_path)
+def test_facts_that_somebody_changed_are_one_line(task: str, objects: Any, tmp_path: Path, copy_small: Copy) -> None:
+    copy_small(task, tmp_path)
     path = tmp_path / "gear/debug/samples/000000.json"
     sidecar = json.loads(path.read_text())
     sidecar["facts"]["objects"] = objects
@@ -334,8 +335,8 @@ def test_facts_that_somebody_changed_are_one_line(
     assert "\n" not in str(caught.value)
 
 
-def test_another_configuration_needs_force(tmp_path: Path, collect_small: Collect) -> None:
-    collect_small("depth", tmp_path)
+def test_another_configuration_needs_force(tmp_path: Path, collect_small: Collect, copy_small: Copy) -> None:
+    copy_small("depth", tmp_path)
     before = tree(tmp_path)
     with pytest.raises(DatasetError, match=r"another configuration \(content\.seed: 10 there, 11 now"):
         collect_small("depth", tmp_path, seed=11)

@@ -19,17 +19,14 @@ from gear.contracts.defenses import DefenseResult
 from gear.contracts.specs import DefenseSpec
 from gear.plugins.defenses.jpeg import Jpeg, JpegConfig
 from gear.values.errors import ConfigError, DatasetError, GearError, PluginError, UnknownNameError
-from gear.verbs.collect.run import CollectReport
 from gear.verbs.defend import defend
 from tests.dataset.splits import tree
-from tests.verbs.conftest import put_package
-
-Collect = Callable[..., CollectReport]
+from tests.verbs.conftest import Copy, put_package
 
 
 @pytest.fixture
-def stereo(tmp_path: Path, collect_small: Collect) -> Path:
-    collect_small("stereo3d", tmp_path / "data", patch="random")
+def stereo(tmp_path: Path, copy_small: Copy) -> Path:
+    copy_small("stereo3d", tmp_path / "data", patch="random")
     return tmp_path / "data"
 
 
@@ -75,8 +72,8 @@ def test_pictures_keep_their_paths_and_are_what_the_defense_makes(stereo: Path, 
     assert not list((tmp_path / "clean").rglob("*mask*")) and not list((tmp_path / "clean").rglob("scores.json"))
 
 
-def test_masks_and_scores_are_written(tmp_path: Path, collect_small: Collect) -> None:
-    collect_small("semseg", tmp_path / "data", patch="random")
+def test_masks_and_scores_are_written(tmp_path: Path, copy_small: Copy) -> None:
+    copy_small("semseg", tmp_path / "data", patch="random")
     assert main(["defend", str(tmp_path / "data"), "--defense", "lgs", "--out", str(tmp_path / "clean")]) == 0
     folder = tmp_path / "clean" / "defense" / "debug"
     scores = json.loads((folder / "scores.json").read_text())["scores"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,10 +12,10 @@ import pytest
 import torch
 
 from gear.nn.network import Network
-from gear.verbs.collect.run import CollectReport
 from gear.verbs.evaluate import player, scoring
 from gear.verbs.evaluate.lanes import MOST, lanes, lanes_of
 from gear.verbs.evaluate.run import evaluate
+from tests.verbs.conftest import Collected
 
 NAME, SETTINGS = "ddrnet23_slim_depth", ("weights=none", "seed=3")
 
@@ -27,15 +27,9 @@ def _threads() -> Iterator[None]:
     torch.set_num_threads(before)
 
 
-@pytest.fixture(scope="module")
-def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("depth") / "none"
-
-
 @pytest.fixture
-def pictures(data: Path, collect_small: Callable[..., CollectReport]) -> Path:
-    collect_small("depth", data, samples=5)
-    return data
+def pictures(collected: Collected) -> Path:
+    return collected("depth", "none", samples=5)
 
 
 @pytest.fixture

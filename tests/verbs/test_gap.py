@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,20 +19,17 @@ from gear.testing.tiny_networks import tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import DatasetError, GearError
 from gear.verbs.collect.patches import read_patch
-from gear.verbs.collect.run import CollectReport
 from gear.verbs.evaluate import choice
 from gear.verbs.gap.figures import PERFECT_DB, picture_gap
 from gear.verbs.gap.run import sample_gaps, shown_patches
-
-Collect = Callable[..., CollectReport]
+from tests.verbs.conftest import Copy
 
 
 @pytest.fixture
-def pair(tmp_path: Path, collect_small: Collect) -> tuple[Path, Path]:
+def pair(tmp_path: Path, copy_small: Copy) -> tuple[Path, Path]:
     """A split with probes and its twin."""
-    collect_small("semseg", tmp_path / "clean", probes=True)
-    collect_small("semseg", tmp_path / "twin", patch="random")
-    return tmp_path / "clean", tmp_path / "twin"
+    clean, twin = tmp_path / "clean", tmp_path / "twin"
+    return copy_small("semseg", clean, probes=True), copy_small("semseg", twin, patch="random")
 
 
 def test_figures_tell_inside_from_outside() -> None:
@@ -64,13 +60,13 @@ def test_a_gap_is_reported_and_written(pair: tuple[Path, Path], tmp_path: Path) 
     assert report.effect == {}
 
 
-def test_a_patch_in_lamplight_is_composed_as_exactly(tmp_path: Path, collect_small: Collect) -> None:
+def test_a_patch_in_lamplight_is_composed_as_exactly(tmp_path: Path, copy_small: Copy) -> None:
     night = {"weather": "WetNight"}
-    collect_small("semseg", tmp_path / "clean", probes=True, **night)
-    collect_small("semseg", tmp_path / "twin", patch="random", **night)
+    copy_small("semseg", tmp_path / "clean", probes=True, **night)
+    copy_small("semseg", tmp_path / "twin", patch="random", **night)
     report = gear.gap(tmp_path / "clean", twin=tmp_path / "twin")
     assert report.median_db("transport") > 40
-    collect_small("semseg", tmp_path / "day", patch="random")
+    copy_small("semseg", tmp_path / "day", patch="random")
     day, dark = (
         np.mean([sample.images["left"].mean() for sample in gear.open_dataset(tmp_path / name, split="debug")])
         for name in ("day", "twin")
@@ -129,8 +125,8 @@ def test_what_does_not_suit_is_said_before_anything_is_rendered(pair: tuple[Path
     assert not (tmp_path / "gap").exists()
 
 
-def test_a_split_without_probes_is_told_before_its_twin_is_rendered(tmp_path: Path, collect_small: Collect) -> None:
-    collect_small("semseg", tmp_path / "clean")
+def test_a_split_without_probes_is_told_before_its_twin_is_rendered(tmp_path: Path, copy_small: Copy) -> None:
+    copy_small("semseg", tmp_path / "clean")
     places: dict[str, Any] = {"town": TINY_TOWN, "scenes": TINY_SCENES, "out": tmp_path / "gap", "patch": "random"}
     with pytest.raises(DatasetError, match="has no probes"):
         gear.gap(tmp_path / "clean", **places)
@@ -153,7 +149,7 @@ def test_the_command_prints_a_table_or_json(pair: tuple[Path, Path], capsys: pyt
     assert json.loads(capsys.readouterr().out)["median_psnr_db"]["transport"] > 40
 
 
-def test_what_cannot_be_compared_is_refused(pair: tuple[Path, Path], tmp_path: Path, collect_small: Collect) -> None:
+def test_what_cannot_be_compared_is_refused(pair: tuple[Path, Path], tmp_path: Path, copy_small: Copy) -> None:
     clean, twin = pair
     with pytest.raises(DatasetError, match="say one of: --twin DIR"):
         gear.gap(clean)
@@ -165,7 +161,7 @@ def test_what_cannot_be_compared_is_refused(pair: tuple[Path, Path], tmp_path: P
         gear.gap(twin, twin=clean)
     with pytest.raises(DatasetError, match="collect the twin yourself"):
         gear.gap(clean, patch="random", out=tmp_path / "gap")
-    collect_small("semseg", tmp_path / "other", patch="random", seed=9)
+    copy_small("semseg", tmp_path / "other", patch="random", seed=9)
     with pytest.raises(DatasetError, match="is no twin"):
         gear.gap(clean, twin=tmp_path / "other")
     with pytest.raises(GearError, match="is a semseg dataset"):

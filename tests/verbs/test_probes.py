@@ -16,6 +16,7 @@ from gear.formats.probes import probes_of
 from gear.values.errors import DatasetError
 from gear.verbs.collect.run import CollectReport
 from tests.dataset.splits import tree
+from tests.verbs.conftest import Copy
 
 Collect = Callable[..., CollectReport]
 
@@ -24,8 +25,8 @@ def without_gear(root: Path) -> dict[str, bytes]:
     return {name: data for name, data in tree(root).items() if not name.startswith("gear/")}
 
 
-def test_probes_hold_the_reach_of_each_surface(tmp_path: Path, collect_small: Collect) -> None:
-    collect_small("semseg", tmp_path, scene="double", probes=True)
+def test_probes_hold_the_reach_of_each_surface(tmp_path: Path, copy_small: Copy) -> None:
+    copy_small("semseg", tmp_path, scene="double", probes=True)
     dataset = gear.open_dataset(tmp_path)
     assert dataset.verify() == []
     for index, sample in enumerate(dataset):
@@ -41,19 +42,19 @@ def test_probes_hold_the_reach_of_each_surface(tmp_path: Path, collect_small: Co
             assert height * width < 4 * seen.sum(), "and not much else"
 
 
-def test_pictures_and_labels_do_not_depend_on_probes(tmp_path: Path, collect_small: Collect) -> None:
-    collect_small("semseg", tmp_path / "with", probes=True)
-    collect_small("semseg", tmp_path / "without")
+def test_pictures_and_labels_do_not_depend_on_probes(tmp_path: Path, copy_small: Copy) -> None:
+    copy_small("semseg", tmp_path / "with", probes=True)
+    copy_small("semseg", tmp_path / "without")
     assert without_gear(tmp_path / "with") == without_gear(tmp_path / "without")
     with_probes, without = gear.open_dataset(tmp_path / "with"), gear.open_dataset(tmp_path / "without")
     assert with_probes.plan.twin_key == without.plan.twin_key
     assert with_probes.plan.content_key != without.plan.content_key
-    collect_small("semseg", tmp_path / "random", patch="random")
+    copy_small("semseg", tmp_path / "random", patch="random")
     assert len(gear.open_twins(tmp_path / "with", tmp_path / "random")) == 2
 
 
-def test_without_probes_nothing_speaks_of_them(tmp_path: Path, collect_small: Collect) -> None:
-    collect_small("depth", tmp_path)
+def test_without_probes_nothing_speaks_of_them(tmp_path: Path, copy_small: Copy) -> None:
+    copy_small("depth", tmp_path)
     for name, data in tree(tmp_path).items():
         if name.endswith(".json"):
             assert b"probes" not in data and b"auxiliary" not in data, name
@@ -70,8 +71,8 @@ def test_probes_are_the_same_whoever_makes_them(tmp_path: Path, collect_small: C
     assert {file["path"] for file in sidecar["auxiliary"].values()} <= set(sidecar["files"])
 
 
-def test_a_split_without_probes_gets_none_by_and_by(tmp_path: Path, collect_small: Collect) -> None:
-    collect_small("depth", tmp_path)
+def test_a_split_without_probes_gets_none_by_and_by(tmp_path: Path, collect_small: Collect, copy_small: Copy) -> None:
+    copy_small("depth", tmp_path)
     with pytest.raises(DatasetError, match=r"another configuration \(auxiliary"):
         collect_small("depth", tmp_path, probes=True)
     with pytest.raises(DatasetError, match="has no probes; collect it with --probes"):
@@ -100,9 +101,9 @@ def test_a_scene_without_surfaces_has_no_probes(tmp_path: Path, collect_small: C
     ],
 )
 def test_a_sidecar_that_says_something_else_of_a_probe_is_one_line(
-    tmp_path: Path, collect_small: Collect, change: Callable[[Any], object], problem: str
+    tmp_path: Path, copy_small: Copy, change: Callable[[Any], object], problem: str
 ) -> None:
-    collect_small("depth", tmp_path, samples=1, probes=True)
+    copy_small("depth", tmp_path, samples=1, probes=True)
     path = tmp_path / "gear/debug/samples/000000.json"
     content = json.loads(path.read_text())
     for file in content["auxiliary"].values():
@@ -115,14 +116,12 @@ def test_a_sidecar_that_says_something_else_of_a_probe_is_one_line(
 
 
 @pytest.mark.parametrize("compositor", ["transport", "homography"])
-def test_a_sidecar_without_a_surfaces_measures_is_one_line(
-    tmp_path: Path, collect_small: Collect, compositor: str
-) -> None:
+def test_a_sidecar_without_a_surfaces_measures_is_one_line(tmp_path: Path, copy_small: Copy, compositor: str) -> None:
     import torch
 
     from gear.compositor.opening import open_compositor
 
-    collect_small("depth", tmp_path, samples=1, probes=True)
+    copy_small("depth", tmp_path, samples=1, probes=True)
     path = tmp_path / "gear/debug/samples/000000.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | {"surfaces": []}))
     dataset = gear.open_dataset(tmp_path)

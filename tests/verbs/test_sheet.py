@@ -17,6 +17,7 @@ from gear.plugins.tasks.depth import DepthTask
 from gear.testing.synthetic import synthetic_frame
 from gear.values.errors import PluginError
 from gear.verbs.sheet import caption, contact_sheet
+from tests.verbs.conftest import Copy
 
 
 def test_a_picture_of_a_pair_says_what_its_own_camera_sees() -> None:
@@ -42,9 +43,9 @@ def test_a_picture_of_a_pair_says_what_its_own_camera_sees() -> None:
     ],
 )
 def test_a_third_partys_preview_that_is_no_picture_is_named(
-    tmp_path: Path, collect_small: Any, monkeypatch: pytest.MonkeyPatch, given: Any, message: str
+    tmp_path: Path, copy_small: Copy, monkeypatch: pytest.MonkeyPatch, given: Any, message: str
 ) -> None:
-    collect_small("depth", tmp_path, samples=1)
+    copy_small("depth", tmp_path, samples=1)
     owner = Owner(plugin="their-depth", package="mujoco-gear-2", version="1.2")
     found = tuple(dataclasses.replace(f, owner=owner) for f in manager.catalogue().of_kind("task"))
     monkeypatch.setattr("gear.plugins.build.catalogue", lambda: Catalogue(found))

@@ -17,7 +17,7 @@ from gear.contracts.specs import ModelSpec
 from gear.nn.weights import write as write_weights
 from gear.plugins.build import NO_OPTIONS, build, find
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_segmenter
-from gear.verbs.collect.run import CollectReport
+from tests.verbs.conftest import Copy
 
 PATTERN = r"gear: note: .*: pictures are 320 px wide and tiny_segmenter sees them at 80 px; it learnt from 512 px, .*: "
 
@@ -31,7 +31,7 @@ class ScaledConfig(TinyConfig):
 
 def test_attack_and_gap_tell_of_it(
     small: Callable[..., Path],
-    collect_small: Callable[..., CollectReport],
+    copy_small: Copy,
     install: Callable[..., None],
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
@@ -39,7 +39,7 @@ def test_attack_and_gap_tell_of_it(
     weights = tmp_path / "net.safetensors"
     write_weights(weights, {"bias": torch.zeros(1)}, {"options": json.dumps({"input_scale": 0.25})})
     install(replace(tiny_segmenter, config=ScaledConfig, build=lambda _: TinySegmenter(TinyConfig())))
-    collect_small("semseg", tmp_path / "twin", patch="random", split="train")
+    copy_small("semseg", tmp_path / "twin", patch="random", split="train")
 
     attack = ["attack", "--model=tiny_segmenter", f"--data={small()}", "--steps=1", "--set=height_px=12"]
     attack += ["--set=width_px=24", "--set=batch=1"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +11,8 @@ import pytest
 
 import gear
 from gear.nn.vision import prepare
-from gear.verbs.collect.run import CollectReport
 from gear.verbs.export import export
-
-Collect = Callable[..., CollectReport]
+from tests.verbs.conftest import Copy
 
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
 """It leaves its files open."""
@@ -27,11 +25,11 @@ def collected_here() -> Iterator[None]:
     gc.collect()
 
 
-def test_cityscapes(collect_small: Collect, tmp_path: Path) -> None:
+def test_cityscapes(copy_small: Copy, tmp_path: Path) -> None:
     prepare()
     from torchvision.datasets import Cityscapes
 
-    collect_small("semseg", tmp_path, split="val")
+    copy_small("semseg", tmp_path, split="val")
     read = Cityscapes(str(tmp_path), split="val", mode="fine", target_type=["semantic", "instance", "color", "polygon"])
     ours = gear.open_dataset(tmp_path)
     assert len(read) == len(ours) == 2
@@ -43,11 +41,11 @@ def test_cityscapes(collect_small: Collect, tmp_path: Path) -> None:
         assert polygon["imgWidth"] == 320 and polygon["objects"]
 
 
-def test_coco(collect_small: Collect, tmp_path: Path) -> None:
+def test_coco(copy_small: Copy, tmp_path: Path) -> None:
     prepare()
     from torchvision.datasets import CocoDetection
 
-    collect_small("detect2d", tmp_path, split="val")
+    copy_small("detect2d", tmp_path, split="val")
     ours = gear.open_dataset(tmp_path)
     read = CocoDetection(str(tmp_path / "images" / "val"), str(tmp_path / "annotations" / "instances_val.json"))
     assert len(read) == 2
@@ -60,11 +58,11 @@ def test_coco(collect_small: Collect, tmp_path: Path) -> None:
             assert np.allclose((left, top, left + width, top + height), found.box_px)
 
 
-def test_kitti(collect_small: Collect, tmp_path: Path) -> None:
+def test_kitti(copy_small: Copy, tmp_path: Path) -> None:
     prepare()
     from torchvision.datasets import Kitti
 
-    collect_small("stereo3d", tmp_path / "data", split="val")
+    copy_small("stereo3d", tmp_path / "data", split="val")
     ours = gear.open_dataset(tmp_path / "data")
     export(tmp_path / "data", layout="kitti", out=tmp_path / "Kitti" / "raw")
     read = Kitti(str(tmp_path), train=True)

@@ -1,13 +1,16 @@
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+import gear
+from gear.dataset.turns import turn
 from gear.testing.tiny_networks import tiny_depth, tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
-from tests.verbs.conftest import other_segmenter, put_package
+from tests.verbs.conftest import other_segmenter, put_package, shared_folder
 
 CONFIG = f"""
 tasks:
@@ -41,6 +44,9 @@ FEW = (
 )
 """Changes that leave one network, one scene and one defense."""
 
+LEARNING = (*FEW[:1], ("      blur: {plugin: gaussian}\n", ""), *FEW[2:4])
+"""Changes that leave one network, one scene and a defense that must learn."""
+
 
 @pytest.fixture
 def plugins(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -51,12 +57,30 @@ def plugins(monkeypatch: pytest.MonkeyPatch) -> None:
 def written(tmp_path: Path) -> Callable[..., Path]:
     """A bench config with some of its text replaced."""
 
-    def write(*changes: tuple[str, str]) -> Path:
-        text = CONFIG
-        for old, new in changes:
-            assert old in text
-            text = text.replace(old, new)
-        (tmp_path / "bench.yml").write_text(text)
-        return tmp_path / "bench.yml"
+    return lambda *changes: write(tmp_path, changes)
 
-    return write
+
+@pytest.fixture
+def made(
+    tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, plugins: None
+) -> Callable[[tuple[tuple[str, str], ...]], Path]:
+    """`tmp_path / "out"` with the finished bench of `FEW` or `LEARNING`, each of which is made once a run."""
+
+    def copy(changes: tuple[tuple[str, str], ...]) -> Path:
+        folder = shared_folder(tmp_path_factory, f"benches/{'few' if changes == FEW else 'learning'}")
+        with turn(folder):
+            if not (folder / "whole").exists():
+                gear.bench(write(folder, changes), out=folder / "out")
+                (folder / "whole").touch()
+        return Path(shutil.copytree(folder / "out", tmp_path / "out"))
+
+    return copy
+
+
+def write(folder: Path, changes: tuple[tuple[str, str], ...]) -> Path:
+    text = CONFIG
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    (folder / "bench.yml").write_text(text)
+    return folder / "bench.yml"

@@ -44,6 +44,7 @@ class Looks:
         raise AssertionError(line)
 
 
+@pytest.mark.slow
 def test_the_whole_way_and_again(tmp_path: Path, written: Callable[..., Path]) -> None:
     config, out, looks = written(), tmp_path / "out", Looks()
     report = gear.bench(config, out=out, watch=looks)
@@ -115,9 +116,8 @@ def _check_files(out: Path, report: BenchReport) -> None:
     assert "http" not in page.replace("http-equiv", "")
 
 
-def test_a_config_that_grows_keeps_what_is_there(tmp_path: Path, written: Callable[..., Path]) -> None:
-    out = tmp_path / "out"
-    gear.bench(written(*FEW), out=out)
+def test_a_config_that_grows_keeps_what_is_there(written: Callable[..., Path], made: Callable[..., Path]) -> None:
+    out = made(FEW)
     more = gear.bench(written(*FEW[1:]), out=out)
     made = {one.model: sum(row.made for row in one.evaluation.rows) for one in more.tasks[0].results}
     assert made == {"small": 0, "second": 6}

@@ -12,12 +12,12 @@ import gear
 from gear.values.errors import GearError
 from gear.verbs.bench.plan import Step
 from gear.verbs.bench.run import VERBS
-from tests.verbs.bench.conftest import FEW
+from tests.verbs.bench.conftest import FEW, LEARNING
 
 pytestmark = pytest.mark.usefixtures("plugins")
 
-LEARNING = (*FEW[:1], ("      blur: {plugin: gaussian}\n", ""), *FEW[2:4])
-"""Changes that leave one network, one scene and a defense that must learn."""
+Written = Callable[..., Path]
+Made = Callable[..., Path]
 
 
 class Looks:
@@ -40,9 +40,9 @@ def times(root: Path, kind: str) -> dict[Path, int]:
     return {path: path.stat().st_mtime_ns for path in root.glob(f"data/semseg/*/ClearNoon/{kind}/**/*.png")}
 
 
-def test_more_pictures_to_attack(tmp_path: Path, written: Callable[..., Path]) -> None:
-    out, looks = tmp_path / "out", Looks()
-    gear.bench(written(*LEARNING), out=out)
+@pytest.mark.slow
+def test_more_pictures_to_attack(tmp_path: Path, written: Written, made: Made) -> None:
+    out, looks = made(LEARNING), Looks()
     kept = {kind: times(out, kind) for kind in ("attack", "none", "random")}
     patch = (out / "patches/semseg/small/tiny-board/patch_0.png").read_bytes()
     more = (*LEARNING, ("attack: 2", "attack: 3"))
@@ -97,10 +97,9 @@ def test_more_pictures_to_an_attack_that_was_stopped(
 
 
 def test_a_bench_that_is_refused_leaves_the_config_of_its_reports(
-    tmp_path: Path, written: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+    written: Written, made: Made, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    out, more = tmp_path / "out", (*LEARNING, ("attack: 2", "attack: 3"))
-    gear.bench(written(*LEARNING), out=out)
+    out, more = made(LEARNING), (*LEARNING, ("attack: 2", "attack: 3"))
     before = (out / "bench.yml").read_bytes()
 
     def refused(*given: Any, **more: Any) -> Any:
@@ -115,9 +114,8 @@ def test_a_bench_that_is_refused_leaves_the_config_of_its_reports(
     assert b"attack: 3" in (out / "bench.yml").read_bytes() and b"attack: 2" in before
 
 
-def test_more_pictures_to_learn_from(tmp_path: Path, written: Callable[..., Path]) -> None:
-    out, looks = tmp_path / "out", Looks()
-    gear.bench(written(*LEARNING), out=out)
+def test_more_pictures_to_learn_from(written: Written, made: Made) -> None:
+    out, looks = made(LEARNING), Looks()
     report = gear.bench(written(*LEARNING, ("calibrate: 8", "calibrate: 9")), out=out, watch=looks)
     alone, guarded = report.tasks[0].results
     assert [row.made for row in alone.evaluation.rows] == [0, 0, 0]
@@ -126,8 +124,7 @@ def test_more_pictures_to_learn_from(tmp_path: Path, written: Callable[..., Path
     assert line.startswith("evaluate small+fpda in semseg: is made again") and "calibration_samples" in line
 
 
-def test_patches_that_are_wanted_otherwise_are_not_made_again(tmp_path: Path, written: Callable[..., Path]) -> None:
-    out = tmp_path / "out"
-    gear.bench(written(*FEW), out=out)
+def test_patches_that_are_wanted_otherwise_are_not_made_again(written: Written, made: Made) -> None:
+    out = made(FEW)
     with pytest.raises(GearError, match=r"made otherwise \(steps: 2 there, 3 now\); use another --out, or remove it$"):
         gear.bench(written(*FEW, ("steps: 2", "steps: 3")), out=out)

@@ -13,8 +13,7 @@ import pytest
 import gear
 from gear.contracts.specs import ModelSpec
 from gear.values.frames import UInt8Image
-from gear.verbs.collect.run import CollectReport
-from tests.verbs.conftest import Install, Small, put_package
+from tests.verbs.conftest import Collected, Install, Small, put_package
 
 Views = Mapping[str, UInt8Image]
 
@@ -58,16 +57,11 @@ def install(monkeypatch: pytest.MonkeyPatch) -> Install:
     return lambda *specs: put_package(monkeypatch, specs)
 
 
-@pytest.fixture(scope="module")
-def small(tmp_path_factory: pytest.TempPathFactory, collect_small: Callable[..., CollectReport]) -> Small:
+@pytest.fixture(scope="session")
+def small(collected: Collected) -> Small:
     """Datasets that tests share and only read; the folder's name is the patch."""
-    made: dict[tuple[str, str, int], Path] = {}
 
     def root(task: str, patch: str = "random", samples: int = 2) -> Path:
-        key = (task, patch, samples)
-        if key not in made:
-            made[key] = tmp_path_factory.mktemp(task) / patch
-            collect_small(task, made[key], samples=samples, patch=patch)
-        return made[key]
+        return collected(task, patch, samples=samples, patch=patch)
 
     return root
