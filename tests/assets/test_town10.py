@@ -292,7 +292,6 @@ def is_seen(
     return unblocked >= 5
 
 
-@pytest.mark.slow
 def test_regenerating_gives_the_same_bytes(tmp_path: Path) -> None:
     authoring = importlib.import_module("authoring.towns.assemble")
     for package in ("shapely", "mapbox_earcut"):

@@ -44,7 +44,6 @@ class Looks:
         raise AssertionError(line)
 
 
-@pytest.mark.slow
 def test_the_whole_way_and_again(tmp_path: Path, written: Callable[..., Path]) -> None:
     config, out, looks = written(), tmp_path / "out", Looks()
     report = gear.bench(config, out=out, watch=looks)

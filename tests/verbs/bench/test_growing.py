@@ -40,7 +40,6 @@ def times(root: Path, kind: str) -> dict[Path, int]:
     return {path: path.stat().st_mtime_ns for path in root.glob(f"data/semseg/*/ClearNoon/{kind}/**/*.png")}
 
 
-@pytest.mark.slow
 def test_more_pictures_to_attack(tmp_path: Path, written: Written, made: Made) -> None:
     out, looks = made(LEARNING), Looks()
     kept = {kind: times(out, kind) for kind in ("attack", "none", "random")}
