@@ -181,6 +181,21 @@ def test_lanes_lie_on_the_road_seen_and_felt(model: mujoco.MjModel, data: mujoco
             assert seen == pytest.approx(2.0, abs=0.03), (name, point)
 
 
+def test_the_horizon_is_never_empty(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """From lanes all over the town something stands above eye level in every direction; over roofs hills are seen."""
+    furthest_m = 0.0
+    for _, points, _ in list(lanes(model).values())[::25]:
+        eye = points[len(points) // 2] + np.array([0.0, 0.0, 1.65])
+        for angle in np.arange(0, 2 * np.pi, np.pi / 36):
+            level, raised = (
+                cast(model, data, eye, np.array([np.cos(angle), np.sin(angle), slope]), VISIBLE)[0]
+                for slope in (0.002, 0.08)
+            )
+            assert level > 0, (eye, np.degrees(angle))
+            furthest_m = max(furthest_m, raised)
+    assert furthest_m > 1000
+
+
 def test_bridges_rise_gently(model: mujoco.MjModel) -> None:
     points = lanes(model)["lane.bridge_c_f0"][1]
     slope = np.diff(points[:, 2]) / np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1)

@@ -85,12 +85,20 @@ def test_presets_are_carlas() -> None:
             noon = PRESETS[name.replace("Night", "Noon")]
             assert dataclasses.replace(noon, name=name, sun_altitude_deg=-90) == weather
     assert all(weather.name == name for name, weather in PRESETS.items())
-    clear, soft, hard = PRESETS["ClearNoon"], PRESETS["SoftRainNoon"], PRESETS["HardRainNoon"]
-    assert (clear.cloudiness, clear.sun_altitude_deg, clear.fog_density, clear.sun_azimuth_deg) == (5, 45, 2, 225)
-    assert (soft.cloudiness, soft.precipitation, soft.precipitation_deposits, soft.wind_intensity) == (20, 30, 50, 30)
-    assert (hard.cloudiness, hard.precipitation, hard.precipitation_deposits, hard.fog_density) == (100, 100, 90, 7)
-    assert PRESETS["ClearSunset"].sun_altitude_deg == 15
-    assert clear.mie_scattering_scale == 0.03 and clear.rayleigh_scattering_scale == 0.0331
+    keys = ("cloudiness", "precipitation", "precipitation_deposits", "wind_intensity", "sun_altitude_deg",
+            "fog_density")  # fmt: skip
+    table = {
+        "ClearNoon": (5, 0, 0, 10, 45, 2), "CloudyNoon": (60, 0, 0, 10, 45, 3), "ClearSunset": (5, 0, 0, 10, 15, 2),
+        "CloudySunset": (60, 0, 0, 10, 15, 3), "SoftRainNoon": (20, 30, 50, 30, 45, 3),
+        "WetNoon": (5, 0, 50, 10, 45, 3), "MidRainyNoon": (60, 60, 60, 60, 45, 3),
+        "HardRainNoon": (100, 100, 90, 100, 45, 7),
+    }  # fmt: skip
+    for name, numbers in table.items():
+        preset = PRESETS[name]
+        assert tuple(getattr(preset, key) for key in keys) == numbers, name
+        assert (preset.fog_distance_m, preset.fog_falloff, preset.wetness) == (0.75, 0.1, 0), name
+        assert (preset.scattering_intensity, preset.mie_scattering_scale) == (1, 0.03), name
+        assert (preset.rayleigh_scattering_scale, preset.sun_azimuth_deg) == (0.0331, 225), name
 
 
 def test_faces_of_the_sky_look_outwards_all_around() -> None:
