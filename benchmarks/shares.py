@@ -35,7 +35,7 @@ class Counts:
 
     def add(self, label_ids: npt.NDArray[np.uint8]) -> None:
         """One more picture."""
-        here = np.bincount(label_ids.ravel(), minlength=COUNT)[: COUNT]
+        here = np.bincount(label_ids.ravel(), minlength=COUNT)[:COUNT]
         self.pixels += here
         self.seen += here > 0
         self.pictures += 1
