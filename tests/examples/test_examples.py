@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 import venv
@@ -14,6 +13,7 @@ import numpy as np
 import pytest
 
 from gear.dataset.turns import turn
+from tests.shared import shared_folder
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = sorted(path.parent for path in (ROOT / "examples").glob("gear-*/pyproject.toml"))
@@ -32,8 +32,7 @@ def call(*command: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
 @pytest.fixture(scope="module")
 def environment(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An environment with gear and all examples from wheels, which all of a run's processes share."""
-    run = tmp_path_factory.getbasetemp()
-    shared = (run.parent if "PYTEST_XDIST_WORKER" in os.environ else run) / "examples"
+    shared = shared_folder(tmp_path_factory, "examples")
     with turn(shared):
         if not (shared / "whole").exists():
             install(shared / "env", shared / "wheels")

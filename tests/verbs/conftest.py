@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import shutil
 import sys
 import types
@@ -22,6 +21,7 @@ from gear.plugins.manager import discover
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_depth, tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.verbs.collect.run import CollectReport, collect
+from tests.shared import shared_folder
 
 Collected = Callable[..., Path]
 Copy = Callable[..., Path]
@@ -85,12 +85,6 @@ def install(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
 
     put(tiny_segmenter, tiny_depth, other_segmenter)
     return put
-
-
-def shared_folder(tmp_path_factory: pytest.TempPathFactory, name: str) -> Path:
-    """A place that all processes of a run have together; who writes there takes its `turn`."""
-    run = tmp_path_factory.getbasetemp()
-    return (run.parent if "PYTEST_XDIST_WORKER" in os.environ else run) / name
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,8 @@ import gear
 from gear.dataset.turns import turn
 from gear.testing.tiny_networks import tiny_depth, tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
-from tests.verbs.conftest import other_segmenter, put_package, shared_folder
+from tests.shared import shared_folder
+from tests.verbs.conftest import other_segmenter, put_package
 
 CONFIG = f"""
 tasks:

@@ -1,0 +1,14 @@
+"""What all processes of a run of the tests have together."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+def shared_folder(tmp_path_factory: pytest.TempPathFactory, name: str) -> Path:
+    """A place of that name, the same one in every process; who writes there takes its `gear.dataset.turns.turn`."""
+    run = tmp_path_factory.getbasetemp()
+    return (run.parent if "PYTEST_XDIST_WORKER" in os.environ else run) / name
