@@ -23,6 +23,7 @@ from gear.world.light import Lighting
 from gear.world.mjb import read_model, write_model
 from gear.world.models import placement_model, render_model
 from gear.world.pool import plan_pool, vehicles_of
+from gear.world.relief import upright_relief
 from gear.world.scene_spec import SceneSpec
 from gear.world.trees import without_mesh_trees
 from gear.world.weather import wetness
@@ -114,6 +115,7 @@ def compile_world(
         ahead.expect(composition.pictures)
         ahead.wait()
         model, classes = render_model(composition)
+    upright_relief(model)
     wet_own_colours(model, classes.label_code, wetness(weather))
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)

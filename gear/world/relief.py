@@ -1,0 +1,180 @@
+"""Normal maps that are lit from the right side, in a renderer that does not look at texture coordinates.
+
+Filament, as MuJoCo 4.0 fills it, makes a mesh's tangents of its normals alone, in the frame that MuJoCo turns the mesh
+into for its inertia. For a unit normal (x, y, z) in that frame red tilts it along `T` and green along `B` (measured),
+
+    T = (-x z / (1 + y), -z, 1 - z^2 / (1 + y))        B = -(1 - x^2 / (1 + y), -x, -x z / (1 + y))
+
+which is Frisvad's basis about y, left-handed ("Building an Orthonormal Basis from a Unit Vector", 2012). So on every
+upright wall red goes up and green to the right of who looks at it, wherever it faces; on level ground and on slopes
+it depends on how the mesh is turned about the vertical. A usual map, with red to the right and green up, is therefore
+right with its two channels exchanged, in a mesh that stands upright and is turned by a well-chosen yaw.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from gear.values.geometry import Array
+
+YAWS = 16
+"""Directions that a mesh is tried in, evenly around the vertical."""
+
+_LOOKED_AT = 192
+"""Triangles of a mesh that decide, evenly out of all."""
+
+_NORMAL, _RGB_CHANNELS = int(mujoco.mjtTextureRole.mjTEXROLE_NORMAL), 3
+_MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
+_SINGULAR = 1e-6
+"""Of 1 + y, below which the basis has no direction of its own."""
+
+_SLACK_M = 1e-4
+"""Boxes of flat meshes have no thickness, and turned vertices are rounded."""
+
+
+def upright_relief(model: mujoco.MjModel) -> None:
+    """Turns normal maps, and the frames of meshes that wear them, so that Filament reads them as they were meant.
+
+    Geoms stay where they are, and so do their triangles; what is turned is the frame between them.
+
+    Args:
+        model: compiled, changed in place: normal textures, which nothing else may use, and meshes with their geoms.
+    """
+    textures = np.unique(model.mat_texid[:, _NORMAL])
+    for texture in textures[textures >= 0].tolist():
+        _exchange_red_and_green(model, texture)
+    wearers = np.flatnonzero(
+        (model.geom_type == _MESH) & (model.geom_matid >= 0) & (model.mat_texid[model.geom_matid, _NORMAL] >= 0)
+    )
+    meshes = np.unique(model.geom_dataid[wearers])
+    meshes = meshes[model.mesh_texcoordnum[meshes] > 0].tolist()
+    if not meshes:
+        return
+    upright_from_mesh = {mesh: _matrix(model.mesh_quat[mesh]) for mesh in meshes}
+    yaws = best_yaws([_sheet(model, mesh, rotation) for mesh, rotation in upright_from_mesh.items()])
+    for (mesh, rotation), yaw in zip(upright_from_mesh.items(), yaws, strict=True):
+        _turn(model, mesh, rotation, float(yaw))
+
+
+def tangents(normals: Array) -> tuple[Array, Array]:
+    """What red and green of a normal map tilt a normal along.
+
+    Args:
+        normals: (..., 3) unit vectors in a mesh's frame.
+
+    Returns:
+        (..., 3) unit vectors: red's, and green's.
+    """
+    x, y, z = np.moveaxis(normals, -1, 0)
+    is_singular = 1 + y < _SINGULAR
+    share = 1 / np.where(is_singular, 1.0, 1 + y)
+    red = np.stack([-x * z * share, -z, 1 - z * z * share], axis=-1)
+    green = -np.stack([1 - x * x * share, -x, -x * z * share], axis=-1)
+    red[is_singular], green[is_singular] = (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+    return red, green
+
+
+def best_yaws(sheets: list[tuple[Array, Array, Array]]) -> Array:
+    """How meshes have to be turned for their normal maps, in radians.
+
+    Args:
+        sheets: of each mesh, in an upright frame: (M, 3) unit normals of triangles, the directions to the right in the
+            texture, and those up in it, both as long as the triangle's area.
+
+    Returns:
+        (meshes,) yaw of the frame in which red goes up and green to the right over most of the mesh.
+    """
+    normals, right, up = (np.concatenate(columns) for columns in zip(*sheets, strict=True))
+    starts = np.cumsum([0, *(len(sheet[0]) for sheet in sheets[:-1])])
+    yaws = np.arange(YAWS) * (2 * np.pi / YAWS)
+    fits = []
+    for yaw in yaws.tolist():
+        turn = _about_z(yaw)
+        red, green = tangents(normals @ turn)
+        agreement = np.einsum("ij,ij->i", red, up @ turn) + np.einsum("ij,ij->i", green, right @ turn)
+        fits.append(np.add.reduceat(agreement, starts))
+    # Upright walls are as well off with any yaw but those that make them singular: rounding must not choose.
+    fit = np.array(fits)
+    is_best = fit >= fit.max(axis=0) - 1e-4 * np.abs(fit).max(axis=0)
+    return np.asarray(yaws[is_best.argmax(axis=0)])
+
+
+def _sheet(model: mujoco.MjModel, mesh: int, upright_from_mesh: Array) -> tuple[Array, Array, Array]:
+    """What `best_yaws` wants to know of a mesh."""
+    count = int(model.mesh_facenum[mesh])
+    chosen = model.mesh_faceadr[mesh] + np.unique(np.linspace(0, count - 1, min(count, _LOOKED_AT)).astype(np.int64))
+    corners = model.mesh_vert[model.mesh_vertadr[mesh] + model.mesh_face[chosen]].astype(np.float64)
+    uvs = model.mesh_texcoord[model.mesh_texcoordadr[mesh] + model.mesh_facetexcoord[chosen]].astype(np.float64)
+    edges = (corners[:, 1:] - corners[:, :1]) @ upright_from_mesh.T
+    steps = uvs[:, 1:] - uvs[:, :1]
+    across = np.cross(edges[:, 0], edges[:, 1])
+    doubled_area = np.linalg.norm(across, axis=1, keepdims=True)
+    # In MuJoCo's texture coordinates v grows downwards.
+    right = edges[:, 0] * steps[:, 1, 1:] - edges[:, 1] * steps[:, 0, 1:]
+    down = edges[:, 1] * steps[:, 0, :1] - edges[:, 0] * steps[:, 1, :1]
+    turned = np.sign(steps[:, 0, :1] * steps[:, 1, 1:] - steps[:, 1, :1] * steps[:, 0, 1:])
+    return (
+        across / np.maximum(doubled_area, 1e-12),
+        doubled_area * turned * _unit(right),
+        -doubled_area * turned * _unit(down),
+    )
+
+
+def _turn(model: mujoco.MjModel, mesh: int, upright_from_mesh: Array, yaw: float) -> None:
+    """Gives a mesh another frame about the same origin, and its geoms too, so that nothing moves."""
+    new_from_mesh = _about_z(yaw).T @ upright_from_mesh
+    upright_from_new = np.array([np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)])
+    mesh_from_new = np.empty(4)
+    mujoco.mju_negQuat(mesh_from_new, model.mesh_quat[mesh])
+    mujoco.mju_mulQuat(mesh_from_new, mesh_from_new.copy(), upright_from_new)
+    matrix = new_from_mesh.T.astype(np.float32)
+    vertices, normals = (
+        values[int(start[mesh]) : int(start[mesh] + size[mesh])]
+        for values, start, size in (
+            (model.mesh_vert, model.mesh_vertadr, model.mesh_vertnum),
+            (model.mesh_normal, model.mesh_normaladr, model.mesh_normalnum),
+        )
+    )
+    vertices[:], normals[:] = vertices @ matrix, normals @ matrix
+    polygons = slice(model.mesh_polyadr[mesh], model.mesh_polyadr[mesh] + model.mesh_polynum[mesh])
+    model.mesh_polynormal[polygons] = model.mesh_polynormal[polygons] @ new_from_mesh.T
+    # What rays find triangles by: boxes about the turned boxes are larger than need be, and right.
+    boxes = model.bvh_aabb[int(model.mesh_bvhadr[mesh]) : int(model.mesh_bvhadr[mesh] + model.mesh_bvhnum[mesh])]
+    boxes[:, :3] = boxes[:, :3] @ new_from_mesh.T
+    boxes[:, 3:] = boxes[:, 3:] @ np.abs(new_from_mesh).T + _SLACK_M
+    low, high = vertices.min(axis=0).astype(np.float64), vertices.max(axis=0).astype(np.float64)
+    model.mesh_quat[mesh] = upright_from_new
+    for geom in np.flatnonzero((model.geom_dataid == mesh) & (model.geom_type == _MESH)).tolist():
+        turned = np.empty(4)
+        mujoco.mju_mulQuat(turned, model.geom_quat[geom], mesh_from_new)
+        model.geom_quat[geom] = turned
+        # Kinematics would else take the frame of its body's inertia for it.
+        model.geom_sameframe[geom] = int(mujoco.mjtSameFrame.mjSAMEFRAME_NONE)
+        model.geom_aabb[geom] = *(low + high) / 2, *(high - low) / 2
+        model.geom_size[geom] = np.maximum(-low, high)
+
+
+def _exchange_red_and_green(model: mujoco.MjModel, texture: int) -> None:
+    width, height, channels = (int(of[texture]) for of in (model.tex_width, model.tex_height, model.tex_nchannel))
+    if channels < _RGB_CHANNELS:
+        return
+    start = int(model.tex_adr[texture])
+    pixels = model.tex_data[start : start + width * height * channels].reshape(-1, channels)
+    pixels[:, :2] = pixels[:, 1::-1]
+
+
+def _matrix(quat: npt.NDArray[np.float64]) -> Array:
+    matrix = np.empty(9)
+    mujoco.mju_quat2Mat(matrix, quat)
+    return matrix.reshape(3, 3)
+
+
+def _about_z(angle: float) -> Array:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _unit(vectors: Array) -> Array:
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12))
