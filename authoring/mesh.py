@@ -34,6 +34,10 @@ Ints = NDArray[np.int64]
 # Ties of the rounding below would depend on the last bit of a sine; this moves them off the middle.
 _TIE_BREAK = 1e-6
 
+# What rounding to millimetres does to flat quads: how far corners are from one plane, and the textures of the two
+# diagonals from each other where they cross.
+_FLAT_M, _FLAT_UV = 1e-3, 1e-3
+
 
 @dataclass(frozen=True)
 class Mesh:
@@ -260,7 +264,8 @@ def write_obj(path: Path, mesh: Mesh, *, is_patchwork: bool = False) -> None:
         path: of the file.
         mesh: what to write.
         is_patchwork: whether it is many small pieces rather than a few skins. Each corner is then written before the
-            first face that uses it, and faces count backwards: pieces that are alike read alike, and pack smaller.
+            first face that uses it, and faces count backwards: pieces that are alike read alike, and pack smaller. Two
+            neighbouring triangles that are one flat quad are written as one face, which MuJoCo cuts again.
     """
     if mesh.normals is None:
         mesh = smooth_normals(mesh)
@@ -280,13 +285,63 @@ def write_obj(path: Path, mesh: Mesh, *, is_patchwork: bool = False) -> None:
         index.append(full[faces])
         text = {number: _number(number / scale, digits) for number in np.unique(kept).tolist()}
         texts.append([" ".join([tag, *(text[number] for number in row)]) for row in kept.tolist()])
-    table = np.stack(index, -1).tolist()
+    table = np.stack(index, -1)
     if is_patchwork:
-        lines = list(_as_needed(texts, table))
+        number = np.zeros((len(mesh.vertices), 3), dtype=np.int64)
+        number[faces] = table
+        pieces = _quads_and_triangles(faces, quantised / 1e3, mesh.uvs)
+        lines = list(_as_needed(texts, [number[piece].tolist() for piece in pieces]))
     else:
         lines = [line for text in texts for line in text]
-        lines += ["f " + " ".join("/".join(map(str, corner)) for corner in face) for face in table]
+        lines += ["f " + " ".join("/".join(map(str, corner)) for corner in face) for face in table.tolist()]
     path.write_text("\n".join(lines) + "\n", encoding="ascii", newline="\n")
+
+
+def _quads_and_triangles(faces: Ints, positions: Floats, uvs: Floats) -> list[list[int]]:
+    """Corners of faces, with each two that follow each other joined where they are one flat, convex quad.
+
+    Args:
+        faces: (M, 3) indices.
+        positions, uvs: (N, 3) and (N, 2) of what they index. A joined quad's texture is one parallelogram, so that
+            nothing depends on the diagonal along which a reader cuts it.
+    """
+    first, second = faces[:-1], faces[1:]
+    quads, is_quad = np.zeros((len(first), 4), dtype=np.int64), np.zeros(len(first), dtype=np.bool_)
+    for i in range(3):
+        for j in range(3):
+            meets = (first[:, i] == second[:, (j + 1) % 3]) & (first[:, (i + 1) % 3] == second[:, j])
+            around = (first[:, i], second[:, (j + 2) % 3], first[:, (i + 1) % 3], first[:, (i + 2) % 3])
+            quads[meets] = np.stack(around, axis=1)[meets]
+            is_quad |= meets
+    corners, places = positions[quads], uvs[quads]
+    edges = np.roll(corners, -1, axis=1) - corners
+    turns = np.cross(np.roll(edges, 1, axis=1), edges)
+    area = np.linalg.norm(turns, axis=2)
+    normal = turns[:, 0] / np.maximum(area[:, :1], 1e-12)
+    is_quad &= (np.einsum("kij,kj->ki", turns, normal) > 0.999 * area).all(axis=1) & (area > 0).all(axis=1)
+    is_quad &= np.abs(np.einsum("kj,kj->k", corners[:, 2] - corners[:, 0], normal)) < _FLAT_M
+    # Of a parallelogram the middles of both diagonals are one point, in the texture as in the world.
+    share = _share_of_diagonal(corners)
+    odd = places[:, 0] + share[:, :1] * (places[:, 2] - places[:, 0])
+    even = places[:, 1] + share[:, 1:] * (places[:, 3] - places[:, 1])
+    is_quad &= (np.abs(odd - even) < _FLAT_UV).all(axis=1)
+    pieces, number, joins, quad_list = [], 0, is_quad.tolist(), quads.tolist()
+    triangles = faces.tolist()
+    while number < len(triangles):
+        joined = number < len(joins) and joins[number]
+        pieces.append(quad_list[number] if joined else triangles[number])
+        number += 2 if joined else 1
+    return pieces
+
+
+def _share_of_diagonal(corners: Floats) -> Floats:
+    """(K, 2) where the diagonals of flat quads (K, 4, 3) cross, as shares of their lengths."""
+    one, other = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
+    between = corners[:, 1] - corners[:, 0]
+    a, b, c = (one * one).sum(1), (one * other).sum(1), (other * other).sum(1)
+    d, e = (one * between).sum(1), (other * between).sum(1)
+    span = np.maximum(a * c - b * b, 1e-12)
+    return np.stack([(d * c - b * e) / span, (d * b - a * e) / span], axis=1)
 
 
 def _as_needed(texts: list[list[str]], faces: list[list[list[int]]]) -> Iterator[str]:
