@@ -30,6 +30,7 @@ TO_KITTI = {
     "motorcycle": "Misc",
     "caravan": "Misc",
     "trailer": "Misc",
+    "train": "Tram",
 }
 
 
