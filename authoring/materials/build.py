@@ -69,14 +69,14 @@ def written_textures(textures: dict[str, Image]) -> dict[str, Image]:
     """The registered textures at the sizes that they are written with, in order of their names."""
     if missing := registered_stems() - set(textures):
         raise ValueError(f"nobody paints {', '.join(sorted(missing))}")
-    largest = {stem: max(textures[stem].shape) for stem in registered_stems()}
+    largest = {material.rgb: max(textures[material.rgb].shape) for material in MATERIALS.values()}
     for material in MATERIALS.values():
         side = max(textures[material.rgb].shape)
         if material.normal:
             # What an atlas has of relief is edges of a few pixels, with nothing between them.
             largest[material.normal] = LARGEST_MAP_PX if material.tile_m else side
         if material.orm:
-            largest[material.orm] = min(LARGEST_MAP_PX, side // 2)
+            largest[material.orm] = min(LARGEST_MAP_PX, max(largest.get(material.orm, 0), side // 2))
     return {stem: shrunk(textures[stem], side) for stem, side in sorted(largest.items())}
 
 

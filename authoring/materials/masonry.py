@@ -147,11 +147,11 @@ def roof_tiles(*, rng: np.random.Generator) -> Textures:
     # Moss and dust lie in the valleys, and each tile was fired at its own heat.
     fired = roof.per_block(rng.uniform(-0.06, 0.06, rows * columns))
     roughness = rough(0.82, fired - 0.05 * wave + 0.06 * fine)
-    valley = 1 - 0.3 * np.clip(-wave, 0, 1)
+    valley = 1 - 0.16 * np.clip(-wave, 0, 1)
     return {
         "tile_roof": linear_to_srgb(albedo),
         "tile_roof_n": normal_from_height(height, (tile_m, tile_m)),
-        "tile_roof_orm": orm(_under_laps(roof.up, 0.14) * valley, roughness, 0.0),
+        "tile_roof_orm": orm(_under_laps(roof.up, 0.10) * valley, roughness, 0.0),
     }
 
 
@@ -200,7 +200,7 @@ def cobbles(*, rng: np.random.Generator) -> Textures:
     return {
         "cobbles": linear_to_srgb(albedo),
         "cobbles_n": normal_from_height(height, (tile_m, tile_m)),
-        "cobbles_orm": orm(open_sky(height, tile_m), roughness, 0.0),
+        "cobbles_orm": orm(open_sky(height, tile_m, strength=2.0), roughness, 0.0),
     }
 
 
@@ -235,7 +235,7 @@ def gravel(*, rng: np.random.Generator) -> Textures:
     return {
         "roof_gravel": linear_to_srgb(albedo),
         "roof_gravel_n": normal_from_height(height, (tile_m, tile_m)),
-        "roof_gravel_orm": orm(0.6 + 0.4 * gap, rough(0.92, pebble * gap), 0.0),
+        "roof_gravel_orm": orm(0.72 + 0.28 * gap, rough(0.92, pebble * gap), 0.0),
     }
 
 
