@@ -85,19 +85,17 @@ def direction_signs(*, rng: np.random.Generator) -> Textures:
 def _livery(colour: Colour, name: str, *, rng: np.random.Generator) -> Canvas:
     cell = Canvas(1024, 128, oversample=2)
     base = np.asarray(colour)
-    cell.fill(base, roughness=0.55)
+    cell.fill(base, roughness=0.58)
     cell.relief_m[:] = RIB_M
-    rib = (np.arange(cell.size[0]) + 0.5) / cell.size[0] / DOOR_U * RIBS % 1
-    web = slice(round(0.05 * cell.size[1]), round(0.95 * cell.size[1]))
-    # From a crest a sixth of the pitch wide flanks fall to a trough as wide.
-    cell.relief_m[web, : round(DOOR_U * cell.size[0])] *= np.clip(1 - (np.abs(rib - 0.51) - 0.11) / 0.26, 0, 1)[
-        : round(DOOR_U * cell.size[0])
-    ]
+    side, web = round(DOOR_U * cell.size[0]), slice(round(0.05 * cell.size[1]), round(0.95 * cell.size[1]))
+    # Flanks fall from crests to troughs, all of them about a quarter of the pitch wide.
+    across = np.abs((np.arange(side) + 0.5) / side * RIBS % 1 - 0.51)
+    cell.relief_m[web, :side] *= np.clip(1 - (across - 0.11) / 0.26, 0, 1)
     for rib in range(RIBS):
         x = DOOR_U * (rib + 0.5) / RIBS
         step = DOOR_U / RIBS
-        cell.rect(x - 0.10 * step, 0.05, x + 0.12 * step, 0.95, base * 1.22, roughness=0.55)
-        cell.rect(x + 0.12 * step, 0.05, x + 0.38 * step, 0.95, base * 0.62, roughness=0.55)
+        cell.rect(x - 0.10 * step, 0.05, x + 0.12 * step, 0.95, base * 1.22, roughness=0.58)
+        cell.rect(x + 0.12 * step, 0.05, x + 0.38 * step, 0.95, base * 0.62, roughness=0.58)
     cell.text(name, DOOR_U * 0.42, 0.46, 0.36, WHITE if base.mean() < 0.3 else (0.03, 0.05, 0.12), weight=0.15)
     for y in (0.0, 0.945):
         cell.rect(0, y, 1, y + 0.055, base * 0.75, roughness=0.6)
@@ -113,5 +111,5 @@ def _livery(colour: Colour, name: str, *, rng: np.random.Generator) -> Canvas:
     cell.albedo *= (1 + 0.10 * noise)[..., None]
     rust = np.clip((noise - 0.66) * 5, 0, 1)[..., None] * 0.8
     cell.albedo = cell.albedo * (1 - rust) + np.array([0.11, 0.05, 0.028]) * rust
-    cell.surface[..., 0] += (0.92 - cell.surface[..., 0]) * rust[..., 0] + 0.05 * noise
+    cell.surface[..., 0] += (0.92 - cell.surface[..., 0]) * rust[..., 0]
     return cell

@@ -9,7 +9,6 @@ import numpy.typing as npt
 from authoring.materials.atlas import DOORS, SHOP_COUNT, WINDOW_COLUMNS, WINDOW_ROWS
 from authoring.materials.canvas import Canvas, Colour, tiled
 from authoring.materials.image import Image, normal_from_slopes
-from authoring.materials.noise import tileable_noise
 
 Array = npt.NDArray[np.float64]
 Textures = dict[str, Image]
@@ -83,7 +82,7 @@ def _atlas(
     stem: str, cells: list[Canvas], columns: int, size_m: tuple[float, float], *, rng: np.random.Generator
 ) -> Textures:
     """Colour, ORM and normals of cells that show `size_m` each."""
-    normals = [cell.normal(size_m, lean=_waviness(cell, rng=rng)) for cell in cells]
+    normals = [cell.normal(size_m, lean=_askew(cell, rng=rng)) for cell in cells]
     return {
         stem: tiled([c.image() for c in cells], columns),
         f"{stem}_orm": tiled([c.orm() for c in cells], columns),
@@ -91,14 +90,17 @@ def _atlas(
     }
 
 
-def _waviness(cell: Canvas, *, rng: np.random.Generator) -> Array:
-    """Slopes (height, width, 2) of the panes: each sits a little askew in its frame, and none is quite flat."""
-    glass = (cell.finished_surface()[..., 0] < GLASS_BELOW).astype(np.uint8)
+def _askew(cell: Canvas, *, rng: np.random.Generator) -> Array:
+    """Slopes (height, width, 2) of the panes: each sits a little askew in its frame and mirrors something else.
+
+    The same all over a pane: where a byte's steps of half a degree followed a wave, reflections would show creases.
+    """
+    # Shadows on the glass are as smooth, and cross the bars that cast them.
+    is_glass = (cell.finished_surface()[..., 0] < GLASS_BELOW) & (cell.finished_relief_m() <= 0)
+    glass = is_glass.astype(np.uint8)
     count, pane = cv2.connectedComponents(glass, connectivity=4)
-    askew = rng.normal(0, 0.010, (count, 2)).clip(-0.02, 0.02)
-    rows, columns = glass.shape
-    waves = [tileable_noise(rows, period=2, octaves=2, rng=rng)[:, :columns] for _ in range(2)]
-    return np.asarray((askew[pane] + 0.010 * np.stack(waves, -1)) * glass[..., None])
+    slopes = rng.normal(0, 0.011, (count, 2)).clip(-0.022, 0.022)
+    return np.asarray(slopes[pane] * glass[..., None])
 
 
 def _glass(cell: Canvas, dressing: int, *, rng: np.random.Generator) -> None:

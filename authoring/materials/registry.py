@@ -14,7 +14,7 @@ class Material:
         normal, orm: stems of the normal and the occlusion/roughness/metalness textures, where it has them.
         tile_m: metres that UV 0..1 covers; 0 for an atlas, whose UVs are rectangles.
         tint: linear factor on the colour texture.
-        roughness, metallic: factors; with an ORM texture they are 1 and the texture decides.
+        roughness, metallic: factors; with an ORM texture they are 1, whatever is said here, and the texture decides.
         emission: light of its own, as a share of the texture's colour.
     """
 
@@ -34,10 +34,16 @@ MATERIALS: dict[str, Material] = {
     "brick_red": Material(rgb="brick_red", normal="brick_n", orm="brick_orm", tile_m=2.0),
     "brick_brown": Material(rgb="brick_brown", normal="brick_n", orm="brick_orm", tile_m=2.0),
     "brick_buff": Material(rgb="brick_buff", normal="brick_n", orm="brick_orm", tile_m=2.0),
-    "plaster_white": Material(rgb="plaster", normal="plaster_n", orm="plaster_orm", tile_m=4.0, tint=(0.92, 0.90, 0.85)),
-    "plaster_ochre": Material(rgb="plaster", normal="plaster_n", orm="plaster_orm", tile_m=4.0, tint=(0.70, 0.56, 0.36)),
+    "plaster_white": Material(
+        rgb="plaster", normal="plaster_n", orm="plaster_orm", tile_m=4.0, tint=(0.92, 0.90, 0.85)
+    ),
+    "plaster_ochre": Material(
+        rgb="plaster", normal="plaster_n", orm="plaster_orm", tile_m=4.0, tint=(0.70, 0.56, 0.36)
+    ),
     "plaster_rose": Material(rgb="plaster", normal="plaster_n", orm="plaster_orm", tile_m=4.0, tint=(0.58, 0.38, 0.30)),
-    "plaster_cream": Material(rgb="plaster", normal="plaster_n", orm="plaster_orm", tile_m=4.0, tint=(0.86, 0.77, 0.58)),
+    "plaster_cream": Material(
+        rgb="plaster", normal="plaster_n", orm="plaster_orm", tile_m=4.0, tint=(0.86, 0.77, 0.58)
+    ),
     "plaster_grey": Material(rgb="plaster", normal="plaster_n", orm="plaster_orm", tile_m=4.0, tint=(0.47, 0.50, 0.50)),
     "ashlar": Material(rgb="ashlar", normal="ashlar_n", orm="ashlar_orm", tile_m=3.0),
     "concrete": Material(rgb="concrete", normal="concrete_n", orm="concrete_orm", tile_m=4.0),
@@ -64,9 +70,7 @@ MATERIALS: dict[str, Material] = {
     ),
     # openings
     "windows": Material(rgb="windows", normal="windows_n", orm="windows_orm", tile_m=0),
-    "curtain_wall": Material(
-        rgb="curtain_wall", normal="curtain_wall_n", orm="curtain_wall_orm", tile_m=12.0
-    ),
+    "curtain_wall": Material(rgb="curtain_wall", normal="curtain_wall_n", orm="curtain_wall_orm", tile_m=12.0),
     "shop_fronts": Material(rgb="shop_fronts", normal="shop_fronts_n", orm="shop_fronts_orm", tile_m=0),
     "signs": Material(rgb="signs", tile_m=0, roughness=0.5),
     "awnings": Material(rgb="awnings", tile_m=0, roughness=0.95),
