@@ -7,8 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from authoring.materials import far, freight, glazing, graphics, ground, masonry, traffic_art
-from authoring.materials.image import Image, shrunk, write_png
+from authoring.materials.image import Image, shrunk
 from authoring.materials.palette import palette_images
+from authoring.materials.png import write_png
 from authoring.materials.registry import MATERIALS
 from gear.values.rng import derive_rng
 
@@ -46,9 +47,7 @@ PAINTERS: tuple[Painter, ...] = (
     freight.containers,
     freight.direction_signs,
 )
-# Noise has few shades: as a palette image it takes a third of the bytes.
-FEW_COLOURS = 256
-# Normals and ORM say less than colours do, and cost as much.
+# Normals say less than colours do, and cost as much; occlusion, roughness and metalness say less still.
 LARGEST_MAP_PX = 512
 
 
@@ -66,15 +65,25 @@ def registered_stems() -> set[str]:
     return {stem for m in MATERIALS.values() for stem in (m.rgb, m.normal, m.orm) if stem}
 
 
-def build(folder: Path) -> None:
-    """Write every registered texture into `folder`."""
-    textures = paint()
+def written_textures(textures: dict[str, Image]) -> dict[str, Image]:
+    """The registered textures at the sizes that they are written with, in order of their names."""
     if missing := registered_stems() - set(textures):
         raise ValueError(f"nobody paints {', '.join(sorted(missing))}")
-    colours = {material.rgb for material in MATERIALS.values()}
-    for stem in sorted(registered_stems()):
-        image = textures[stem] if stem in colours else shrunk(textures[stem], LARGEST_MAP_PX)
-        write_png(folder / f"{stem}.png", image, colours=FEW_COLOURS)
+    largest = {material.rgb: max(textures[material.rgb].shape) for material in MATERIALS.values()}
+    for material in MATERIALS.values():
+        side = max(textures[material.rgb].shape)
+        if material.normal:
+            # What an atlas has of relief is edges of a few pixels, with nothing between them.
+            largest[material.normal] = LARGEST_MAP_PX if material.tile_m else side
+        if material.orm:
+            largest[material.orm] = min(LARGEST_MAP_PX, max(largest.get(material.orm, 0), side // 2))
+    return {stem: shrunk(textures[stem], side) for stem, side in sorted(largest.items())}
+
+
+def build(folder: Path) -> None:
+    """Write every registered texture into `folder`."""
+    for stem, image in written_textures(paint()).items():
+        write_png(folder / f"{stem}.png", image)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""A small canvas in linear colour for drawing atlases: pixels with albedo, roughness and metalness."""
+"""A small canvas in linear colour for drawing atlases: pixels with albedo, roughness, metalness and height."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from authoring.materials.image import Image, linear_to_srgb, orm
+from authoring.materials.image import Image, linear_to_srgb, normal_from_slopes, orm
 
 Array = npt.NDArray[np.float64]
 Colour = Sequence[float] | Array
@@ -21,6 +21,7 @@ class Canvas:
     Attributes:
         albedo: (H, W, 3) linear colour at the supersampled size.
         surface: (H, W, 2) roughness and metalness.
+        relief_m: (H, W) height, which stays where things are drawn without one.
     """
 
     def __init__(self, width_px: int, height_px: int, *, oversample: int = 2) -> None:
@@ -29,6 +30,7 @@ class Canvas:
         self.albedo: Array = np.zeros((self.size[1], self.size[0], 3))
         self.surface: Array = np.zeros((self.size[1], self.size[0], 2))
         self.surface[..., 0] = 0.8
+        self.relief_m: Array = np.zeros((self.size[1], self.size[0]))
 
     def fill(self, colour: Colour, *, roughness: float = 0.8, metallic: float = 0.0) -> None:
         """Paint everything."""
@@ -44,11 +46,14 @@ class Canvas:
         *,
         roughness: float = 0.8,
         metallic: float = 0.0,
+        height_m: float | None = None,
     ) -> None:
-        """Paint a rectangle."""
+        """Paint a rectangle, and set it that high."""
         box = self._box(x0, y0, x1, y1)
         self.albedo[box] = colour
         self.surface[box] = roughness, metallic
+        if height_m is not None:
+            self.relief_m[box] = height_m
 
     def gradient(self, x0: float, y0: float, x1: float, y1: float, top: Colour, bottom: Colour) -> None:
         """Colour a rectangle from top to bottom and leave its roughness and metalness."""
@@ -107,10 +112,31 @@ class Canvas:
         """The finished colour, sRGB bytes (height, width, 3)."""
         return linear_to_srgb(self._reduced(self.albedo))
 
-    def orm(self) -> Image:
-        """The finished occlusion (none), roughness and metalness, (height, width, 3)."""
-        surface = self._reduced(self.surface)
-        return orm(1.0, surface[..., 0], surface[..., 1])
+    def orm(self, occlusion: Array | float = 1.0) -> Image:
+        """The finished occlusion, roughness and metalness, (height, width, 3)."""
+        surface = self.finished_surface()
+        return orm(occlusion, surface[..., 0], surface[..., 1])
+
+    def finished_surface(self) -> Array:
+        """Roughness and metalness at the finished size, (height, width, 2)."""
+        return self._reduced(self.surface)
+
+    def finished_relief_m(self) -> Array:
+        """Height at the finished size, (height, width)."""
+        return self._reduced(self.relief_m[..., None])[..., 0]
+
+    def normal(self, size_m: tuple[float, float], *, lean: Array | None = None) -> Image:
+        """The finished normal map, (height, width, 3).
+
+        Args:
+            size_m: width and height of what the canvas shows.
+            lean: (height, width, 2) slopes to the right and upwards that the surface has besides its relief.
+        """
+        relief_m = self.finished_relief_m()
+        rows, columns = relief_m.shape
+        down, right = np.gradient(relief_m, size_m[1] / rows, size_m[0] / columns)
+        slopes = np.stack([right, -down], -1) + (0.0 if lean is None else lean)
+        return normal_from_slopes(slopes[..., 0], slopes[..., 1])
 
     def _reduced(self, image: Array) -> Array:
         n = self.oversample

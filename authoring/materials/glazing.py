@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
 from authoring.materials.atlas import DOORS, SHOP_COUNT, WINDOW_COLUMNS, WINDOW_ROWS
 from authoring.materials.canvas import Canvas, Colour, tiled
-from authoring.materials.image import Image, to_bytes
+from authoring.materials.image import Image, normal_from_slopes
 
 Array = npt.NDArray[np.float64]
 Textures = dict[str, Image]
 # Glass is drawn as a smooth, dark, half-metallic surface: its reflectance at right angles is that of double glazing.
 GLASS = {"roughness": 0.06, "metallic": 0.85}
 BEHIND = {"roughness": 0.09, "metallic": 0.10}
+# What is smoother than this is glass.
+GLASS_BELOW = 0.12
+# Nominal width and height of what an atlas's cells show.
+WINDOW_M, SHOP_M, DOOR_M = (1.2, 1.8), (2.2, 2.4), (1.2, 2.3)
 
 
 def windows(*, rng: np.random.Generator) -> Textures:
@@ -25,7 +30,7 @@ def windows(*, rng: np.random.Generator) -> Textures:
             _glass(cell, dressing, rng=rng)
             _frame(cell, kind, dressing)
             cells.append(cell)
-    return _pair("windows", cells, WINDOW_COLUMNS)
+    return _atlas("windows", cells, WINDOW_COLUMNS, WINDOW_M, rng=rng)
 
 
 def shop_fronts(*, rng: np.random.Generator) -> Textures:
@@ -40,7 +45,8 @@ def shop_fronts(*, rng: np.random.Generator) -> Textures:
         cell = Canvas(128, 256)
         _door(cell, name)
         doors.append(cell)
-    upper, lower = _pair("shop_fronts", shops, 4), _pair("shop_fronts", doors, 8)
+    upper = _atlas("shop_fronts", shops, 4, SHOP_M, rng=rng)
+    lower = _atlas("shop_fronts", doors, 8, DOOR_M, rng=rng)
     return {stem: np.concatenate([upper[stem], lower[stem]], axis=0) for stem in upper}
 
 
@@ -62,19 +68,39 @@ def curtain_wall(*, rng: np.random.Generator) -> Textures:
             wall.rect(x0, split, x1, y1, np.array([0.062, 0.075, 0.082]) * tone, roughness=0.22, metallic=0.5)
             wall.rect(x0, split - 0.004, x1, split + 0.004, (0.03, 0.03, 0.032), roughness=0.5)
             rows = slice(round(y0 * size), round(y1 * size))
-            tilt[rows, round(x0 * size) : round(x1 * size)] = rng.integers(-1, 2, 2) / 127.5
+            tilt[rows, round(x0 * size) : round(x1 * size)] = 0.012 * rng.integers(-1, 2, 2)
     for pane in range(panes + 1):
         wall.rect(pane / panes - 0.003, 0, pane / panes + 0.003, 1, (0.03, 0.03, 0.032), roughness=0.5)
-    normal = np.concatenate([tilt, np.ones((size, size, 1))], axis=-1)
     return {
         "curtain_wall": wall.image(),
         "curtain_wall_orm": wall.orm(),
-        "curtain_wall_n": to_bytes(normal * 0.5 + 0.5),
+        "curtain_wall_n": normal_from_slopes(tilt[..., 0], tilt[..., 1]),
     }
 
 
-def _pair(stem: str, cells: list[Canvas], columns: int) -> Textures:
-    return {stem: tiled([c.image() for c in cells], columns), f"{stem}_orm": tiled([c.orm() for c in cells], columns)}
+def _atlas(
+    stem: str, cells: list[Canvas], columns: int, size_m: tuple[float, float], *, rng: np.random.Generator
+) -> Textures:
+    """Colour, ORM and normals of cells that show `size_m` each."""
+    normals = [cell.normal(size_m, lean=_askew(cell, rng=rng)) for cell in cells]
+    return {
+        stem: tiled([c.image() for c in cells], columns),
+        f"{stem}_orm": tiled([c.orm() for c in cells], columns),
+        f"{stem}_n": tiled(normals, columns),
+    }
+
+
+def _askew(cell: Canvas, *, rng: np.random.Generator) -> Array:
+    """Slopes (height, width, 2) of the panes: each sits a little askew in its frame and mirrors something else.
+
+    The same all over a pane: where a byte's steps of half a degree followed a wave, reflections would show creases.
+    """
+    # Shadows on the glass are as smooth, and cross the bars that cast them.
+    is_glass = (cell.finished_surface()[..., 0] < GLASS_BELOW) & (cell.finished_relief_m() <= 0)
+    glass = is_glass.astype(np.uint8)
+    count, pane = cv2.connectedComponents(glass, connectivity=4)
+    slopes = rng.normal(0, 0.011, (count, 2)).clip(-0.022, 0.022)
+    return np.asarray(slopes[pane] * glass[..., None])
 
 
 def _glass(cell: Canvas, dressing: int, *, rng: np.random.Generator) -> None:
@@ -136,16 +162,17 @@ def _frame(cell: Canvas, kind: str, dressing: int) -> None:
     thick = {"casement": 0.07, "sash": 0.045, "modern": 0.05, "industrial": 0.026}[kind]
     for x in bars[0]:
         cell.rect(x + thick / 2, 0, x + thick / 2 + shadow, 1, (0.02, 0.022, 0.022), roughness=0.1)
-        cell.rect(x - thick / 2, 0, x + thick / 2, 1, colour, roughness=0.55)
+        cell.rect(x - thick / 2, 0, x + thick / 2, 1, colour, roughness=0.55, height_m=0.016)
     for y in bars[1]:
         half = thick / 4 if kind != "sash" else 0.016
         cell.rect(0, y + half, 1, y + half + shadow / 2, (0.02, 0.022, 0.022), roughness=0.1)
-        cell.rect(0, y - half, 1, y + half, colour, roughness=0.55)
+        cell.rect(0, y - half, 1, y + half, colour, roughness=0.55, height_m=0.014)
     for x0, y0, x1, y1 in ((0, 0, side, 1), (1 - side, 0, 1, 1), (0, 0, 1, side / 2), (0, 1 - side / 2, 1, 1)):
-        cell.rect(x0, y0, x1, y1, colour, roughness=0.55)
+        cell.rect(x0, y0, x1, y1, colour, roughness=0.55, height_m=0.022)
     cell.rect(0, 0, 1, 0.008, np.asarray(colour) * 0.5, roughness=0.6)
+    cell.relief_m[-round(side / 4 * cell.size[1]) :] += 0.012  # the sill's nose
     if kind == "casement":
-        cell.rect(0.485, 0.55, 0.515, 0.6, (0.3, 0.28, 0.24), roughness=0.4, metallic=0.8)
+        cell.rect(0.485, 0.55, 0.515, 0.6, (0.3, 0.28, 0.24), roughness=0.4, metallic=0.8, height_m=0.03)
 
 
 def _shop(cell: Canvas, index: int, *, rng: np.random.Generator) -> None:
@@ -243,31 +270,34 @@ def _door(cell: Canvas, name: str) -> None:
             }[name[6:]]
         )
         cell.fill(colour, roughness=0.35)
-        cell.rect(0.06, 0.02, 0.94, 0.20, (0.09, 0.10, 0.105), **GLASS)
+        cell.rect(0.06, 0.02, 0.94, 0.20, (0.09, 0.10, 0.105), height_m=-0.02, **GLASS)
         cell.rect(0, 0.2, 1, 0.215, colour * 0.4)
         for y0, y1 in ((0.26, 0.54), (0.60, 0.93)):
             for x0, x1 in ((0.12, 0.46), (0.54, 0.88)):
-                cell.rect(x0, y0, x1, y1, colour * 0.45, roughness=0.4)
-                cell.rect(x0 + 0.03, y0 + 0.012, x1 - 0.015, y1 - 0.006, colour * 1.35, roughness=0.35)
-                cell.rect(x0 + 0.05, y0 + 0.025, x1 - 0.05, y1 - 0.025, colour, roughness=0.35)
+                cell.rect(x0, y0, x1, y1, colour * 0.45, roughness=0.4, height_m=-0.012)
+                cell.rect(x0 + 0.03, y0 + 0.012, x1 - 0.015, y1 - 0.006, colour * 1.35, roughness=0.35, height_m=-0.006)
+                cell.rect(x0 + 0.05, y0 + 0.025, x1 - 0.05, y1 - 0.025, colour, roughness=0.35, height_m=0.0)
         cell.ellipse(0.9, 0.57, 0.03, 0.015, (0.55, 0.42, 0.18), roughness=0.3, metallic=0.9)
-        cell.rect(0.3, 0.565, 0.7, 0.58, (0.45, 0.36, 0.17), roughness=0.35, metallic=0.9)
+        cell.rect(0.3, 0.565, 0.7, 0.58, (0.45, 0.36, 0.17), roughness=0.35, metallic=0.9, height_m=0.006)
     elif name.startswith("glass"):
         cell.fill((0.05, 0.052, 0.055), roughness=0.45, metallic=0.3)
         leaves = [(0.06, 0.94)] if name == "glass" else [(0.04, 0.485), (0.515, 0.96)]
         for x0, x1 in leaves:
-            cell.rect(x0, 0.03, x1, 0.95, (0.10, 0.108, 0.112), **GLASS)
+            cell.rect(x0, 0.03, x1, 0.95, (0.10, 0.108, 0.112), height_m=-0.02, **GLASS)
             cell.gradient(x0, 0.03, x1, 0.95, (0.085, 0.092, 0.096), (0.13, 0.13, 0.125))
         for x in (0.82,) if name == "glass" else (0.42, 0.55):
-            cell.rect(x, 0.42, x + 0.035, 0.66, (0.6, 0.6, 0.6), roughness=0.3, metallic=0.9)
+            cell.rect(x, 0.42, x + 0.035, 0.66, (0.6, 0.6, 0.6), roughness=0.3, metallic=0.9, height_m=0.01)
     elif name == "steel":
         cell.fill((0.07, 0.075, 0.08), roughness=0.5)
-        cell.rect(0.06, 0.03, 0.94, 1.0, (0.13, 0.14, 0.15), roughness=0.45)
-        cell.rect(0.08, 0.48, 0.2, 0.53, (0.5, 0.5, 0.5), roughness=0.35, metallic=0.9)
-        cell.rect(0.3, 0.14, 0.7, 0.3, (0.08, 0.09, 0.09), **GLASS)
-        cell.rect(0.06, 0.93, 0.94, 1.0, (0.35, 0.35, 0.35), roughness=0.4, metallic=0.8)
+        cell.rect(0.06, 0.03, 0.94, 1.0, (0.13, 0.14, 0.15), roughness=0.45, height_m=-0.015)
+        cell.rect(0.08, 0.48, 0.2, 0.53, (0.5, 0.5, 0.5), roughness=0.35, metallic=0.9, height_m=0.01)
+        cell.rect(0.3, 0.14, 0.7, 0.3, (0.08, 0.09, 0.09), height_m=-0.03, **GLASS)
+        cell.rect(0.06, 0.93, 0.94, 1.0, (0.35, 0.35, 0.35), roughness=0.4, metallic=0.8, height_m=-0.012)
     else:
         cell.fill((0.28, 0.285, 0.29), roughness=0.5, metallic=0.3)
+        # Slats of 9 cm, rounded.
+        slat = (np.arange(cell.size[1]) + 0.5) / cell.size[1] / 0.04
+        cell.relief_m[:] = 0.014 * np.abs(np.sin(np.pi * slat))[:, None] ** 0.7
         for y in np.arange(0.0, 1.0, 0.04):
             cell.rect(0, y, 1, y + 0.006, (0.08, 0.08, 0.085), roughness=0.7)
             cell.rect(0, y + 0.006, 1, y + 0.014, (0.36, 0.365, 0.37), roughness=0.45, metallic=0.3)

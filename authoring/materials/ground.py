@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from authoring.materials.image import Image, linear_to_srgb, normal_from_height, orm
+from authoring.materials.image import Image, linear_to_srgb, normal_from_height, open_sky, orm, rough
 from authoring.materials.noise import tileable_noise, worley, wrapped_blur
 
 Array = npt.NDArray[np.float64]
@@ -62,7 +62,7 @@ def asphalt_lanes(*, rng: np.random.Generator) -> Textures:
 
 
 def concrete(*, rng: np.random.Generator) -> Textures:
-    """Cast concrete: boards' and panel joints, tie holes, stains; the kerb shares its normal map."""
+    """Cast concrete: boards' and panel joints, tie holes, stains; the kerb shares its normal and ORM maps."""
     size, tile_m = 1024, 4.0
     fine = tileable_noise(size, period=256, octaves=2, rng=rng)
     broad = tileable_noise(size, period=3, octaves=6, rng=rng)
@@ -84,9 +84,12 @@ def concrete(*, rng: np.random.Generator) -> Textures:
     kerb_joint = np.clip((0.006 - _to_line(kerb_axis, 1.0)) / 0.004, 0, 1)[None, :]
     dirt = tileable_noise(kerb_size, period=4, octaves=4, rng=rng)
     kerb = np.array([0.34, 0.335, 0.32]) * ((1 + 0.14 * kerb_fine + 0.12 * dirt) * (1 - 0.6 * kerb_joint))[..., None]
+    # Where rain runs the skin of cement is washed off; what the forms' joints left is rougher, too.
+    roughness = rough(0.85, 0.08 * broad + 0.06 * streaks + 0.08 * groove + 0.05 * holes)
     return {
         "concrete": linear_to_srgb(albedo),
         "concrete_n": normal_from_height(height, (tile_m, tile_m)),
+        "concrete_orm": orm(open_sky(height, tile_m), roughness, 0.0),
         "kerb": linear_to_srgb(kerb),
     }
 
@@ -96,12 +99,15 @@ def plaster(*, rng: np.random.Generator) -> Textures:
     size, tile_m = 512, 4.0
     fine = tileable_noise(size, period=128, octaves=3, rng=rng, gain=0.8)
     broad = tileable_noise(size, period=2, octaves=6, rng=rng, gain=0.55)
-    shade = 0.80 * (1 + 0.05 * fine + 0.085 * broad - 0.06 * _streaks(size, rng=rng))
+    streaks = _streaks(size, rng=rng)
+    shade = 0.80 * (1 + 0.05 * fine + 0.085 * broad - 0.06 * streaks)
     tone = np.stack([np.ones_like(shade), 1 + 0.012 * broad, 1 + 0.03 * broad], -1)
     height = 0.0016 * fine + 0.003 * broad
     return {
         "plaster": linear_to_srgb(shade[..., None] * tone),
         "plaster_n": normal_from_height(height, (tile_m, tile_m)),
+        # The trowel left smoother patches; dirt in the streaks is dull.
+        "plaster_orm": orm(open_sky(height, tile_m), rough(0.85, 0.09 * broad + 0.06 * streaks), 0.0),
     }
 
 
@@ -136,7 +142,13 @@ def boards(*, rng: np.random.Generator) -> Textures:
     shade = rng.uniform(0.78, 1.18, count)[board] * (1 + 0.22 * grain) * (1 - 0.75 * gap)
     albedo = np.array([0.25, 0.145, 0.075]) * shade[..., None]
     height = 0.0008 * grain - 0.006 * gap
-    return {"wood": linear_to_srgb(albedo), "wood_n": normal_from_height(height, (tile_m, tile_m))}
+    # Each board has kept as much of its varnish as it has.
+    varnish = rng.uniform(-0.09, 0.09, count)[board]
+    return {
+        "wood": linear_to_srgb(albedo),
+        "wood_n": normal_from_height(height, (tile_m, tile_m)),
+        "wood_orm": orm(1 - 0.5 * gap, rough(0.75, varnish + 0.06 * grain + 0.1 * gap), 0.0),
+    }
 
 
 def road_paint(*, rng: np.random.Generator) -> Textures:

@@ -1,15 +1,19 @@
-"""From float maps to texture files: colour spaces, normal maps from heights, small PNGs."""
+"""From float maps to textures: colour spaces, normal and occlusion maps from heights."""
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from PIL import Image as PillowImage
+
+from authoring.materials.noise import wrapped_blur
 
 Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.uint8]
+Axes = Literal["uv", "vu"]
+# A surface's grain is no pit: what it hides, its colour shows already.
+GRAIN_M = 0.0005
 
 
 def linear_to_srgb(linear: npt.ArrayLike) -> Image:
@@ -24,13 +28,45 @@ def to_bytes(unit: npt.ArrayLike) -> Image:
 
 
 def normal_from_height(height_m: Array, size_m: tuple[float, float]) -> Image:
-    """Tangent-space normal map (x right, y up, z out) of a tileable height field (H, W) that covers `size_m` (w, h)."""
+    """Normal map of a tileable height field (H, W), row 0 at the top, that covers `size_m` (w, h)."""
     rows, columns = height_m.shape
-    slope_x = (np.roll(height_m, -1, 1) - np.roll(height_m, 1, 1)) / (2 * size_m[0] / columns)
-    slope_up = (np.roll(height_m, 1, 0) - np.roll(height_m, -1, 0)) / (2 * size_m[1] / rows)
-    normal = np.stack([-slope_x, -slope_up, np.ones_like(height_m)], -1)
+    slope_u = (np.roll(height_m, -1, 1) - np.roll(height_m, 1, 1)) / (2 * size_m[0] / columns)
+    slope_v = (np.roll(height_m, 1, 0) - np.roll(height_m, -1, 0)) / (2 * size_m[1] / rows)
+    return normal_from_slopes(slope_u, slope_v)
+
+
+def normal_from_slopes(slope_u: Array, slope_v: Array, *, axes: Axes = "uv") -> Image:
+    """Encodes every normal map of the town, and is where its axes are chosen.
+
+    Args:
+        slope_u: (H, W) rise to the right in the texture, metres a metre.
+        slope_v: (H, W) rise upwards in the texture.
+        axes: what red and green hold of the normal, which renderers read along a tangent T and a bitangent B. `uv`: red
+            along +u, green along +v (T = +u, B = +v). `vu`: red along +v, green along -u (T = +v, B = -u).
+    """
+    along_u, along_v = -slope_u, -slope_v
+    red, green = (along_u, along_v) if axes == "uv" else (along_v, -along_u)
+    normal = np.stack([red, green, np.ones_like(red)], -1)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     return to_bytes(normal * 0.5 + 0.5)
+
+
+def open_sky(height_m: Array, tile_m: float, *, reach_m: float = 0.015, strength: float = 3.0) -> Array:
+    """Occlusion (H, W) of a tileable height field: 1 on what stands out, less in joints and pits.
+
+    Args:
+        height_m: (H, W).
+        tile_m: side of the square that it covers.
+        reach_m: how wide around a pixel the surface is that its depth is measured against.
+        strength: how quickly it gets dark with that depth; 1 halves the light at a depth of `reach_m`.
+    """
+    deep_m = wrapped_blur(height_m, reach_m / tile_m * height_m.shape[1]) - height_m
+    return np.asarray(1 / (1 + strength * np.clip(deep_m - GRAIN_M, 0, None) / reach_m))
+
+
+def rough(mean: float, variation: Array) -> Array:
+    """Roughness (H, W) around a mean: what the variation adds to it anywhere is taken off everywhere."""
+    return np.asarray(np.clip(mean + variation - variation.mean(), 0.05, 1.0))
 
 
 def orm(occlusion: npt.ArrayLike, roughness: npt.ArrayLike, metallic: npt.ArrayLike) -> Image:
@@ -45,11 +81,3 @@ def shrunk(image: Image, largest_px: int) -> Image:
     blocks = image[: height * factor, : width * factor].reshape(height, factor, width, factor, -1)
     small: Image = np.rint(blocks.mean((1, 3))).astype(np.uint8)
     return small
-
-
-def write_png(path: Path, image: Image, *, colours: int | None = None) -> None:
-    """Write (H, W, 3) as PNG; with `colours` as a palette image of so many, a third of the size for noise."""
-    picture = PillowImage.fromarray(image)
-    if colours is not None:
-        picture = picture.quantize(colours, method=PillowImage.Quantize.MEDIANCUT, dither=PillowImage.Dither.NONE)
-    picture.save(path, optimize=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from authoring.materials.image import Image, linear_to_srgb, normal_from_height, orm
+from authoring.materials.image import Image, linear_to_srgb, normal_from_height, open_sky, orm, rough
 from authoring.materials.noise import tileable_noise, worley, wrapped_blur
 
 Array = npt.NDArray[np.float64]
@@ -105,7 +105,14 @@ def ashlar(*, rng: np.random.Generator) -> Textures:
     albedo = (stone + warm) * (0.62 + 0.38 * solid)[..., None]
     tooled = 0.0007 * grain + 0.0004 * fine
     height = 0.006 * np.clip(wall.edge_m / 0.012, 0, 1) ** 0.7 + tooled
-    return {"ashlar": linear_to_srgb(albedo), "ashlar_n": normal_from_height(height, (tile_m, tile_m))}
+    # Some blocks are of a harder bed than others; weather opens their pores in clouds, and joints are sand.
+    bed = wall.per_block(rng.uniform(-0.05, 0.05, rows * columns))
+    roughness = rough(0.85, solid * (bed + 0.07 * broad) + 0.10 * (1 - solid))
+    return {
+        "ashlar": linear_to_srgb(albedo),
+        "ashlar_n": normal_from_height(height, (tile_m, tile_m)),
+        "ashlar_orm": orm(open_sky(height, tile_m), roughness, 0.0),
+    }
 
 
 def slates(*, rng: np.random.Generator) -> Textures:
@@ -117,7 +124,14 @@ def slates(*, rng: np.random.Generator) -> Textures:
     solid = np.clip(roof.edge_m / 0.006, 0, 1)
     albedo = np.array([0.075, 0.08, 0.09]) * (tone * (1 + 0.15 * fine) * (0.5 + 0.5 * solid))[..., None]
     height = 0.012 * (1 - roof.up) + 0.003 * np.clip(roof.edge_m / 0.01, 0, 1) + 0.001 * fine
-    return {"slate_roof": linear_to_srgb(albedo), "slate_roof_n": normal_from_height(height, (tile_m, tile_m))}
+    # Rain has polished some slates, lichen has roughened others, most so at their sheltered upper end.
+    polish = roof.per_block(rng.uniform(-0.14, 0.12, rows * columns))
+    roughness = rough(0.6, solid * (polish + 0.05 * fine + 0.06 * roof.up) + 0.2 * (1 - solid))
+    return {
+        "slate_roof": linear_to_srgb(albedo),
+        "slate_roof_n": normal_from_height(height, (tile_m, tile_m)),
+        "slate_roof_orm": orm(_under_laps(roof.up, 0.10) * (0.7 + 0.3 * solid), roughness, 0.0),
+    }
 
 
 def roof_tiles(*, rng: np.random.Generator) -> Textures:
@@ -130,7 +144,15 @@ def roof_tiles(*, rng: np.random.Generator) -> Textures:
     shade = 0.72 + 0.28 * np.clip(wave * 0.5 + 0.7, 0, 1) * np.clip((1 - roof.up) * 6, 0.35, 1)
     albedo = np.array([0.26, 0.105, 0.062]) * (tone * shade * (1 + 0.2 * fine))[..., None]
     height = 0.03 * wave + 0.03 * (1 - roof.up) + 0.002 * fine
-    return {"tile_roof": linear_to_srgb(albedo), "tile_roof_n": normal_from_height(height, (tile_m, tile_m))}
+    # Moss and dust lie in the valleys, and each tile was fired at its own heat.
+    fired = roof.per_block(rng.uniform(-0.06, 0.06, rows * columns))
+    roughness = rough(0.82, fired - 0.05 * wave + 0.06 * fine)
+    valley = 1 - 0.16 * np.clip(-wave, 0, 1)
+    return {
+        "tile_roof": linear_to_srgb(albedo),
+        "tile_roof_n": normal_from_height(height, (tile_m, tile_m)),
+        "tile_roof_orm": orm(_under_laps(roof.up, 0.10) * valley, roughness, 0.0),
+    }
 
 
 def pavement(*, rng: np.random.Generator) -> Textures:
@@ -149,7 +171,14 @@ def pavement(*, rng: np.random.Generator) -> Textures:
     joint = np.array([0.15, 0.14, 0.12]) * (1 + 0.3 * broad)[..., None]
     albedo = joint * (1 - solid[..., None]) + albedo * solid[..., None]
     height = 0.004 * np.clip(floor.edge_m / 0.008, 0, 1) + 0.0015 * tilt * (floor.along - 0.5) * solid + 0.0006 * fine
-    return {"pavement": linear_to_srgb(albedo), "pavement_n": normal_from_height(height, (tile_m, tile_m))}
+    # Soles polish the slabs' faces and leave their rims; gum is smooth.
+    worn = floor.per_block(rng.uniform(-0.04, 0.04, rows * columns))
+    roughness = rough(0.88, solid * (worn + 0.05 * broad - 0.04 * (1 - chips)) - 0.15 * spots + 0.06 * (1 - solid))
+    return {
+        "pavement": linear_to_srgb(albedo),
+        "pavement_n": normal_from_height(height, (tile_m, tile_m)),
+        "pavement_orm": orm(open_sky(height, tile_m), roughness, 0.0),
+    }
 
 
 def cobbles(*, rng: np.random.Generator) -> Textures:
@@ -164,7 +193,15 @@ def cobbles(*, rng: np.random.Generator) -> Textures:
     joint = np.array([0.10, 0.09, 0.075]) * (1 + 0.3 * fine)[..., None]
     albedo = joint * (1 - solid[..., None]) + stone * solid[..., None]
     height = 0.012 * np.clip(floor.edge_m / 0.025, 0, 1) ** 0.5 + 0.001 * fine
-    return {"cobbles": linear_to_srgb(albedo), "cobbles_n": normal_from_height(height, (tile_m, tile_m))}
+    # Wheels polish the crowns of the stones.
+    crown = np.clip(floor.edge_m / 0.03, 0, 1)
+    polish = floor.per_block(rng.uniform(0.5, 1.0, rows * columns))
+    roughness = rough(0.85, 0.05 * fine - 0.2 * polish * crown)
+    return {
+        "cobbles": linear_to_srgb(albedo),
+        "cobbles_n": normal_from_height(height, (tile_m, tile_m)),
+        "cobbles_orm": orm(open_sky(height, tile_m, strength=2.0), roughness, 0.0),
+    }
 
 
 def tactile(*, rng: np.random.Generator) -> Textures:
@@ -194,7 +231,17 @@ def gravel(*, rng: np.random.Generator) -> Textures:
     broad = tileable_noise(size, period=4, octaves=3, rng=rng)
     albedo = np.array([0.23, 0.22, 0.20]) * (tone * (0.35 + 0.65 * gap) * (1 + 0.2 * broad))[..., None]
     height = 0.012 * np.sqrt(gap)
-    return {"roof_gravel": linear_to_srgb(albedo), "roof_gravel_n": normal_from_height(height, (tile_m, tile_m))}
+    pebble = rng.uniform(-0.08, 0.04, cells * cells)[stone]
+    return {
+        "roof_gravel": linear_to_srgb(albedo),
+        "roof_gravel_n": normal_from_height(height, (tile_m, tile_m)),
+        "roof_gravel_orm": orm(0.72 + 0.28 * gap, rough(0.92, pebble * gap), 0.0),
+    }
+
+
+def _under_laps(up: Array, reach: float) -> Array:
+    """Occlusion just below the edge of the course above: 0.5 at a block's upper end, 1 from `reach` of it downwards."""
+    return np.asarray(1 - 0.5 * np.clip((up - 1 + reach) / reach, 0, 1))
 
 
 def _spots(size_px: int, count: int, radii_px: tuple[int, int], *, rng: np.random.Generator) -> Array:

@@ -14,7 +14,7 @@ class Material:
         normal, orm: stems of the normal and the occlusion/roughness/metalness textures, where it has them.
         tile_m: metres that UV 0..1 covers; 0 for an atlas, whose UVs are rectangles.
         tint: linear factor on the colour texture.
-        roughness, metallic: factors; with an ORM texture they are 1 and the texture decides.
+        roughness, metallic: factors; with an ORM texture they are 1, whatever is said here, and the texture decides.
         emission: light of its own, as a share of the texture's colour.
     """
 
@@ -34,13 +34,19 @@ MATERIALS: dict[str, Material] = {
     "brick_red": Material(rgb="brick_red", normal="brick_n", orm="brick_orm", tile_m=2.0),
     "brick_brown": Material(rgb="brick_brown", normal="brick_n", orm="brick_orm", tile_m=2.0),
     "brick_buff": Material(rgb="brick_buff", normal="brick_n", orm="brick_orm", tile_m=2.0),
-    "plaster_white": Material(rgb="plaster", normal="plaster_n", tile_m=4.0, tint=(0.92, 0.90, 0.85)),
-    "plaster_ochre": Material(rgb="plaster", normal="plaster_n", tile_m=4.0, tint=(0.70, 0.56, 0.36)),
-    "plaster_rose": Material(rgb="plaster", normal="plaster_n", tile_m=4.0, tint=(0.58, 0.38, 0.30)),
-    "plaster_cream": Material(rgb="plaster", normal="plaster_n", tile_m=4.0, tint=(0.86, 0.77, 0.58)),
-    "plaster_grey": Material(rgb="plaster", normal="plaster_n", tile_m=4.0, tint=(0.47, 0.50, 0.50)),
-    "ashlar": Material(rgb="ashlar", normal="ashlar_n", tile_m=3.0),
-    "concrete": Material(rgb="concrete", normal="concrete_n", tile_m=4.0),
+    "plaster_white": Material(
+        rgb="plaster", normal="plaster_n", orm="plaster_orm", tile_m=4.0, tint=(0.92, 0.90, 0.85)
+    ),
+    "plaster_ochre": Material(
+        rgb="plaster", normal="plaster_n", orm="plaster_orm", tile_m=4.0, tint=(0.70, 0.56, 0.36)
+    ),
+    "plaster_rose": Material(rgb="plaster", normal="plaster_n", orm="plaster_orm", tile_m=4.0, tint=(0.58, 0.38, 0.30)),
+    "plaster_cream": Material(
+        rgb="plaster", normal="plaster_n", orm="plaster_orm", tile_m=4.0, tint=(0.86, 0.77, 0.58)
+    ),
+    "plaster_grey": Material(rgb="plaster", normal="plaster_n", orm="plaster_orm", tile_m=4.0, tint=(0.47, 0.50, 0.50)),
+    "ashlar": Material(rgb="ashlar", normal="ashlar_n", orm="ashlar_orm", tile_m=3.0),
+    "concrete": Material(rgb="concrete", normal="concrete_n", orm="concrete_orm", tile_m=4.0),
     "metal_panel": Material(rgb="metal_panel", normal="metal_panel_n", orm="metal_panel_orm", tile_m=2.0),
     "cladding_white": Material(
         rgb="metal_panel", normal="metal_panel_n", orm="metal_panel_orm", tile_m=2.0, tint=(1.0, 0.99, 0.96)
@@ -51,23 +57,21 @@ MATERIALS: dict[str, Material] = {
     "cladding_green": Material(
         rgb="metal_panel", normal="metal_panel_n", orm="metal_panel_orm", tile_m=2.0, tint=(0.30, 0.42, 0.32)
     ),
-    "containers": Material(rgb="containers", tile_m=0, roughness=0.6),
-    "wood": Material(rgb="wood", normal="wood_n", tile_m=2.0, roughness=0.75),
-    "roof_gravel": Material(rgb="roof_gravel", normal="roof_gravel_n", tile_m=2.0, roughness=0.95),
-    "slate_roof": Material(rgb="slate_roof", normal="slate_roof_n", tile_m=3.0, roughness=0.6),
-    "tile_roof": Material(rgb="tile_roof", normal="tile_roof_n", tile_m=3.0, roughness=0.8),
+    "containers": Material(rgb="containers", normal="containers_n", orm="containers_orm", tile_m=0),
+    "wood": Material(rgb="wood", normal="wood_n", orm="wood_orm", tile_m=2.0),
+    "roof_gravel": Material(rgb="roof_gravel", normal="roof_gravel_n", orm="roof_gravel_orm", tile_m=2.0),
+    "slate_roof": Material(rgb="slate_roof", normal="slate_roof_n", orm="slate_roof_orm", tile_m=3.0),
+    "tile_roof": Material(rgb="tile_roof", normal="tile_roof_n", orm="tile_roof_orm", tile_m=3.0),
     "tile_roof_brown": Material(
-        rgb="tile_roof", normal="tile_roof_n", tile_m=3.0, tint=(0.66, 0.66, 0.68), roughness=0.85
+        rgb="tile_roof", normal="tile_roof_n", orm="tile_roof_orm", tile_m=3.0, tint=(0.66, 0.66, 0.68)
     ),
     "tile_roof_grey": Material(
-        rgb="tile_roof", normal="tile_roof_n", tile_m=3.0, tint=(0.62, 0.92, 1.0), roughness=0.85
+        rgb="tile_roof", normal="tile_roof_n", orm="tile_roof_orm", tile_m=3.0, tint=(0.62, 0.92, 1.0)
     ),
     # openings
-    "windows": Material(rgb="windows", orm="windows_orm", tile_m=0, roughness=1.0),
-    "curtain_wall": Material(
-        rgb="curtain_wall", normal="curtain_wall_n", orm="curtain_wall_orm", tile_m=12.0, roughness=1.0
-    ),
-    "shop_fronts": Material(rgb="shop_fronts", orm="shop_fronts_orm", tile_m=0, roughness=1.0),
+    "windows": Material(rgb="windows", normal="windows_n", orm="windows_orm", tile_m=0),
+    "curtain_wall": Material(rgb="curtain_wall", normal="curtain_wall_n", orm="curtain_wall_orm", tile_m=12.0),
+    "shop_fronts": Material(rgb="shop_fronts", normal="shop_fronts_n", orm="shop_fronts_orm", tile_m=0),
     "signs": Material(rgb="signs", tile_m=0, roughness=0.5),
     "awnings": Material(rgb="awnings", tile_m=0, roughness=0.95),
     "far_facades": Material(rgb="far_facades", orm="far_facades_orm", tile_m=0),
@@ -85,10 +89,10 @@ MATERIALS: dict[str, Material] = {
         rgb="asphalt", normal="asphalt_n", orm="asphalt_orm", tile_m=6.0, tint=(0.76, 0.75, 0.74)
     ),
     "asphalt_seal": Material(rgb="asphalt", orm="asphalt_orm", tile_m=6.0, tint=(0.32, 0.32, 0.33)),
-    "pavement": Material(rgb="pavement", normal="pavement_n", tile_m=3.0, roughness=0.88),
-    "cobbles": Material(rgb="cobbles", normal="cobbles_n", tile_m=2.0, roughness=0.85),
+    "pavement": Material(rgb="pavement", normal="pavement_n", orm="pavement_orm", tile_m=3.0),
+    "cobbles": Material(rgb="cobbles", normal="cobbles_n", orm="cobbles_orm", tile_m=2.0),
     "tactile": Material(rgb="tactile", normal="tactile_n", tile_m=1.6, roughness=0.8),
-    "kerb": Material(rgb="kerb", normal="concrete_n", tile_m=2.0),
+    "kerb": Material(rgb="kerb", normal="concrete_n", orm="concrete_orm", tile_m=2.0),
     "road_paint_white": Material(rgb="road_paint", tile_m=2.0, roughness=0.7),
     "road_paint_yellow": Material(rgb="road_paint", tile_m=2.0, tint=(0.95, 0.58, 0.06), roughness=0.7),
     "ironwork": Material(rgb="ironwork", normal="ironwork_n", tile_m=0, roughness=0.55, metallic=0.4),
