@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 import numpy.typing as npt
 
@@ -11,7 +9,6 @@ from authoring.materials.noise import wrapped_blur
 
 Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.uint8]
-Axes = Literal["uv", "vu"]
 # A surface's grain is no pit: what it hides, its colour shows already.
 GRAIN_M = 0.0005
 
@@ -35,18 +32,14 @@ def normal_from_height(height_m: Array, size_m: tuple[float, float]) -> Image:
     return normal_from_slopes(slope_u, slope_v)
 
 
-def normal_from_slopes(slope_u: Array, slope_v: Array, *, axes: Axes = "uv") -> Image:
-    """Encodes every normal map of the town, and is where its axes are chosen.
+def normal_from_slopes(slope_u: Array, slope_v: Array) -> Image:
+    """Encodes every normal map of the town: red leans to the right of the texture, green up.
 
     Args:
         slope_u: (H, W) rise to the right in the texture, metres a metre.
         slope_v: (H, W) rise upwards in the texture.
-        axes: what red and green hold of the normal, which renderers read along a tangent T and a bitangent B. `uv`: red
-            along +u, green along +v (T = +u, B = +v). `vu`: red along +v, green along -u (T = +v, B = -u).
     """
-    along_u, along_v = -slope_u, -slope_v
-    red, green = (along_u, along_v) if axes == "uv" else (along_v, -along_u)
-    normal = np.stack([red, green, np.ones_like(red)], -1)
+    normal = np.stack([-slope_u, -slope_v, np.ones_like(slope_u)], -1)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     return to_bytes(normal * 0.5 + 0.5)
 
