@@ -27,7 +27,6 @@ Picture = npt.NDArray[np.uint8]
 IMAGES = Path(__file__).parent / "images"
 QUALITY = 88
 WORKERS = 2
-CROWD = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,7 +53,7 @@ class Shot:
         out = root / "-".join([self.task, self.town, self.scene, self.weather, str(self.seed), self.patch])
         gear.collect(
             self.task, town=self.town, scene=self.scene, weather=self.weather, seed=self.seed, patch=self.patch,
-            samples=self.index + 1, out=out, settings=(f"crowd={CROWD}",), workers=WORKERS,
+            samples=self.index + 1, out=out, workers=WORKERS,
         )  # fmt: skip
         return gear.open_dataset(out)[self.index]
 

@@ -64,7 +64,7 @@ def main() -> int:
             )
         collections.add_argument(
             "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings",
-            help="a key of all collections, such as crowd=5; repeatable",
+            help="a key of all collections, such as crowd=2; repeatable",
         )  # fmt: skip
         collections.add_argument("--jobs", type=int, default=2, help="collections at a time (2)")
         collections.add_argument("--list", action="store_true", help="print the commands and do nothing")

@@ -121,7 +121,7 @@ class SimulationConfig:
     """
 
     splits: dict[str, SplitConfig]
-    max_vehicles: int = 7
+    max_vehicles: int = 21
     max_pedestrians: int = 200
 
     def __post_init__(self) -> None:

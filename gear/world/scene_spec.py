@@ -174,10 +174,10 @@ class SceneSpec:
     truck: TruckSpec | None = None
     ego: EgoLimits | None = None
     npc_vehicles: VehicleLimits = field(
-        default_factory=lambda: VehicleLimits(count=(3, 7), radius_m=(0.0, 80.0)), metadata=WHOLE
+        default_factory=lambda: VehicleLimits(count=(9, 21), radius_m=(0.0, 80.0)), metadata=WHOLE
     )
     pedestrians: NpcLimits = field(
-        default_factory=lambda: NpcLimits(count=(6, 20), radius_m=(0.0, 60.0)), metadata=WHOLE
+        default_factory=lambda: NpcLimits(count=(18, 60), radius_m=(0.0, 60.0)), metadata=WHOLE
     )
 
     def __post_init__(self) -> None:

@@ -55,6 +55,14 @@ def test_a_scene_library_is_found_by_commands_alike(tmp_path: Path) -> None:
             look_up(load_collection(None, {"task": "depth"}, [f"scenes={name}"]))
 
 
+@pytest.mark.parametrize("town", ["town10", "suburb", "harbour"])
+def test_the_usual_limits_leave_the_towns_own_scenes_as_they_are(town: str) -> None:
+    scenes = read_town(town).scenes
+    assert scenes is not None
+    for name, scene in scenes.scenes.items():
+        assert look_up(load_collection(None, {"task": "depth", "town": town, "scene": name})).scene == scene
+
+
 def test_a_scene_without_a_name_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "my.yml"
     file.write_text('town: tiny\nscenes:\n  "": {}\n')

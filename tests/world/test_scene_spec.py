@@ -94,3 +94,5 @@ def test_a_crowd_multiplies_both_ends_up_to_the_most_there_may_be() -> None:
     assert scene.crowded(10).pedestrians.count == (60, 1000)
     assert scene.crowded(0).npc_vehicles.count == (0, 0)
     assert scene.crowded(1.0) is scene
+    third = SceneSpec().crowded(0.333)
+    assert (third.npc_vehicles.count, third.pedestrians.count) == ((3, 7), (6, 20)), "three digits are enough"

@@ -44,11 +44,10 @@ EVERY = 25
 PICTURES: dict[str, tuple[str, ...]] = {
     "semseg": ("quality=fast",),
     "depth": ("quality=fast",),
-    "detect2d": ("crowd=3",),
-    "stereo3d": ("quality=fast", "crowd=5"),
+    "stereo3d": ("quality=fast", f"crowd={5 / 3:g}"),
 }
 """Settings of a task's pictures beside those of training: what costs most is rendered as `fast`, which networks know,
-and a test of which objects are found wants objects."""
+and a test of which cars are found wants cars within a patch's reach."""
 
 _LEFT_OUT = tuple(f"losses.{name}=0" for name in ("sides", "centre", "size", "hidden", "surface", "disparity_bins"))
 
