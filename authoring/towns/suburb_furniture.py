@@ -6,7 +6,6 @@ import numpy as np
 from shapely.geometry import Point  # type: ignore[import-untyped]
 
 from authoring import kit
-from authoring.kit.parts import Part
 from authoring.towns import suburb
 from authoring.towns.furniture import FAR_M, Furnisher
 from authoring.towns.network import Street
@@ -19,8 +18,6 @@ SPECIES = (("broad", 8.0), ("street", 6.5), ("linden", 8.5), ("columnar", 8.0), 
 STREET_SPECIES = 4
 FAR_SPECIES = (("broad", 8.0), ("linden", 7.0), ("street", 5.5), ("conifer", 8.0))
 LAMP_M = 34.0
-# The trunk of a near tree comes first among its faces; the branches after it are hidden in the crown.
-TRUNK_FACES = 90
 EXTRAS = ("bench", "cable_box", "bin", "letter_box") + ("none",) * 22
 
 
@@ -30,7 +27,7 @@ class SuburbFurnisher(Furnisher):
     def __init__(self, props: Props, regions: Regions, ground: Ground, *, rng: np.random.Generator) -> None:
         super().__init__(props, regions, ground, rng=rng)
         tree_rng = np.random.default_rng([88, 1])
-        self.trees = [_with_trunk_only(kit.tree(species, height, tree_rng)) for species, height in SPECIES]
+        self.trees = [kit.tree(species, height, tree_rng) for species, height in SPECIES]
         self.far_trees = [kit.tree(species, height, tree_rng, lod="far") for species, height in FAR_SPECIES]
 
     def plant(self, x: float, y: float, z: float, *, kind: int, always: bool = False, simple: bool = False) -> None:
@@ -110,14 +107,3 @@ class SuburbFurnisher(Furnisher):
                 self._stand("cable_box", kit.cable_box(), x, y, yaw + np.pi, 0.5, high=1.1)
             elif kind == "bin":
                 self._stand("bin", kit.bin_(style="post"), x, y, yaw, 0.3, high=1.0)
-
-
-def _with_trunk_only(parts: list[Part]) -> list[Part]:
-    """A tree without the branches inside its crown."""
-    kept = []
-    for part in parts:
-        mesh = part.mesh
-        if part.material == "bark":
-            mesh = mesh.part(mesh.faces[:TRUNK_FACES])
-        kept.append(Part(part.material, part.label, mesh))
-    return kept
