@@ -24,7 +24,14 @@ Box = tuple[float, float, float, float]
 
 
 def party_wall(
-    facade: Facade, style: Style, floors: int, top_m: float, *, ridge_m: float, rng: np.random.Generator
+    facade: Facade,
+    style: Style,
+    floors: int,
+    top_m: float,
+    *,
+    ridge_m: float,
+    covered_m: float,
+    rng: np.random.Generator,
 ) -> None:
     """A wall with flues, a few small or blind windows, and perhaps an advert or the outline of a house that was there.
 
@@ -34,32 +41,35 @@ def party_wall(
         floors: storeys, the ground floor included.
         top_m: height of the walls.
         ridge_m: how far the roof or its parapet rises over them here.
+        covered_m: up to where a neighbour stands before it.
         rng: decides what there is.
     """
     width = facade.width_m
     kind = str(rng.choice(["house", "advert", "render", "plain"], p=[0.3, 0.2, 0.3, 0.2]))
     render = str(rng.choice(RENDERS["brick" if style.wall.startswith("brick") else "other"]))
-    taken: list[Box] = []
-    if kind == "advert" and width > 8.0 and top_m > 9.5:
+    taken: list[Box] = [(0.0, 0.0, width, covered_m)] if covered_m else []
+    if top_m - covered_m < 2.5:
+        kind = "plain"
+    if kind == "advert" and width > 8.0 and top_m - covered_m > 9.5:
         taken.append(_advert(facade, top_m, rng=rng))
-    elif kind == "house" and width > 8.0 and top_m > 8.0:
+    elif kind == "house" and width > 8.0 and top_m > 8.0 and not covered_m:
         taken.append(_former_house(facade, render, top_m, rng=rng))
-    elif kind == "render":
+    elif kind == "render" and not covered_m:
         high = style.ground_m + style.floor_m * int(rng.integers(0, max(floors - 2, 1)))
         facade.panel(render, 0.0, 0.0, width, min(high, top_m - 1.0), d_m=SKIN_M)
         taken.append((0.0, 0.0, width, high))
-    if width > 5.0 and rng.random() < 0.75:
+    if width > 5.0 and rng.random() < 0.6:
         taken.append(_flue(facade, style.wall, top_m, ridge_m, taken, rng=rng))
     openings, blind = _windows(width, style, floors, taken, rng=rng)
     facade.wall(style.wall, 0.0, 0.0, width, top_m, openings)
-    bare = replace(style.window, surround=None, lintel=None, shutters=None)
+    bare = replace(style.window, surround=None, lintel=None, shutters=None, ledge=None)
     for opening in openings:
         if opening in blind:
             facade.panel(render, opening.u0, opening.v0, opening.u1, opening.v1, d_m=-0.07)
             facade.reveal(style.wall, opening, 0.07)
         else:
             window(facade, opening, bare, rng=rng)
-    if rng.random() < 0.5:
+    if not covered_m and rng.random() < 0.5:
         downpipe(facade, width - 0.35 if rng.random() < 0.5 else 0.35, top_m - 0.3)
     if style.wall.startswith("brick") and rng.random() < 0.6:
         _ties(facade, style, floors, taken)
@@ -74,7 +84,7 @@ def _windows(
     columns = np.arange(1.7, width - 1.6, 3.4)
     chosen = rng.random(len(columns)) < 0.5
     # No wall stays blank.
-    if not taken and not chosen.any():
+    if len(taken) <= 1 and not chosen.any():
         chosen[len(columns) // 2 :] = True
     for centre in columns[chosen]:
         half, high = (0.32, 0.75) if rng.random() < 0.5 else (0.45, 1.25)
@@ -170,7 +180,7 @@ def _field(facade: Facade, material: str, outline: list[tuple[float, float]], d_
     corners = np.stack([facade.at(u, v, d_m) for u, v in outline])
     if material in MATERIALS:
         offset = float(facade.origin @ facade.right)
-        uvs = (np.asarray(outline) + (offset, 0.0)) / MATERIALS[material].tile_m
+        uvs = np.add(outline, (offset, 0.0)) / MATERIALS[material].tile_m
         facade.sink.polygon(material, corners, uvs)
     else:
         facade.sink.swatch_quad(material, corners)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,16 +26,19 @@ def storeyed_building(
     sides: Sequence[str],
     *,
     rng: np.random.Generator,
+    covered_m: Mapping[str, float] | None = None,
 ) -> None:
-    """Walls, windows, ground floor, ornament and roof of one building."""
-    top_m = style.ground_m + (floors - 1) * style.floor_m
+    """Walls, windows, ground floor, ornament and roof of one building; see `building` for what they are made from."""
+    top_m, low_m = style.ground_m + (floors - 1) * style.floor_m, covered_m or {}
     for side, facade in facades(sink, width_m, depth_m).items():
         if side in sides:
             _street_side(facade, style, floors, top_m, main=side == sides[0], rng=rng)
         elif side == "back":
             _plain_side(facade, style, floors, top_m, rng=rng)
         else:
-            party_wall(facade, style, floors, top_m, ridge_m=_ridge_m(style, depth_m), rng=rng)
+            party_wall(
+                facade, style, floors, top_m, ridge_m=_ridge_m(style, depth_m), covered_m=low_m.get(side, 0.0), rng=rng
+            )
     _ornament(sink, style, width_m, depth_m, floors, top_m, sides)
     if style.roof == "mansard":
         mansard(sink, width_m, depth_m, top_m, sides=sides, dormer_pitch_m=style.bay_m, rng=rng)
