@@ -11,7 +11,7 @@ Array = npt.NDArray[np.float64]
 
 GOLDEN_RAD = np.pi * (3 - np.sqrt(5))
 # Of a bough's masses all but the first lie this many of its radii away from its tip.
-SPREAD = 0.68
+SPREAD = 0.8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,10 +58,10 @@ def spreading(
     up = np.linspace(-0.85, 0.62, side) + rng.uniform(-0.16, 0.16, side)
     turn = np.arange(side) * GOLDEN_RAD + rng.uniform(0, 2 * np.pi) + rng.uniform(-0.45, 0.45, side)
     # One or two boughs are far larger than the rest, and none is as large as any other.
-    size = rng.permutation(np.linspace(0.68, 1.32, side)) * rng.uniform(0.92, 1.08, side)
+    size = rng.permutation(np.linspace(0.6, 1.3, side)) * rng.uniform(0.92, 1.08, side)
     radius = np.append(bough_m * size, bough_m * rng.uniform(0.8, 1.05))
     flat = np.sqrt(np.maximum(1 - up**2, 0.16)) * (1 - taper * (up + 1) / 2 * 0.8)
-    reach = np.maximum(across_m * flat * rng.uniform(0.82, 1.1, side) - radius[:-1] * 0.7, across_m * 0.14)
+    reach = np.maximum(across_m * flat * rng.uniform(0.8, 1.15, side) - radius[:-1] * 0.62, across_m * 0.14)
     height = middle_m + up * (rise_m - radius[:-1] * 0.6 * upright)
     tips = np.stack([np.cos(turn) * reach, np.sin(turn) * reach, height], 1)
     lean = rng.uniform(-0.16, 0.16, 2) * across_m
@@ -101,12 +101,12 @@ def _clusters(tips: Array, radius: Array, masses: int, squash: Array, rng: np.ra
     centres, radii = [], []
     for tip, size in zip(tips, radius, strict=True):
         centres.append(tip)
-        radii.append(size * (0.78 if masses > 1 else 1.0) * squash)
+        radii.append(size * (0.7 if masses > 1 else 1.0) * squash)
         first = float(rng.uniform(0, 2 * np.pi))
         for index in range(masses - 1):
             turn = first + (index + float(rng.uniform(-0.25, 0.25))) * 2 * np.pi / (masses - 1)
             lift = float(rng.uniform(-0.75, 0.75))
             away = np.array([np.cos(turn), np.sin(turn), lift]) * squash * size * SPREAD
             centres.append(tip + away)
-            radii.append(size * float(rng.uniform(0.42, 0.64)) * squash)
+            radii.append(size * float(rng.uniform(0.38, 0.58)) * squash)
     return np.asarray(centres), np.asarray(radii)

@@ -20,6 +20,8 @@ ADVERTS = ("dark_green", "dark_red", "dark_blue", "cream_paint", "mustard")
 # How far what is painted or rendered on a wall stands out of it: enough to be in front from far away.
 SKIN_M = 0.02
 FLUE_M = (1.05, 0.24)
+# From so many storeys on there are fewer columns of windows.
+TALL = 8
 Box = tuple[float, float, float, float]
 
 
@@ -82,9 +84,9 @@ def _windows(
     openings: list[Opening] = []
     blind: list[Opening] = []
     columns = np.arange(1.7, width - 1.6, 3.4)
-    chosen = rng.random(len(columns)) < 0.5
+    chosen = rng.random(len(columns)) < (0.5 if floors < TALL else 0.3)
     # No wall stays blank.
-    if len(taken) <= 1 and not chosen.any():
+    if not chosen.any():
         chosen[len(columns) // 2 :] = True
     for centre in columns[chosen]:
         half, high = (0.32, 0.75) if rng.random() < 0.5 else (0.45, 1.25)
@@ -105,7 +107,7 @@ def _flue(
 ) -> Box:
     """A chimney breast up the wall, drawn in above the roof to a stack with pots; returns what it covers."""
     half, deep = FLUE_M[0] / 2, FLUE_M[1]
-    material = wall if rng.random() < 0.7 else "brick_brown"
+    material = wall if wall not in ("ashlar", "concrete") and rng.random() < 0.7 else "brick_brown"
     middle = facade.width_m * float(rng.choice([0.28, 0.5, 0.7]))
     low = max([0.0, *(b[3] + 0.3 for b in taken if b[0] < middle + half and b[2] > middle - half)])
     low = low if low < top_m - 1.5 else top_m - 0.4

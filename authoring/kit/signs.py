@@ -32,7 +32,7 @@ def _rounded_triangle(corners: list[tuple[float, float]]) -> Array:
 
 
 # Outlines (K, 2) in -1..1, counter-clockwise as the driver sees them: x right, y up; and half the height in metres.
-_ROUND = (_ring(18, 0), 0.3)
+_ROUND = (_ring(16, 0), 0.3)
 _SQUARE = (np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * 0.98, 0.3)
 OUTLINES: dict[str, tuple[Array, float]] = {
     "stop": (_ring(8, 22.5) / np.cos(np.pi / 8) * 0.98, 0.38),

@@ -123,7 +123,7 @@ NEAR = (
     Layer(share=0.3, size=1.3, lift=0.2, breadth=1.5),
     Layer(share=0.75, size=0.8, lift=1.0, breadth=0.9),
 )
-FAR = (Layer(share=0.055, size=2.3, lift=0.4, breadth=1.3),)
+FAR = (Layer(share=0.06, size=2.1, lift=0.6, breadth=1.3),)
 """Shingles that cover the masses, and small sprays that make the outline; from afar a few large ones do."""
 
 
@@ -180,7 +180,7 @@ def _crown(habit: Species, height_m: float, rng: np.random.Generator, *, near: b
         rise,
         middle,
         boughs=habit.boughs if near else 6,
-        bough_m=habit.bough * height_m * (1.0 if near else 1.1),
+        bough_m=habit.bough * height_m * (1.0 if near else 0.98),
         masses=MASSES if near else 1,
         taper=habit.taper,
         upright=habit.upright,

@@ -126,6 +126,7 @@ class Furnisher:
                     self.stand("no_entry", kit.traffic_sign("no_entry"), x, y, yaw + np.pi, 0.08, high=2.8)
         self._one_way(name)
         self._corner(name)
+        signage.heads(self, name)
 
     def quay(self, line: Array, from_middle_m: float, land: BaseGeometry) -> None:
         """Trees, lamps and benches on both banks of a canal, wherever `land` is free for them."""

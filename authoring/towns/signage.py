@@ -27,6 +27,8 @@ FAST_MPS = 10.0
 BEND_M, BEND_RAD = 90.0, np.radians(50)
 CHEVRON_M = 11.0
 RAIL_M = (2.6, 8.4)
+# Who goes on by less than this to another arm has none ahead.
+HEAD_COS = np.cos(np.radians(50))
 
 
 def signs_along(furnisher: Furnisher, street: Street, *, last_m: float, slow: bool = False) -> None:
@@ -86,6 +88,20 @@ def light(furnisher: Furnisher, street: Street, station: float, *, forward: bool
     """One light on a post at the right kerb."""
     x, y, yaw = _at_kerb(furnisher, street, station, forward=forward)
     furnisher.stand(f"light_{lit}", kit.traffic_light(lit=lit), x, y, yaw, 0.15, high=3.0)
+
+
+def heads(furnisher: Furnisher, name: str) -> None:
+    """Names of streets before those who come to the head of a T, a little to their right."""
+    arms, node = furnisher.network.arms(name), np.asarray(furnisher.network.nodes[name].position)
+    for arm, _, away in arms:
+        others = [(other, way) for other, _, way in arms if other != arm]
+        if not others or max(float(-away @ way) for _, way in others) > HEAD_COS:
+            continue
+        half = max(furnisher.network.streets[other].profile.half_width_m for other, _ in others)
+        heading, right = -away, np.array([-away[1], away[0]])
+        x, y = (float(v) for v in node + heading * (half + 1.0) + right * 3.2)
+        yaw = float(np.arctan2(heading[1], heading[0]) - np.pi / 2)
+        furnisher.stand("street_name", kit.street_name_sign(), x, y, yaw, 0.08, high=3.0)
 
 
 def corner_railings(furnisher: Furnisher, street: Street, *, starts: bool) -> None:

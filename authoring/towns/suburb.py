@@ -69,7 +69,7 @@ TERRACES = {("north_1", 1), ("north_1", -1), ("elm", -1), ("west", 1), ("south_1
 PARK = ((34, -34), (160, -34), (160, -150), (8, -150), (8, -84), (34, -66))
 SHOPS = ((50, -8), (90, -8), (90, -27), (50, -27))
 # Lights (junction, arm) that let traffic into the circus when it is full.
-LIGHTS = {("cs", "south_1"), ("cn", "north_1")}
+LIGHTS = {("cs", "south_1")}
 BUS_STOPS = (("ring_n", -1, 0.5), ("ring_se", 1, 0.32), ("ring_s", 1, 0.5))
 
 # Boards (x, y, facing in degrees) and from where a driver sees them: no house and no tree comes between.

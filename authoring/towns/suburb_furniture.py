@@ -35,10 +35,11 @@ class SuburbFurnisher(Furnisher):
         if not simple and max(abs(x), abs(y)) < FAR_M:
             super().plant(x, y, z, kind=kind, always=always)
         elif not self.ground.views.contains(Point(x, y)):
-            # Few triangles: merged into the town's chunks they cost no geoms.
+            # Merged, a tree costs no geom; shared, it costs no triangles: the town has room for some of both.
             index = kind % len(self.far_trees)
+            put = self.props.instance if index == 0 else self.props.put
             yaw = float(self.rng.uniform(0, 2 * np.pi))
-            self.props.put(f"tree_far{index}", self.far_trees[index], x, y, z, yaw, radius_m=0.3, high_m=4.0)
+            put(f"tree_far{index}", self.far_trees[index], x, y, z, yaw, radius_m=0.3, high_m=4.0)
 
     def signs(self, street: Street) -> None:
         """Signs along a street, which warn of children here."""
@@ -81,6 +82,7 @@ class SuburbFurnisher(Furnisher):
                 sign = str(self.rng.choice(["speed_30", "warning_children", "no_parking", "speed_30"]))
                 self.stand(f"sign_{sign}", kit.traffic_sign(sign), x, y, yaw + np.pi, 0.08, high=2.8)
         self._street_name(name)
+        signage.heads(self, name)
 
     def _street_name(self, name: str) -> None:
         arm, starts, away = self.network.arms(name)[0]
