@@ -174,6 +174,8 @@ class Furnisher:
     def _trees(self, street: Street, side: int, start: float, end: float) -> None:
         kind = sum(map(ord, street.name)) % len(TREES)
         for station in np.arange(start + (0 if side > 0 else street.trees_m / 3), end, street.trees_m):
+            if signage.hides_lights(self.network, street.name, side, float(station)):
+                continue
             x, y, _ = self.beside(street, side, float(station), 1.0)
             before = len(self.props.spots)
             self.plant(x, y, KERB_M, kind=kind if self.rng.random() < 0.8 else int(self.rng.integers(len(TREES))))

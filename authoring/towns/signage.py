@@ -11,7 +11,7 @@ from authoring import kit
 from authoring.kit.parts import Part
 from authoring.towns import paths, solids
 from authoring.towns.collision import Solid
-from authoring.towns.network import CROSSING_M, STOP_LINE_GAP_M, Street
+from authoring.towns.network import CROSSING_M, STOP_LINE_GAP_M, Network, Street
 from authoring.towns.regions import KERB_M
 
 if TYPE_CHECKING:
@@ -26,6 +26,8 @@ FAST_MPS = 10.0
 # Bends of at most this radius that turn at least so much have arrows on their outside.
 BEND_M, BEND_RAD = 90.0, np.radians(50)
 CHEVRON_M = 11.0
+# No tree stands so far before a crossing's light.
+CLEAR_M = 22.0
 RAIL_M = (2.6, 8.4)
 # Who goes on by less than this to another arm has none ahead.
 HEAD_COS = np.cos(np.radians(50))
@@ -82,6 +84,11 @@ def crossing_lights(furnisher: Furnisher, street: Street) -> None:
             station = middle - sign * (CROSSING_M / 2 + STOP_LINE_GAP_M - 0.4)
             light(furnisher, street, station, forward=forward, lit="red" if forward else "green")
             _sign(furnisher, street, "crossing", middle + sign * (CROSSING_M / 2 + 0.6), forward=forward)
+
+
+def hides_lights(network: Network, street: str, side: int, station: float) -> bool:
+    """Whether a tree on a side of a street would hide a crossing's light from those who come."""
+    return any(0 < (station - middle) * side < CLEAR_M for middle in network.crossings_m(street))
 
 
 def light(furnisher: Furnisher, street: Street, station: float, *, forward: bool, lit: str) -> None:

@@ -27,6 +27,8 @@ Kind = Literal["plaza", "park", "parking_lot", "vacant", "construction"]
 LOT_BAY_M = (5.0, 2.5)
 HILL_STEP_M = 1.5
 PATH_M = 2.6
+# A strip of grass between a parking lot and its street.
+VERGE_M = 1.8
 # An edge of a lot at most so far from a sidewalk is its front.
 STREET_SIDE_M = 3.0
 YARD_WALLS = ("brick_brown", "brick_red")
@@ -156,7 +158,12 @@ class SiteBuilder:
         hedge = kit.hedge(12.6, 0.9, 0.7, self.rng)
         for x in np.arange(x0 + 9, x1 - 9, 14.5):
             y = y0 + 1.0 + self._slack(ground, float(x), y0)
-            if self.props.is_free(float(x), y, 0.5):
+            if not self.props.is_free(float(x), y, 0.5):
+                continue
+            if round((float(x) - x0 - 9) / 14.5) % 3 == 2:
+                line = np.array([(float(x) - 6.3, y), (float(x) + 6.3, y)])
+                self._wall(line, kit.wall(12.6, material="brick_brown", height_m=0.7), 0.9)
+            else:
                 self.props.instance("hedge", hedge, float(x), y, KERB_M, 0.0, radius_m=0.5, high_m=0.9)
 
     def _slack(self, ground: BaseGeometry, x: float, y0: float) -> float:
@@ -180,8 +187,11 @@ class SiteBuilder:
         self.sink.triangles("grass", vertices, faces, uvs=uvs, normals=normals, label="terrain")
 
     def _parking_lot(self, site: Site, ground: BaseGeometry) -> None:
-        solids.flat(self.sink, ground, KERB_M, "asphalt_worn", "parking")
         x0, y0, x1, y1 = ground.bounds
+        way = (x0 + x1) / 2
+        verge = ground.intersection(box(x0, y0, x1, y0 + VERGE_M)).difference(box(way - 4, y0, way + 4, y1))
+        solids.flat(self.sink, ground.difference(verge), KERB_M, "asphalt_worn", "parking")
+        solids.flat(self.sink, verge, KERB_M, "grass", "terrain")
         bays = []
         for y, yaw in ((y0 + 5.2, 90.0), (y1 - 4.2, -90.0)):
             for x in np.arange(x0 + 4, x1 - 4, LOT_BAY_M[1]):

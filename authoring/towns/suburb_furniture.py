@@ -101,6 +101,8 @@ class SuburbFurnisher(Furnisher):
     def _trees(self, street: Street, side: int, start: float, end: float) -> None:
         kind = sum(map(ord, street.name)) % STREET_SPECIES
         for station in np.arange(start + (0 if side > 0 else street.trees_m / 2), end, street.trees_m):
+            if signage.hides_lights(self.network, street.name, side, float(station)):
+                continue
             x, y, _ = self.beside(street, side, float(station), 0.85)
             other = int(self.rng.integers(STREET_SPECIES))
             self.plant(x, y, KERB_M, kind=kind if self.rng.random() < 0.7 else other)
