@@ -13,7 +13,7 @@ Materials are named as in `authoring.materials.MATERIALS`; `authoring.materials.
 
 from __future__ import annotations
 
-from authoring.kit.barriers import bridge_railing, fence, guard_rail, jersey_barrier, wall
+from authoring.kit.barriers import bridge_railing, fence, guard_rail, jersey_barrier, seat_wall, wall
 from authoring.kit.buildings import STYLES, building
 from authoring.kit.furniture import (
     bench,
@@ -59,6 +59,7 @@ __all__ = [
     "planter",
     "power_pole",
     "road_cover",
+    "seat_wall",
     "shrub",
     "street_lamp",
     "street_name_sign",

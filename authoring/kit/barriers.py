@@ -42,6 +42,15 @@ def wall(length_m: float, *, material: str = "brick_red", height_m: float = 1.8,
     return sink.parts()
 
 
+def seat_wall(length_m: float, *, height_m: float = 0.42) -> list[Part]:
+    """A low wall of ashlar with a slab to sit on, 0.45 m deep."""
+    sink = Sink("wall")
+    half, tile_m = length_m / 2, MATERIALS["ashlar"].tile_m
+    sink.tiled_box("ashlar", (-half, -0.18, 0), (half, 0.18, height_m), tile_m=tile_m, skip="zZ")
+    sink.swatch_box("concrete_light", (-half - 0.04, -0.225, height_m), (half + 0.04, 0.225, height_m + 0.08))
+    return sink.parts()
+
+
 def guard_rail(length_m: float) -> list[Part]:
     """A W-beam on posts, its face towards -y, 0.75 m high."""
     sink = Sink("guard_rail")

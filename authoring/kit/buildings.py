@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from authoring.kit.styles import FAMILIES, shop_house
 from authoring.materials.atlas import FAR_STYLES
 
 STYLES = FAR_STYLES
+# No storey is lower.
+FLOOR_M = 3.0
 
 
 def building(
@@ -26,6 +28,7 @@ def building(
     rng: np.random.Generator,
     sides: Sequence[str] = ("front",),
     lod: str = "near",
+    covered_m: Mapping[str, float] | None = None,
 ) -> list[Part]:
     """One building in its own frame: footprint centred at the origin, ground at z = 0, main facade facing -y.
 
@@ -37,6 +40,7 @@ def building(
         rng: decides every detail; the same state gives the same building.
         sides: which of `front` (-y), `right` (+x), `back` (+y), `left` (-x) face a street; the others are plain.
         lod: `near` for 1.5 to 6 thousand triangles (more for the largest), `far` for under 200.
+        covered_m: up to which height neighbours stand before `left` and `right`: nothing is put there.
     """
     if style not in STYLES:
         raise ValueError(f"no building style named {style!r}; there are {', '.join(STYLES)}")
@@ -52,19 +56,26 @@ def building(
     elif style == "glass_office":
         glass_office(sink, width_m, depth_m, floors, sides, rng=rng)
     elif style == "shop_row":
-        return _shop_row(width_m, depth_m, floors, sides, rng=rng)
+        return _shop_row(width_m, depth_m, floors, sides, rng=rng, covered_m=covered_m or {})
     else:
-        storeyed_building(sink, FAMILIES[style](rng), width_m, depth_m, floors, sides, rng=rng)
+        storeyed_building(sink, FAMILIES[style](rng), width_m, depth_m, floors, sides, rng=rng, covered_m=covered_m)
     return sink.parts()
 
 
 def _shop_row(
-    width_m: float, depth_m: float, floors: int, sides: Sequence[str], *, rng: np.random.Generator
+    width_m: float,
+    depth_m: float,
+    floors: int,
+    sides: Sequence[str],
+    *,
+    rng: np.random.Generator,
+    covered_m: Mapping[str, float],
 ) -> list[Part]:
     """Narrow houses side by side, each of its own make and height."""
     count = max(1, round(width_m / float(rng.uniform(6.0, 8.0))))
     shares = rng.uniform(0.8, 1.25, count)
     widths = shares / shares.sum() * width_m
+    lowest = FLOOR_M * max(1, floors - 1)
     row = Sink("building")
     left = -width_m / 2
     for index, house_m in enumerate(widths):
@@ -72,7 +83,9 @@ def _shop_row(
         faces += ["left"] * (index == 0 and "left" in sides) + ["right"] * (index == count - 1 and "right" in sides)
         house = Sink("building")
         storeys = max(1, floors + int(rng.integers(-1, 1)))
-        storeyed_building(house, shop_house(rng), float(house_m), depth_m, storeys, faces, rng=rng)
+        ends = {"left": index == 0, "right": index == count - 1}
+        covered = {side: covered_m.get(side, 0.0) if end else lowest for side, end in ends.items()}
+        storeyed_building(house, shop_house(rng), float(house_m), depth_m, storeys, faces, rng=rng, covered_m=covered)
         row.extend(place(house.parts(), x_m=left + house_m / 2))
         left += float(house_m)
     return row.parts()

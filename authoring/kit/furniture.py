@@ -102,16 +102,34 @@ def fire_hydrant() -> list[Part]:
 
 
 def parking_meter() -> list[Part]:
-    """A single-space meter on a post."""
+    """A single-space meter: a tapered housing with a round glazed head on a post with a foot, 1.5 m high."""
     sink = Sink("parking_meter")
-    cylinder(sink, "galvanised", (0, 0, 0), 0.035, 1.1, segments=10)
-    sink.swatch_box("plastic_grey", (-0.09, -0.07, 1.1), (0.09, 0.07, 1.36))
-    tube(sink, "plastic_grey", [(0, 0.07, 1.36), (0, -0.07, 1.36)], 0.09, segments=16, caps=True)
-    sink.swatch_quad(
-        "dark_glass", [(-0.06, -0.072, 1.27), (0.06, -0.072, 1.27), (0.06, -0.072, 1.4), (-0.06, -0.072, 1.4)]
-    )
-    sink.swatch_box("steel", (-0.035, -0.085, 1.14), (0.035, -0.07, 1.22), skip="Y")
-    sink.swatch_box("signal_blue", (-0.06, -0.074, 1.23), (0.06, -0.071, 1.26), skip="Y")
+    for foot, radius, top, high in ((0.0, 0.11, 0.1, 0.025), (0.025, 0.06, 0.036, 0.06)):
+        cylinder(sink, "galvanised", (0, 0, foot), radius, high, top_radius_m=top, segments=12, cap=radius > 0.1)
+    cylinder(sink, "galvanised", (0, 0, 0.085), 0.036, 0.96, segments=10, cap=False)
+    cylinder(sink, "anthracite", (0, 0, 1.0), 0.055, 0.06, top_radius_m=0.062, segments=12)
+    # A housing that widens to its shoulders, and a head as round as a clock on it.
+    shoulders = [(-0.055, 1.06), (0.055, 1.06), (0.1, 1.2), (0.105, 1.31), (0.09, 1.33), (-0.09, 1.33)]
+    _slab(sink, "anthracite", [*shoulders, (-0.105, 1.31), (-0.1, 1.2)], 0.075)
+    _slab(sink, "grey_paint", _round(0.0, 1.4, 0.105, 20), 0.06)
+    _slab(sink, "plastic_grey", _round(0.0, 1.4, 0.088, 20), 0.068)
+    _slab(sink, "dark_glass", _round(0.0, 1.4, 0.078, 20), 0.07)
+    front = -0.0755
+    for swatch, (x0, x1), (z0, z1) in (
+        ("lamp_glass", (-0.046, 0.046), (1.395, 1.44)),
+        ("signal_red", (-0.03, 0.03), (1.345, 1.36)),
+    ):
+        sink.swatch_quad(swatch, [(x0, front, z0), (x1, front, z0), (x1, front, z1), (x0, front, z1)])
+    for swatch, (x0, x1), (z0, z1), out in (
+        ("steel", (-0.085, -0.02), (1.23, 1.31), 0.006),
+        ("rubber", (-0.056, -0.049), (1.245, 1.295), 0.008),
+        ("plastic_white", (0.0, 0.085), (1.23, 1.31), 0.004),
+        ("signal_blue", (0.01, 0.05), (1.245, 1.295), 0.006),
+        ("steel", (-0.05, 0.05), (1.1, 1.16), 0.006),
+        ("rubber", (-0.038, 0.038), (1.125, 1.135), 0.008),
+    ):
+        sink.swatch_box(swatch, (x0, -0.075 - out, z0), (x1, -0.074, z1), skip="Y")
+    tube(sink, "steel", [(0.1, 0.0, 1.26), (0.135, 0.0, 1.26)], 0.026, segments=10, caps=True)
     return sink.parts()
 
 
@@ -175,3 +193,21 @@ def cable_box(*, width_m: float = 0.8) -> list[Part]:
             sink.swatch_box("anthracite", (x + 0.06, -0.174, z), (x + half - 0.1, -0.172, z + 0.012), skip="Y")
     sink.swatch_box("black_paint", (-0.05, -0.19, 0.55), (-0.03, -0.172, 0.68), skip="Y")
     return sink.parts()
+
+
+def _round(x_m: float, z_m: float, radius_m: float, sides: int) -> list[tuple[float, float]]:
+    """A circle in the plane of a front, counter-clockwise as one sees it."""
+    angle = np.arange(sides) * 2 * np.pi / sides
+    return [(float(x_m + radius_m * np.cos(a)), float(z_m + radius_m * np.sin(a))) for a in angle]
+
+
+def _slab(sink: Sink, swatch: str, outline: list[tuple[float, float]], half_m: float) -> None:
+    """A plate of a convex outline of (x, z), as seen from the front, between -half_m and half_m along y."""
+    ring = np.asarray(outline)
+    count = len(ring)
+    fan = np.array([(0, i, i + 1) for i in range(1, count - 1)])
+    for y, faces in ((-half_m, fan), (half_m, fan[:, ::-1])):
+        points = np.column_stack([ring[:, 0], np.full(count, y), ring[:, 1]])
+        sink.swatch_mesh(swatch, points, faces, np.tile([0.0, np.sign(y), 0.0], (count, 1)))
+    for (x0, z0), (x1, z1) in itertools.pairwise([*outline, outline[0]]):
+        sink.swatch_quad(swatch, [(x1, -half_m, z1), (x0, -half_m, z0), (x0, half_m, z0), (x1, half_m, z1)])

@@ -81,7 +81,7 @@ def street_lamp(*, height_m: float = 8.0, arm_m: float = 1.8, style: str = "mode
     if style not in ("modern", "double"):
         raise ValueError(f"no street lamp style named {style!r}; there are modern, double, heritage")
     cylinder(sink, "galvanised", (0, 0, 0), 0.11, 1.2, segments=12)
-    cylinder(sink, "galvanised", (0, 0, 1.2), 0.085, height_m - 2.0, top_radius_m=0.06, segments=12)
+    cylinder(sink, "galvanised", (0, 0, 1.2), 0.085, height_m - 2.0, top_radius_m=0.06, segments=12, cap=False)
     sink.swatch_box("anthracite", (-0.06, -0.115, 0.5), (0.06, -0.09, 0.95), skip="Y")
     for sign in (-1,) if style == "modern" else (-1, 1):
         top = height_m
@@ -92,7 +92,7 @@ def street_lamp(*, height_m: float = 8.0, arm_m: float = 1.8, style: str = "mode
             (0, sign * 0.7, top),
             (0, sign * arm_m, top + 0.06),
         ]
-        tube(sink, "galvanised", bend, [0.06, 0.055, 0.05, 0.045, 0.04], segments=10)
+        tube(sink, "galvanised", bend, [0.06, 0.055, 0.05, 0.045, 0.04], segments=8)
         low, high = sorted((sign * (arm_m - 0.1), sign * (arm_m + 0.65)))
         sink.swatch_box("anthracite", (-0.16, low, top + 0.0), (0.16, high, top + 0.09))
         sink.swatch_box("anthracite", (-0.1, low + 0.1, top + 0.09), (0.1, high - 0.1, top + 0.13), skip="z")

@@ -32,7 +32,7 @@ def _rounded_triangle(corners: list[tuple[float, float]]) -> Array:
 
 
 # Outlines (K, 2) in -1..1, counter-clockwise as the driver sees them: x right, y up; and half the height in metres.
-_ROUND = (_ring(24, 0), 0.3)
+_ROUND = (_ring(16, 0), 0.3)
 _SQUARE = (np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * 0.98, 0.3)
 OUTLINES: dict[str, tuple[Array, float]] = {
     "stop": (_ring(8, 22.5) / np.cos(np.pi / 8) * 0.98, 0.38),
@@ -73,8 +73,8 @@ def traffic_sign(*names: str, post_m: float = 2.2) -> list[Part]:
         z += half_v
         _plate(sink, name, outline, half_m, z - half_m * float(outline[:, 1].max() + outline[:, 1].min()) / 2)
         z += half_v + 0.04
-    cylinder(sink, "galvanised", (0, 0.035, 0), 0.032, z - 0.02, segments=10, label="pole")
-    disc(sink, "concrete_dark", (0, 0.035, 0.004), 0.09, segments=10, label="pole")
+    cylinder(sink, "galvanised", (0, 0.035, 0), 0.032, z - 0.02, segments=8, label="pole")
+    disc(sink, "concrete_dark", (0, 0.035, 0.004), 0.09, segments=8, label="pole")
     return sink.parts()
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from authoring.kit.facade import SIDES, Facade, Opening, belt, facades
 from authoring.kit.ground import ground_floor
 from authoring.kit.openings import balcony, window
 from authoring.kit.parts import Sink
+from authoring.kit.party_walls import party_wall
 from authoring.kit.roofs import flat_roof, gable_roof, mansard, roof_machinery
 from authoring.kit.styles import Style
 
@@ -25,14 +26,19 @@ def storeyed_building(
     sides: Sequence[str],
     *,
     rng: np.random.Generator,
+    covered_m: Mapping[str, float] | None = None,
 ) -> None:
-    """Walls, windows, ground floor, ornament and roof of one building."""
-    top_m = style.ground_m + (floors - 1) * style.floor_m
+    """Walls, windows, ground floor, ornament and roof of one building; see `building` for what they are made from."""
+    top_m, low_m = style.ground_m + (floors - 1) * style.floor_m, covered_m or {}
     for side, facade in facades(sink, width_m, depth_m).items():
         if side in sides:
             _street_side(facade, style, floors, top_m, main=side == sides[0], rng=rng)
-        else:
+        elif side == "back":
             _plain_side(facade, style, floors, top_m, rng=rng)
+        else:
+            party_wall(
+                facade, style, floors, top_m, ridge_m=_ridge_m(style, depth_m), covered_m=low_m.get(side, 0.0), rng=rng
+            )
     _ornament(sink, style, width_m, depth_m, floors, top_m, sides)
     if style.roof == "mansard":
         mansard(sink, width_m, depth_m, top_m, sides=sides, dormer_pitch_m=style.bay_m, rng=rng)
@@ -41,6 +47,13 @@ def storeyed_building(
     else:
         flat_roof(sink, width_m, depth_m, top_m, wall=style.wall, coping=style.trim)
         roof_machinery(sink, width_m, depth_m, top_m, rng=rng, water_tank=style.water_tank)
+
+
+def _ridge_m(style: Style, depth_m: float) -> float:
+    """How far the roof rises over the walls where it meets a party wall."""
+    if style.roof == "mansard":
+        return 3.0
+    return min(3.6, depth_m * 0.3) if style.roof == "gable" and depth_m < 16 else 0.8
 
 
 def bays(width_m: float, bay_m: float, margin_m: float) -> list[float]:
@@ -134,7 +147,7 @@ def _pilaster(facade: Facade, u: float, style: Style, top_m: float) -> None:
 
 
 def _plain_side(facade: Facade, style: Style, floors: int, top_m: float, *, rng: np.random.Generator) -> None:
-    """A party wall or a courtyard side: few windows, no ornament."""
+    """A courtyard side: few windows, no ornament."""
     width = facade.width_m
     openings = []
     if width > 8 and rng.random() < 0.7:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from authoring.kit.crowns import Crown, spreading, tiered
 from authoring.kit.leaves import lump, on_masses, scatter_leaves
 from authoring.kit.parts import Part, Sink
 from authoring.kit.shapes import ring_faces, sweep
@@ -22,23 +23,25 @@ class Species:
         foliage: material of the leaves.
         crown: half extents of the crown (across, up).
         centre: height of the crown's middle.
-        lumps: masses of foliage that make the crown.
-        lump: radius of one.
+        boughs: limbs with foliage of their own; of a conifer, whorls of them.
+        bough: radius of the foliage on one.
         leaves: sprays of leaves on a near tree.
         leaf_m: length of a spray on a tree of 8 m.
         trunk: radius at the foot.
         taper: how much the crown narrows upwards: 0 ellipsoid, 1 cone.
+        upright: height of a mass of foliage over its breadth.
     """
 
     foliage: str
     crown: tuple[float, float]
     centre: float
-    lumps: int
-    lump: float
+    boughs: int
+    bough: float
     leaves: int
     leaf_m: float
     trunk: float
     taper: float = 0.0
+    upright: float = 0.92
 
 
 SPECIES: dict[str, Species] = {
@@ -46,8 +49,8 @@ SPECIES: dict[str, Species] = {
         foliage="foliage_green",
         crown=(0.37, 0.33),
         centre=0.65,
-        lumps=30,
-        lump=0.125,
+        boughs=8,
+        bough=0.19,
         leaves=1500,
         leaf_m=0.30,
         trunk=0.026,
@@ -56,18 +59,19 @@ SPECIES: dict[str, Species] = {
         foliage="foliage_light",
         crown=(0.14, 0.42),
         centre=0.55,
-        lumps=26,
-        lump=0.082,
+        boughs=8,
+        bough=0.112,
         leaves=1500,
         leaf_m=0.24,
         trunk=0.016,
+        upright=1.5,
     ),
     "street": Species(
         foliage="foliage_olive",
         crown=(0.26, 0.28),
         centre=0.68,
-        lumps=24,
-        lump=0.105,
+        boughs=7,
+        bough=0.158,
         leaves=1500,
         leaf_m=0.24,
         trunk=0.017,
@@ -76,8 +80,8 @@ SPECIES: dict[str, Species] = {
         foliage="foliage_dark",
         crown=(0.22, 0.47),
         centre=0.54,
-        lumps=30,
-        lump=0.085,
+        boughs=8,
+        bough=0.0,
         leaves=1500,
         leaf_m=0.34,
         trunk=0.017,
@@ -87,8 +91,8 @@ SPECIES: dict[str, Species] = {
         foliage="foliage_light",
         crown=(0.26, 0.37),
         centre=0.60,
-        lumps=28,
-        lump=0.105,
+        boughs=8,
+        bough=0.158,
         leaves=1500,
         leaf_m=0.26,
         trunk=0.022,
@@ -113,11 +117,13 @@ class Layer:
     breadth: float = 1.0
 
 
+MASSES = 4
+TRUNK_SIDES = 7
 NEAR = (
     Layer(share=0.3, size=1.3, lift=0.2, breadth=1.5),
     Layer(share=0.75, size=0.8, lift=1.0, breadth=0.9),
 )
-FAR = (Layer(share=0.06, size=2.6, lift=0.35, breadth=1.4),)
+FAR = (Layer(share=0.06, size=2.1, lift=0.6, breadth=1.3),)
 """Shingles that cover the masses, and small sprays that make the outline; from afar a few large ones do."""
 
 
@@ -128,7 +134,7 @@ def tree(species: str, height_m: float, rng: np.random.Generator, *, lod: str = 
         species: of `SPECIES`.
         height_m: to the top of the crown, at least 2.
         rng: decides branches and leaves.
-        lod: `near` for about 3 to 4 thousand triangles, `far` for about 400.
+        lod: `near` for about 3 to 4 thousand triangles, `far` for about 300.
     """
     if species not in SPECIES:
         raise ValueError(f"no tree species named {species!r}; there are {', '.join(SPECIES)}")
@@ -139,10 +145,9 @@ def tree(species: str, height_m: float, rng: np.random.Generator, *, lod: str = 
     habit = SPECIES[species]
     near = lod == "near"
     sink = Sink("vegetation")
-    centres, radii = _crown(habit, height_m, rng, lumps=habit.lumps if near else 9)
-    if not near:
-        radii = radii * 1.5
-    _wood(sink, habit, height_m, centres, near=near, rng=rng)
+    crown = _crown(habit, height_m, rng, near=near)
+    centres, radii = crown.centres, crown.radii
+    _wood(sink, habit, height_m, crown.tips, near=near, rng=rng)
     middle = np.array([0.0, 0.0, habit.centre * height_m])
     masses = [
         lump(sink, habit.foliage, centre, radius, around=middle, detail=0, rng=rng)
@@ -165,49 +170,45 @@ def tree(species: str, height_m: float, rng: np.random.Generator, *, lod: str = 
     return sink.parts()
 
 
-def _crown(habit: Species, height_m: float, rng: np.random.Generator, *, lumps: int) -> tuple[Array, Array]:
-    """Centres (K, 3) and half extents (K, 3) of the foliage masses, around and up the crown with some disorder.
-
-    The last two fill the crown's middle, so that no sky shows through it.
-    """
-    number = np.arange(lumps) + 0.5
-    up = 1 - 2 * number / lumps + rng.uniform(-0.08, 0.08, lumps)
-    turn = number * np.pi * (3 - np.sqrt(5)) + rng.uniform(-0.3, 0.3, lumps)
-    across, rise = habit.crown[0] * height_m, habit.crown[1] * height_m
-    radii = habit.lump * height_m * rng.uniform(0.8, 1.25, lumps)
+def _crown(habit: Species, height_m: float, rng: np.random.Generator, *, near: bool) -> Crown:
+    """The crown's masses; far trees have one where near ones have a handful."""
+    across, rise, middle = habit.crown[0] * height_m, habit.crown[1] * height_m, habit.centre * height_m
     if habit.taper == 1.0:
-        radii = radii * (1.35 - 0.75 * (up + 1) / 2)
-    flat = np.sqrt(np.maximum(1 - up**2, 0)) if habit.taper < 1 else np.ones(lumps)
-    narrow = 1 - habit.taper * (up + 1) / 2 * 0.95
-    reach = np.maximum(across * flat * narrow * rng.uniform(0.85, 1.1, lumps) - radii * 0.75, 0.0)
-    height = habit.centre * height_m + np.clip(up, -0.95, 1.0) * np.maximum(rise - radii * 0.7, 0.1)
-    shell = np.stack([np.cos(turn) * reach, np.sin(turn) * reach, height], 1)
-    squash = np.array([1.0, 1.0, 0.62 if habit.taper == 1.0 else 0.85])
-    core = np.array([(0.0, 0.0, habit.centre * height_m + sign * rise * 0.3) for sign in (-1, 1)])
-    core_radii = np.array([[across * 0.62, across * 0.62, rise * 0.5], [across * 0.5, across * 0.5, rise * 0.42]])
-    if habit.taper == 1.0:
-        core_radii = core_radii * [[0.8, 0.8, 1.0], [0.5, 0.5, 1.0]]
-    return np.concatenate([shell, core]), np.concatenate([radii[:, None] * squash, core_radii])
+        return tiered(across, rise, middle, tiers=habit.boughs if near else 4, masses=4 if near else 2, rng=rng)
+    return spreading(
+        across,
+        rise,
+        middle,
+        boughs=habit.boughs if near else 6,
+        bough_m=habit.bough * height_m * (1.0 if near else 0.98),
+        masses=MASSES if near else 1,
+        taper=habit.taper,
+        upright=habit.upright,
+        rng=rng,
+    )
 
 
-def _wood(sink: Sink, habit: Species, height_m: float, centres: Array, *, near: bool, rng: np.random.Generator) -> None:
-    segments = 8 if near else 4
-    top = habit.centre * height_m + habit.crown[1] * height_m * 0.4
-    levels = np.array([0.0, 0.04, 0.2, 0.5, 0.8, 1.0]) if near else np.array([0.0, 1.0])
+def _wood(sink: Sink, habit: Species, height_m: float, tips: Array, *, near: bool, rng: np.random.Generator) -> None:
+    """Trunk and limbs; the trunk of a near tree goes on into the topmost bough, and limbs leave it below the crown."""
+    top = tips[-1, 2] if near else habit.centre * height_m
+    levels = np.array([0.0, 0.04, 0.3, 0.62, 1.0]) if near else np.array([0.0, 1.0])
     sway = rng.uniform(-1, 1, (len(levels), 2)) * habit.trunk * height_m * np.minimum(levels * 3, 1)[:, None]
+    sway += tips[-1, :2] * levels[:, None] ** 2 * near
     path = np.column_stack([sway, levels * top])
     flare = np.where(levels == 0, 1.45, 1.0)
-    radii = habit.trunk * height_m * (1 - 0.75 * levels) * flare
-    _bark_tube(sink, path, radii, segments)
-    if not near:
+    radii = habit.trunk * height_m * (1 - 0.8 * levels) * flare
+    _bark_tube(sink, path, radii, TRUNK_SIDES if near else 4)
+    if not near or habit.taper == 1.0:
         return
     fork = (habit.centre - habit.crown[1]) * height_m
-    for centre in centres[:9]:
-        start_z = max(fork * 0.92, centre[2] - np.hypot(centre[0], centre[1]) * 1.3 - 0.3)
-        start = np.array([0.0, 0.0, min(start_z, top * 0.95)])
-        middle = start * 0.5 + centre * 0.5 + (0, 0, -0.06 * height_m * 0.5)
-        thick = habit.trunk * height_m * 0.42
-        _bark_tube(sink, np.stack([start, middle, centre]), np.array([thick, thick * 0.6, thick * 0.2]), 4)
+    for tip in tips[:-1]:
+        start_z = float(np.clip(tip[2] - np.hypot(tip[0], tip[1]) * 1.1, fork * 0.86, top * 0.9))
+        share = start_z / top
+        start = np.array([*(np.interp(share, levels, path[:, axis]) for axis in (0, 1)), start_z])
+        # Limbs leave the trunk outwards and bend up.
+        middle = start * 0.45 + tip * 0.55 + (0, 0, -0.05 * height_m)
+        thick = habit.trunk * height_m * (0.62 - 0.3 * share)
+        _bark_tube(sink, np.stack([start, middle, tip]), np.array([thick, thick * 0.66, thick * 0.25]), 3)
 
 
 def _bark_tube(sink: Sink, path: Array, radii: Array, segments: int) -> None:

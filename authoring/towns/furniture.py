@@ -12,7 +12,7 @@ from shapely.ops import unary_union  # type: ignore[import-untyped]
 
 from authoring import kit
 from authoring.kit.parts import Part
-from authoring.towns import paths
+from authoring.towns import paths, signage
 from authoring.towns.network import BAY_M, CROSSING_M, STOP_LINE_GAP_M, Street
 from authoring.towns.props import Ground, Props
 from authoring.towns.regions import KERB_M, Regions
@@ -25,8 +25,13 @@ SEEN_FROM_BRIDGE_M = 34.0
 # How far lamps go on along a street out of town.
 OUTSIDE_M = 80.0
 FROM_KERB_M = 0.65
+# On faster streets one has priority where lights fail.
+PRIORITY_MPS = 12.0
 FAR_M = 236.0
-TREES = (("street", 7.5), ("broad", 8.5), ("linden", 8.0), ("street", 6.5), ("columnar", 9.0), ("linden", 7.0))
+TREES = (
+    ("street", 7.5), ("broad", 8.5), ("linden", 8.0), ("street", 6.5), ("columnar", 9.0), ("linden", 7.0),
+    ("broad", 7.2), ("street", 8.2),
+)  # fmt: skip
 EXTRAS = ("bin", "bench", "cable_box", "planter") + ("none",) * 11
 
 
@@ -53,6 +58,7 @@ class Furnisher:
     def street(self, street: Street) -> None:
         """Everything along one street."""
         start, end = self.network.span(street.name)
+        signage.crossing_lights(self, street)
         for side in (1, -1):
             self._lamps(street, side, start, end)
             if street.trees_m and not street.hump_m:
@@ -67,6 +73,15 @@ class Furnisher:
             self._hydrant(street, start, end)
             self._meters(street)
             self._covers(street, start, end)
+        self.signs(street)
+
+    def signs(self, street: Street) -> None:
+        """Signs along a street; what stands there already stays where it is."""
+        if street.hump_m or street.joins:
+            return
+        start, end = self.network.span(street.name)
+        signage.signs_along(self, street, last_m=end if street.end else min(end, start + OUTSIDE_M))
+        signage.chevrons(self, street)
 
     def node(self, name: str) -> None:
         """Signals or signs on every arm of a junction, seen by those who arrive on it."""
@@ -82,30 +97,36 @@ class Furnisher:
             green = (abs(heading[0]) > abs(heading[1])) == east_west_green
             lit = "green" if green else "red"
             back = mouth - STOP_LINE_GAP_M - CROSSING_M - 0.35
-            x, y = self._at_mouth(street, starts, back, FROM_KERB_M + 0.1)
+            x, y = self.at_mouth(street, starts, back, FROM_KERB_M + 0.1)
             yaw = float(np.arctan2(heading[1], heading[0]) - np.pi / 2)
             if node.control == "signals":
                 if coming > 1 or street.hump_m:
                     parts = kit.traffic_light_mast(arm_m=6.4 if coming > 1 else 4.6, lit=(lit,) * max(coming, 1))
-                    self._stand(f"light_mast{coming}_{lit}", parts, x, y, yaw, 0.2, high=5.5)
+                    self.stand(f"light_mast{coming}_{lit}", parts, x, y, yaw, 0.2, high=5.5)
                 else:
-                    self._stand(f"light_{lit}", kit.traffic_light(lit=lit), x, y, yaw, 0.15, high=3.0)
-                x, y = self._at_mouth(street, starts, mouth + 0.8, FROM_KERB_M + 0.1, left=True)
-                self._stand(f"light_{lit}", kit.traffic_light(lit=lit), x, y, yaw, 0.15, high=3.0)
+                    self.stand(f"light_{lit}", kit.traffic_light(lit=lit), x, y, yaw, 0.15, high=3.0)
+                    x, y = self.at_mouth(street, starts, mouth + 0.8, FROM_KERB_M + 0.1, left=True)
+                    self.stand(f"light_{lit}", kit.traffic_light(lit=lit), x, y, yaw, 0.15, high=3.0)
+                if coming > 1 and not street.hump_m:
+                    signage.corner_railings(self, street, starts=starts)
+                sign = "priority" if street.profile.speed_mps > PRIORITY_MPS else "yield"
+                x, y = self.at_mouth(street, starts, mouth + 10.0, FROM_KERB_M)
+                self.stand(f"sign_{sign}", kit.traffic_sign(sign), x, y, yaw, 0.08, high=2.8)
             else:
-                x, y = self._at_mouth(street, starts, mouth - 0.2, FROM_KERB_M)
+                x, y = self.at_mouth(street, starts, mouth - 0.2, FROM_KERB_M)
                 sign = "stop" if node.control == "stop" else "yield"
-                self._stand(f"sign_{sign}", kit.traffic_sign(sign), x, y, yaw, 0.08, high=2.9)
+                self.stand(f"sign_{sign}", kit.traffic_sign(sign), x, y, yaw, 0.08, high=2.9)
             if self.rng.random() < 0.6:
-                x, y = self._at_mouth(street, starts, mouth + 14.0, FROM_KERB_M, left=True)
+                x, y = self.at_mouth(street, starts, mouth + 14.0, FROM_KERB_M, left=True)
                 sign = str(self.rng.choice(["speed_30", "no_parking", "crossing", "speed_50", "parking"]))
-                self._stand(f"sign_{sign}", kit.traffic_sign(sign), x, y, yaw + np.pi, 0.08, high=2.8)
+                self.stand(f"sign_{sign}", kit.traffic_sign(sign), x, y, yaw + np.pi, 0.08, high=2.8)
             if street.profile.one_way and not starts:
                 for left in (False, True):
-                    x, y = self._at_mouth(street, starts, mouth + 1.6, FROM_KERB_M, left=left)
-                    self._stand("no_entry", kit.traffic_sign("no_entry"), x, y, yaw + np.pi, 0.08, high=2.8)
+                    x, y = self.at_mouth(street, starts, mouth + 1.6, FROM_KERB_M, left=left)
+                    self.stand("no_entry", kit.traffic_sign("no_entry"), x, y, yaw + np.pi, 0.08, high=2.8)
         self._one_way(name)
         self._corner(name)
+        signage.heads(self, name)
 
     def quay(self, line: Array, from_middle_m: float, land: BaseGeometry) -> None:
         """Trees, lamps and benches on both banks of a canal, wherever `land` is free for them."""
@@ -146,14 +167,16 @@ class Furnisher:
         if street.end is None:
             end = min(end, start + OUTSIDE_M)
         for station in np.arange(start + 4 + (LAMP_M / 2 if side < 0 else 0), end - 2, LAMP_M):
-            x, y, toward = self._beside(street, side, float(station), FROM_KERB_M)
+            x, y, toward = self.beside(street, side, float(station), FROM_KERB_M)
             yaw = float(np.arctan2(toward[1], toward[0]) + np.pi / 2)
-            self._stand(f"lamp_{style}", parts, x, y, yaw, 0.15, high=6.0)
+            self.stand(f"lamp_{style}", parts, x, y, yaw, 0.15, high=6.0)
 
     def _trees(self, street: Street, side: int, start: float, end: float) -> None:
         kind = sum(map(ord, street.name)) % len(TREES)
         for station in np.arange(start + (0 if side > 0 else street.trees_m / 3), end, street.trees_m):
-            x, y, _ = self._beside(street, side, float(station), 1.0)
+            if signage.hides_lights(self.network, street.name, side, float(station)):
+                continue
+            x, y, _ = self.beside(street, side, float(station), 1.0)
             before = len(self.props.spots)
             self.plant(x, y, KERB_M, kind=kind if self.rng.random() < 0.8 else int(self.rng.integers(len(TREES))))
             if len(self.props.spots) > before and max(abs(x), abs(y)) < FAR_M:
@@ -164,32 +187,32 @@ class Furnisher:
             kind = str(self.rng.choice(self.extras))
             if kind == "none":
                 continue
-            x, y, toward = self._beside(street, side, float(station), 0.75)
+            x, y, toward = self.beside(street, side, float(station), 0.75)
             yaw = float(np.arctan2(toward[1], toward[0]) + np.pi / 2)
             if kind == "bench":
-                self._stand("bench", kit.bench(style="wood"), x, y, yaw + np.pi, 0.9, high=0.8)
+                self.stand("bench", kit.bench(style="wood"), x, y, yaw + np.pi, 0.9, high=0.8)
             elif kind == "planter":
-                self._stand("planter", kit.planter("box", self.rng), x, y, yaw, 0.8, high=0.8)
+                self.stand("planter", kit.planter("box", self.rng), x, y, yaw, 0.8, high=0.8)
             elif kind == "letter_box":
-                self._stand("letter_box", kit.letter_box(colour="signal_blue"), x, y, yaw + np.pi, 0.35, high=1.2)
+                self.stand("letter_box", kit.letter_box(colour="signal_blue"), x, y, yaw + np.pi, 0.35, high=1.2)
             elif kind == "cable_box":
-                self._stand("cable_box", kit.cable_box(), x, y, yaw + np.pi, 0.5, high=1.1)
+                self.stand("cable_box", kit.cable_box(), x, y, yaw + np.pi, 0.5, high=1.1)
             else:
-                self._stand("bin", kit.bin_(style="post" if side > 0 else "steel"), x, y, yaw, 0.3, high=1.0)
+                self.stand("bin", kit.bin_(style="post" if side > 0 else "steel"), x, y, yaw, 0.3, high=1.0)
 
     def _hydrant(self, street: Street, start: float, end: float) -> None:
         side = 1 if sum(map(ord, street.name)) % 2 else -1
-        x, y, toward = self._beside(street, side, start + 0.37 * (end - start), 0.6)
+        x, y, toward = self.beside(street, side, start + 0.37 * (end - start), 0.6)
         yaw = float(np.arctan2(toward[1], toward[0]) + np.pi / 2)
-        self._stand("hydrant", kit.fire_hydrant(), x, y, yaw, 0.25, high=0.8)
+        self.stand("hydrant", kit.fire_hydrant(), x, y, yaw, 0.25, high=0.8)
 
     def bus_stop(self, street: Street, side: int, share: float) -> None:
         """A shelter beside a street, its back to the houses."""
         start, end = self.network.span(street.name)
-        x, y, toward = self._beside(street, side, start + share * (end - start), 2.0)
+        x, y, toward = self.beside(street, side, start + share * (end - start), 2.0)
         yaw = float(np.arctan2(toward[1], toward[0]) + np.pi / 2)
         if self.props.is_free(x, y, 1.0):
-            self._stand("bus_stop", kit.bus_stop(self.rng), x, y, yaw, 1.9, high=2.4)
+            self.stand("bus_stop", kit.bus_stop(self.rng), x, y, yaw, 1.9, high=2.4)
 
     def _meters(self, street: Street) -> None:
         axis = LineString(self.network.lines[street.name])
@@ -203,7 +226,7 @@ class Furnisher:
                         away = normal if axis.distance(Point(*beyond)) > axis.distance(Point(x, y)) else -normal
                         px, py = np.array([x, y]) + along * BAY_M[0] / 2 + away * (BAY_M[1] / 2 + 0.4)
                         yaw = float(np.arctan2(-away[1], -away[0]) + np.pi / 2) + np.pi
-                        self._stand("meter", kit.parking_meter(), float(px), float(py), yaw, 0.12, high=1.3)
+                        self.stand("meter", kit.parking_meter(), float(px), float(py), yaw, 0.12, high=1.3)
 
     def _covers(self, street: Street, start: float, end: float) -> None:
         if street.hump_m:
@@ -228,22 +251,22 @@ class Furnisher:
         for arm, starts, away in self.network.arms(name):
             street = self.network.streets[arm]
             if street.profile.one_way and street.profile.forward and starts:
-                x, y = self._at_mouth(street, starts, self.network.mouths[arm, starts] + 3.0, FROM_KERB_M, left=True)
+                x, y = self.at_mouth(street, starts, self.network.mouths[arm, starts] + 3.0, FROM_KERB_M, left=True)
                 yaw = float(np.arctan2(away[1], away[0]) - np.pi / 2)
-                self._stand("one_way", kit.traffic_sign("one_way"), x, y, yaw, 0.08, high=2.8)
+                self.stand("one_way", kit.traffic_sign("one_way"), x, y, yaw, 0.08, high=2.8)
 
     def _corner(self, name: str) -> None:
         arm, starts, away = self.network.arms(name)[0]
         street = self.network.streets[arm]
-        x, y = self._at_mouth(street, starts, self.network.mouths[arm, starts] + 2.2, FROM_KERB_M, left=True)
+        x, y = self.at_mouth(street, starts, self.network.mouths[arm, starts] + 2.2, FROM_KERB_M, left=True)
         yaw = float(np.arctan2(away[1], away[0]))
-        self._stand("street_name", kit.street_name_sign(), x, y, yaw, 0.08, high=3.0)
+        self.stand("street_name", kit.street_name_sign(), x, y, yaw, 0.08, high=3.0)
         for arm, starts, _ in self.network.arms(name):
             back = self.network.mouths[arm, starts] - STOP_LINE_GAP_M - CROSSING_M - 0.7
-            x, y = self._at_mouth(self.network.streets[arm], starts, back, 0.45)
-            self._stand("bollard", kit.bollard(), x, y, 0.0, 0.12, high=0.9)
+            x, y = self.at_mouth(self.network.streets[arm], starts, back, 0.45)
+            self.stand("bollard", kit.bollard(), x, y, 0.0, 0.12, high=0.9)
 
-    def _beside(self, street: Street, side: int, station: float, from_kerb: float) -> tuple[float, float, Array]:
+    def beside(self, street: Street, side: int, station: float, from_kerb: float) -> tuple[float, float, Array]:
         """A point on a sidewalk's edge and the unit direction from it to the road."""
         point, along = paths.at(self.network.lines[street.name], station)
         normal = side * np.array([-along[1], along[0]])
@@ -253,18 +276,20 @@ class Furnisher:
             spot = spot + normal * BAY_M[1]
         return float(spot[0]), float(spot[1]), -normal
 
-    def _at_mouth(
+    def at_mouth(
         self, street: Street, starts: bool, back: float, from_kerb: float, *, left: bool = False
     ) -> tuple[float, float]:
+        """A point at the right kerb of those who arrive at an end of a street, so far before its junction's middle."""
         line = self.network.lines[street.name]
         station = back if starts else paths.length(line) - back
         # Who arrives at the street's start drives against it and has his right kerb on the street's left.
         side = 1 if starts != left else -1
-        x, y, _ = self._beside(street, side, station, from_kerb)
+        x, y, _ = self.beside(street, side, station, from_kerb)
         return x, y
 
-    def _stand(
+    def stand(
         self, kind: str, parts: list[Part], x: float, y: float, yaw: float, radius: float, *, high: float
     ) -> None:
+        """Put something on the sidewalk, if there is room."""
         if self.ground.takes(x, y) and self.props.is_free(x, y, radius):
             self.props.put(kind, parts, x, y, KERB_M, yaw, radius_m=radius, high_m=high)

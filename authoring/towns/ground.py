@@ -57,11 +57,15 @@ def tactile_paving(regions: Regions) -> BaseGeometry:
     network, strips = regions.network, []
     for street in network.streets.values():
         line = network.lines[street.name]
+        half = street.profile.half_width_m
+        edges = (half, -half - TACTILE_DEPTH_M - 0.35)
+        for middle in network.crossings_m(street.name):
+            span = (middle - CROSSING_M / 2, middle + CROSSING_M / 2)
+            strips += [regions.band(street.name, left, left + TACTILE_DEPTH_M + 0.35, span) for left in edges]
         for at_start in (True, False) if street.end else (True,):
             mouth = network.mouths[street.name, at_start] - STOP_LINE_GAP_M
             low, high = sorted(s if at_start else paths.length(line) - s for s in (mouth, mouth - CROSSING_M))
-            half = street.profile.half_width_m
-            for left in (half, -half - TACTILE_DEPTH_M - 0.35):
+            for left in edges:
                 strips.append(regions.band(street.name, left, left + TACTILE_DEPTH_M + 0.35, (low, high)))
     return unary_union(strips).intersection(regions.sidewalks)
 

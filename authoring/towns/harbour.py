@@ -22,10 +22,10 @@ _NODES = (
     Node(name="sw", position=(-215, -140), control="stop"),
     Node(name="sx", position=(-135, -141), control="stop"),
     Node(name="sc", position=(0, -142), control="signals"),
-    Node(name="se", position=(215, -140), control="stop"),
-    Node(name="nw", position=(-215, 140), control="stop"),
+    Node(name="se", position=(215, -140), control="signals"),
+    Node(name="nw", position=(-215, 140), control="signals"),
     Node(name="nc", position=(0, 142), control="signals"),
-    Node(name="nx", position=(135, 141), control="stop"),
+    Node(name="nx", position=(135, 141), control="signals"),
     Node(name="ne", position=(215, 140), control="stop"),
 )
 

@@ -23,6 +23,7 @@ from authoring.towns.regions import KERB_M, Regions
 Array = npt.NDArray[np.float64]
 CAR_BAY_M = (5.0, 2.5)
 LORRY_BAY_M = (16.0, 3.8)
+BARRIER_M = 4.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,6 +34,7 @@ class Plot:
         corners: xmin, ymin, xmax, ymax.
         material, label: of its surface.
         fenced: which sides have netting, of `nesw`.
+        walled: which sides have a row of concrete barriers.
     """
 
     name: str
@@ -40,6 +42,7 @@ class Plot:
     material: str = "concrete"
     label: str = "ground"
     fenced: str = ""
+    walled: str = ""
 
     @property
     def outline(self) -> Polygon:
@@ -64,10 +67,31 @@ PLOTS = (
     Plot(name="store", corners=(-206, 153, -14, 206), material="asphalt_worn", label="parking"),
     Plot(name="verge_south", corners=(50, -32, 78, -18.5), material="grass", label="terrain"),
     Plot(name="verge_north", corners=(-82, 18.5, -44, 32), material="grass", label="terrain"),
-    Plot(name="verge_east", corners=(223.5, -155, 236, -125), material="roof_gravel", label="terrain"),
-    Plot(name="verge_west", corners=(-238, 124, -223.5, 157), material="roof_gravel", label="terrain"),
-    Plot(name="verge_petrol", corners=(106, 120, 150, 131.5), material="grass", label="terrain"),
-    Plot(name="verge_terminal", corners=(-22.5, -232, -8, -203), material="grass", label="terrain"),
+    Plot(
+        name="verge_east",
+        corners=(223.5, -155, 236, -125),
+        material="roof_gravel",
+        label="terrain",
+        fenced="e",
+        walled="e",
+    ),
+    Plot(
+        name="verge_west",
+        corners=(-238, 124, -223.5, 157),
+        material="roof_gravel",
+        label="terrain",
+        fenced="w",
+        walled="w",
+    ),
+    Plot(name="verge_petrol", corners=(106, 120, 150, 131.5), material="grass", label="terrain", walled="s"),
+    Plot(
+        name="verge_terminal",
+        corners=(-22.5, -232, -8, -203),
+        material="grass",
+        label="terrain",
+        fenced="w",
+        walled="w",
+    ),
     *(
         Plot(name=f"gate_{index}", corners=corners, material="asphalt_worn")
         for index, corners in enumerate(
@@ -109,6 +133,8 @@ class Yards:
             self.props.solids.append(level_box(f"ground.{plot.name}", plot.outline, KERB_M))
             for side in plot.fenced:
                 self._fence(plot, side)
+            for side in plot.walled:
+                self._barriers(plot, side)
         self._south()
         self._terminal()
         self._south_west()
@@ -248,12 +274,20 @@ class Yards:
             paint_bay(self.sink, float(x), y, np.radians(yaw_deg), *bay_m, z_m=KERB_M + 0.006)
         self.bays.append((name, *bay_m, np.array([(float(x), y, KERB_M, yaw_deg) for x, y in middles])))
 
+    def _barriers(self, plot: Plot, side: str) -> None:
+        """A row of concrete barriers along one side, in front of its netting."""
+        line = _side(plot, side, 2.0)
+        total = paths.length(line)
+        for index in range(int(total / BARRIER_M)):
+            piece = paths.cut(line, index * BARRIER_M + 0.05, (index + 1) * BARRIER_M - 0.05)
+            x, y = (float(v) for v in piece.mean(0))
+            yaw = float(np.arctan2(*(piece[1] - piece[0])[::-1]))
+            parts = kit.jersey_barrier(BARRIER_M - 0.1)
+            self.props.put("barrier", parts, x, y, KERB_M, yaw, radius_m=0.35, high_m=0.8)
+
     def _fence(self, plot: Plot, side: str) -> None:
         """Netting along one side, a metre inside."""
-        x0, y0, x1, y1 = plot.outline.buffer(-1.0).bounds
-        a, b = {"n": ((x0, y1), (x1, y1)), "s": ((x1, y0), (x0, y0)), "w": ((x0, y0), (x0, y1)),
-                "e": ((x1, y1), (x1, y0))}[side]  # fmt: skip
-        line = np.array([a, b])
+        line = _side(plot, side, 1.0)
         total = paths.length(line)
         count = max(1, round(total / 24.0))
         for index in range(count):
@@ -267,3 +301,16 @@ class Yards:
             self.props.solids.append(
                 Solid(f"netting_{x:.1f}_{y:.1f}", "box", (x, y, KERB_M + 1.1), (long / 2, 0.05, 1.1), turn)
             )
+
+
+def _side(plot: Plot, side: str, inside_m: float) -> Array:
+    """A line (2, 2) along one side of a plot, so far inside, with the plot on its right."""
+    x0, y0, x1, y1 = plot.outline.buffer(-inside_m).bounds
+    return np.array(
+        {
+            "n": ((x0, y1), (x1, y1)),
+            "s": ((x1, y0), (x0, y0)),
+            "w": ((x0, y0), (x0, y1)),
+            "e": ((x1, y1), (x1, y0)),
+        }[side]
+    )

@@ -12,7 +12,7 @@ from shapely.geometry import LineString, Point, Polygon  # type: ignore[import-u
 from shapely.geometry.base import BaseGeometry  # type: ignore[import-untyped]
 from shapely.geometry.polygon import orient  # type: ignore[import-untyped]
 
-from authoring.kit.buildings import building
+from authoring.kit.buildings import FLOOR_M, building
 from authoring.kit.parts import Sink, place
 from authoring.towns import paths
 from authoring.towns.lod import without_hidden_edges
@@ -32,6 +32,8 @@ MIDDLE = {
 }
 LOW = {"shop_row": 0.3, "brick_apartment": 0.25, "plaster_apartment": 0.2, "warehouse_loft": 0.25}
 STREET_M = 0.6
+# Buildings whose middles are farther apart do not touch.
+REACH_M = 40.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,11 +81,27 @@ def build_lots(sink: Sink, lots: list[Lot], *, seed: int) -> None:
             rng=np.random.default_rng([seed, index]),
             sides=lot.sides,
             lod="near" if lot.near else "far",
+            covered_m=_covered(lot, lots) if lot.near else None,
         )
         if lot.near:
             parts = without_hidden_edges(parts, lot.width_m, lot.depth_m)
         x, y = lot.centre
         sink.extend(place(parts, x_m=x, y_m=y, z_m=KERB_M, yaw_rad=lot.yaw_rad))
+
+
+def _covered(lot: Lot, lots: list[Lot]) -> dict[str, float]:
+    """Up to which height a neighbour stands right before all of the left and the right side of a building."""
+    cos, sin = np.cos(lot.yaw_rad), np.sin(lot.yaw_rad)
+    near = [other for other in lots if other is not lot and np.hypot(*np.subtract(other.centre, lot.centre)) < REACH_M]
+    found = {}
+    for side, u in (("left", -lot.width_m / 2 - 0.35), ("right", lot.width_m / 2 + 0.35)):
+        heights = []
+        for v in np.array([-0.47, -0.16, 0.16, 0.47]) * lot.depth_m:
+            point = Point(lot.centre[0] + cos * u - sin * v, lot.centre[1] + sin * u + cos * v)
+            before = [other.floors - (other.style == "shop_row") for other in near if other.footprint.contains(point)]
+            heights.append(max(before, default=0) * FLOOR_M)
+        found[side] = float(min(heights))
+    return found
 
 
 def _along(

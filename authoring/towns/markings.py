@@ -71,9 +71,31 @@ def paint_streets(sink: Sink, regions: Regions, turns: Callable[[str], set[str]]
             _mouth(painter, at_start)
             if street.end is not None:
                 _arrows(painter, at_start, turns)
+        paint_crossings(painter)
     for group in regions.bay_groups:
         for x, y, yaw_deg in group.bays:
             _bay(sink, x, y, np.radians(yaw_deg), *BAY_M, z_m=LIFT_M)
+
+
+def zebra(painter: Painter, middle_m: float) -> None:
+    """The stripes of a crossing from kerb to kerb."""
+    reach = painter.street.profile.half_width_m - 0.5
+    count = int((2 * reach + 0.55) // 1.1)
+    for left in (np.arange(count) - (count - 1) / 2) * 1.1:
+        painter.stripe(middle_m - CROSSING_M / 2, middle_m + CROSSING_M / 2, float(left), 0.55)
+
+
+def paint_crossings(painter: Painter) -> None:
+    """Stripes and stop lines of a street's crossings between its junctions."""
+    profile = painter.street.profile
+    for middle in painter.network.crossings_m(painter.street.name):
+        zebra(painter, middle)
+        for forward, count in ((True, profile.forward), (False, profile.backward)):
+            back = CROSSING_M / 2 + STOP_LINE_GAP_M
+            low, high = sorted(middle + (-s if forward else s) for s in (back, back + 0.45))
+            for index in range(count):
+                left = profile.lane_offset_m(index, forward=forward)
+                painter.stripe(low, high, left, profile.lane_m - 0.3)
 
 
 def paint_bay(sink: Sink, x: float, y: float, yaw_rad: float, length_m: float, width_m: float, z_m: float) -> None:
@@ -125,10 +147,7 @@ def _mouth(painter: Painter, at_start: bool) -> None:
 
     if node.control != "yield" or len(painter.network.arms(node.name)) > 3:
         middle = place(mouth - STOP_LINE_GAP_M - CROSSING_M / 2)
-        reach = profile.half_width_m - 0.5
-        count = int((2 * reach + 0.55) // 1.1)
-        for left in (np.arange(count) - (count - 1) / 2) * 1.1:
-            painter.stripe(middle - CROSSING_M / 2, middle + CROSSING_M / 2, float(left), 0.55)
+        zebra(painter, middle)
     coming = profile.backward if at_start else profile.forward
     for index in range(coming):
         left = profile.lane_offset_m(index, forward=not at_start)

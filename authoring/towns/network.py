@@ -84,6 +84,7 @@ class Street:
         hump_m: height of its bridge, 0 for a level street.
         ramp_m, deck_half_m: length of the bridge's ramps, and half the length of what lies between them.
         trees_m: spacing of street trees, 0 for none.
+        crossings: where people cross at lights between its junctions, as shares of its line.
     """
 
     name: str
@@ -99,6 +100,7 @@ class Street:
     ramp_m: float = 26.0
     deck_half_m: float = 11.0
     trees_m: float = 0.0
+    crossings: Sequence[float] = ()
 
 
 @dataclass(frozen=True)
@@ -162,6 +164,10 @@ class Network:
         line_m = paths.length(self.lines[street])
         end_m = line_m - self.mouths[street, False] if self.streets[street].end else line_m
         return self.mouths[street, True], end_m
+
+    def crossings_m(self, street: str) -> list[float]:
+        """The distances along a street's line of the middles of its crossings between junctions."""
+        return [share * paths.length(self.lines[street]) for share in self.streets[street].crossings]
 
     def height_m(self, street: str, station_m: npt.ArrayLike) -> Array:
         """Height of a street's surface at distances along its line: 0 save on a bridge."""

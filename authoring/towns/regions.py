@@ -136,10 +136,13 @@ class Regions:
         count = int((last - first + BAY_GAP_M) // (group_m + 2 * BAY_TAPER_M + BAY_GAP_M))
         slack = (last - first - count * (group_m + 2 * BAY_TAPER_M) - (count - 1) * BAY_GAP_M) / 2
         kerb, back = street.profile.half_width_m - 0.02, street.profile.half_width_m + BAY_M[1]
-        line = self.network.lines[name]
+        line, crossings = self.network.lines[name], self.network.crossings_m(name)
         for index in range(count):
             begin = first + slack + index * (group_m + 2 * BAY_TAPER_M + BAY_GAP_M)
-            outer = paths.cut(line, begin, begin + group_m + 2 * BAY_TAPER_M)
+            ending = begin + group_m + 2 * BAY_TAPER_M
+            if any(begin - CORNER_CLEAR_M < middle < ending + CORNER_CLEAR_M for middle in crossings):
+                continue
+            outer = paths.cut(line, begin, ending)
             inner = paths.cut(line, begin + BAY_TAPER_M, begin + BAY_TAPER_M + group_m)
             outline = Polygon(
                 np.concatenate([paths.offset(outer, side * kerb), paths.offset(inner, side * back)[::-1]])

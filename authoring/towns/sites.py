@@ -20,12 +20,20 @@ from authoring.towns.furniture import Furnisher
 from authoring.towns.markings import paint_bay
 from authoring.towns.props import Props
 from authoring.towns.regions import KERB_M, Regions, polygons
+from authoring.towns.signage import barrier
 
 Array = npt.NDArray[np.float64]
 Kind = Literal["plaza", "park", "parking_lot", "vacant", "construction"]
 LOT_BAY_M = (5.0, 2.5)
 HILL_STEP_M = 1.5
 PATH_M = 2.6
+# A strip of grass between a parking lot and its street.
+VERGE_M = 1.8
+# An edge of a lot at most so far from a sidewalk is its front.
+STREET_SIDE_M = 3.0
+YARD_WALLS = ("brick_brown", "brick_red")
+# Length of a low wall on a square, and of the way between two.
+SEAT_M = (5.6, 3.4)
 # Trees farther from every road are simple ones.
 NEAR_ROAD_M = 12.0
 
@@ -90,6 +98,7 @@ class SiteBuilder:
 
     def _plaza(self, site: Site, ground: BaseGeometry) -> None:
         solids.flat(self.sink, ground, KERB_M, "cobbles", "sidewalk", cell_m=55.0)
+        self._seats(ground)
         x0, y0, x1, y1 = ground.bounds
         for x in np.arange(x0 + 5, x1 - 3, 8.5):
             for y in np.arange(y0 + 4, y1 - 3, 8.5):
@@ -149,7 +158,12 @@ class SiteBuilder:
         hedge = kit.hedge(12.6, 0.9, 0.7, self.rng)
         for x in np.arange(x0 + 9, x1 - 9, 14.5):
             y = y0 + 1.0 + self._slack(ground, float(x), y0)
-            if self.props.is_free(float(x), y, 0.5):
+            if not self.props.is_free(float(x), y, 0.5):
+                continue
+            if round((float(x) - x0 - 9) / 14.5) % 3 == 2:
+                line = np.array([(float(x) - 6.3, y), (float(x) + 6.3, y)])
+                self._wall(line, kit.wall(12.6, material="brick_brown", height_m=0.7), 0.9)
+            else:
                 self.props.instance("hedge", hedge, float(x), y, KERB_M, 0.0, radius_m=0.5, high_m=0.9)
 
     def _slack(self, ground: BaseGeometry, x: float, y0: float) -> float:
@@ -173,8 +187,11 @@ class SiteBuilder:
         self.sink.triangles("grass", vertices, faces, uvs=uvs, normals=normals, label="terrain")
 
     def _parking_lot(self, site: Site, ground: BaseGeometry) -> None:
-        solids.flat(self.sink, ground, KERB_M, "asphalt_worn", "parking")
         x0, y0, x1, y1 = ground.bounds
+        way = (x0 + x1) / 2
+        verge = ground.intersection(box(x0, y0, x1, y0 + VERGE_M)).difference(box(way - 4, y0, way + 4, y1))
+        solids.flat(self.sink, ground.difference(verge), KERB_M, "asphalt_worn", "parking")
+        solids.flat(self.sink, verge, KERB_M, "grass", "terrain")
         bays = []
         for y, yaw in ((y0 + 5.2, 90.0), (y1 - 4.2, -90.0)):
             for x in np.arange(x0 + 4, x1 - 4, LOT_BAY_M[1]):
@@ -197,7 +214,7 @@ class SiteBuilder:
                 shrub = kit.shrub(float(self.rng.uniform(0.5, 1.1)), self.rng, foliage="foliage_olive")
                 if piece.buffer(-1.2).contains(Point(x, y)) and not self.furnisher.ground.views.contains(Point(x, y)):
                     self._put("shrub", shrub, x, y, 0.5, 0.8)
-            self._rim(piece)
+            self._rim(site, piece)
 
     def _construction(self, site: Site, ground: BaseGeometry) -> None:
         solids.flat(self.sink, ground, KERB_M, "soil", "terrain")
@@ -228,10 +245,31 @@ class SiteBuilder:
             y = y0 + self._slack(ground, float(x), y0) + 1.2
             self._put("jersey", kit.jersey_barrier(3.0), float(x), y, 0.4, 0.8, yaw=0.0)
 
-    def _rim(self, ground: Polygon) -> None:
+    def _rim(self, site: Site, ground: Polygon) -> None:
+        """A railing towards the street, and the neighbours' walls on the other sides."""
+        material = YARD_WALLS[sum(map(ord, site.name)) % len(YARD_WALLS)]
         for rim in self._edges(ground):
-            solids.railing(self.sink, rim, KERB_M, "galvanised", "fence", top_m=1.1, post_m=2.5)
-            self._barrier(rim, 1.1)
+            if self.regions.sidewalks.distance(Point(*rim.mean(0))) < STREET_SIDE_M:
+                solids.railing(self.sink, rim, KERB_M, "galvanised", "fence", top_m=1.1, post_m=2.5)
+                barrier(self.props.solids, rim, 1.1)
+            else:
+                self._wall(rim, kit.wall(paths.length(rim), material=material, height_m=1.9, thick_m=0.24), 2.0)
+
+    def _seats(self, ground: BaseGeometry) -> None:
+        """Low walls to sit on along the edges of a square, with ways between them."""
+        for rim in self._edges(ground.buffer(-1.1)):
+            total = paths.length(rim)
+            for start in np.arange(2.0, total - SEAT_M[0] - 1.5, SEAT_M[0] + SEAT_M[1]):
+                piece = paths.cut(rim, float(start), float(start) + SEAT_M[0])
+                if all(self.props.is_free(*(float(v) for v in point), 0.5) for point in paths.densified(piece, 1.0)):
+                    self._wall(piece, kit.seat_wall(SEAT_M[0]), 0.5)
+                    self.props.spots.extend((float(x), float(y), 0.9) for x, y in paths.densified(piece, 1.0))
+
+    def _wall(self, line: Array, parts: list[Part], height_m: float) -> None:
+        x, y = (float(v) for v in line.mean(0))
+        yaw = float(np.arctan2(*(line[1] - line[0])[::-1]))
+        self.sink.extend(place(parts, x_m=x, y_m=y, z_m=KERB_M, yaw_rad=yaw))
+        barrier(self.props.solids, line[[0, -1]], height_m, half_m=0.2)
 
     def _hoarding(self, ground: BaseGeometry) -> None:
         for rim in self._edges(ground):
@@ -239,7 +277,7 @@ class SiteBuilder:
             x, y = (float(v) for v in rim.mean(0))
             panels = kit.wall(span, material="metal_panel", height_m=2.0, thick_m=0.1)
             self.sink.extend(place(panels, x_m=x, y_m=y, z_m=KERB_M, yaw_rad=yaw))
-            self._barrier(rim, 2.0)
+            barrier(self.props.solids, rim, 2.0)
 
     def _edges(self, ground: BaseGeometry) -> list[Array]:
         edges = []
@@ -255,15 +293,7 @@ class SiteBuilder:
         x, y = (float(v) for v in line.mean(0))
         yaw = float(np.arctan2(*(line[1] - line[0])[::-1]))
         self.sink.extend(place(kit.fence(span, style=style, height_m=height_m), x_m=x, y_m=y, z_m=KERB_M, yaw_rad=yaw))
-        self._barrier(line, height_m)
-
-    def _barrier(self, line: Array, height_m: float) -> None:
-        x, y = (float(v) for v in line.mean(0))
-        yaw = float(np.arctan2(*(line[1] - line[0])[::-1]))
-        size = (paths.length(line) / 2, 0.06, height_m / 2)
-        turn = (float(np.cos(yaw / 2)), 0.0, 0.0, float(np.sin(yaw / 2)))
-        name = f"fence_{x:.1f}_{y:.1f}"
-        self.props.solids.append(Solid(name, "box", (x, y, KERB_M + height_m / 2), size, turn))
+        barrier(self.props.solids, line, height_m)
 
     def _tree(self, x: float, y: float, kind: int, *, z: float = KERB_M, room_m: float = 1.5) -> None:
         if self.props.is_free(x, y, room_m):

@@ -17,14 +17,14 @@ _NODES = (
     Node(name="cn", position=(0, CIRCUS_M)),
     Node(name="cw", position=(-CIRCUS_M, 0)),
     Node(name="cs", position=(0, -CIRCUS_M)),
-    Node(name="n1", position=(-4, 128), control="stop"),
+    Node(name="n1", position=(-4, 128), control="signals"),
     Node(name="n2", position=(4, 74)),
-    Node(name="n4", position=(88, 124)),
+    Node(name="n4", position=(88, 124), control="signals"),
     Node(name="e1", position=(150, 4), control="signals"),
     Node(name="e2", position=(100, 3), control="stop"),
     Node(name="s1", position=(4, -132), control="signals"),
     Node(name="s2", position=(-6, -72)),
-    Node(name="w1", position=(-138, -4), control="stop"),
+    Node(name="w1", position=(-138, -4), control="signals"),
     Node(name="w2", position=(-134, 66)),
     Node(name="w3", position=(-130, -70), control="stop"),
 )
@@ -51,7 +51,7 @@ _STREETS = (
     Street(name="ring_ne", start="n4", end="e1", corners=((142, 114, 42), (158, 56, 80)), profile=COLLECTOR,
            trees_m=21),
     Street(name="ring_se", start="e1", end="s1", corners=((152, -52, 90), (138, -126, 48), (62, -138, 90)),
-           profile=COLLECTOR, trees_m=21),
+           profile=COLLECTOR, trees_m=21, crossings=(0.341,)),
     Street(name="ring_s", start="s1", end="w3", corners=((-62, -136, 90), (-126, -130, 45)), profile=COLLECTOR,
            trees_m=22),
     Street(name="ring_w1", start="w3", end="w1", corners=((-140, -36, 60),), profile=COLLECTOR, trees_m=22),
@@ -68,6 +68,8 @@ NETWORK = Network({node.name: node for node in _NODES}, {street.name: street for
 TERRACES = {("north_1", 1), ("north_1", -1), ("elm", -1), ("west", 1), ("south_1", 1), ("ring_nw", -1), ("ash", 1)}
 PARK = ((34, -34), (160, -34), (160, -150), (8, -150), (8, -84), (34, -66))
 SHOPS = ((50, -8), (90, -8), (90, -27), (50, -27))
+# Lights (junction, arm) that let traffic into the circus when it is full.
+LIGHTS = {("cs", "south_1")}
 BUS_STOPS = (("ring_n", -1, 0.5), ("ring_se", 1, 0.32), ("ring_s", 1, 0.5))
 
 # Boards (x, y, facing in degrees) and from where a driver sees them: no house and no tree comes between.

@@ -20,6 +20,7 @@ POND = (84.0, -84.0)
 PLAY = (52.0, -116.0)
 WATER_DROP_M = 0.28
 TREES = 46
+ISLAND_WALL_M = 14.3
 
 
 def park_ground(regions: Regions, corners: tuple[tuple[float, float], ...]) -> Polygon:
@@ -77,7 +78,11 @@ def build_park(
 def build_island(
     props: Props, furnisher: Furnisher, regions: Regions, views: BaseGeometry, rng: np.random.Generator
 ) -> None:
-    """The green in the middle of the circus: trees around a bed of flowers."""
+    """The green in the middle of the circus: trees around a bed of flowers, held by a low wall."""
+    turn = np.linspace(0, 2 * np.pi, 37)
+    rim = ISLAND_WALL_M * np.stack([np.cos(turn), np.sin(turn)], 1)
+    section = [(-0.17, 0.0), (-0.17, 0.5), (0.17, 0.5), (0.17, 0.0)]
+    solids.sweep(props.sink, rim, KERB_M, section, "brick_red", "wall")
     for index in range(14):
         turn = index * 2 * np.pi / 14 + 0.2
         reach = 13.0 if index % 2 else 9.0

@@ -10,7 +10,7 @@ from shapely.ops import unary_union  # type: ignore[import-untyped]
 from authoring.kit.parts import Sink
 from authoring.towns import paths, solids, suburb
 from authoring.towns.ground import tactile_paving
-from authoring.towns.markings import WHITE, Painter
+from authoring.towns.markings import WHITE, Painter, paint_crossings, zebra
 from authoring.towns.network import CROSSING_M, STOP_LINE_GAP_M, Network, Street
 from authoring.towns.regions import KERB_M, Regions
 
@@ -88,6 +88,7 @@ def paint(sink: Sink, regions: Regions) -> None:
             painter.dashes(start + 0.5, end - 0.5, 0.0, dash_m=2.0, gap_m=4.0, paint=WHITE)
         for at_start in (True, False) if street.end else ():
             _mouth(painter, network, street, at_start)
+        paint_crossings(painter)
         for side, bays in ((1, street.bays_left), (-1, street.bays_right)):
             if bays:
                 painter.dashes(start, end, side * (street.profile.half_width_m - 0.1), dash_m=1, gap_m=1, paint=WHITE)
@@ -103,11 +104,7 @@ def _mouth(painter: Painter, network: Network, street: Street, at_start: bool) -
         return min(ends), max(ends)
 
     if node.control != "yield" or len(network.arms(node.name)) > 3:
-        low, high = span(mouth - STOP_LINE_GAP_M - CROSSING_M, mouth - STOP_LINE_GAP_M)
-        reach = profile.half_width_m - 0.5
-        count = int((2 * reach + 0.55) // 1.1)
-        for left in (np.arange(count) - (count - 1) / 2) * 1.1:
-            painter.stripe(low, high, float(left), 0.55)
+        zebra(painter, sum(span(mouth - STOP_LINE_GAP_M - CROSSING_M, mouth - STOP_LINE_GAP_M)) / 2)
     if not gives_way(network, node.name, street.name) or street.profile.one_way:
         return
     for index in range(profile.backward if at_start else profile.forward):

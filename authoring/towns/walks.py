@@ -55,22 +55,30 @@ def sidewalks(regions: Regions, bounds: tuple[float, float, float, float]) -> It
 
 
 def crosswalks(regions: Regions) -> Iterator[Walk]:
-    """Every zebra crossing from kerb to kerb, but for streets that lead out of the town, where nobody drives."""
+    """Every zebra crossing from kerb to kerb, but on streets that lead out of the town, where nobody drives."""
     network = regions.network
     for street in network.streets.values():
         if not street.end:
             continue
         line = network.lines[street.name]
         half = street.profile.half_width_m - 0.3
+        for index, middle in enumerate(network.crossings_m(street.name)):
+            yield _across(line, middle, half, f"{street.name}_{index}")
         for at_start in (True, False):
             node = network.nodes[street.start if at_start else street.end]
             if node.control == "yield" and len(network.arms(node.name)) <= 3:
                 continue
             back = network.mouths[street.name, at_start] - STOP_LINE_GAP_M - CROSSING_M / 2
-            point, along = paths.at(line, back if at_start else paths.length(line) - back)
-            normal = np.array([-along[1], along[0]])
-            ends = np.stack([point + normal * half, point - normal * half])
-            yield Walk(f"{node.name}_{street.name}", CROSSING_M, np.column_stack([ends, np.zeros(2)]))
+            middle = back if at_start else paths.length(line) - back
+            yield _across(line, middle, half, f"{node.name}_{street.name}")
+
+
+def _across(line: Array, station_m: float, half_m: float, name: str) -> Walk:
+    """A crossing of a street at a distance along its line."""
+    point, along = paths.at(line, station_m)
+    normal = np.array([-along[1], along[0]])
+    ends = np.stack([point + normal * half_m, point - normal * half_m])
+    return Walk(name, CROSSING_M, np.column_stack([ends, np.zeros(2)]))
 
 
 def _lines(shape: BaseGeometry) -> list[LineString]:

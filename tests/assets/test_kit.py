@@ -157,6 +157,49 @@ def test_leaves_are_seen_from_both_sides() -> None:
     assert (agreement > 0).sum() > 1000
 
 
+def outline_share(parts: list[kit.Part], turn_rad: float) -> float:
+    """How much of the convex hull of a crown's outline its leaves fill, seen from one side."""
+    crown = np.concatenate([p.mesh.vertices[p.mesh.faces] for p in parts if p.material.startswith("foliage")])
+    flat = np.stack([crown @ (np.cos(turn_rad), np.sin(turn_rad), 0.0), crown[..., 2]], -1)
+    pixels = ((flat - flat.reshape(-1, 2).min(0)) * 40 + 4).astype(np.int32)
+    image = np.zeros(pixels.reshape(-1, 2).max(0)[::-1] + 8, np.uint8)
+    for triangle in pixels:
+        cv2.fillConvexPoly(image, triangle, 1)
+    return float(image.sum() / cv2.contourArea(cv2.convexHull(np.argwhere(image).astype(np.int32))))
+
+
+@pytest.mark.parametrize("species", list(kit.SPECIES))
+def test_crowns_are_no_balls_and_no_two_are_alike(species: str) -> None:
+    """A ball fills all of its hull; boughs with gaps between them do not, each tree in another way."""
+    shares = [
+        outline_share(kit.tree(species, 8.0, derive_rng(seed, species)), turn)
+        for seed in range(5)
+        for turn in (0.0, 1.5)
+    ]
+    assert np.mean(shares) < 0.87
+    assert np.std(shares) > 0.008
+
+
+@pytest.mark.parametrize("style", sorted(set(kit.STYLES) - {"glass_office"}))
+def test_no_party_wall_is_blank_but_where_a_neighbour_stands(style: str) -> None:
+    def on_the_left(covered_m: float, seed: int) -> tuple[int, float]:
+        """Faces before and behind the plane of the left side, and how low they begin."""
+        parts = kit.building(
+            style=style, width_m=9.0, depth_m=14.0, floors=6, rng=derive_rng(seed, "party", style),
+            sides=("front",), covered_m={"left": covered_m},
+        )  # fmt: skip
+        middles = np.concatenate([part.mesh.vertices[part.mesh.faces].mean(1) for part in parts])
+        off_m = -4.5 - middles[:, 0]
+        near = middles[
+            (off_m > -0.24) & (np.abs(off_m) > 0.01) & (np.abs(middles[:, 1]) < 6.2) & (middles[:, 2] < 17.0)
+        ]
+        return len(near), float(near[:, 2].min()) if len(near) else np.inf
+
+    open_sides = [on_the_left(0.0, seed)[0] for seed in range(6)]
+    assert min(open_sides) >= 2
+    assert all(on_the_left(9.0, seed)[1] > 8.9 for seed in range(6))
+
+
 def test_leaves_grow_on_the_outside_of_overlapping_masses() -> None:
     rng = derive_rng(0, "masses")
     centres, radii_m = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)]), np.full((2, 3), 0.8)
