@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from shapely import box, line_merge  # type: ignore[import-untyped]
 
 from authoring.mesh import Floats, Mesh
 from authoring.vehicles.atlas import DETAILS, LAMPS, cell_uvs, flat
@@ -13,11 +14,15 @@ from authoring.vehicles.patches import arch_flare, through
 from authoring.vehicles.shapes import Shape, disc, rounded
 from authoring.vehicles.sheet import Field, Sheet
 from authoring.vehicles.shell import Level, Shell, make_shell
+from authoring.vehicles.thin import thin
 from authoring.vehicles.wheels import WheelSpec, make_wheel
 
-__all__ = ["CarSpec", "Points", "Stamp", "build_car"]
+__all__ = ["CarSpec", "Points", "Stamp", "build_car", "side_lines"]
 
 Points = tuple[tuple[float, float], ...]
+
+_BESIDE_GLASS_M = 0.034
+"""How far from the side windows the doors' shut line runs."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +69,7 @@ class CarSpec:
         glass_posts: (x, width) of dark posts across the side windows.
         blind_sides: the stretch in x without windows.
         lines_side, lines_top, lines_front, lines_rear: shut lines, as `PaintMap` takes them.
+        door_rear: x behind which no door has a window; None where side windows have no doors about them.
         handles: (x, z) of door handles. rails: front x, rear x and y of roof rails.
         mirror: size of a door mirror, if it has any.
         plates, badges: z at front and rear; `plate_stand_off` is how far plates stand before the body.
@@ -106,6 +112,7 @@ class CarSpec:
     lines_top: tuple[Points, ...] = ()
     lines_front: tuple[Points, ...] = ()
     lines_rear: tuple[Points, ...] = ()
+    door_rear: float | None = None
     handles: Points = ()
     plates: tuple[float, float] = (0.45, 0.6)
     plate_stand_off: float = 0.012
@@ -136,13 +143,19 @@ def build_car(spec: CarSpec) -> tuple[Parts, Shell, Shell]:
         through(spec.cabin_crown), shift_reach=spec.cabin_reach, cells=(18, 7, 4), corner_deg=50,
     )  # fmt: skip
     parts = Parts()
-    _wells(spec, body, arch, parts)
-    for stamp in spec.stamps:
-        _stamp(body, stamp, parts)
+    _cut_wells(spec, body, arch)
+    stamped = [_stamp(body, stamp) for stamp in spec.stamps]
     _glaze(spec, cabin)
     _hide_under(cabin, body)
     if spec.bed is not None:
-        _sink_bed(spec.bed, body, parts)
+        _cut_bed(spec.bed, body)
+    for sheet in (body.side, body.top, cabin.side, cabin.top):
+        thin(sheet)
+    _line_wells(spec, body, arch, parts)
+    for stamp, name in zip(spec.stamps, stamped, strict=True):
+        _add_stamp(body, stamp, name, parts)
+    if spec.bed is not None:
+        _sink_bed(body, parts)
     parts.add("paint", body.side.part("paint"), both_sides=True)
     parts.add("paint", body.top.part("paint"), both_sides=True)
     parts.add("trim", flat(body.side.part("trim"), DETAILS["plastic"]), both_sides=True)
@@ -160,7 +173,7 @@ def _side_view(points: Floats) -> Floats:
     return points[:, [0, 2]]
 
 
-def _wells(spec: CarSpec, body: Shell, arch: float, parts: Parts) -> None:
+def _cut_wells(spec: CarSpec, body: Shell, arch: float) -> None:
     beside: Field = lambda p, q: 0.3 - p[:, 1]  # noqa: E731
     for x in spec.axles:
         ring = disc(x, spec.wheel.radius, arch)
@@ -171,6 +184,9 @@ def _wells(spec: CarSpec, body: Shell, arch: float, parts: Parts) -> None:
     if spec.sill_z:
         below: Field = lambda p, q: p[:, 2] - spec.sill_z  # noqa: E731
         body.side.stamp(below, "trim", on=("paint",), finest_m=0.2)
+
+
+def _line_wells(spec: CarSpec, body: Shell, arch: float, parts: Parts) -> None:
     edges = body.side.border("hole")
     points = body.side.points
     inner = spec.track / 2 - spec.wheel.width / 2 - 0.10
@@ -196,15 +212,19 @@ def _seen(shape: Shape) -> Field:
     return lambda p, q: shape(_side_view(p))
 
 
-def _stamp(body: Shell, stamp: Stamp, parts: Parts) -> None:
-    def project(points: Floats, params: Floats) -> Floats:
-        if stamp.at == "side":
-            return _side_view(points)
-        run = body.along(params[:, 0])
-        return np.stack([run if stamp.at == "front" else body.arc_m - run, points[:, 2]], axis=1)
+def _on_sheet(body: Shell, stamp: Stamp, points: Floats, params: Floats) -> Floats:
+    """(N, 2) of the body's points, in the coordinates that a stamp is drawn in."""
+    if stamp.at == "side":
+        return _side_view(points)
+    run = body.along(params[:, 0])
+    return np.stack([run if stamp.at == "front" else body.arc_m - run, points[:, 2]], axis=1)
+
+
+def _stamp(body: Shell, stamp: Stamp) -> str:
+    """Cuts a stamp into the body and returns what its faces are called."""
 
     def field_of(shape: Shape) -> Field:
-        return lambda p, q: shape(project(p, q))
+        return lambda p, q: shape(_on_sheet(body, stamp, p, q))
 
     solid = ("paint", "trim")
     own = f"{stamp.part}:{stamp.cell}:{len(body.side.faces)}"
@@ -216,11 +236,15 @@ def _stamp(body: Shell, stamp: Stamp, parts: Parts) -> None:
         frame = field_of(rounded(stamp.corners, stamp.radius, stamp.rim))
         body.side.stamp(frame, "trim", on=solid, finest_m=0.02, bend_m=0.003)
     body.side.stamp(field_of(rounded(stamp.corners, stamp.radius)), own, on=solid, finest_m=0.012, bend_m=0.003)
+    return own
+
+
+def _add_stamp(body: Shell, stamp: Stamp, own: str, parts: Parts) -> None:
     mesh = body.side.part(own, stamp.sink)
     low, high = np.min(stamp.corners, axis=0), np.max(stamp.corners, axis=0)
     low = np.maximum(low, [0, -9]) if stamp.at != "side" else low
     faces = body.side.faces_of(own)
-    flat_at = project(body.side.points, body.side.params)[np.unique(faces)]
+    flat_at = _on_sheet(body, stamp, body.side.points, body.side.params)[np.unique(faces)]
     cells = DETAILS if stamp.part == "trim" else LAMPS
     uvs = cell_uvs(cells[stamp.cell], (flat_at - low) / (high - low))
     parts.add(stamp.part, mesh.with_uvs(uvs), both_sides=True)
@@ -252,6 +276,25 @@ def _glaze(spec: CarSpec, cabin: Shell) -> None:
         _band(sheet, *spec.blind_sides, "paint", beside, ("glass", "trim"))
 
 
+def side_lines(spec: CarSpec, cabin: Shell) -> tuple[Points, ...]:
+    """All shut lines that are drawn from the side: the car's own, and that of its doors about the side windows."""
+    if spec.door_rear is None:
+        return spec.lines_side
+    front, rear = cabin.along(np.array(cabin.corners))
+    left, right = front + spec.side_glass[0] - _BESIDE_GLASS_M, rear - spec.side_glass[1] + _BESIDE_GLASS_M
+    high, radius = spec.side_v[1] * spec.rise + _BESIDE_GLASS_M, 0.07
+    outline = box(left, -1, right, high).buffer(-radius).buffer(radius, quad_segs=3).exterior.segmentize(0.15)
+    over = line_merge(outline.intersection(box(left - 1, 0.02 * spec.rise, right + 1, high + 1)))
+    ring = np.asarray(over.coords)
+    ring = ring if ring[0, 0] < ring[-1, 0] else ring[::-1]
+    u = np.linspace(0, 1, 601)
+    params = np.column_stack([np.interp(ring[:, 0], cabin.along(u), u), ring[:, 1] / spec.rise])
+    frame = cabin.side.patch.evaluate(params)[:, [0, 2]]
+    frame = frame[frame[:, 0] > spec.door_rear]
+    end = frame[-1] - [0, 0.05]
+    return (*spec.lines_side, tuple((float(x), float(z)) for x, z in [*frame, end]))
+
+
 def _band(sheet: Sheet, low_x: float, high_x: float, material: str, where: Field, on: tuple[str, ...]) -> None:
     """Names everything between two x positions; both lines are cut first, as the band may be narrower than a face."""
     for x in (low_x, high_x):
@@ -279,10 +322,13 @@ def _hide_under(cabin: Shell, body: Shell) -> None:
     body.top.material = ["hidden" if h else m for h, m in zip(hidden, body.top.material, strict=True)]
 
 
-def _sink_bed(bed: tuple[float, float, float], body: Shell, parts: Parts) -> None:
+def _cut_bed(bed: tuple[float, float, float], body: Shell) -> None:
     rear, front, half = bed
     shape = rounded([(rear, -half), (front, -half), (front, half), (rear, half)], 0.04)
     body.top.stamp(lambda p, q: shape(p[:, :2]), "bed", on=("paint",), finest_m=0.06)
+
+
+def _sink_bed(body: Shell, parts: Parts) -> None:
     depth = 0.24
     parts.add("trim", flat(body.top.part("bed", depth), DETAILS["plastic"]), both_sides=True)
     parts.add("trim", flat(body.top.walls("bed", depth), DETAILS["plastic"]), both_sides=True)

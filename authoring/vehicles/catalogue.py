@@ -11,7 +11,7 @@ from authoring.mesh import Floats
 from authoring.vehicles.atlas import PLATE_CELLS, write_atlases
 from authoring.vehicles.bus import fit_bus
 from authoring.vehicles.bus_inside import write_bus_inside
-from authoring.vehicles.car import CarSpec, build_car
+from authoring.vehicles.car import CarSpec, build_car, side_lines
 from authoring.vehicles.car_inside import look_inside, write_car_inside
 from authoring.vehicles.cars import ESTATE, SALOON, SPORTS
 from authoring.vehicles.finish import Box, Finish, PaintMap, write_vehicle
@@ -55,9 +55,8 @@ def _car(
             spec.name, spec.kind, spec.palette, _boxes(spec, bounds, cabin), shown=spec.shown,
             own_inside=draw_inside is not None,
         )  # fmt: skip
-        paint = PaintMap(
-            bounds[0], bounds[1], spec.paint_px, spec.lines_side, spec.lines_top, spec.lines_front, spec.lines_rear
-        )
+        lines = (side_lines(spec, cabin), spec.lines_top, spec.lines_front, spec.lines_rear)
+        paint = PaintMap(bounds[0], bounds[1], spec.paint_px, *lines)
         write_vehicle(out, finish, meshes, paint)
         if draw_inside is not None:
             draw_inside(out / spec.name / "inside.png")

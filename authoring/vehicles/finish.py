@@ -6,13 +6,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from PIL import Image, ImageDraw, ImageFilter
+from PIL import Image
 
 from authoring.mesh import Floats, Mesh, merge, write_obj
+from authoring.vehicles.grooves import Line, carve
 
 __all__ = ["PALETTES", "Box", "Finish", "PaintMap", "write_vehicle"]
 
-Line = tuple[tuple[float, float], ...]
+_DARK, _DARK_PX, _RAMP_PX = 56 / 255, 40, 3
+"""How dark shut lines are at their bottoms, how large a square shows that (in mip levels it is to be dark, too), and
+how much of the texture lies between a lip and the bottom."""
 
 PALETTES = {
     # Linear albedo and weight; the weights follow what European registrations look like.
@@ -34,7 +37,7 @@ PALETTES = {
 
 @dataclass(frozen=True)
 class PaintMap:
-    """Where paint lies in its texture, and the lines drawn there.
+    """Where paint lies in its texture, and the lines cut into it.
 
     The map has a side view (x, z) at the bottom, a top view (x, |y|) above it, then front and rear views (|y|, z) side
     by side: both sides of a vehicle share their texels.
@@ -42,7 +45,7 @@ class PaintMap:
     Attributes:
         low, high: (3,) bounds of the painted parts, metres.
         size: (width, height) of the texture in pixels.
-        side, top, front, rear: polylines of dark shut lines in metres.
+        side, top, front, rear: polylines of shut lines in metres, as `carve` takes them.
     """
 
     low: Floats
@@ -89,22 +92,26 @@ class PaintMap:
             pieces.append(piece.with_uvs(self.pixel(name, a, b) / np.array(self.size)))
         return merge(pieces)
 
+    @property
+    def _dark(self) -> tuple[int, int]:
+        """The left upper corner of the dark square, `_DARK_PX` wide, in pixels from above: no view comes near it."""
+        return self.size[0] - _DARK_PX - 8, 8
+
+    def carved(self, mesh: Mesh) -> Mesh:
+        """The unwrapped mesh with grooves along the shut lines, which darken from their lips to their bottoms."""
+        left, top = self._dark
+        right, up = left + _DARK_PX / 2, self.size[1] - top - _DARK_PX
+        shade = np.array([[right, up - _RAMP_PX / 2], [right, up + _RAMP_PX / 2]]) / np.array(self.size)
+        views = {"side": self.side, "top": self.top, "front": self.front, "rear": self.rear}
+        return carve(self.unwrap(mesh), views, shade)
+
     def draw(self, path: Path) -> None:
-        """Writes the texture: white, with dark shut lines in a faint shade and some road dirt low down."""
-        over = 4
+        """Writes the texture: white, with some road dirt low down, and the dark of shut lines in a corner."""
         width, height = self.size
-        core = Image.new("L", (width * over, height * over), 255)
-        draw = ImageDraw.Draw(core)
         per_metre = self._scale[0]
-        stroke = max(1, round(0.0065 * per_metre * over))
-        for view, lines in (("side", self.side), ("top", self.top), ("front", self.front), ("rear", self.rear)):
-            for line in lines:
-                at = np.asarray(line, dtype=np.float64)
-                p = self.pixel(view, at[:, 0], at[:, 1]) * over
-                draw.line([(float(x), height * over - float(y)) for x, y in p], fill=56, width=stroke, joint="curve")
-        small = core.resize((width, height), Image.Resampling.LANCZOS)
-        shade = np.asarray(small.filter(ImageFilter.GaussianBlur(float(0.006 * per_metre))), dtype=np.float64) / 255
-        value = np.asarray(small, dtype=np.float64) / 255 * (0.8 + 0.2 * shade)
+        value = np.ones((height, width))
+        left, top = self._dark
+        value[top : top + _DARK_PX, left : left + _DARK_PX] = _DARK
         rows = self._scale[1]
         up = height - 1 - np.arange(height)
         z = (up - rows[0]) / per_metre + self.low[2]
@@ -172,11 +179,11 @@ def write_vehicle(
     """
     folder = out / finish.name
     folder.mkdir(parents=True, exist_ok=True)
+    skin = paint_map.carved(meshes["paint"])
     paint_map.draw(folder / "paint.png")
     names = [n for n in ("paint", *_MATERIALS) if n in meshes]
     for name in names:
-        mesh = meshes[name]
-        write_obj(folder / f"{name}.obj", paint_map.unwrap(mesh) if name == "paint" else mesh)
+        write_obj(folder / f"{name}.obj", skin if name == "paint" else meshes[name])
     kind, stem = finish.kind, finish.name
     inside = f"{stem if finish.own_inside else 'common'}/inside.png"
     rgb = " ".join(f"{v:g}" for v in PALETTES[finish.palette][finish.shown][:3])

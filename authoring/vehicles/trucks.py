@@ -9,10 +9,11 @@ from PIL import Image
 
 from authoring.mesh import Mesh, bevelled_box, box, merge, revolve, write_obj
 from authoring.vehicles.atlas import DETAILS, LAMPS, PLATE_CELLS, flat
-from authoring.vehicles.car import build_car
+from authoring.vehicles.car import build_car, side_lines
 from authoring.vehicles.car_inside import look_inside
 from authoring.vehicles.finish import Box, Finish, PaintMap, write_vehicle
 from authoring.vehicles.fittings import add_handles, add_mirrors, add_plate, add_wipers, panel
+from authoring.vehicles.grooves import Line
 from authoring.vehicles.heavy import CAB
 from authoring.vehicles.parts import Parts
 from authoring.vehicles.wheels import WheelSpec, make_wheel
@@ -28,7 +29,7 @@ _BED_Z = 1.02
 
 def write_box_truck(out: Path) -> None:
     """A rigid lorry with a closed box; its rear doors carry the patch."""
-    parts = _chassis("truck_box")
+    parts, side = _chassis("truck_box")
     low, high, width, front = _BED_Z, 3.46, 2.48, 1.98
     middle = ((front + _REAR_X + 0.03) / 2, 0.0, (low + high) / 2)
     size = (front - _REAR_X - 0.03, width, high - low)
@@ -61,12 +62,13 @@ def write_box_truck(out: Path) -> None:
         Box((0.95, 1.13, 1.14), (_CAB_X, 0, 1.56)),
         Box((size[0] / 2 + 0.02, width / 2, (high - 0.45) / 2), (middle[0], 0, (high + 0.45) / 2)),
     )
-    _write(out, "truck_box", parts, boxes, "The box's rear doors carry the patch: geom `face`, site `surface`.", lines)
+    comment = "The box's rear doors carry the patch: geom `face`, site `surface`."
+    _write(out, "truck_box", parts, side, boxes, comment, lines)
 
 
 def write_flatbed(out: Path) -> None:
     """A rigid lorry with a wooden deck and low drop sides, loaded with pallets of crates."""
-    parts = _chassis("truck_rigid")
+    parts, side = _chassis("truck_rigid")
     front, width = 1.95, 2.44
     length, middle_x = front - _REAR_X, (front + _REAR_X) / 2
     deck = box((length, width, 0.10), (middle_x, 0, _BED_Z))
@@ -75,8 +77,8 @@ def write_flatbed(out: Path) -> None:
     for k in range(panels):
         span = length / panels
         x = _REAR_X + span * (k + 0.5)
-        side = bevelled_box((span - 0.06, 0.035, 0.42), 0.012, 1, (x, width / 2, _BED_Z + 0.25))
-        parts.add("body", side, both_sides=True)
+        board = bevelled_box((span - 0.06, 0.035, 0.42), 0.012, 1, (x, width / 2, _BED_Z + 0.25))
+        parts.add("body", board, both_sides=True)
         for rib in (0.12, 0.30):
             bar = box((span - 0.10, 0.012, 0.03), (x, width / 2 + 0.02, _BED_Z + 0.06 + rib))
             parts.add("body", bar, both_sides=True)
@@ -95,11 +97,15 @@ def write_flatbed(out: Path) -> None:
         Box((0.95, 1.13, 1.14), (_CAB_X, 0, 1.56)),
         Box((length / 2, width / 2, 0.9), (middle_x, 0, 1.35)),
     )
-    _write(out, "truck_rigid", parts, boxes, "A flat bed with drop sides and a load.", None, shown=1)
+    _write(out, "truck_rigid", parts, side, boxes, "A flat bed with drop sides and a load.", None, shown=1)
 
 
-def _chassis(name: str) -> Parts:
-    """Cab, frame, tanks, guards, wheels and the file's own number plates of an eight-metre lorry."""
+def _chassis(name: str) -> tuple[Parts, tuple[Line, ...]]:
+    """Cab, frame, tanks, guards, wheels and the file's own number plates of an eight-metre lorry.
+
+    Returns:
+        The parts, and the shut lines of the cab's sides.
+    """
     local, body, cabin = build_car(CAB)
     look_inside(local, cabin)
     front = cabin.side.patch.evaluate(np.array([[cabin.corners[0], 0.2]]))[0]
@@ -147,7 +153,7 @@ def _chassis(name: str) -> Parts:
             parts.add("rim", wheel.rim.translated(*at), both_sides=True)
             parts.add("trim", flat(wheel.drum.translated(*at), DETAILS["gloss"]), both_sides=True)
     dark(revolve([(0.09, -0.9), (0.09, 0.9)], 10, "y").translated(_REAR_AXLE_X, 0, spec.radius))
-    return parts
+    return parts, tuple(tuple((x + _CAB_X, z) for x, z in line) for line in side_lines(CAB, cabin))
 
 
 def _rear_doors(parts: Parts, low: float, high: float, width: float) -> None:
@@ -186,6 +192,7 @@ def _write(
     out: Path,
     name: str,
     parts: Parts,
+    side: tuple[Line, ...],
     boxes: tuple[Box, ...],
     comment: str,
     face: tuple[str, str, str] | None,
@@ -193,10 +200,6 @@ def _write(
 ) -> None:
     meshes = parts.merged()
     bounds = meshes["paint"].bounds
-    shift = _CAB_X
-    paint = PaintMap(
-        bounds[0], bounds[1], (512, 512),
-        tuple(tuple((x + shift, z) for x, z in line) for line in CAB.lines_side), (), CAB.lines_front,
-    )  # fmt: skip
+    paint = PaintMap(bounds[0], bounds[1], (512, 512), side, (), CAB.lines_front)
     finish = Finish(name, "truck", "truck", boxes, comment=comment, shown=shown)
     write_vehicle(out, finish, meshes, paint, face=face)
