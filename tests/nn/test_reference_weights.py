@@ -102,7 +102,7 @@ def test_on_a_street_that_nobody_has_seen_before(path: Path, tmp_path: Path) -> 
     task = find("model", path.stem).spec.tasks[0]
     collect(
         task, town="suburb", scene="no_billboard", split="debug", seed=51_234, samples=2, weather="CloudyNoon",
-        settings=["crowd=3"] if task == "stereo3d" else [], out=tmp_path / "data",
+        out=tmp_path / "data",
     )  # fmt: skip
     report = evaluate(tmp_path / "data", model=path.stem, reports=["reference"], resamples=0, out=tmp_path / "out")
     name, bounds = UNSEEN[path.stem]
