@@ -1,7 +1,7 @@
 """Parts of textures shared by all vehicles: where each one is, and the drawing of them.
 
-`details.png` dresses trim: its upper half has 4 × 4 cells (plastic, grilles), its lower half 2 × 8 number plates, one a
-vehicle. `lamps.png` has all lights, in 4 × 4 cells.
+`details.png` dresses trim, in 4 × 4 cells (plastic, grilles). `lamps.png` has all lights, in 4 × 4 cells. `plates.png`
+has 3 × 12 number plates: one of its own a vehicle, and some that all of them share.
 """
 
 from __future__ import annotations
@@ -14,15 +14,16 @@ from PIL import Image, ImageDraw
 
 from authoring.mesh import Floats, Mesh
 from authoring.vehicles.lettering import lettering
-from authoring.vehicles.plates import PLATES, draw_plate
+from authoring.vehicles.plates import PLATES, SHARED_PLATES, draw_plate
 
-__all__ = ["DETAILS", "LAMPS", "PLATE_CELLS", "Cell", "cell_uvs", "flat", "write_atlases"]
+__all__ = ["DETAILS", "LAMPS", "Cell", "cell_uvs", "flat", "plate_cells", "write_atlases"]
 
 _SIZE, _OVER = 512, 4
 _CELL = _SIZE // 4
 _MARGIN = 0.06
-_PLATE = (_SIZE // 2, _SIZE // 8)
+_PLATE, _PLATE_COLUMNS = (170, 42), 3
 _PLATE_MARGIN_PX = 4
+_PLATES_EACH = 6
 
 
 @dataclass(frozen=True)
@@ -41,9 +42,9 @@ class Cell:
     margin: tuple[float, float] = (_MARGIN, _MARGIN)
 
 
-def _grid(names: dict[str, tuple[int, int]], rows: int) -> dict[str, Cell]:
-    """Square cells, four beside each other, in a texture of so many rows, by (column, row)."""
-    return {name: Cell(column / 4, row / rows, 1 / 4, 1 / rows) for name, (column, row) in names.items()}
+def _grid(names: dict[str, tuple[int, int]]) -> dict[str, Cell]:
+    """Cells of 4 × 4, by (column, row)."""
+    return {name: Cell(column / 4, row / 4, 1 / 4, 1 / 4) for name, (column, row) in names.items()}
 
 
 _DETAILS = {
@@ -58,14 +59,19 @@ _LAMPS = {
     "amber": (0, 2), "reverse": (1, 2), "tail_block": (2, 2), "blue": (3, 2),
     "drl": (0, 3), "red": (1, 3), "head_block": (2, 3), "clear": (3, 3),
 }  # fmt: skip
-DETAILS = _grid(_DETAILS, 8)
-LAMPS = _grid(_LAMPS, 4)
-PLATE_CELLS = {
-    name: Cell(
-        (k % 2) / 2, 0.5 + (k // 2) / 16, 1 / 2, 1 / 16, (_PLATE_MARGIN_PX / _PLATE[0], _PLATE_MARGIN_PX / _PLATE[1])
-    )
-    for k, name in enumerate(PLATES)
-}
+DETAILS = _grid(_DETAILS)
+LAMPS = _grid(_LAMPS)
+
+
+def plate_cells(name: str) -> list[Cell]:
+    """The plates that instances of a vehicle have by turns: its own, then some of those that all share."""
+    own = list(PLATES).index(name)
+    shared = [len(PLATES) + (5 * own + k) % len(SHARED_PLATES) for k in range(_PLATES_EACH - 1)]
+    margin = (_PLATE_MARGIN_PX / _PLATE[0], _PLATE_MARGIN_PX / _PLATE[1])
+    width, height = _PLATE[0] / _SIZE, _PLATE[1] / _SIZE
+    return [
+        Cell(k % _PLATE_COLUMNS * width, k // _PLATE_COLUMNS * height, width, height, margin) for k in (own, *shared)
+    ]
 
 
 def cell_uvs(cell: Cell, unit: Floats) -> Floats:
@@ -82,12 +88,10 @@ def flat(mesh: Mesh, cell: Cell) -> Mesh:
 
 
 def write_atlases(folder: Path) -> None:
-    """Draws both textures."""
-    details = Image.new("RGB", (_SIZE, 2 * _SIZE))
-    details.paste(_details().resize((_SIZE, _SIZE), Image.Resampling.LANCZOS), (0, 0))
-    details.paste(_plates().resize((_SIZE, _SIZE), Image.Resampling.LANCZOS), (0, _SIZE))
-    details.save(folder / "details.png", optimize=True)
-    _lamps().resize((_SIZE, _SIZE), Image.Resampling.LANCZOS).save(folder / "lamps.png", optimize=True)
+    """Draws the textures."""
+    for name, image in (("details", _details()), ("plates", _plates()), ("lamps", _lamps())):
+        size = (image.width // _OVER, image.height // _OVER)
+        image.resize(size, Image.Resampling.LANCZOS).save(folder / f"{name}.png", optimize=True)
 
 
 class _Cell:
@@ -128,8 +132,9 @@ def _plates() -> Image.Image:
     """All plates, each with its edge's colour in the margin round it."""
     image = Image.new("RGB", (_SIZE * _OVER,) * 2, (20, 20, 20))
     wide, high = (_OVER * (side - 2 * _PLATE_MARGIN_PX) for side in _PLATE)
-    for k, text in enumerate(PLATES.values()):
-        corner = (k % 2 * _PLATE[0] + _PLATE_MARGIN_PX, k // 2 * _PLATE[1] + _PLATE_MARGIN_PX)
+    for k, text in enumerate((*PLATES.values(), *SHARED_PLATES)):
+        column, row = k % _PLATE_COLUMNS, k // _PLATE_COLUMNS
+        corner = (column * _PLATE[0] + _PLATE_MARGIN_PX, row * _PLATE[1] + _PLATE_MARGIN_PX)
         image.paste(draw_plate(text, wide, high), (corner[0] * _OVER, corner[1] * _OVER))
     return image
 

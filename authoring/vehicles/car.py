@@ -121,7 +121,7 @@ class CarSpec:
     rails: tuple[float, float, float] | None = None
     mirror: tuple[float, float, float] | None = (0.11, 0.20, 0.14)
     bed: tuple[float, float, float] | None = None
-    paint_px: tuple[int, int] = (1024, 512)
+    paint_px: tuple[int, int] = (512, 256)
 
 
 def build_car(spec: CarSpec) -> tuple[Parts, Shell, Shell]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from authoring.mesh import Floats
-from authoring.vehicles.atlas import PLATE_CELLS, write_atlases
+from authoring.vehicles.atlas import write_atlases
 from authoring.vehicles.bus import fit_bus
 from authoring.vehicles.bus_inside import write_bus_inside
 from authoring.vehicles.car import CarSpec, build_car, side_lines
@@ -71,7 +71,7 @@ def _fit(spec: CarSpec, parts: Parts, body: Shell, cabin: Shell) -> None:
         add_mirrors(parts, cabin, float(front[0]) - behind, float(front[2]), size=spec.mirror, paint=_mirror_part(spec))
     add_handles(parts, body, spec.handles)
     for plate_z, ahead in zip(spec.plates, (True, False), strict=True):
-        add_plate(parts, body, plate_z, ahead, PLATE_CELLS[spec.name], stand_off=spec.plate_stand_off)
+        add_plate(parts, body, plate_z, ahead, stand_off=spec.plate_stand_off)
     add_wipers(parts, cabin)
     for z, ahead in zip(spec.badges, (True, False), strict=True):
         if z is not None:

@@ -9,6 +9,7 @@ import numpy as np
 from PIL import Image
 
 from authoring.mesh import Floats, Mesh, merge, write_obj
+from authoring.vehicles.atlas import cell_uvs, plate_cells
 from authoring.vehicles.grooves import Line, carve
 
 __all__ = ["PALETTES", "Box", "Finish", "PaintMap", "write_vehicle"]
@@ -162,6 +163,7 @@ _MATERIALS = {
     "rim": 'rgba="0.60 0.61 0.62 1" metallic="0.6" roughness="0.32"',
     "chrome": 'rgba="0.62 0.62 0.63 1" metallic="1" roughness="0.12"',
     "body": 'rgba="0.62 0.62 0.61 1" metallic="0" roughness="0.45"',
+    "plate": 'texture="plates" metallic="0" roughness="0.4"',
 }
 
 
@@ -173,7 +175,7 @@ def write_vehicle(
     Args:
         out: the folder of vehicles.
         finish: names, colours and boxes.
-        meshes: by material: paint, glass, trim, lights, tyre, rim, chrome, body.
+        meshes: by material: paint, glass, trim, lights, tyre, rim, chrome, body, plate.
         paint_map: of the paint.
         face: for a patchable truck, its extra asset, geom and site lines.
     """
@@ -182,7 +184,7 @@ def write_vehicle(
     skin = paint_map.carved(meshes["paint"])
     paint_map.draw(folder / "paint.png")
     names = [n for n in ("paint", *_MATERIALS) if n in meshes]
-    for name in names:
+    for name in names[:-1]:
         write_obj(folder / f"{name}.obj", skin if name == "paint" else meshes[name])
     kind, stem = finish.kind, finish.name
     inside = f"{stem if finish.own_inside else 'common'}/inside.png"
@@ -204,9 +206,11 @@ def write_vehicle(
         "    </default>",
         "  </default>",
         "  <asset>",
-        *(f'    <mesh class="seen" name="{n}" file="{stem}/{n}.obj"/>' for n in names),
+        *(f'    <mesh class="seen" name="{n}" file="{stem}/{n}.obj"/>' for n in names[:-1]),
+        *_plates(stem, meshes["plate"]),
         f'    <texture name="paint" type="2d" file="{stem}/paint.png" colorspace="sRGB"/>',
         '    <texture name="details" type="2d" file="common/details.png" colorspace="sRGB"/>',
+        '    <texture name="plates" type="2d" file="common/plates.png" colorspace="sRGB"/>',
         '    <texture name="lamps" type="2d" file="common/lamps.png" colorspace="sRGB"/>',
         f'    <texture name="inside" type="2d" file="{inside}" colorspace="sRGB"/>',
         f'    <material name="paint" texture="paint" rgba="{rgb} 1" metallic="{finish.metallic:g}" '
@@ -232,3 +236,19 @@ def write_vehicle(
         "</mujoco>",
     ]
     (out / f"{stem}.xml").write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+
+
+def _plates(name: str, mesh: Mesh) -> list[str]:
+    """Number plates with one text each: instances wear them by turns."""
+    vertices = "  ".join(" ".join(f"{v:.4g}" for v in row) for row in mesh.vertices)
+    faces = "  ".join(" ".join(str(v) for v in row) for row in mesh.faces)
+    lines = []
+    for k, cell in enumerate(plate_cells(name)):
+        uvs = cell_uvs(cell, mesh.uvs)
+        # What stands in a file of MJCF counts v down, as the picture's rows do.
+        texture = "  ".join(f"{u:.5g} {1 - v:.5g}" for u, v in uvs)
+        lines.append(
+            f'    <mesh class="seen" name="plate{f"_{k}" if k else ""}" vertex="{vertices}"\n'
+            f'          texcoord="{texture}" face="{faces}"/>'
+        )
+    return lines

@@ -11,6 +11,8 @@ from authoring.vehicles.sheet import Sheet
 from authoring.vehicles.shell import Shell, surface_point
 
 __all__ = [
+    "PLATE_SIZE_M",
+    "WHOLE",
     "add_antenna",
     "add_badge",
     "add_exhaust",
@@ -23,6 +25,10 @@ __all__ = [
     "add_wipers",
     "panel",
 ]
+
+
+PLATE_SIZE_M = (0.52, 0.112)
+WHOLE = Cell(0.0, 0.0, 1.0, 1.0, (0.0, 0.0))
 
 
 def panel(width: float, height: float, at: tuple[float, float, float], yaw_deg: float, cell: Cell) -> Mesh:
@@ -75,15 +81,15 @@ def add_handles(parts: Parts, body: Shell, places: tuple[tuple[float, float], ..
         parts.add("trim", flat(cup, DETAILS["gloss"]), both_sides=True)
 
 
-def add_plate(parts: Parts, body: Shell, z: float, front: bool, cell: Cell, *, stand_off: float = 0.012) -> None:
-    """A number plate, which `cell` shows, in its holder, in the middle of the front or the rear."""
+def add_plate(parts: Parts, body: Shell, z: float, front: bool, *, stand_off: float = 0.012) -> None:
+    """A number plate, which shows the whole of its picture, in its holder, in the middle of the front or the rear."""
     v = np.linspace(0, 1, 201)
     line = body.side.patch.evaluate(np.column_stack([np.full_like(v, 0.0 if front else 1.0), v]))
     nearest = int(np.abs(line[:, 2] - z).argmin())
     x = float(line[nearest, 0]) + (stand_off if front else -stand_off)
     yaw = 0.0 if front else 180.0
     parts.add("trim", flat(box((0.03, 0.54, 0.13), (x - 0.017 if front else x + 0.017, 0, z)), DETAILS["plastic"]))
-    parts.add("trim", panel(0.52, 0.112, (x + (0.005 if front else -0.005), 0.0, z), yaw, cell))
+    parts.add("plate", panel(*PLATE_SIZE_M, (x + (0.005 if front else -0.005), 0.0, z), yaw, WHOLE))
 
 
 def add_wipers(parts: Parts, cabin: Shell, *, rise: float = 0.1) -> None:

@@ -6,7 +6,7 @@ from PIL import Image, ImageDraw
 
 from authoring.vehicles.lettering import lettering
 
-__all__ = ["PLATES", "draw_plate"]
+__all__ = ["PLATES", "SHARED_PLATES", "draw_plate"]
 
 PLATES = {
     "bus_city": "GR 20 KV",
@@ -25,6 +25,12 @@ PLATES = {
     "van_panel": "NW 87 JL",
 }
 """The text by the vehicle's file; front and rear plate of one vehicle agree. motorcycles bring their own."""
+
+SHARED_PLATES = (
+    "GR 68 LP", "KE 15 BD", "TO 92 VA", "HA 27 SC", "LO 44 EX", "GR 39 MU", "NW 51 TF", "DU 73 RK", "KE 86 OL",
+    "SZ 20 HW", "TO 57 NY", "PV 64 GB", "LF 31 CE", "GR 90 DA", "HA 78 UR", "RA 45 JT", "LO 13 WN", "KE 29 PH",
+)  # fmt: skip
+"""What is written on the plates of those that are not the first of their kind in a town."""
 
 _EDGE, _WHITE, _BLUE, _INK = (20, 20, 20), (232, 232, 226), (28, 58, 150), (16, 16, 18)
 

@@ -8,11 +8,19 @@ import numpy as np
 from PIL import Image
 
 from authoring.mesh import Mesh, bevelled_box, box, merge, revolve, write_obj
-from authoring.vehicles.atlas import DETAILS, LAMPS, PLATE_CELLS, flat
+from authoring.vehicles.atlas import DETAILS, LAMPS, flat
 from authoring.vehicles.car import build_car, side_lines
 from authoring.vehicles.car_inside import look_inside
 from authoring.vehicles.finish import Box, Finish, PaintMap, write_vehicle
-from authoring.vehicles.fittings import add_handles, add_mirrors, add_plate, add_wipers, panel
+from authoring.vehicles.fittings import (
+    PLATE_SIZE_M,
+    WHOLE,
+    add_handles,
+    add_mirrors,
+    add_plate,
+    add_wipers,
+    panel,
+)
 from authoring.vehicles.grooves import Line
 from authoring.vehicles.heavy import CAB
 from authoring.vehicles.parts import Parts
@@ -29,7 +37,7 @@ _BED_Z = 1.02
 
 def write_box_truck(out: Path) -> None:
     """A rigid lorry with a closed box; its rear doors carry the patch."""
-    parts, side = _chassis("truck_box")
+    parts, side = _chassis()
     low, high, width, front = _BED_Z, 3.46, 2.48, 1.98
     middle = ((front + _REAR_X + 0.03) / 2, 0.0, (low + high) / 2)
     size = (front - _REAR_X - 0.03, width, high - low)
@@ -68,7 +76,7 @@ def write_box_truck(out: Path) -> None:
 
 def write_flatbed(out: Path) -> None:
     """A rigid lorry with a wooden deck and low drop sides, loaded with pallets of crates."""
-    parts, side = _chassis("truck_rigid")
+    parts, side = _chassis()
     front, width = 1.95, 2.44
     length, middle_x = front - _REAR_X, (front + _REAR_X) / 2
     deck = box((length, width, 0.10), (middle_x, 0, _BED_Z))
@@ -100,8 +108,8 @@ def write_flatbed(out: Path) -> None:
     _write(out, "truck_rigid", parts, side, boxes, "A flat bed with drop sides and a load.", None, shown=1)
 
 
-def _chassis(name: str) -> tuple[Parts, tuple[Line, ...]]:
-    """Cab, frame, tanks, guards, wheels and the file's own number plates of an eight-metre lorry.
+def _chassis() -> tuple[Parts, tuple[Line, ...]]:
+    """Cab, frame, tanks, guards, wheels and number plates of an eight-metre lorry.
 
     Returns:
         The parts, and the shut lines of the cab's sides.
@@ -112,7 +120,7 @@ def _chassis(name: str) -> tuple[Parts, tuple[Line, ...]]:
     assert CAB.mirror is not None
     add_mirrors(local, cabin, float(front[0]) - 0.14, float(front[2]) + 0.10, size=CAB.mirror, paint="trim")
     add_handles(local, body, CAB.handles)
-    add_plate(local, body, CAB.plates[0], True, PLATE_CELLS[name], stand_off=0.03)
+    add_plate(local, body, CAB.plates[0], True, stand_off=0.03)
     add_wipers(local, cabin)
     parts = Parts()
     for part, meshes in local.meshes.items():
@@ -138,7 +146,7 @@ def _chassis(name: str) -> tuple[Parts, tuple[Line, ...]]:
     lamp = panel(0.44, 0.13, (_REAR_X + 0.10, 0.86, 0.78), 180, LAMPS["tail_block"])
     parts.add("lights", lamp, both_sides=True)
     dark(box((0.08, 0.50, 0.18), (_REAR_X + 0.145, 0.86, 0.78)), True)
-    parts.add("trim", panel(0.52, 0.112, (_REAR_X + 0.10, 0, 0.78), 180, PLATE_CELLS[name]))
+    parts.add("plate", panel(*PLATE_SIZE_M, (_REAR_X + 0.10, 0, 0.78), 180, WHOLE))
     dark(box((0.05, 0.58, 0.16), (_REAR_X + 0.13, 0, 0.78)))
     for x in (0.6, -0.9, -3.3):
         marker = box((0.09, 0.012, 0.035), (x, 1.235, 0.93))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -99,6 +100,8 @@ class AssetParts:
         self._models: dict[Path, mjcf.RootElement] = {}
         self._textures: dict[tuple[str, ...], Any] = {}
         self._defaults: dict[str, str] = {}
+        self._plates: dict[Path, list[tuple[str, list[Any]]]] = {}
+        self._instances: Counter[Path] = Counter()
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -106,7 +109,7 @@ class AssetParts:
         return tuple(self._models)
 
     def add_instance(self, path: Path, body: Any) -> None:
-        """Fills `body` with an instance of the asset that shares everything.
+        """Fills `body` with an instance of the asset that shares everything; number plates are worn by turns.
 
         Raises:
             TownError: the file cannot be used, or its instance would have the name of something else in the world.
@@ -118,6 +121,9 @@ class AssetParts:
         except ValueError as error:
             told = f"cannot be put into one world with the town as {body.name!r}: {without_breaks(error)}"
             raise TownError(path, told) from error
+        for geom, plates in self._plates[path]:
+            self._root.find("geom", f"{body.name}_{geom}").mesh = plates[self._instances[path] % len(plates)]
+        self._instances[path] += 1
 
     def add_bearer(self, path: Path, body: Any, *, is_carried: bool) -> FaceName:
         """Fills `body` with an instance whose face has a texture of its own.
@@ -180,6 +186,7 @@ class AssetParts:
                 raise TownError(path, f"cannot be put into one world with the town: {error}") from error
             self._share_textures(model)
             self._models[path] = model
+            self._plates[path] = list(_plates_of(model))
         return self._models[path]
 
     def _share_textures(self, model: mjcf.RootElement) -> None:
@@ -228,6 +235,16 @@ def _turns_of(model: mjcf.RootElement) -> str:
     """How a file writes its angles. One setting holds for the whole world, so that of one file, which another only
     lacks, would turn the other's geoms as well."""
     return f"angle={model.compiler.angle or 'degree'} eulerseq={model.compiler.eulerseq or 'xyz'}"
+
+
+def _plates_of(model: mjcf.RootElement) -> Iterator[tuple[str, list[Any]]]:
+    """Geoms of a class ending in `.plate`, and the meshes that they can wear: `m`, their own, `m_1`, `m_2` …"""
+    for geom in model.find_all("geom"):
+        if class_name(geom.dclass).endswith(".plate") and getattr(geom.mesh, "name", None):
+            meshes = [geom.mesh]
+            while (other := model.find("mesh", f"{geom.mesh.name}_{len(meshes)}")) is not None:
+                meshes.append(other)
+            yield geom.name, meshes
 
 
 def _attributes_outside(element: Any) -> dict[str, Any]:

@@ -298,18 +298,20 @@ def test_lorry_face_shows_its_picture_the_right_way_round() -> None:
         assert int(places[corner].argmax()) == int(np.argmax(wanted)), f"{corner} shows {places[corner]}"
 
 
-def _plates(name: str) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Corners of a vehicle's faces that show the plates' half of `details.png`: (K, 3, 3) places, (K, 3, 2) u and v."""
+def _plates(
+    name: str, part: str = "plate", below: float = -1.0
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Corners of the faces of a part that lie below a v: (K, 3, 3) places, (K, 3, 2) u and v."""
     model = mujoco.MjModel.from_xml_path(str(VEHICLES / f"{name}.xml"))
-    mesh = model.mesh("trim").id
+    mesh = model.mesh(part).id
     faces = slice(model.mesh_faceadr[mesh], model.mesh_faceadr[mesh] + model.mesh_facenum[mesh])
     uvs = model.mesh_texcoord[model.mesh_texcoordadr[mesh] :][model.mesh_facetexcoord[faces]].astype(np.float64)
-    shown = (uvs[:, :, 1] > 0.5).all(axis=1)
-    return _in_file_frame(model, _geom_of(model, "trim"))[model.mesh_face[faces][shown]], uvs[shown]
+    shown = (uvs[:, :, 1] > below).all(axis=1)
+    return _in_file_frame(model, _geom_of(model, part))[model.mesh_face[faces][shown]], uvs[shown]
 
 
 def test_every_vehicle_has_a_plate_of_its_own_in_front_and_behind() -> None:
-    sheet = cv2.imread(str(VEHICLES / "common" / "details.png"), cv2.IMREAD_GRAYSCALE)
+    sheet = cv2.imread(str(VEHICLES / "common" / "plates.png"), cv2.IMREAD_GRAYSCALE)
     assert sheet is not None
     pictures: dict[bytes, str] = {}
     for name in NAMES:
@@ -332,10 +334,21 @@ def test_every_vehicle_has_a_plate_of_its_own_in_front_and_behind() -> None:
         pictures[picture.tobytes()] = name
 
 
+def test_instances_of_a_vehicle_have_six_plates_by_turns(model: mujoco.MjModel) -> None:
+    shown = set()
+    for part in ["plate", *(f"plate_{k}" for k in range(1, 6))]:
+        mesh = model.mesh(part).id
+        faces = slice(model.mesh_faceadr[mesh], model.mesh_faceadr[mesh] + model.mesh_facenum[mesh])
+        uvs = model.mesh_texcoord[model.mesh_texcoordadr[mesh] :][model.mesh_facetexcoord[faces]].reshape(-1, 2)
+        assert np.ptp(uvs, axis=0) == pytest.approx([162 / 512, 34 / 512], abs=1e-4), "one plate, less its margin"
+        shown.add(tuple(np.floor(uvs.mean(axis=0) * 512 / [170, 42]).astype(int).tolist()))
+    assert len(shown) == 6
+
+
 def test_motorcycles_have_plates_of_their_own() -> None:
     lower: list[bytes] = []
     for name in ("motorcycle_a", "motorcycle_b"):
-        corners, uvs = _plates(name)
+        corners, uvs = _plates(name, "trim", 0.5)
         assert len(uvs) == 2
         assert (corners[:, :, 0] < -0.5).all(), "behind"
         assert np.array_equal(uvs[:, :, 0] > 0.5, corners[:, :, 1] < 0), "reads to the right"

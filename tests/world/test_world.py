@@ -18,12 +18,16 @@ from gear.values.frames import STATIC_OBJECT_BASE
 from gear.values.labels import GROUND_CODES, LABEL_BY_NAME
 from gear.values.optics import CameraEffects
 from gear.values.scene import ActorRecord, Pose, SceneRecord, Weather
+from gear.world.ahead import AssetsAhead
 from gear.world.air import darkroom_of
 from gear.world.classes import NEVER_SEEN
 from gear.world.faces import FACE_SIZE_PX
+from gear.world.instances import AssetParts
+from gear.world.quiet_mjcf import mjcf
 from gear.world.weather import PRESETS
 from gear.world.world import World
 
+MJCF = Path(__file__).parents[2] / "mjcf"
 POSE = Pose(position_m=(10.0, -1.75, 0.0), quat_wxyz=(0.8660254, 0.0, 0.0, 0.5))
 
 
@@ -67,6 +71,17 @@ def test_instances_share_meshes_and_materials() -> None:
     assert list(world.model.geom_matid[first]) == list(world.model.geom_matid[second])
     assert list(world.model.geom_dataid[first]) == list(world.model.geom_dataid[second])
     assert world.model.nmesh == 1, "the only mesh is the truck's face"
+
+
+def test_instances_wear_number_plates_by_turns() -> None:
+    root = mjcf.RootElement(model="town")
+    parts = AssetParts(root, AssetsAhead(None))
+    worn = []
+    for k in range(8):
+        body = root.worldbody.add("body", name=f"car_{k}")
+        parts.add_instance(MJCF / "vehicles" / "car_city.xml", body)
+        worn += [geom.mesh.name for geom in body.find_all("geom") if geom.mesh and geom.mesh.name.startswith("plate")]
+    assert worn == ["plate", *(f"plate_{k}" for k in range(1, 6)), "plate", "plate_1"]
 
 
 def test_every_board_has_a_material_and_a_texture_of_its_own() -> None:
