@@ -63,12 +63,12 @@ def party_wall(
     if width > 5.0 and rng.random() < 0.6:
         taken.append(_flue(facade, style.wall, top_m, ridge_m, taken, rng=rng))
     openings, blind = _windows(width, style, floors, taken, rng=rng)
-    facade.wall(style.wall, 0.0, 0.0, width, top_m, openings)
+    facade.wall(style.wall, 0.0, 0.0, width, top_m, [opening for opening in openings if opening not in blind])
     bare = replace(style.window, surround=None, lintel=None, shutters=None, ledge=None)
     for opening in openings:
         if opening in blind:
-            facade.panel(render, opening.u0, opening.v0, opening.u1, opening.v1, d_m=-0.07)
-            facade.reveal(style.wall, opening, 0.07)
+            facade.panel(render, opening.u0, opening.v0, opening.u1, opening.v1, d_m=SKIN_M)
+            facade.swatch("concrete_dark", opening.u0, opening.v0 - 0.1, opening.u1, opening.v0, d_m=SKIN_M)
         else:
             window(facade, opening, bare, rng=rng)
     if not covered_m and rng.random() < 0.5:
@@ -107,7 +107,7 @@ def _flue(
 ) -> Box:
     """A chimney breast up the wall, drawn in above the roof to a stack with pots; returns what it covers."""
     half, deep = FLUE_M[0] / 2, FLUE_M[1]
-    material = wall if wall not in ("ashlar", "concrete") and rng.random() < 0.7 else "brick_brown"
+    material = wall if wall not in ("ashlar", "concrete") and rng.random() < 0.7 else "brick_red"
     middle = facade.width_m * float(rng.choice([0.28, 0.5, 0.7]))
     low = max([0.0, *(b[3] + 0.3 for b in taken if b[0] < middle + half and b[2] > middle - half)])
     low = low if low < top_m - 1.5 else top_m - 0.4

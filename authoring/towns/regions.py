@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry  # type: ignore[import-untyped]
 from shapely.ops import unary_union  # type: ignore[import-untyped]
 
 from authoring.towns import paths
-from authoring.towns.network import BAY_M, CORNER_RADIUS_M, Network
+from authoring.towns.network import BAY_M, CORNER_RADIUS_M, CROSSING_M, Network
 
 Array = npt.NDArray[np.float64]
 OUTER_M = 420.0
@@ -140,7 +140,7 @@ class Regions:
         for index in range(count):
             begin = first + slack + index * (group_m + 2 * BAY_TAPER_M + BAY_GAP_M)
             ending = begin + group_m + 2 * BAY_TAPER_M
-            if any(begin - CORNER_CLEAR_M < middle < ending + CORNER_CLEAR_M for middle in crossings):
+            if any(begin - CROSSING_M / 2 < middle < ending + CROSSING_M / 2 for middle in crossings):
                 continue
             outer = paths.cut(line, begin, ending)
             inner = paths.cut(line, begin + BAY_TAPER_M, begin + BAY_TAPER_M + group_m)

@@ -261,9 +261,10 @@ class SiteBuilder:
             total = paths.length(rim)
             for start in np.arange(2.0, total - SEAT_M[0] - 1.5, SEAT_M[0] + SEAT_M[1]):
                 piece = paths.cut(rim, float(start), float(start) + SEAT_M[0])
-                if all(self.props.is_free(*(float(v) for v in point), 0.5) for point in paths.densified(piece, 1.0)):
+                points = [(float(x), float(y)) for x, y in paths.densified(piece, 1.0)]
+                if all(self.props.is_free(x, y, 0.5) for x, y in points):
                     self._wall(piece, kit.seat_wall(SEAT_M[0]), 0.5)
-                    self.props.spots.extend((float(x), float(y), 0.9) for x, y in paths.densified(piece, 1.0))
+                    self.props.spots.extend((x, y, 0.9) for x, y in points)
 
     def _wall(self, line: Array, parts: list[Part], height_m: float) -> None:
         x, y = (float(v) for v in line.mean(0))

@@ -79,8 +79,8 @@ def build_island(
     props: Props, furnisher: Furnisher, regions: Regions, views: BaseGeometry, rng: np.random.Generator
 ) -> None:
     """The green in the middle of the circus: trees around a bed of flowers, held by a low wall."""
-    turn = np.linspace(0, 2 * np.pi, 37)
-    rim = ISLAND_WALL_M * np.stack([np.cos(turn), np.sin(turn)], 1)
+    around = np.linspace(0, 2 * np.pi, 37)
+    rim = ISLAND_WALL_M * np.stack([np.cos(around), np.sin(around)], 1)
     section = [(-0.17, 0.0), (-0.17, 0.5), (0.17, 0.5), (0.17, 0.0)]
     solids.sweep(props.sink, rim, KERB_M, section, "brick_red", "wall")
     for index in range(14):

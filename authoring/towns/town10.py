@@ -47,7 +47,7 @@ _STREETS = (
     Street(name="ring_e2", start="e2", end="e3", profile=RING, trees_m=14),
     Street(name="bridge_e", start="e3", end="e4", profile=RING, hump_m=1.1),
     Street(name="ring_s2", start="c4", end="e4", profile=RING, trees_m=12, crossings=(0.25,)),
-    Street(name="ring_s1", start="w4", end="c4", profile=RING, bays_left=True, crossings=(0.5,)),
+    Street(name="ring_s1", start="w4", end="c4", profile=RING, bays_left=True, crossings=(0.4148,)),
     Street(name="bridge_w", start="w3", end="w4", profile=RING, hump_m=1.1),
     Street(name="ring_w2", start="w2", end="w3", profile=RING, trees_m=14),
     Street(name="ring_w1", start="w1", end="w2", profile=RING),
