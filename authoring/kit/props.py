@@ -86,7 +86,7 @@ def write_prop(name: str, folder: Path) -> None:
     lines = [
         f'<mujoco model="{name}">',
         "  <!-- Made by `python -m authoring.kit.props`. -->",
-        f'  <compiler angle="degree" meshdir="{name}" texturedir="../textures"/>',
+        f'  <compiler angle="degree" balanceinertia="true" meshdir="{name}" texturedir="../textures"/>',
         "  <default>",
         '    <default class="seen">',
         '      <mesh inertia="shell"/>',

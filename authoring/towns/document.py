@@ -26,7 +26,7 @@ UNDERGROUND_XML = (
 HEAD = """\
 <!-- Written by `python -m authoring.towns {name}`. Conventions: docs/mjcf-conventions.md. -->
 <mujoco model="{name}">
-  <compiler angle="degree" meshdir="{name}" texturedir="../textures"/>
+  <compiler angle="degree" balanceinertia="true" meshdir="{name}" texturedir="../textures"/>
   <statistic extent="400" center="0 0 10"/>
   <visual>
     <global offwidth="2048" offheight="1024"/>

@@ -185,6 +185,8 @@ def _compile(
             spec.meshdir = spec.texturedir = str(composition.folder)
         # Either would make away with bodies and geoms that are looked for by name.
         spec.compiler.discardvisual = spec.compiler.fusestatic = False
+        # A flat sign in a body of its own is at the edge of what inertia can be; rounding decides.
+        spec.compiler.balanceinertia = True
         return spec, spec.compile()
     except ValueError as error:
         raise refused(error, composition.files) from error
