@@ -179,13 +179,25 @@ def find_windows(model: mujoco.MjModel, data: mujoco.MjData, rng: np.random.Gene
 
 
 def _quads(corners: Array, uv: Array) -> tuple[Array, Array]:
-    """(N, 4, 3) and (N, 4, 2): neighbouring triangles (a, b, c) and (a, c, d) as one."""
-    pairs = len(corners) // 2
-    one, other = slice(0, 2 * pairs, 2), slice(1, 2 * pairs, 2)
-    fits = np.isclose(corners[one, 0], corners[other, 0]).all(axis=1)
-    fits &= np.isclose(corners[one, 2], corners[other, 1]).all(axis=1)
-    joined = [np.concatenate([table[one], table[other, 2:]], axis=1)[fits] for table in (corners, uv)]
-    return joined[0], joined[1]
+    """(N, 4, 3) and (N, 4, 2): triangles that follow each other as one quad (a, b, c, d), along whichever diagonal they
+    were cut: (a, b, c) and (a, c, d), or (a, b, d) and (b, c, d), as MuJoCo does where neither is shorter."""
+
+    def meet(corner: int, others: int) -> npt.NDArray[np.bool_]:
+        return np.asarray(np.isclose(corners[:-1, corner], corners[1:, others]).all(axis=1))
+
+    is_fan = meet(0, 0) & meet(2, 1)
+    fits = is_fan | (meet(1, 0) & meet(2, 2))
+    # No triangle twice: of fits that follow each other every other one counts.
+    places = np.arange(len(fits))
+    fits &= (places - np.maximum.accumulate(np.where(fits, -1, places))) % 2 == 1
+
+    def joined(table: Array) -> Array:
+        one, other = table[:-1], table[1:]
+        fan = np.concatenate([one, other[:, 2:]], axis=1)
+        cut = np.stack([one[:, 0], one[:, 1], other[:, 1], one[:, 2]], axis=1)
+        return np.asarray(np.where(is_fan[:, None, None], fan, cut)[fits])
+
+    return joined(corners), joined(uv)
 
 
 def _panes(quads: Array, uv: Array, glazing: Glazing) -> Array:
