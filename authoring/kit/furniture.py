@@ -116,7 +116,7 @@ def parking_meter() -> list[Part]:
     _slab(sink, "dark_glass", _round(0.0, 1.4, 0.078, 20), 0.07)
     front = -0.0755
     for swatch, (x0, x1), (z0, z1) in (
-        ("lamp_glass", (-0.046, 0.046), (1.395, 1.44)),
+        ("plastic_white", (-0.046, 0.046), (1.395, 1.44)),
         ("signal_red", (-0.03, 0.03), (1.345, 1.36)),
     ):
         sink.swatch_quad(swatch, [(x0, front, z0), (x1, front, z0), (x1, front, z1), (x0, front, z1)])

@@ -25,6 +25,7 @@ SEEN_FROM_BRIDGE_M = 34.0
 # How far lamps go on along a street out of town.
 OUTSIDE_M = 80.0
 FROM_KERB_M = 0.65
+LAMP_SHIFTS_M = (0.0, 0.8, -0.8)
 # On faster streets one has priority where lights fail.
 PRIORITY_MPS = 12.0
 FAR_M = 236.0
@@ -167,9 +168,16 @@ class Furnisher:
         if street.end is None:
             end = min(end, start + OUTSIDE_M)
         for station in np.arange(start + 4 + (LAMP_M / 2 if side < 0 else 0), end - 2, LAMP_M):
-            x, y, toward = self.beside(street, side, float(station), FROM_KERB_M)
-            yaw = float(np.arctan2(toward[1], toward[0]) + np.pi / 2)
-            self.stand(f"lamp_{style}", parts, x, y, yaw, 0.15, high=6.0)
+            self.lamp(f"lamp_{style}", parts, street, side, float(station))
+
+    def lamp(self, kind: str, parts: list[Part], street: Street, side: int, station: float) -> None:
+        """A lamp over the road, which gives way by a step to a sign that has its place."""
+        for shift in LAMP_SHIFTS_M:
+            x, y, toward = self.beside(street, side, station + shift, FROM_KERB_M)
+            if self.ground.takes(x, y) and self.props.is_free(x, y, 0.15):
+                yaw = float(np.arctan2(toward[1], toward[0]) + np.pi / 2)
+                self.stand(kind, parts, x, y, yaw, 0.15, high=6.0)
+                return
 
     def _trees(self, street: Street, side: int, start: float, end: float) -> None:
         kind = sum(map(ord, street.name)) % len(TREES)

@@ -94,9 +94,7 @@ class SuburbFurnisher(Furnisher):
         parts = kit.street_lamp(height_m=6.2, arm_m=1.1)
         first = start + 6 + (LAMP_M if side < 0 else 0)
         for station in np.arange(first, min(end, start + 150.0) - 2, 2 * LAMP_M):
-            x, y, toward = self.beside(street, side, float(station), 0.65)
-            yaw = float(np.arctan2(toward[1], toward[0]) + np.pi / 2)
-            self.stand("lamp_modern", parts, x, y, yaw, 0.15, high=6.0)
+            self.lamp("lamp_modern", parts, street, side, float(station))
 
     def _trees(self, street: Street, side: int, start: float, end: float) -> None:
         kind = sum(map(ord, street.name)) % STREET_SPECIES
