@@ -265,7 +265,8 @@ def write_obj(path: Path, mesh: Mesh, *, is_patchwork: bool = False) -> None:
         mesh: what to write.
         is_patchwork: whether it is many small pieces rather than a few skins. Each corner is then written before the
             first face that uses it, and faces count backwards: pieces that are alike read alike, and pack smaller. Two
-            neighbouring triangles that are one flat quad are written as one face, which MuJoCo cuts again.
+            neighbouring triangles that are one flat quad are written as one face, which MuJoCo cuts along the shorter
+            diagonal.
     """
     if mesh.normals is None:
         mesh = smooth_normals(mesh)
@@ -302,8 +303,8 @@ def _quads_and_triangles(faces: Ints, positions: Floats, uvs: Floats) -> list[li
 
     Args:
         faces: (M, 3) indices.
-        positions, uvs: (N, 3) and (N, 2) of what they index. A joined quad's texture is one parallelogram, so that
-            nothing depends on the diagonal along which a reader cuts it.
+        positions, uvs: (N, 3) and (N, 2) of what they index. A joined quad's texture is one parallelogram, so that it
+            lies alike along whichever diagonal a reader cuts it.
     """
     first, second = faces[:-1], faces[1:]
     quads, is_quad = np.zeros((len(first), 4), dtype=np.int64), np.zeros(len(first), dtype=np.bool_)

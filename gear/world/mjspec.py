@@ -18,10 +18,17 @@ def read_spec(path: Path) -> mujoco.MjSpec:
         TownError: it is no XML, or cannot be read.
     """
     if path.suffix == ".xml":
-        return mujoco.MjSpec.from_file(str(path))
-    root = read_xml(path)
-    for include in root.iter("include"):
-        include.set("file", str(path.parent.absolute() / include.get("file", "")))
-    spec = mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
-    spec.modelfiledir = str(path.parent.absolute())
+        spec = mujoco.MjSpec.from_file(str(path))
+    else:
+        root = read_xml(path)
+        for include in root.iter("include"):
+            include.set("file", str(path.parent.absolute() / include.get("file", "")))
+        spec = mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
+        spec.modelfiledir = str(path.parent.absolute())
+    bear_flat_bodies(spec)
     return spec
+
+
+def bear_flat_bodies(spec: mujoco.MjSpec) -> None:
+    """Lets a flat sign be a body of its own: it is at the edge of what inertia can be, and rounding decides."""
+    spec.compiler.balanceinertia = True

@@ -13,6 +13,7 @@ from gear.values.errors import TownError
 from gear.world.classes import GeomClasses, classify, own_class
 from gear.world.compose import Composition
 from gear.world.materials import refuse_deadly
+from gear.world.mjspec import bear_flat_bodies
 from gear.world.refusals import refused
 
 COLLISION_CLASS = "collision"
@@ -185,8 +186,7 @@ def _compile(
             spec.meshdir = spec.texturedir = str(composition.folder)
         # Either would make away with bodies and geoms that are looked for by name.
         spec.compiler.discardvisual = spec.compiler.fusestatic = False
-        # A flat sign in a body of its own is at the edge of what inertia can be; rounding decides.
-        spec.compiler.balanceinertia = True
+        bear_flat_bodies(spec)
         return spec, spec.compile()
     except ValueError as error:
         raise refused(error, composition.files) from error

@@ -19,8 +19,8 @@ import numpy.typing as npt
 
 from gear.values.geometry import Array
 
-YAWS = 16
-"""Directions that a mesh is tried in, evenly around the vertical."""
+_YAWS = 16
+"""How many directions a mesh is tried in, evenly around the vertical."""
 
 _LOOKED_AT = 192
 """Triangles of a mesh that decide, evenly out of all."""
@@ -37,21 +37,20 @@ _SLACK_M = 1e-4
 def upright_relief(model: mujoco.MjModel) -> None:
     """Turns normal maps, and the frames of meshes that wear them, so that Filament reads them as they were meant.
 
-    Geoms stay where they are, and so do their triangles; what is turned is the frame between them.
+    Geoms stay where they are, and so do their triangles; what is turned is the frame between them. Primitives, meshes
+    without texture coordinates and textures that some material wears as something else stay as they are.
 
     Args:
-        model: compiled, changed in place: normal textures, which nothing else may use, and meshes with their geoms.
+        model: compiled, changed in place: normal textures, and meshes with their geoms. A mesh's file has z up.
     """
-    textures = np.unique(model.mat_texid[:, _NORMAL])
-    for texture in textures[textures >= 0].tolist():
-        _exchange_red_and_green(model, texture)
-    wearers = np.flatnonzero(
-        (model.geom_type == _MESH) & (model.geom_matid >= 0) & (model.mat_texid[model.geom_matid, _NORMAL] >= 0)
-    )
-    meshes = np.unique(model.geom_dataid[wearers])
-    meshes = meshes[model.mesh_texcoordnum[meshes] > 0].tolist()
-    if not meshes:
+    wearers = np.flatnonzero((model.geom_type == _MESH) & (model.geom_matid >= 0))
+    wearers = wearers[model.mesh_texcoordnum[model.geom_dataid[wearers]] > 0]
+    worn = model.mat_texid[model.geom_matid[wearers], _NORMAL] if len(wearers) else np.zeros(0, np.int32)
+    if not (worn >= 0).any():
         return
+    for texture in np.setdiff1d(worn[worn >= 0], np.delete(model.mat_texid, _NORMAL, axis=1)).tolist():
+        _exchange_red_and_green(model, texture)
+    meshes = np.unique(model.geom_dataid[wearers[worn >= 0]]).tolist()
     upright_from_mesh = {mesh: _matrix(model.mesh_quat[mesh]) for mesh in meshes}
     yaws = best_yaws([_sheet(model, mesh, rotation) for mesh, rotation in upright_from_mesh.items()])
     for (mesh, rotation), yaw in zip(upright_from_mesh.items(), yaws, strict=True):
@@ -81,14 +80,14 @@ def best_yaws(sheets: list[tuple[Array, Array, Array]]) -> Array:
 
     Args:
         sheets: of each mesh, in an upright frame: (M, 3) unit normals of triangles, the directions to the right in the
-            texture, and those up in it, both as long as the triangle's area.
+            texture, and those up in it, both as long as twice the triangle's area.
 
     Returns:
         (meshes,) yaw of the frame in which red goes up and green to the right over most of the mesh.
     """
     normals, right, up = (np.concatenate(columns) for columns in zip(*sheets, strict=True))
     starts = np.cumsum([0, *(len(sheet[0]) for sheet in sheets[:-1])])
-    yaws = np.arange(YAWS) * (2 * np.pi / YAWS)
+    yaws = np.arange(_YAWS) * (2 * np.pi / _YAWS)
     fits = []
     for yaw in yaws.tolist():
         turn = _about_z(yaw)

@@ -100,7 +100,7 @@ def test_panes_lean_each_its_own_way_and_are_flat() -> None:
     assert np.abs(leans - 127.5).max() < 4
 
 
-def test_painting_and_writing_give_the_same_bytes_each_time(tmp_path: Path) -> None:
+def test_painting_and_writing_again_give_the_same_bytes_each_time(tmp_path: Path) -> None:
     for name in ("a", "b"):
         painted = masonry.roof_tiles(rng=derive_rng(0, "textures", "roof_tiles"))
         for stem, image in painted.items():

@@ -141,6 +141,11 @@ def test_bonnets_are_closed_all_round(spec: CarSpec) -> None:
     line = np.array(spec.lines_top[0])
     assert line[0, 1] == line[-1, 1] == 0.0, "it begins and ends in the middle, where the other half's begins"
     assert line[0, 0] - line[-1, 0] < -0.4
+    model, data = _model(spec.name)
+    middle = [place for place in _along(spec.lines_top[0]) if place[0][1] < 0.35]
+    sunken = np.array([_sunken(model, data, "top", *place) for place in middle])
+    assert np.isfinite(sunken).sum() > 10
+    assert np.nanmedian(sunken) > 0.003, "it is there in the middle, too"
 
 
 @pytest.mark.parametrize("sun", [(0.9, -0.3, -0.3), (-0.9, -0.3, -0.3)], ids=["from_behind", "from_ahead"])

@@ -102,7 +102,7 @@ def town(request: pytest.FixtureRequest) -> Town:
 
 
 def test_no_class_of_a_street_is_missing_before_a_board(town: Town) -> None:
-    """In most of the places from where a driver sees a board, and of each scene's, every class is seen."""
+    """From a third of the places at least from where a driver sees a board every class is seen."""
     missing = []
     for scene in town.scenes:
         if not scene.startswith("billboard"):

@@ -69,7 +69,7 @@ def test_every_collection_can_be_made(task: str) -> None:
         assert job.plan.info.split == one.split
 
 
-def test_the_shipped_networks_learnt_from_just_so_many_road_users() -> None:
+def test_training_and_patched_streets_have_just_so_many_road_users() -> None:
     """Of the patches' streets, too; a factor that is no whole number leaves whole numbers of them."""
 
     def counts(flags: Mapping[str, str | None], settings: Sequence[str]) -> tuple[tuple[int, int], tuple[int, int]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from authoring.mesh import Mesh, grid, merge, rotation, write_obj
 from gear.testing.tiny_town import CLEAR, TINY_TOWN, tiny_scenes, tiny_world
 from gear.values.errors import TownError
 from gear.values.labels import GROUND_CODES, LABEL_BY_NAME
@@ -162,3 +164,29 @@ def test_even_light_is_what_the_sky_and_the_houses_give() -> None:
     above, aside, below = even_light(NIGHT)
     assert (above > aside).all() and (aside > below).all() and (below > 0).all()
     assert above.mean() == pytest.approx(lighting_of(NIGHT, sky_face_px=16).ambient.mean(), rel=0.4)
+
+
+@pytest.mark.parametrize("width_m", [0.6, 1.0, 1.4], ids=["tall", "square", "wide"])
+def test_every_pane_is_found_however_its_quad_was_cut(
+    width_m: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Gear's own files have quads, which MuJoCo cuts along one diagonal or the other; a triangle may be in between."""
+    monkeypatch.setitem(GLAZINGS, "windows", replace(GLAZINGS["windows"], lit=1.0))
+    panes = [
+        grid([[(x, 0, z) for x in (2 * k, 2 * k + width_m)] for z in (0, 1)]).transformed(rotation("z", 17.0 * k))
+        for k in range(6)
+    ]
+    lone = Mesh.of([(0, 0, 5), (1, 0, 5), (1, 0, 6)], [[0, 1, 2]])
+    write_obj(tmp_path / "panes.obj", merge([*panes[:3], lone, *panes[3:]]), is_patchwork=True)
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><asset><material name="windows"/><mesh name="p" file="{tmp_path}/panes.obj" inertia="shell"/></asset>'
+        '<worldbody><geom type="mesh" mesh="p" material="windows" contype="0" conaffinity="0"/></worldbody></mujoco>'
+    )
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    found = find_windows(model, data, derive_rng(0, "windows", "test"))
+    assert len(found.corners_m) == len(panes)
+    for pane, corners in zip(panes, found.corners_m, strict=True):
+        np.testing.assert_allclose(corners.mean(axis=0), pane.vertices.mean(axis=0), atol=2e-3)
+        sides = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
+        np.testing.assert_allclose(sorted(sides), sorted([width_m, width_m, 1, 1]), atol=4e-3)

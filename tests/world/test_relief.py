@@ -155,3 +155,89 @@ def test_tangents_are_the_directions_of_a_left_handed_basis() -> None:
     red, green = tangents(normals)
     np.testing.assert_allclose(np.cross(green, red), normals, atol=1e-9)
     np.testing.assert_allclose(np.linalg.norm(red, axis=1), 1, atol=1e-9)
+
+
+SCRAP = (
+    '<mesh name="{name}" vertex="0 0 0  2 0 0  2 0.3 1  0 0.3 1  0.2 0.4 2" {uvs} face="0 1 2  0 2 3  3 2 4" '
+    'inertia="shell"/>'
+)
+UVS = 'texcoord="0 1  1 1  1 0.5  0 0.5  0.1 0"'
+
+
+def small(materials: str, geoms: str, meshes: str = "") -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_string(
+        "<mujoco><asset>"
+        '<texture name="n" type="2d" builtin="gradient" rgb1="0.6 0.4 1" rgb2="0.4 0.6 1" width="8" height="8"/>'
+        '<texture name="c" type="2d" builtin="flat" rgb1="0.6 0.4 1" width="4" height="4"/>'
+        f"{materials}{meshes}</asset><worldbody>{geoms}</worldbody></mujoco>"
+    )
+
+
+def worn(roles: str) -> str:
+    return f'<material name="m" metallic="0" roughness="1">{roles}</material>'
+
+
+RELIEF = worn('<layer role="rgb" texture="c"/><layer role="normal" texture="n"/>')
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        small("", '<geom type="box" size="1 1 1" rgba="0.5 0.4 0.3 1"/>'),
+        small("", '<geom type="mesh" mesh="a" contype="0" conaffinity="0"/>', SCRAP.format(name="a", uvs=UVS)),
+        small(
+            worn('<layer role="rgb" texture="c"/>'),
+            '<geom type="mesh" mesh="a" material="m" contype="0" conaffinity="0"/>',
+            SCRAP.format(name="a", uvs=UVS),
+        ),
+        small(RELIEF, '<geom type="box" size="1 1 1" material="m"/>'),
+        small(
+            RELIEF,
+            '<geom type="mesh" mesh="a" material="m" contype="0" conaffinity="0"/>',
+            SCRAP.format(name="a", uvs=""),
+        ),
+    ],
+    ids=["nothing", "no material", "no normal map", "a primitive", "no texture coordinates"],
+)
+def test_what_has_no_relief_stays_as_it_is(model: mujoco.MjModel) -> None:
+    kept = [getattr(model, name).copy() for name in ("tex_data", "mesh_vert", "mesh_quat", "geom_quat")]
+    upright_relief(model)
+    for name, values in zip(("tex_data", "mesh_vert", "mesh_quat", "geom_quat"), kept, strict=True):
+        np.testing.assert_array_equal(getattr(model, name), values)
+
+
+@pytest.mark.parametrize("is_colour_too", [False, True])
+def test_a_picture_that_is_colour_too_keeps_its_channels(is_colour_too: bool) -> None:
+    colour = "n" if is_colour_too else "c"
+    model = small(
+        worn(f'<layer role="rgb" texture="{colour}"/><layer role="normal" texture="n"/>'),
+        '<geom type="mesh" mesh="a" material="m" contype="0" conaffinity="0"/>',
+        SCRAP.format(name="a", uvs=UVS),
+    )
+    before = model.tex_data.reshape(-1, 3).copy()
+    upright_relief(model)
+    after = model.tex_data.reshape(-1, 3)
+    size = model.tex_width[0] * model.tex_height[0]
+    np.testing.assert_array_equal(after[:size], before[:size] if is_colour_too else before[:size, [1, 0, 2]])
+    np.testing.assert_array_equal(after[size:], before[size:])
+
+
+def test_bodies_that_are_one_mesh_and_meshes_that_others_wear_too_stay_where_they_are() -> None:
+    model = small(
+        RELIEF + '<material name="plain" rgba="0.5 0.5 0.5 1"/>',
+        '<body mocap="true" pos="1 2 3" quat="0.6 0 0.8 0"><geom type="mesh" mesh="a" material="m" contype="0" '
+        'conaffinity="0"/></body><body pos="4 0 1"><geom type="mesh" mesh="a" material="plain" contype="0" '
+        'conaffinity="0" quat="0.8 0.6 0 0"/></body>',
+        SCRAP.format(name="a", uvs=UVS),
+    )
+    before = corners(model)
+    upright_relief(model)
+    np.testing.assert_allclose(corners(model), before, atol=1e-6)
+    for geom in range(model.ngeom):
+        np.testing.assert_allclose(
+            model.geom_aabb[geom, :3] - model.geom_aabb[geom, 3:], model.mesh_vert.min(axis=0), atol=1e-6
+        )
+        np.testing.assert_allclose(
+            model.geom_aabb[geom, :3] + model.geom_aabb[geom, 3:], model.mesh_vert.max(axis=0), atol=1e-6
+        )
+        assert (model.geom_size[geom] >= np.abs(model.mesh_vert).max(axis=0) - 1e-6).all()

@@ -13,6 +13,7 @@ from gear.values.geometry import Array
 from gear.verbs.towns.canvas import Canvas, Colour
 from gear.world.assets import AssetLibrary
 from gear.world.classes import own_class
+from gear.world.mjspec import read_spec
 from gear.world.scene_spec import BoardSpec, NpcLimits, Range, SceneSpec
 from gear.world.shapes import geom_triangles
 
@@ -137,7 +138,7 @@ def face_width_m(library: AssetLibrary, asset: str) -> float:
     """
     path = library.path("surface", asset)
     try:
-        spec = mujoco.MjSpec.from_file(str(path))
+        spec = read_spec(path)
         model = spec.compile()
     except ValueError as error:
         raise TownError(path, f"MuJoCo cannot compile it: {' '.join(str(error).split())}") from error
