@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-KittiType = Literal["Car", "Van", "Truck", "Pedestrian", "Cyclist", "Tram", "Misc"]
+KittiType = Literal["Car", "Van", "Truck", "Pedestrian", "Cyclist", "Misc"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,6 @@ LABELS: tuple[Label, ...] = (
     Label(31, "caravan", 29, kitti_type="Misc", is_instance=True),
     Label(32, "trailer", 30, kitti_type="Misc", is_instance=True),
     Label(33, "traffic_sign_back", 4),
-    Label(34, "train", 31, coco_id=7, kitti_type="Tram", is_instance=True),
 )
 """All labels, in the order of their codes."""
 

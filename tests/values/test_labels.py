@@ -30,7 +30,6 @@ TO_KITTI = {
     "motorcycle": "Misc",
     "caravan": "Misc",
     "trailer": "Misc",
-    "train": "Tram",
 }
 
 
