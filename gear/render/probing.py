@@ -13,6 +13,7 @@ import numpy as np
 
 from gear.contracts.rendering import Quality, RawView, RendererInfo, Stage
 from gear.render.opening import open_renderer
+from gear.render.quiet import native_output
 from gear.values.geometry import CAMERA_FROM_ACTOR_AXES, Intrinsics, RigidTransform
 from gear.values.scene import CameraRecord, Pose
 
@@ -65,17 +66,18 @@ def probe(name: str, *, quality: Quality = "film") -> ProbeResult:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     stage = Stage(model=model, data=data)
-    started = time.perf_counter()
-    renderer = open_renderer(name, model, quality=quality)
-    try:
-        start_s = time.perf_counter() - started
-        renderer.render(stage, (_CAMERA,))
+    with native_output():  # on a busy machine the driver's thread speaks of small frames after they are done
         started = time.perf_counter()
-        (view,) = renderer.render(stage, (_CAMERA,))
-        frame_s = time.perf_counter() - started
-        return ProbeResult(info=renderer.info, sha256=_sha256(view), start_s=start_s, frame_s=frame_s)
-    finally:
-        renderer.close()
+        renderer = open_renderer(name, model, quality=quality)
+        try:
+            start_s = time.perf_counter() - started
+            renderer.render(stage, (_CAMERA,))
+            started = time.perf_counter()
+            (view,) = renderer.render(stage, (_CAMERA,))
+            frame_s = time.perf_counter() - started
+            return ProbeResult(info=renderer.info, sha256=_sha256(view), start_s=start_s, frame_s=frame_s)
+        finally:
+            renderer.close()
 
 
 def _sha256(view: RawView) -> str:
