@@ -303,8 +303,8 @@ def _quads_and_triangles(faces: Ints, positions: Floats, uvs: Floats) -> list[li
 
     Args:
         faces: (M, 3) indices.
-        positions, uvs: (N, 3) and (N, 2) of what they index. A joined quad's texture is one parallelogram, so that it
-            lies alike along whichever diagonal a reader cuts it.
+        positions, uvs: (N, 3) and (N, 2) of what they index. A joined quad's texture lies on it without a bend, alike
+            along whichever diagonal a reader cuts it.
     """
     first, second = faces[:-1], faces[1:]
     quads, is_quad = np.zeros((len(first), 4), dtype=np.int64), np.zeros(len(first), dtype=np.bool_)
@@ -321,7 +321,7 @@ def _quads_and_triangles(faces: Ints, positions: Floats, uvs: Floats) -> list[li
     normal = turns[:, 0] / np.maximum(area[:, :1], 1e-12)
     is_quad &= (np.einsum("kij,kj->ki", turns, normal) > 0.999 * area).all(axis=1) & (area > 0).all(axis=1)
     is_quad &= np.abs(np.einsum("kj,kj->k", corners[:, 2] - corners[:, 0], normal)) < _FLAT_M
-    # Of a parallelogram the middles of both diagonals are one point, in the texture as in the world.
+    # Where its diagonals cross, both are to have the same place in the texture.
     share = _share_of_diagonal(corners)
     odd = places[:, 0] + share[:, :1] * (places[:, 2] - places[:, 0])
     even = places[:, 1] + share[:, 1:] * (places[:, 3] - places[:, 1])

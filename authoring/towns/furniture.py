@@ -174,9 +174,7 @@ class Furnisher:
         """A lamp over the road, which gives way by a step to a sign that has its place."""
         for shift in LAMP_SHIFTS_M:
             x, y, toward = self.beside(street, side, station + shift, FROM_KERB_M)
-            if self.ground.takes(x, y) and self.props.is_free(x, y, 0.15):
-                yaw = float(np.arctan2(toward[1], toward[0]) + np.pi / 2)
-                self.stand(kind, parts, x, y, yaw, 0.15, high=6.0)
+            if self.stand(kind, parts, x, y, float(np.arctan2(toward[1], toward[0]) + np.pi / 2), 0.15, high=6.0):
                 return
 
     def _trees(self, street: Street, side: int, start: float, end: float) -> None:
@@ -297,7 +295,9 @@ class Furnisher:
 
     def stand(
         self, kind: str, parts: list[Part], x: float, y: float, yaw: float, radius: float, *, high: float
-    ) -> None:
-        """Put something on the sidewalk, if there is room."""
-        if self.ground.takes(x, y) and self.props.is_free(x, y, radius):
+    ) -> bool:
+        """Put something on the sidewalk, if there is room; whether there was."""
+        has_room = self.ground.takes(x, y) and self.props.is_free(x, y, radius)
+        if has_room:
             self.props.put(kind, parts, x, y, KERB_M, yaw, radius_m=radius, high_m=high)
+        return has_room

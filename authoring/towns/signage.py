@@ -26,9 +26,12 @@ FAST_MPS = 10.0
 # Bends of at most this radius that turn at least so much have arrows on their outside.
 BEND_M, BEND_RAD = 90.0, np.radians(50)
 CHEVRON_M = 11.0
+# From where along the street an arrow is to be read.
+READ_FROM_M = 9.0
 # No tree stands so far before a crossing's light.
 CLEAR_M = 22.0
 RAIL_M = (2.6, 8.4)
+RAIL_HALF_M = 0.06
 # Who goes on by less than this to another arm has none ahead.
 HEAD_COS = np.cos(np.radians(50))
 
@@ -67,8 +70,8 @@ def chevrons(furnisher: Furnisher, street: Street) -> None:
         forward = turn < 0
         for step in (-0.5, 0.5, 1.5):
             station = middle + (step if forward else -step) * min(CHEVRON_M, radius_m * 0.5)
-            spot, facing = furnisher.beside(street, 1 if forward else -1, station, FROM_KERB_M), 9.0
-            eye, _ = paths.at(line, station - facing if forward else station + facing)
+            spot = furnisher.beside(street, 1 if forward else -1, station, FROM_KERB_M)
+            eye, _ = paths.at(line, station - READ_FROM_M if forward else station + READ_FROM_M)
             towards = np.array(spot[:2]) - eye
             yaw = float(np.arctan2(towards[1], towards[0]) - np.pi / 2)
             furnisher.stand(
@@ -125,7 +128,7 @@ def corner_railings(furnisher: Furnisher, street: Street, *, starts: bool) -> No
         furnisher.props.spots.extend((float(x), float(y), 0.6) for x, y in points)
 
 
-def barrier(found: list[Solid], line: Array, height_m: float, *, half_m: float = 0.06) -> None:
+def barrier(found: list[Solid], line: Array, height_m: float, *, half_m: float = RAIL_HALF_M) -> None:
     """The solid of a fence or wall between two points (2, 2)."""
     x, y = (float(v) for v in line.mean(0))
     yaw = float(np.arctan2(*(line[1] - line[0])[::-1]))

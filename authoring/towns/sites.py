@@ -20,7 +20,7 @@ from authoring.towns.furniture import Furnisher
 from authoring.towns.markings import paint_bay
 from authoring.towns.props import Props
 from authoring.towns.regions import KERB_M, Regions, polygons
-from authoring.towns.signage import barrier
+from authoring.towns.signage import RAIL_HALF_M, barrier
 
 Array = npt.NDArray[np.float64]
 Kind = Literal["plaza", "park", "parking_lot", "vacant", "construction"]
@@ -34,6 +34,7 @@ STREET_SIDE_M = 3.0
 YARD_WALLS = ("brick_brown", "brick_red")
 # Length of a low wall on a square, and of the way between two.
 SEAT_M = (5.6, 3.4)
+WALL_HALF_M = 0.2
 # Trees farther from every road are simple ones.
 NEAR_ROAD_M = 12.0
 
@@ -162,7 +163,7 @@ class SiteBuilder:
                 continue
             if round((float(x) - x0 - 9) / 14.5) % 3 == 2:
                 line = np.array([(float(x) - 6.3, y), (float(x) + 6.3, y)])
-                self._wall(line, kit.wall(12.6, material="brick_brown", height_m=0.7), 0.9)
+                self._stretch(line, kit.wall(12.6, material="brick_brown", height_m=0.7), 0.9, half_m=WALL_HALF_M)
             else:
                 self.props.instance("hedge", hedge, float(x), y, KERB_M, 0.0, radius_m=0.5, high_m=0.9)
 
@@ -253,7 +254,8 @@ class SiteBuilder:
                 solids.railing(self.sink, rim, KERB_M, "galvanised", "fence", top_m=1.1, post_m=2.5)
                 barrier(self.props.solids, rim, 1.1)
             else:
-                self._wall(rim, kit.wall(paths.length(rim), material=material, height_m=1.9, thick_m=0.24), 2.0)
+                wall = kit.wall(paths.length(rim), material=material, height_m=1.9, thick_m=0.24)
+                self._stretch(rim, wall, 2.0, half_m=WALL_HALF_M)
 
     def _seats(self, ground: BaseGeometry) -> None:
         """Low walls to sit on along the edges of a square, with ways between them."""
@@ -263,22 +265,19 @@ class SiteBuilder:
                 piece = paths.cut(rim, float(start), float(start) + SEAT_M[0])
                 points = [(float(x), float(y)) for x, y in paths.densified(piece, 1.0)]
                 if all(self.props.is_free(x, y, 0.5) for x, y in points):
-                    self._wall(piece, kit.seat_wall(SEAT_M[0]), 0.5)
+                    self._stretch(piece[[0, -1]], kit.seat_wall(SEAT_M[0]), 0.5, half_m=WALL_HALF_M)
                     self.props.spots.extend((x, y, 0.9) for x, y in points)
 
-    def _wall(self, line: Array, parts: list[Part], height_m: float) -> None:
+    def _stretch(self, line: Array, parts: list[Part], height_m: float, *, half_m: float = RAIL_HALF_M) -> None:
+        """A wall or a fence between two points (2, 2), seen and felt."""
         x, y = (float(v) for v in line.mean(0))
         yaw = float(np.arctan2(*(line[1] - line[0])[::-1]))
         self.sink.extend(place(parts, x_m=x, y_m=y, z_m=KERB_M, yaw_rad=yaw))
-        barrier(self.props.solids, line[[0, -1]], height_m, half_m=0.2)
+        barrier(self.props.solids, line, height_m, half_m=half_m)
 
     def _hoarding(self, ground: BaseGeometry) -> None:
         for rim in self._edges(ground):
-            span, yaw = paths.length(rim), float(np.arctan2(*(rim[1] - rim[0])[::-1]))
-            x, y = (float(v) for v in rim.mean(0))
-            panels = kit.wall(span, material="metal_panel", height_m=2.0, thick_m=0.1)
-            self.sink.extend(place(panels, x_m=x, y_m=y, z_m=KERB_M, yaw_rad=yaw))
-            barrier(self.props.solids, rim, 2.0)
+            self._stretch(rim, kit.wall(paths.length(rim), material="metal_panel", height_m=2.0, thick_m=0.1), 2.0)
 
     def _edges(self, ground: BaseGeometry) -> list[Array]:
         edges = []
@@ -289,12 +288,8 @@ class SiteBuilder:
 
     def _fence(self, line: Array, style: str, height_m: float) -> None:
         span = paths.length(line)
-        if span < 1.0:
-            return
-        x, y = (float(v) for v in line.mean(0))
-        yaw = float(np.arctan2(*(line[1] - line[0])[::-1]))
-        self.sink.extend(place(kit.fence(span, style=style, height_m=height_m), x_m=x, y_m=y, z_m=KERB_M, yaw_rad=yaw))
-        barrier(self.props.solids, line, height_m)
+        if span >= 1.0:
+            self._stretch(line, kit.fence(span, style=style, height_m=height_m), height_m)
 
     def _tree(self, x: float, y: float, kind: int, *, z: float = KERB_M, room_m: float = 1.5) -> None:
         if self.props.is_free(x, y, room_m):
