@@ -10,9 +10,10 @@ from gear.camera.air import Air
 from gear.camera.ground_shade import GroundShade
 from gear.camera.night import Night, NightLight
 from gear.camera.optics import lens_map, motion_blurred, noisy, through_lens, vignetted
-from gear.camera.puddles import Puddles
 from gear.camera.rain import Rain
+from gear.camera.reflection import Below, Reflection, camera_below
 from gear.camera.response import Response
+from gear.camera.water import Water
 from gear.contracts.rendering import RawView
 from gear.values.frames import GeomTable, UInt16Image, View
 from gear.values.labels import GROUND_CODES, OPEN_GROUND_CODES
@@ -30,7 +31,7 @@ class Darkroom:
         shade: what road users keep from the ground; None for nothing.
         night: the town's lamps; None by day.
         air: fog and haze.
-        puddles: standing water.
+        water: on the ground.
         rain: falling water.
         effects: of the camera.
     """
@@ -39,7 +40,7 @@ class Darkroom:
     shade: GroundShade | None = None
     night: Night | None = None
     air: Air
-    puddles: Puddles
+    water: Water
     rain: Rain
     effects: CameraEffects
 
@@ -60,6 +61,25 @@ class Darkroom:
         """What a view gets of lamps, for `view`; None by day."""
         return self.night.light(truth, camera, record, geoms) if self.night is not None else None
 
+    def camera_below(self, camera: CameraRecord, record: SceneRecord) -> CameraRecord | None:
+        """Who has to look as well, since the ground mirrors what is seen from there; None where nothing is wet.
+
+        At night lamps are mirrored by `NightLight`, and nothing else is bright enough.
+        """
+        if self.night is not None or (self.water.share <= 0 and self.water.film <= 0):
+            return None
+        return camera_below(camera, record.ego.world_from_actor.position_m[2])
+
+    def _reflection(self, below: Below | None, record: SceneRecord, geoms: GeomTable) -> Reflection | None:
+        if below is None:
+            return None
+        raw, camera = below
+        assert raw.linear_rgb is not None
+        # What the ground hides from a real camera below it is no part of the mirror.
+        see_through = np.append(np.isin(geoms.label_code, GROUND_CODES), False)[raw.geom_id]
+        veiled = replace(raw, linear_rgb=self.air.veil(raw.linear_rgb, raw.depth_m, camera))
+        return Reflection.of(veiled, camera, record.ego.world_from_actor.position_m[2], see_through)
+
     def view(
         self,
         raw: RawView,
@@ -67,6 +87,7 @@ class Darkroom:
         record: SceneRecord,
         geoms: GeomTable,
         night_light: NightLight | None = None,
+        below: Below | None = None,
     ) -> View:
         """One view: colour with everything that the weather and the camera add, and truth aligned with it.
 
@@ -76,8 +97,10 @@ class Darkroom:
             record: the scene, for its seed and the ego car's motion.
             geoms: what each geom is.
             night_light: what the same view, whatever its surfaces show, gets of lamps; found anew unless given.
+            below: what `camera_below` saw, with neutral surfaces; without it wet ground mirrors sky alone.
         """
-        seen = replace(raw, linear_rgb=self._weathered(raw, camera, record, geoms, night_light))
+        reflection = self._reflection(below, record, geoms)
+        seen = replace(raw, linear_rgb=self._weathered(raw, camera, record, geoms, night_light, reflection))
         assert seen.linear_rgb is not None
         if self.effects.shutter_s > 0:
             speed = record.ego.velocity_world_mps
@@ -104,17 +127,23 @@ class Darkroom:
         )
 
     def _weathered(
-        self, raw: RawView, camera: CameraRecord, record: SceneRecord, geoms: GeomTable, given: NightLight | None
+        self,
+        raw: RawView,
+        camera: CameraRecord,
+        record: SceneRecord,
+        geoms: GeomTable,
+        given: NightLight | None,
+        reflection: Reflection | None,
     ) -> UInt16Image:
         assert raw.linear_rgb is not None
         linear_rgb = raw.linear_rgb
         lamps = given or self.night_light(raw, camera, record, geoms)
         if lamps is not None:
             linear_rgb = lamps.lay(linear_rgb)
-        if self.puddles.share > 0:
+        if self.water.share > 0 or reflection is not None:
             # The last entry is what id -1, nothing, finds.
             holds_water = np.append(np.isin(geoms.label_code, OPEN_GROUND_CODES), False)
-            linear_rgb = self.puddles.lay(linear_rgb, raw.depth_m, holds_water[raw.geom_id], camera)
+            linear_rgb = self.water.lay(linear_rgb, raw.depth_m, holds_water[raw.geom_id], camera, reflection)
         if self.shade is not None:
             is_ground = np.append(np.isin(geoms.label_code, GROUND_CODES), False)
             linear_rgb = self.shade.lay(linear_rgb, raw.depth_m, is_ground[raw.geom_id], camera, record)

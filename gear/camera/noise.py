@@ -34,13 +34,18 @@ def periodic_noise(rng: np.random.Generator, octaves: Sequence[int], slope: floa
     return ranks.reshape(total.shape)
 
 
-def sampled(picture: npt.NDArray[np.float32], x: npt.NDArray[Any], y: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
-    """A periodic picture at (N,) places in its pixels, bilinear: (N,) or (N, channels)."""
+def sampled(
+    picture: npt.NDArray[np.float32], x: npt.NDArray[Any], y: npt.NDArray[Any], *, is_periodic: bool = True
+) -> npt.NDArray[np.float32]:
+    """A picture at (N,) places in its pixels, bilinear: (N,) or (N, channels); beyond its borders the border."""
     # OpenCV's remap takes at most 32767 columns: the list is folded into rows.
     rows = -(-len(x) // _FOLD)
     height, width = picture.shape[:2]
-    folded = [np.resize((v % side).astype(np.float32), (rows, _FOLD)) for v, side in ((x, width), (y, height))]
-    found = cv2.remap(picture, folded[0], folded[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
+    if is_periodic:
+        x, y = x % width, y % height
+    folded = [np.resize(v.astype(np.float32), (rows, _FOLD)) for v in (x, y)]
+    border = cv2.BORDER_WRAP if is_periodic else cv2.BORDER_REPLICATE
+    found = cv2.remap(picture, folded[0], folded[1], cv2.INTER_LINEAR, borderMode=border)
     return np.asarray(found.reshape(-1, *picture.shape[2:])[: len(x)], dtype=np.float32)
 
 

@@ -18,6 +18,7 @@ import mujoco
 
 from gear.camera.ground_shade import MOST_HIDDEN, worth_beside
 from gear.camera.response import response_for
+from gear.camera.water import FILM_F90
 from gear.dataset.plan import Plan
 from gear.values.errors import FieldError, GearError
 from gear.values.serial import Json, from_json, to_json
@@ -25,7 +26,7 @@ from gear.world.air import even_share
 from gear.world.assets import AssetLibrary
 from gear.world.digest import assets_digest
 from gear.world.light import lighting_of
-from gear.world.weather import PRESETS
+from gear.world.weather import PRESETS, wetness
 
 SKY_FACE_PX = 8
 """A small sky says as much about the light as a large one."""
@@ -114,7 +115,7 @@ def read_look(value: Json) -> Look | None:
 @cache
 def light_digest() -> str:
     """sha256 of every preset by day with the light that follows from it, what road users keep of it from the ground,
-    and the camera's response to a ramp.
+    what wet ground mirrors, and the camera's response to a ramp.
 
     No shipped weights know nights.
     """
@@ -127,7 +128,8 @@ def light_digest() -> str:
         levels = [int(level) for level in light.sky_faces.mean(axis=(0, 1)).round()]
         ramp = [round(float(value), 2) for value in response_for("filament", weather).curve(RAMP)]
         hidden = round(MOST_HIDDEN * worth_beside(even_share(weather, light)), 2)
-        presets[name] = [to_json(weather), [f"{number:.3g}" for number in numbers], levels, ramp, hidden]
+        film = round(FILM_F90 * wetness(weather), 2)
+        presets[name] = [to_json(weather), [f"{number:.3g}" for number in numbers], levels, ramp, hidden, film]
     return _digest(presets)
 
 

@@ -1,4 +1,4 @@
-"""A weather as the camera needs it: CARLA's fog, what clear air scatters, rain and puddles."""
+"""A weather as the camera needs it: CARLA's fog, what clear air scatters, rain and water on the ground."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from gear.camera.air import Air, Fog
 from gear.camera.develop import Darkroom
 from gear.camera.ground_shade import GroundShade
 from gear.camera.night import Night
-from gear.camera.puddles import Puddles
 from gear.camera.rain import Rain
 from gear.camera.response import encode_srgb, response_for
+from gear.camera.water import Water
 from gear.values.frames import Shape
 from gear.values.optics import CameraEffects
 from gear.values.scene import Weather
@@ -27,6 +27,7 @@ from gear.world.light import (
     lighting_of,
     mirrored_light,
 )
+from gear.world.weather import wetness
 
 DENSEST_FOG_PER_M = 0.05
 """Extinction of CARLA's 100 percent: what is 60 m away can no longer be told."""
@@ -86,10 +87,11 @@ def darkroom_of(
         shade=None if shapes is None else shade_of(weather, renderer_name, shapes),
         night=night,
         air=air_of(weather, renderer_name, left),
-        puddles=Puddles(
+        water=Water(
             town=town,
             share=FULL_PUDDLES * weather.precipitation_deposits / 100,
             ripples=min(1.0, 1.5 * weather.precipitation / 100),
+            film=wetness(weather),
             mirrored=_shown(mirrored, renderer_name).astype(np.float32),
         ),
         rain=Rain.of(

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gear.camera.puddles import Puddles
 from gear.camera.rain import Rain
+from gear.camera.water import Water
 from gear.values.frames import LINEAR_FULL_SCALE
 from gear.values.geometry import CAMERA_FROM_ACTOR_AXES, RigidTransform
 from gear.values.rng import derive_rng
@@ -83,10 +83,10 @@ def test_more_rain_covers_more_and_none_nothing() -> None:
     assert np.array_equal(dry, picture)
 
 
-def puddles(share: float = 0.4, ripples: float = 0.0) -> Puddles:
+def puddles(share: float = 0.4, ripples: float = 0.0) -> Water:
     mirrored = np.zeros((16, 64, 3), np.float32)
     mirrored[..., 2] = np.linspace(1, 0, 16)[:, None]
-    return Puddles(town="x", share=share, ripples=ripples, mirrored=mirrored)
+    return Water(town="x", share=share, ripples=ripples, mirrored=mirrored)
 
 
 @pytest.mark.parametrize("effect", ["rain", "puddles"])

@@ -339,7 +339,7 @@ def test_fog_at_dusk_has_the_colour_of_the_streets_light() -> None:
 
 def test_a_weather_says_what_the_camera_adds() -> None:
     dry, wet = (darkroom_of(PRESETS[name], "filament", "t") for name in ("ClearNoon", "HardRainNoon"))
-    assert dry.puddles.share == 0 == dry.rain.intensity and wet.puddles.share > 0.2 and wet.rain.intensity == 1
+    assert dry.water.share == 0 == dry.rain.intensity and wet.water.share > 0.2 and wet.rain.intensity == 1
     assert wet.air.fogs[0].per_m > 5 * dry.air.fogs[0].per_m
     still = darkroom_of(Weather(name="x", scattering_intensity=0, fog_density=50), "filament", "t").air
     assert still.fogs == () and not still.clear_per_m.any()

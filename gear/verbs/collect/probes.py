@@ -6,12 +6,13 @@ says of white says too little of every patch. Such a surface is seen in grey as 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gear.camera.develop import Darkroom
+from gear.camera.reflection import Below
 from gear.camera.response import face_light
 from gear.contracts.rendering import RawView, Renderer
 from gear.formats.probes import Probe, crop_probe
@@ -78,17 +79,20 @@ def _is_clipped(black: RawView, white: RawView) -> bool:
     return bool(((white.linear_rgb >= LINEAR_FULL_SCALE) & (white.linear_rgb != black.linear_rgb)).any())
 
 
-def develop_probes(darkroom: Darkroom, shot: ProbeShot, record: SceneRecord, geoms: GeomTable) -> list[Probe]:
-    """Crops of developed frames."""
+def develop_probes(
+    darkroom: Darkroom, shot: ProbeShot, record: SceneRecord, geoms: GeomTable, below: Sequence[Below | None]
+) -> list[Probe]:
+    """Crops of developed frames; `below` is what wet ground mirrors in the sample itself, by camera."""
     quiet = replace(darkroom, effects=replace(darkroom.effects, shot_noise=0.0, read_noise=0.0))
     probes = []
     for number, camera in enumerate(record.cameras if shot.white else ()):
+        mirrored = below[number]
         lamps = quiet.night_light(shot.black[number], camera, record, geoms)
-        black = quiet.view(shot.black[number], camera, record, geoms, lamps).linear_rgb
+        black = quiet.view(shot.black[number], camera, record, geoms, lamps, mirrored).linear_rgb
         for surface, raws in shot.white.items():
-            white = quiet.view(raws[number], camera, record, geoms, lamps).linear_rgb
+            white = quiet.view(raws[number], camera, record, geoms, lamps, mirrored).linear_rgb
             if surface in shot.grey:
-                grey = quiet.view(shot.grey[surface][number], camera, record, geoms, lamps).linear_rgb
+                grey = quiet.view(shot.grey[surface][number], camera, record, geoms, lamps, mirrored).linear_rgb
                 white = _unclipped(black, white, grey, shot.grey_weight)
             probe = crop_probe(surface, camera.name, black, white, darkroom.response)
             if probe is not None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gear.camera.develop import Darkroom
+from gear.camera.reflection import Below
 from gear.contracts.rendering import RawView, Renderer
 from gear.contracts.tasks import Encoded, Sample, Task
 from gear.dataset.given import check_encoded
@@ -20,6 +21,7 @@ from gear.values.scene import SceneRecord
 from gear.verbs.collect.job import Job
 from gear.verbs.collect.probes import ProbeShot, develop_probes, shoot_probes
 from gear.world.air import darkroom_of
+from gear.world.below import look_from_below
 from gear.world.memory import forget_shown, map_large_buffers, release_memory
 from gear.world.night import night_of
 from gear.world.planner import ScenePlanner
@@ -34,12 +36,14 @@ class Shot:
     Attributes:
         record: the scene.
         raw: one view a camera, in the record's order.
+        below: what wet ground mirrors, one a camera; None for dry ground.
         geoms, objects: the tables to read it, as in `Frame`.
         probes: the same scene with black and with white surfaces, where that was asked for.
     """
 
     record: SceneRecord
     raw: tuple[RawView, ...]
+    below: tuple[Below | None, ...]
     geoms: GeomTable
     objects: Mapping[int, SceneObject]
     probes: ProbeShot | None = None
@@ -66,15 +70,16 @@ class Session:
         names = tuple(surface.name for surface in record.surfaces)
         placed = self.world.place(record, self.job.patch.by_surface(names))
         raw = self.renderer.render(placed.stage, record.cameras)
+        below = look_from_below(self.world, self.renderer, placed, record, self.darkroom)
         is_probed = self.job.config.probes
         probes = shoot_probes(self.world, self.renderer, placed, record, raw) if is_probed else None
-        return Shot(record=record, raw=raw, geoms=placed.geoms, objects=placed.objects, probes=probes)
+        return Shot(record=record, raw=raw, below=below, geoms=placed.geoms, objects=placed.objects, probes=probes)
 
     def develop(self, shot: Shot) -> Frame:
         """Turns what the renderer saw into pictures; needs neither world nor renderer, so it can run beside them."""
         views = {
-            camera.name: self.darkroom.view(view, camera, shot.record, shot.geoms)
-            for camera, view in zip(shot.record.cameras, shot.raw, strict=True)
+            camera.name: self.darkroom.view(view, camera, shot.record, shot.geoms, below=below)
+            for camera, view, below in zip(shot.record.cameras, shot.raw, shot.below, strict=True)
         }
         return Frame(views=views, geoms=shot.geoms, objects=shot.objects)
 
@@ -86,7 +91,7 @@ class Session:
             encoded = check_encoded(self.task.encode(sample, self.job.plan.info), "encode")
         if shot.probes is None:
             return sample, encoded, {}
-        probes = develop_probes(self.darkroom, shot.probes, shot.record, shot.geoms)
+        probes = develop_probes(self.darkroom, shot.probes, shot.record, shot.geoms, shot.below)
         return sample, encoded, probe_files(probes, self.job.plan.info.split, shot.record.index)
 
 

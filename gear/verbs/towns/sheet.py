@@ -18,6 +18,7 @@ from gear.verbs.collect.run import Progress
 from gear.verbs.towns.canvas import Canvas
 from gear.verbs.towns.facts import Town
 from gear.world.air import darkroom_of
+from gear.world.below import look_from_below
 from gear.world.night import night_of
 from gear.world.planner import ScenePlanner
 from gear.world.scene_spec import SceneSpec
@@ -80,9 +81,12 @@ def thumbnail(town: Town, name: str, scene: SceneSpec, options: SheetOptions) ->
     rig = Rig(cameras=(CameraMount(name="rgb", width_px=options.width_px, height_px=options.height_px),))
     record = ScenePlanner(world, rig, SplitConfig(seed=options.seed, samples=1), split_name="debug").plan(0)
     placed = world.place(record)
+    night = night_of(world, options.weather, options.renderer)
+    darkroom = darkroom_of(options.weather, options.renderer, world.town_name, night=night, shapes=world.shapes)
     renderer = open_renderer(options.renderer, world.model, quality=options.quality)
     try:
         (view,) = renderer.render(placed.stage, record.cameras)
+        (below,) = look_from_below(world, renderer, placed, record, darkroom)
     finally:
         renderer.close()
     seen = []
@@ -91,9 +95,7 @@ def thumbnail(town: Town, name: str, scene: SceneSpec, options: SheetOptions) ->
         where = f"{np.nanmean(view.depth_m[pixels]):.0f} m ahead, " if pixels.any() else ""
         seen.append(f"{face.asset} {where}{pixels.mean():.1%} of the picture")
     others = len(record.actors) - 1
-    night = night_of(world, options.weather, options.renderer)
-    darkroom = darkroom_of(options.weather, options.renderer, world.town_name, night=night, shapes=world.shapes)
-    shown = darkroom.view(view, record.cameras[0], record, placed.geoms)
+    shown = darkroom.view(view, record.cameras[0], record, placed.geoms, below=below)
     return shown.rgb, "; ".join([*seen, f"{others} other road users"])
 
 

@@ -1,0 +1,166 @@
+"""Water on open ground, laid over linear frames by what each pixel shows and where that lies: puddles, and a film.
+
+    L' = L + f (S - L)                        damp ground
+    L'' = L' (1 - p) + p (L d (1 - F) + R F)    with puddles on it
+
+p, the share of still water, is noise fixed to the town; F is Fresnel's share of light that it mirrors at this angle; d
+darkens the bottom. f is what a film of water on rough ground mirrors. R and S are the street as still water and as
+damp ground show it (`gear.camera.reflection`), with neutral surfaces. None of these depends on any patch, so frames
+stay linear in every albedo, and a patch changes no pixel that it does not reach.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from gear.camera.noise import TILE_PX, periodic_noise, sampled, smooth_step
+from gear.camera.reflection import Reflection
+from gear.values.frames import LINEAR_FULL_SCALE, FloatImage, UInt16Image
+from gear.values.rng import derive_rng
+from gear.values.scene import CameraRecord
+
+_Floats = npt.NDArray[np.float32]
+_Mask = npt.NDArray[np.bool_]
+
+TILE_M = 96.0
+"""The pattern of a town's puddles comes back after so many metres."""
+
+WATER_F0 = 0.02
+BOTTOM = 0.6
+FILM_F0, FILM_F90 = 0.03, 0.55
+"""What damp ground mirrors from above and at a grazing angle: rough ground lets less of it be seen than a mirror."""
+
+LEVEL_M = 0.5
+"""So far from its height the ground mirrors about what a mirror at that height does."""
+
+_OCTAVES = (32, 64, 128, 256)
+_SLOPE = 0.9
+_EDGE = 0.035
+_RIPPLE_TILE_M = 3.0
+_RIPPLE_SLOPE = 0.12
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Water:
+    """What one weather leaves on the ground of one town.
+
+    Attributes:
+        town: whose pattern of puddles it is.
+        share: of open ground that lies under water, 0..1.
+        ripples: how much falling rain stirs it, 0..1.
+        film: how wet the ground between puddles is, 0..1.
+        mirrored: (rows, columns, 3) float32, light by the sine of its height (row 0 is level, the last one
+            overhead) and azimuth (column 0 is east, counter-clockwise); 1.0 is the frame's full scale. What puddles
+            show where there is no reflection.
+    """
+
+    town: str
+    share: float
+    ripples: float
+    film: float = 0.0
+    mirrored: npt.NDArray[np.float32]
+
+    def lay(
+        self,
+        linear_rgb: UInt16Image,
+        depth_m: FloatImage,
+        open_ground: _Mask,
+        camera: CameraRecord,
+        reflection: Reflection | None = None,
+    ) -> UInt16Image:
+        """The frame with water.
+
+        Args:
+            linear_rgb: (H, W, 3) uint16, 0..`LINEAR_FULL_SCALE`.
+            depth_m: (H, W) float32 planar z, NaN where nothing is.
+            open_ground: (H, W) where water may be.
+            camera: who looks.
+            reflection: the street, as ground at its height mirrors it. Without it there is no film, and puddles mirror
+                `mirrored`; so they do on ground at another height.
+
+        Returns:
+            (H, W, 3) uint16, a new array, rounded.
+        """
+        result = linear_rgb.copy()
+        film = self.film if reflection is not None else 0.0
+        rows, columns = np.nonzero(open_ground)
+        if (self.share <= 0 and film <= 0) or not len(rows):
+            return result
+        position_m = camera.world_from_camera_transform.translation_m
+        towards = _towards(rows, columns, depth_m[rows, columns], camera)
+        at_px = [(towards[axis] + np.float32(position_m[axis] % TILE_M)) * (TILE_PX / TILE_M) for axis in (0, 1)]
+        water = smooth_step(sampled(_pattern(self.town), *at_px), 1 - self.share, _EDGE)
+        distance_m = np.sqrt(towards[0] ** 2 + towards[1] ** 2 + towards[2] ** 2)
+        seen = linear_rgb[rows, columns].astype(np.float32)
+        mixed = seen
+        is_level = np.zeros(len(rows), bool)
+        if reflection is not None:
+            is_level = np.abs(towards[2] + np.float32(position_m[2] - reflection.height_m)) < LEVEL_M
+            if film > 0:
+                mixed = seen + self._filmed(seen, towards, distance_m, is_level, reflection)
+        wet = np.flatnonzero(water > 0)
+        if len(wet):
+            ways = [axis[wet] for axis in towards]
+            sine = self._stirred(np.clip(-ways[2] / distance_m[wet], 0, 1), distance_m[wet], [v[wet] for v in at_px])
+            light = self._light(sine, cv2.phase(ways[0], ways[1]).reshape(-1))
+            if reflection is not None:
+                level = np.flatnonzero(is_level[wet])
+                east, north, up = ways[0][level], ways[1][level], (sine * distance_m[wet])[level]
+                light[level] = reflection.at(reflection.sharp, east, north, up)
+            mirror = _fresnel(sine, WATER_F0, 1.0)[:, None]
+            under = seen[wet] * BOTTOM * (1 - mirror) + light * np.float32(LINEAR_FULL_SCALE) * mirror
+            mixed[wet] += water[wet, None] * (under - mixed[wet])
+        result[rows, columns] = np.minimum(mixed + 0.5, LINEAR_FULL_SCALE).astype(np.uint16)
+        return result
+
+    def _filmed(
+        self, seen: _Floats, towards: list[_Floats], distance_m: _Floats, is_level: _Mask, reflection: Reflection
+    ) -> _Floats:
+        """(N, 3) what a film of water adds to pixels, in steps of the frame."""
+        sine = np.clip(-towards[2] / distance_m, 0, 1)
+        share = np.float32(self.film) * _fresnel(sine, FILM_F0, FILM_F90) * is_level
+        soft = reflection.at(reflection.soft, towards[0], towards[1], -towards[2])
+        return np.asarray(share[:, None] * (soft * np.float32(LINEAR_FULL_SCALE) - seen), dtype=np.float32)
+
+    def _stirred(self, sine: _Floats, distance_m: _Floats, at_px: list[_Floats]) -> _Floats:
+        """(N,) sines of the heights that rays see in the water, moved by ripples."""
+        if self.ripples <= 0:
+            return sine
+        scale = TILE_M / _RIPPLE_TILE_M
+        # Ripples that are smaller than a pixel cancel out.
+        slope = _RIPPLE_SLOPE * self.ripples / (1 + distance_m / 6)
+        ripple = sampled(_pattern("ripples"), at_px[0] * scale, at_px[1] * scale) - np.float32(0.5)
+        return np.asarray(np.minimum(np.abs(sine + 2 * slope * ripple), 1), dtype=np.float32)
+
+    def _light(self, sine: _Floats, azimuth_rad: _Floats) -> _Floats:
+        rows, columns = self.mirrored.shape[:2]
+        # A little below the last row, so that the zenith does not wrap around to the horizon.
+        row = np.minimum(sine * (rows - 1), np.float32(rows - 1.001))
+        return sampled(self.mirrored, azimuth_rad * np.float32(columns / (2 * np.pi)), row)
+
+
+def _fresnel(sine: _Floats, above: float, grazing: float) -> _Floats:
+    """(N,) share of light that is mirrored, by the sine of its height: Schlick's approximation."""
+    flat = (1 - sine) ** 2
+    return np.asarray(above + (grazing - above) * flat * flat * (1 - sine), dtype=np.float32)
+
+
+def _towards(
+    rows: npt.NDArray[np.intp], columns: npt.NDArray[np.intp], depth_m: _Floats, camera: CameraRecord
+) -> list[_Floats]:
+    """East, north and up, (N,) each in metres, from the camera to what pixels show."""
+    x = (columns.astype(np.float32) - np.float32((camera.width_px - 1) / 2)) * depth_m * np.float32(1 / camera.focal_px)
+    y = (rows.astype(np.float32) - np.float32((camera.height_px - 1) / 2)) * depth_m * np.float32(1 / camera.focal_px)
+    rotation = camera.world_from_camera_transform.rotation.astype(np.float32)
+    return [row[0] * x + row[1] * y + row[2] * depth_m for row in rotation]
+
+
+@cache
+def _pattern(town: str) -> npt.NDArray[np.float32]:
+    """(`TILE_PX`, `TILE_PX`) noise that belongs to a town."""
+    return periodic_noise(derive_rng(0, "puddles", town), _OCTAVES, _SLOPE)
