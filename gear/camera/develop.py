@@ -70,15 +70,13 @@ class Darkroom:
             return None
         return camera_below(camera, record.ego.world_from_actor.position_m[2])
 
-    def _reflection(self, below: Below | None, record: SceneRecord, geoms: GeomTable) -> Reflection | None:
+    def _reflection(self, below: Below | None, record: SceneRecord) -> Reflection | None:
         if below is None:
             return None
         raw, camera = below
         assert raw.linear_rgb is not None
-        # What the ground hides from a real camera below it is no part of the mirror.
-        see_through = np.append(np.isin(geoms.label_code, GROUND_CODES), False)[raw.geom_id]
         veiled = replace(raw, linear_rgb=self.air.veil(raw.linear_rgb, raw.depth_m, camera))
-        return Reflection.of(veiled, camera, record.ego.world_from_actor.position_m[2], see_through)
+        return Reflection.of(veiled, camera, record.ego.world_from_actor.position_m[2])
 
     def view(
         self,
@@ -97,9 +95,9 @@ class Darkroom:
             record: the scene, for its seed and the ego car's motion.
             geoms: what each geom is.
             night_light: what the same view, whatever its surfaces show, gets of lamps; found anew unless given.
-            below: what `camera_below` saw, with neutral surfaces; without it wet ground mirrors sky alone.
+            below: what `camera_below` saw, without ground and with neutral surfaces; puddles mirror only sky without.
         """
-        reflection = self._reflection(below, record, geoms)
+        reflection = self._reflection(below, record)
         seen = replace(raw, linear_rgb=self._weathered(raw, camera, record, geoms, night_light, reflection))
         assert seen.linear_rgb is not None
         if self.effects.shutter_s > 0:

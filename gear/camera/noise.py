@@ -38,8 +38,8 @@ def sampled(
     picture: npt.NDArray[np.float32], x: npt.NDArray[Any], y: npt.NDArray[Any], *, is_periodic: bool = True
 ) -> npt.NDArray[np.float32]:
     """A picture at (N,) places in its pixels, bilinear: (N,) or (N, channels); beyond its borders the border."""
-    # OpenCV's remap takes at most 32767 columns: the list is folded into rows.
-    rows = -(-len(x) // _FOLD)
+    # OpenCV's remap takes at most 32767 columns, and at least one: the list is folded into rows.
+    rows = max(1, -(-len(x) // _FOLD))
     height, width = picture.shape[:2]
     if is_periodic:
         x, y = x % width, y % height

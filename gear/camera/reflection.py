@@ -1,7 +1,6 @@
 """What level wet ground mirrors: the street as a camera below the ground sees it.
 
-A mirror shows what a camera sees that stands as far behind it as the real one before it. Renderers leave out faces
-that are seen from behind, and ground is made of such, so the camera below looks through it.
+A mirror shows what a camera sees that stands as far behind it as the real one before it.
 """
 
 from __future__ import annotations
@@ -51,26 +50,19 @@ class Reflection:
     soft: _Floats
 
     @staticmethod
-    def of(view: RawView, camera: CameraRecord, height_m: float, see_through: npt.NDArray[np.bool_]) -> Reflection:
-        """From a rendered view.
+    def of(view: RawView, camera: CameraRecord, height_m: float) -> Reflection:
+        """From a rendered view of a world without its ground.
 
         Args:
             view: of `camera`.
             camera: from `camera_below`.
             height_m: of the mirror.
-            see_through: (h, w) where the view shows ground from below, which mirrors nothing; filled from about it.
         """
         assert view.linear_rgb is not None
         light = view.linear_rgb.astype(np.float32) * np.float32(1 / LINEAR_FULL_SCALE)
-        weight = np.where(see_through, np.float32(1e-4), np.float32(1))
-        blur = [rad * camera.focal_px for rad in _BLUR_RAD]
-        soft, total = (
-            cv2.GaussianBlur(picture, (0, 0), blur[0], sigmaY=blur[1], borderType=cv2.BORDER_REPLICATE)
-            for picture in (light * weight[..., None], weight)
-        )
-        soft = np.asarray(soft / total[..., None], dtype=np.float32)
-        light[see_through] = soft[see_through]
-        return Reflection(camera=camera, height_m=height_m, sharp=light, soft=soft)
+        across, along = (rad * camera.focal_px for rad in _BLUR_RAD)
+        soft = cv2.GaussianBlur(light, (0, 0), across, sigmaY=along, borderType=cv2.BORDER_REPLICATE)
+        return Reflection(camera=camera, height_m=height_m, sharp=light, soft=np.asarray(soft, dtype=np.float32))
 
     def at(self, picture: _Floats, east: _Floats, north: _Floats, up: _Floats) -> _Floats:
         """(N, 3) of `sharp` or `soft` in (N,) directions, of any length."""

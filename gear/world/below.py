@@ -1,4 +1,4 @@
-"""What wet ground mirrors: the placed scene once more, from below, with neutral surfaces."""
+"""What wet ground mirrors: the placed scene once more, from below, without its ground and with neutral surfaces."""
 
 from __future__ import annotations
 
@@ -25,5 +25,6 @@ def look_from_below(
     looking = [camera for camera in cameras if camera is not None]
     if not looking:
         return (None,) * len(cameras)
-    raws = iter(renderer.render(world.redressed(placed, {}), looking))
+    with world.without_ground(placed) as stage:
+        raws = iter(renderer.render(stage, looking))
     return tuple(None if camera is None else (next(raws), camera) for camera in cameras)

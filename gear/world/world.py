@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import numpy as np
 from gear.contracts.rendering import Stage
 from gear.values.errors import PlacementError
 from gear.values.frames import GeomTable, SceneObject, Shape, UInt8Image
+from gear.values.labels import GROUND_CODES
 from gear.values.scene import ActorRecord, SceneRecord, SurfaceRecord, Vec3, Weather
 from gear.world.assets import AssetLibrary
 from gear.world.catalogue import ActorType, StaticObjects, actor_types, static_objects, visible_geoms
@@ -27,6 +29,8 @@ from gear.world.scene_spec import SceneSpec
 from gear.world.surfaces import Face, find_faces
 
 FACES_KEPT = 8
+
+_OUT_OF_SIGHT_M = -1e5
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -196,6 +200,21 @@ class World:
             ValueError: a surface is named that is not there.
         """
         return replace(placed.stage, faces=self._faces(surfaces))
+
+    @contextmanager
+    def without_ground(self, placed: PlacedStage) -> Iterator[Stage]:
+        """What was placed last, with neutral faces and nothing that hides it from below; its ground is back at the end.
+
+        Args:
+            placed: of the last `place`.
+        """
+        is_ground = np.isin(self.classes.label_code, GROUND_CODES)
+        heights_m = self._data.geom_xpos[is_ground, 2]
+        self._data.geom_xpos[is_ground, 2] = _OUT_OF_SIGHT_M
+        try:
+            yield self.redressed(placed, {})
+        finally:
+            self._data.geom_xpos[is_ground, 2] = heights_m
 
     def _faces(self, surfaces: SurfaceAlbedos) -> dict[int, UInt8Image]:
         unknown = set(surfaces) - {face.name for face in self.faces}

@@ -53,6 +53,7 @@ def test_composed_and_rendered_pictures_are_the_same(
         ("camera.lens.k1=-0.12",),
         ("camera.shutter_s=0.02",),
         ("weather=HardRainNoon",),
+        ("weather=WetNoon",),
     ],
 )
 def test_what_weather_and_camera_add_is_in_the_composed_picture(twins: MakeTwins, setting: tuple[str, ...]) -> None:
