@@ -7,9 +7,10 @@ ten equal cars cost one mesh. Only faces that take a patch get a material and a 
 
 from __future__ import annotations
 
+import copy
 import math
 import os
-import re
+import xml.etree.ElementTree as ET
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -17,7 +18,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import quoteattr, unescape
 
 from gear.values.errors import TownError
 from gear.values.scene import Weather
@@ -29,9 +29,6 @@ from gear.world.quiet_mjcf import mjcf
 from gear.world.scene_spec import BoardSpec
 from gear.world.statics import Place, Statics, split_town
 from gear.world.weather import apply_weather
-
-_FILE = re.compile(r'file="([^"]*)"')
-_STRIPPED = ' strippath="true"'
 
 PARKED_DEPTH_M = 60.0
 """Actors of the pool that a sample does not use wait this far below the town, under its ground."""
@@ -57,7 +54,7 @@ class Composition:
     """A composed world, not yet compiled.
 
     Attributes:
-        xml: the whole of it as MJCF.
+        tree: the whole of it as MJCF.
         assets: files that it refers to, by name; of meshes, where they lie.
         folder: where those of them lie that are no longer in `assets`.
         town: path of the town's MJCF.
@@ -66,7 +63,7 @@ class Composition:
         faces: what takes patches, in patch order.
     """
 
-    xml: str
+    tree: ET.Element
     assets: Mapping[str, bytes]
     town: Path
     files: tuple[Path, ...]
@@ -86,12 +83,13 @@ class Composition:
         for name, content in self.assets.items():
             if not isinstance(content, Place):
                 (folder / name).write_bytes(content)
-        xml = _FILE.sub(self._placed_file, self.xml.replace(_STRIPPED, ""))
-        return replace(self, xml=xml, assets={}, folder=folder)
-
-    def _placed_file(self, file: re.Match[str]) -> str:
-        place = self.assets.get(unescape(file[1], {"&quot;": '"'}))
-        return f"file={quoteattr(os.fsdecode(place))}" if isinstance(place, Place) else file[0]
+        tree = copy.deepcopy(self.tree)
+        for element in tree.iter():
+            element.attrib.pop("strippath", None)
+            place = self.assets.get(element.get("file", ""))
+            if isinstance(place, Place):
+                element.set("file", os.fsdecode(place))
+        return replace(self, tree=tree, assets={}, folder=folder)
 
 
 def compose(
@@ -127,8 +125,10 @@ def compose(
         parts = AssetParts(root, ahead)
         faces = _fill(root, parts, library, statics, boards, slots)
     apply_weather(root, weather, light.result(), statics.worn)
+    tree = ET.fromstring(statics.put_into(parts.put_defaults_into(root.to_xml_string())))
+    parts.put_copies_into(tree)
     return Composition(
-        xml=statics.put_into(parts.put_defaults_into(root.to_xml_string())),
+        tree=tree,
         assets=root.get_assets(),
         town=library.town,
         files=(library.town, *parts.files),
@@ -155,11 +155,16 @@ def _fill(
         if slot.body in {face.owner for face in faces}:
             problem = f"is called {slot.actor.name!r}, so its instances would have the names of the boards; rename it"
             raise TownError(slot.actor.path, problem)
+        path = slot.actor.path
+        if not slot.bears_surface and parts.has_instance(path):
+            _refuse_taken(root, library.town, statics, slot.body)
+            parts.copy_instance(path, slot.body)
+            continue
         body = _new_body(root, library.town, statics, slot.body, mocap=True)
         if slot.bears_surface:
-            faces.append(parts.add_bearer(slot.actor.path, body, is_carried=True))
+            faces.append(parts.add_bearer(path, body, is_carried=True))
         else:
-            parts.add_instance(slot.actor.path, body)
+            parts.add_instance(path, body)
     parts.drop_templates()
     return tuple(faces)
 
@@ -175,13 +180,13 @@ def slots_of(pool: Sequence[tuple[ActorFacts, int]], carrier: ActorFacts | None)
 
 
 def _new_body(root: mjcf.RootElement, town: Path, statics: Statics, name: str, **attributes: Any) -> Any:
-    taken = TownError(town, f"has a body named {name!r}, a name that gear gives to what it puts there")
-    if name in statics.body_names:
-        raise taken
-    try:
-        return root.worldbody.add("body", name=name, **attributes)
-    except ValueError as error:
-        raise taken from error
+    _refuse_taken(root, town, statics, name)
+    return root.worldbody.add("body", name=name, **attributes)
+
+
+def _refuse_taken(root: mjcf.RootElement, town: Path, statics: Statics, name: str) -> None:
+    if name in statics.body_names or root.find("body", name) is not None:
+        raise TownError(town, f"has a body named {name!r}, a name that gear gives to what it puts there")
 
 
 def _merged(pool: Sequence[tuple[ActorFacts, int]]) -> list[tuple[ActorFacts, int]]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections import Counter
+import xml.etree.ElementTree as ET
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 
 from gear.values.errors import TownError
 from gear.world.ahead import AssetsAhead
+from gear.world.copies import Copy, put_copies_into
 from gear.world.faces import FACE_SIZE_PX
 from gear.world.quiet_mjcf import mjcf
 from gear.world.refusals import refusal_of, without_breaks
@@ -102,6 +104,8 @@ class AssetParts:
         self._defaults: dict[str, str] = {}
         self._plates: dict[Path, list[tuple[str, list[Any]]]] = {}
         self._instances: Counter[Path] = Counter()
+        self._originals: dict[Path, str] = {}
+        self._copies: defaultdict[str, list[Copy]] = defaultdict(list)
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -114,6 +118,20 @@ class AssetParts:
         Raises:
             TownError: the file cannot be used, or its instance would have the name of something else in the world.
         """
+        self._fill(path, body)
+        self._originals.setdefault(path, body.name)
+
+    def has_instance(self, path: Path) -> bool:
+        """Whether there is one that others can be copied from."""
+        return path in self._originals
+
+    def copy_instance(self, path: Path, name: str) -> None:
+        """As `add_instance` into a body of that name, but for dm_control: it is `put_copies_into` that writes it."""
+        plates = {geom: plate.full_identifier for geom, plate in self._next_plates(path).items()}
+        frame = self._model(path).full_identifier  # of the empty body that dm_control puts behind the first instance
+        self._copies[frame].append(Copy(name=name, original=self._originals[path], plates=plates))
+
+    def _fill(self, path: Path, body: Any) -> None:
         model = self._model(path)
         try:
             for child in model.worldbody.all_children():
@@ -121,9 +139,14 @@ class AssetParts:
         except ValueError as error:
             told = f"cannot be put into one world with the town as {body.name!r}: {without_breaks(error)}"
             raise TownError(path, told) from error
-        for geom, plates in self._plates[path]:
-            self._root.find("geom", f"{body.name}_{geom}").mesh = plates[self._instances[path] % len(plates)]
+        for geom, plate in self._next_plates(path).items():
+            self._root.find("geom", f"{body.name}_{geom}").mesh = plate
+
+    def _next_plates(self, path: Path) -> dict[str, Any]:
+        """Meshes that the next instance wears, by geom."""
+        turn = self._instances[path]
         self._instances[path] += 1
+        return {geom: plates[turn % len(plates)] for geom, plates in self._plates[path]}
 
     def add_bearer(self, path: Path, body: Any, *, is_carried: bool) -> FaceName:
         """Fills `body` with an instance whose face has a texture of its own.
@@ -131,7 +154,7 @@ class AssetParts:
         Raises:
             TownError: the asset has not exactly one face, or the face has no material or no `surface` site.
         """
-        self.add_instance(path, body)
+        self._fill(path, body)
         model = self._model(path)
         faces = [geom for geom in model.find_all("geom") if class_name(geom.dclass).endswith(".face")]
         if len(faces) != 1:
@@ -157,6 +180,11 @@ class AssetParts:
         for model in self._models.values():
             for child in list(model.worldbody.all_children()):
                 child.remove()
+
+    def put_copies_into(self, tree: ET.Element) -> None:
+        """Writes the instances that went around dm_control into the MJCF that it has written."""
+        for worldbody in tree.iterfind("worldbody"):
+            put_copies_into(worldbody, self._copies)
 
     def put_defaults_into(self, xml: str) -> str:
         """MJCF with the default classes that went around dm_control, where it left room for them."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -57,7 +58,7 @@ def render_model(composition: Composition) -> tuple[mujoco.MjModel, GeomClasses]
     Raises:
         TownError: MuJoCo refuses it, a visible geom has no label, or a material would end Filament.
     """
-    tree = ET.fromstring(composition.xml)
+    tree = copy.deepcopy(composition.tree)
     for parent, geom in _geoms(tree, _collides):
         parent.remove(geom)
     spec, model = _compile(composition, tree, composition.assets)
@@ -75,7 +76,7 @@ def placement_model(composition: Composition, stances: Mapping[str, Stance]) -> 
     Raises:
         TownError: MuJoCo refuses it, a collision geom is no primitive, or an actor has none.
     """
-    tree = ET.fromstring(composition.xml)
+    tree = copy.deepcopy(composition.tree)
     for section in list(tree):
         if section.tag not in _PLACEMENT_SECTIONS:
             tree.remove(section)
