@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import tempfile
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,7 +22,7 @@ from gear.world.compose import Slot, compose, slots_of
 from gear.world.instances import FaceName
 from gear.world.light import Lighting
 from gear.world.mjb import read_model, write_model
-from gear.world.models import placement_model, render_model
+from gear.world.models import placement_model, placement_spec, render_model
 from gear.world.pool import plan_pool, vehicles_of
 from gear.world.relief import upright_relief
 from gear.world.scene_spec import SceneSpec
@@ -109,20 +110,29 @@ def compile_world(
         UnknownNameError: there is no such board or truck.
         TownError: a file breaks the conventions.
     """
-    with assets_ahead(readers) as ahead, tempfile.TemporaryDirectory(prefix="gear-") as folder:
+    with (
+        assets_ahead(readers) as ahead,
+        tempfile.TemporaryDirectory(prefix="gear-") as folder,
+        ThreadPoolExecutor(1) as aside,
+    ):
         pool, carrier = plan_pool(scene, library), carrier_of(scene, library)
         composition = compose(library, scene.boards, pool, carrier, weather, lighting, ahead).laid_out(Path(folder))
         ahead.expect(composition.pictures)
         ahead.wait()
+        felt = aside.submit(placement_spec, composition)
         model, classes = render_model(composition)
     upright_relief(model)
     wet_own_colours(model, classes.label_code, wetness(weather))
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     types = actor_types(model, data, classes, composition.slots)
-    felt = placement_model(composition, {slot.body: types[slot.actor.name].stance for slot in composition.slots})
+    stances = {slot.body: types[slot.actor.name].stance for slot in composition.slots}
     return Compiled(
-        model=model, placement_model=felt, classes=classes, slots=composition.slots, faces=composition.faces
+        model=model,
+        placement_model=placement_model(composition, felt.result(), stances),
+        classes=classes,
+        slots=composition.slots,
+        faces=composition.faces,
     )
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,6 +28,7 @@ _BODIES, _FEET = "1", "2"
 """Contact bits: bodies touch bodies and obstacles, feet touch ground."""
 
 FOOT_RADIUS_M = 0.05
+_CORNERS = ((1, 1), (1, -1), (-1, 1), (-1, -1))
 
 _OPAQUE = "1 1 1 1"
 """Rays pass through what has no colour."""
@@ -61,17 +63,16 @@ def render_model(composition: Composition) -> tuple[mujoco.MjModel, GeomClasses]
     tree = copy.deepcopy(composition.tree)
     for parent, geom in _geoms(tree, _collides):
         parent.remove(geom)
-    spec, model = _compile(composition, tree, composition.assets)
+    with _refusing(composition):
+        spec = _read(composition, tree, composition.assets)
+        model = spec.compile()
     refuse_deadly(model, composition.town)
     return model, classify(spec, composition.town)
 
 
-def placement_model(composition: Composition, stances: Mapping[str, Stance]) -> mujoco.MjModel:
-    """Compiles what is felt: collision geoms, every actor of the pool free to move and standing on four feet.
-
-    Args:
-        composition: the world.
-        stances: by name of the slot's body.
+def placement_spec(composition: Composition) -> mujoco.MjSpec:
+    """What is felt: collision geoms, every actor of the pool free to move and on four feet. How they stand is missing,
+    which only shows in what is seen; until that is compiled, this is read beside.
 
     Raises:
         TownError: MuJoCo refuses it, a collision geom is no primitive, or an actor has none.
@@ -91,22 +92,41 @@ def placement_model(composition: Composition, stances: Mapping[str, Stance]) -> 
     for light in list(worldbody.findall("light")):
         worldbody.remove(light)
     paths = _files_of_bodies(composition)
+    actors = {slot.body for slot in composition.slots}
     for element in worldbody:
         for geom in element.iter("geom"):
             if "mesh" in geom.attrib or "hfield" in geom.attrib:
                 path = paths.get(element.get("name", ""), composition.town)
                 raise TownError(path, f"collision geom {geom.get('name')!r} must be a primitive")
             geom.attrib.pop("material", None)
-        if element.get("name") in stances and element.tag == "body":
+        if element.get("name") in actors and element.tag == "body":
             if next(element.iter("geom"), None) is None:
                 raise TownError(
                     paths[element.get("name", "")], "has no geom of class collision, so everything could stand in it"
                 )
-            _free(element, stances[element.get("name", "")])
+            _free(element)
         else:
             for geom in element.iter("geom"):
                 _fix(geom)
-    return _compile(composition, tree, {})[1]
+    with _refusing(composition):
+        return _read(composition, tree, {})
+
+
+def placement_model(composition: Composition, spec: mujoco.MjSpec, stances: Mapping[str, Stance]) -> mujoco.MjModel:
+    """Compiles what is felt.
+
+    Args:
+        composition: the world.
+        spec: of it, as `placement_spec` gives it.
+        stances: by name of the slot's body.
+
+    Raises:
+        TownError: MuJoCo refuses it.
+    """
+    for name, stance in stances.items():
+        _stand(spec, name, stance)
+    with _refusing(composition):
+        return spec.compile()
 
 
 def _files_of_bodies(composition: Composition) -> dict[str, Path]:
@@ -148,24 +168,21 @@ def _fix(geom: ET.Element) -> None:
     geom.set("rgba", _OPAQUE)
 
 
-def _free(body: ET.Element, stance: Stance) -> None:
-    """Makes an actor of the pool free to move."""
+def _free(body: ET.Element) -> None:
+    """Makes an actor of the pool free to move, with all that `_stand` gives a size and a place."""
     body.attrib.pop("mocap")
     name = body.get("name", "")
     for geom in body.iter("geom"):
         geom.attrib.update(group=str(ACTOR_GROUP), contype=_BODIES, conaffinity=_BODIES, mass="0", rgba=_OPAQUE)
-    x, y, z = 2 * stance.half_length_m, 2 * stance.half_width_m, stance.height_m
-    inertia = [stance.mass_kg / 12 * (a * a + b * b) for a, b in ((y, z), (x, z), (x, y))]
     body.insert(0, ET.Element("freejoint", name=name))
-    ET.SubElement(body, "inertial", pos=f"0 0 {0.4 * z:.6g}", mass=f"{stance.mass_kg:.6g}", diaginertia=_words(inertia))
-    for number, (sx, sy) in enumerate(((1, 1), (1, -1), (-1, 1), (-1, -1))):
+    ET.SubElement(body, "inertial", pos="0 0 0", mass="1", diaginertia="1 1 1")
+    for foot in _feet_of(name):
         ET.SubElement(
             body,
             "geom",
-            name=f"{name}_foot_{number}",
+            name=foot,
             type="sphere",
             size=f"{FOOT_RADIUS_M}",
-            pos=_words((sx * stance.half_length_m, sy * stance.half_width_m, FOOT_RADIUS_M)),
             mass="0",
             group=str(FOOT_GROUP),
             contype=_FEET,
@@ -174,20 +191,43 @@ def _free(body: ET.Element, stance: Stance) -> None:
         )
 
 
-def _words(numbers: Iterable[float]) -> str:
-    return " ".join(f"{number:.9g}" for number in numbers)
+def _stand(spec: mujoco.MjSpec, name: str, stance: Stance) -> None:
+    """Stands an actor of the pool on its feet.
+
+    Numbers are rounded so that they do not hang on the last digits of what is seen, and everything stands as before
+    where those change.
+    """
+    body = spec.body(name)
+    x, y, z = 2 * stance.half_length_m, 2 * stance.half_width_m, stance.height_m
+    body.mass, body.ipos = _rounded(stance.mass_kg, 6), [0, 0, _rounded(0.4 * z, 6)]
+    body.inertia = [_rounded(stance.mass_kg / 12 * (a * a + b * b), 9) for a, b in ((y, z), (x, z), (x, y))]
+    for foot, (sx, sy) in zip(_feet_of(name), _CORNERS, strict=True):
+        place = sx * stance.half_length_m, sy * stance.half_width_m, FOOT_RADIUS_M
+        spec.geom(foot).pos = [_rounded(along, 9) for along in place]
 
 
-def _compile(
-    composition: Composition, tree: ET.Element, assets: Mapping[str, bytes]
-) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
+def _feet_of(name: str) -> list[str]:
+    return [f"{name}_foot_{number}" for number in range(len(_CORNERS))]
+
+
+def _rounded(number: float, digits: int) -> float:
+    return float(f"{number:.{digits}g}")
+
+
+def _read(composition: Composition, tree: ET.Element, assets: Mapping[str, bytes]) -> mujoco.MjSpec:
+    spec = mujoco.MjSpec.from_string(ET.tostring(tree, encoding="unicode"), assets=dict(assets))
+    if composition.folder is not None:
+        spec.meshdir = spec.texturedir = str(composition.folder)
+    # Either would make away with bodies and geoms that are looked for by name.
+    spec.compiler.discardvisual = spec.compiler.fusestatic = False
+    bear_flat_bodies(spec)
+    return spec
+
+
+@contextlib.contextmanager
+def _refusing(composition: Composition) -> Iterator[None]:
+    """What MuJoCo has against a world, with the file that it is in."""
     try:
-        spec = mujoco.MjSpec.from_string(ET.tostring(tree, encoding="unicode"), assets=dict(assets))
-        if composition.folder is not None:
-            spec.meshdir = spec.texturedir = str(composition.folder)
-        # Either would make away with bodies and geoms that are looked for by name.
-        spec.compiler.discardvisual = spec.compiler.fusestatic = False
-        bear_flat_bodies(spec)
-        return spec, spec.compile()
+        yield
     except ValueError as error:
         raise refused(error, composition.files) from error
