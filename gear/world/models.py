@@ -176,11 +176,11 @@ def _free(body: ET.Element) -> None:
         geom.attrib.update(group=str(ACTOR_GROUP), contype=_BODIES, conaffinity=_BODIES, mass="0", rgba=_OPAQUE)
     body.insert(0, ET.Element("freejoint", name=name))
     ET.SubElement(body, "inertial", pos="0 0 0", mass="1", diaginertia="1 1 1")
-    for foot in _feet_of(name):
+    for number in range(len(_CORNERS)):
         ET.SubElement(
             body,
             "geom",
-            name=foot,
+            name=f"{name}_foot_{number}",
             type="sphere",
             size=f"{FOOT_RADIUS_M}",
             mass="0",
@@ -201,13 +201,10 @@ def _stand(spec: mujoco.MjSpec, name: str, stance: Stance) -> None:
     x, y, z = 2 * stance.half_length_m, 2 * stance.half_width_m, stance.height_m
     body.mass, body.ipos = _rounded(stance.mass_kg, 6), [0, 0, _rounded(0.4 * z, 6)]
     body.inertia = [_rounded(stance.mass_kg / 12 * (a * a + b * b), 9) for a, b in ((y, z), (x, z), (x, y))]
-    for foot, (sx, sy) in zip(_feet_of(name), _CORNERS, strict=True):
+    # Its last geoms: to find them by name, MuJoCo would look at every geom before them.
+    for foot, (sx, sy) in zip(body.geoms[-len(_CORNERS) :], _CORNERS, strict=True):
         place = sx * stance.half_length_m, sy * stance.half_width_m, FOOT_RADIUS_M
-        spec.geom(foot).pos = [_rounded(along, 9) for along in place]
-
-
-def _feet_of(name: str) -> list[str]:
-    return [f"{name}_foot_{number}" for number in range(len(_CORNERS))]
+        foot.pos = [_rounded(along, 9) for along in place]
 
 
 def _rounded(number: float, digits: int) -> float:
