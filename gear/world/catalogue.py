@@ -73,12 +73,9 @@ class ActorType:
 
 
 def body_tree(model: mujoco.MjModel, body_id: int) -> list[int]:
-    """Ids of a body and of all below it."""
-    inside = {body_id}
-    for child in range(body_id + 1, model.nbody):
-        if int(model.body_parentid[child]) in inside:
-            inside.add(child)
-    return sorted(inside)
+    """Ids of a body and of all below it, which follow it: MuJoCo numbers bodies depth first."""
+    outside = np.flatnonzero(model.body_parentid[body_id + 1 :] < body_id)
+    return list(range(body_id, body_id + 1 + int(outside[0]) if len(outside) else model.nbody))
 
 
 def visible_geoms(model: mujoco.MjModel, body_id: int, label_code: npt.NDArray[np.uint8]) -> list[int]:
