@@ -11,7 +11,7 @@ from gear.camera.ground_shade import GroundShade
 from gear.camera.night import Night, NightLight
 from gear.camera.optics import lens_map, motion_blurred, noisy, through_lens, vignetted
 from gear.camera.rain import Rain
-from gear.camera.reflection import Below, Reflection, camera_below
+from gear.camera.reflection import Below, Reflection, beyond_mirror, camera_below
 from gear.camera.response import Response
 from gear.camera.water import Water
 from gear.contracts.rendering import RawView
@@ -70,13 +70,16 @@ class Darkroom:
             return None
         return camera_below(camera, record.ego.world_from_actor.position_m[2])
 
-    def _reflection(self, below: Below | None, record: SceneRecord) -> Reflection | None:
+    def reflection(self, below: Below | None, record: SceneRecord) -> Reflection | None:
+        """What wet ground mirrors, from what `camera_below` saw without ground and with neutral surfaces."""
         if below is None:
             return None
         raw, camera = below
         assert raw.linear_rgb is not None
-        veiled = replace(raw, linear_rgb=self.air.veil(raw.linear_rgb, raw.depth_m, camera))
-        return Reflection.of(veiled, camera, record.ego.world_from_actor.position_m[2])
+        height_m = record.ego.world_from_actor.position_m[2]
+        # The air on this side of the mirror is laid over the whole frame, later.
+        veiled = replace(raw, linear_rgb=self.air.veil(raw.linear_rgb, *beyond_mirror(raw.depth_m, camera, height_m)))
+        return Reflection.of(veiled, camera, height_m)
 
     def view(
         self,
@@ -85,7 +88,7 @@ class Darkroom:
         record: SceneRecord,
         geoms: GeomTable,
         night_light: NightLight | None = None,
-        below: Below | None = None,
+        reflection: Reflection | None = None,
     ) -> View:
         """One view: colour with everything that the weather and the camera add, and truth aligned with it.
 
@@ -95,9 +98,8 @@ class Darkroom:
             record: the scene, for its seed and the ego car's motion.
             geoms: what each geom is.
             night_light: what the same view, whatever its surfaces show, gets of lamps; found anew unless given.
-            below: what `camera_below` saw, without ground and with neutral surfaces; puddles mirror only sky without.
+            reflection: what wet ground mirrors; without it puddles mirror the sky alone.
         """
-        reflection = self._reflection(below, record)
         seen = replace(raw, linear_rgb=self._weathered(raw, camera, record, geoms, night_light, reflection))
         assert seen.linear_rgb is not None
         if self.effects.shutter_s > 0:
@@ -138,13 +140,13 @@ class Darkroom:
         lamps = given or self.night_light(raw, camera, record, geoms)
         if lamps is not None:
             linear_rgb = lamps.lay(linear_rgb)
+        if self.shade is not None:
+            is_ground = np.append(np.isin(geoms.label_code, GROUND_CODES), False)
+            linear_rgb = self.shade.lay(linear_rgb, raw.depth_m, is_ground[raw.geom_id], camera, record)
         if self.water.share > 0 or reflection is not None:
             # The last entry is what id -1, nothing, finds.
             holds_water = np.append(np.isin(geoms.label_code, OPEN_GROUND_CODES), False)
             linear_rgb = self.water.lay(linear_rgb, raw.depth_m, holds_water[raw.geom_id], camera, reflection)
-        if self.shade is not None:
-            is_ground = np.append(np.isin(geoms.label_code, GROUND_CODES), False)
-            linear_rgb = self.shade.lay(linear_rgb, raw.depth_m, is_ground[raw.geom_id], camera, record)
         if lamps is not None:
             linear_rgb = lamps.mirror(linear_rgb)
             del lamps  # much memory

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from gear.camera.noise import sampled
 from gear.contracts.rendering import RawView
-from gear.values.frames import LINEAR_FULL_SCALE
+from gear.values.frames import LINEAR_FULL_SCALE, FloatImage
 from gear.values.geometry import Array, RigidTransform
 from gear.values.scene import CameraRecord, Pose
 
@@ -25,10 +25,16 @@ Below = tuple[RawView, CameraRecord]
 SHARE_PX = 0.5
 """Of the picture's pixels to a radian: water that rain stirs and rough ground show less than a mirror."""
 
-_RAYS = (17, 65)
+_RAYS = (33, 65)
 """Columns and rows of rays that say what of the street the picture can mirror."""
 
-_MARGIN_PX = 4
+_STEP_PX, _MARGIN_PX = 32, 8
+"""Sizes go by steps, since renderers keep what they once needed for a size."""
+
+_STEEPEST = 0.2
+"""Cosine off the view's axis of the widest rays that are looked at."""
+
+_UNDER_M = 0.05
 _BLUR_RAD = (0.008, 0.04)
 """Standard deviations across and along the view of what damp ground mirrors: leaning facets draw it out to streaks."""
 
@@ -40,8 +46,9 @@ class Reflection:
     Attributes:
         camera: who looked.
         height_m: of the mirror in the world.
-        sharp: (h, w, 3) float32 light, 1.0 is the frame's full scale: as still water shows it.
-        soft: the same as damp ground shows it.
+        sharp: (h, w, 4) float32: how much of what the mirror shows is known (0..1, the last channel), and so much of
+            its light; 1.0 is the frame's full scale. What lies under the mirror hides what it shows.
+        soft: the same, as damp ground shows it.
     """
 
     camera: CameraRecord
@@ -59,13 +66,15 @@ class Reflection:
             height_m: of the mirror.
         """
         assert view.linear_rgb is not None
-        light = view.linear_rgb.astype(np.float32) * np.float32(1 / LINEAR_FULL_SCALE)
+        at_m = np.nan_to_num(view.depth_m, nan=np.inf) * _climb(camera) + camera.world_from_camera.position_m[2]
+        known = (at_m > height_m - _UNDER_M).astype(np.float32)[..., None]
+        sharp = np.concatenate([view.linear_rgb * (known / np.float32(LINEAR_FULL_SCALE)), known], axis=-1)
         across, along = (rad * camera.focal_px for rad in _BLUR_RAD)
-        soft = cv2.GaussianBlur(light, (0, 0), across, sigmaY=along, borderType=cv2.BORDER_REPLICATE)
-        return Reflection(camera=camera, height_m=height_m, sharp=light, soft=np.asarray(soft, dtype=np.float32))
+        soft = cv2.GaussianBlur(sharp, (0, 0), across, sigmaY=along, borderType=cv2.BORDER_REPLICATE)
+        return Reflection(camera=camera, height_m=height_m, sharp=sharp, soft=np.asarray(soft, dtype=np.float32))
 
     def at(self, picture: _Floats, east: _Floats, north: _Floats, up: _Floats) -> _Floats:
-        """(N, 3) of `sharp` or `soft` in (N,) directions, of any length."""
+        """(N, 4) of `sharp` or `soft` in (N,) directions, of any length."""
         x, y, z = (
             axis[0] * east + axis[1] * north + axis[2] * up
             for axis in self.camera.world_from_camera_transform.rotation.T.astype(np.float32)
@@ -89,14 +98,17 @@ def camera_below(camera: CameraRecord, height_m: float) -> CameraRecord | None:
     )
     rays = np.stack([columns.ravel(), rows.ravel(), np.full(columns.size, camera.focal_px)])
     rays = (world_from_camera.rotation @ (rays / np.linalg.norm(rays, axis=0))).T
-    mirrored = rays[rays[:, 2] < 0] * (1, 1, -1)
-    if not len(mirrored) or world_from_camera.translation_m[2] <= height_m:
+    # Up to the horizon itself, which lies between two rays.
+    step = max(camera.width_px / (_RAYS[0] - 1), camera.height_px / (_RAYS[1] - 1)) / camera.focal_px
+    seen = rays[rays[:, 2] < step]
+    if not (rays[:, 2] < 0).any() or world_from_camera.translation_m[2] <= height_m:
         return None
-    rotation = _facing(mirrored.mean(axis=0), world_from_camera.rotation[:, 0])
-    seen = mirrored @ rotation
-    reach = np.abs(seen[:, :2] / np.maximum(seen[:, 2:], 0.05)).max(axis=0)
+    mirrored = np.column_stack([seen[:, :2], np.maximum(-seen[:, 2], 0)])
+    rotation = _facing(mirrored.mean(axis=0), world_from_camera.rotation)
+    ahead = mirrored @ rotation
+    reach = np.abs(ahead[:, :2] / np.maximum(ahead[:, 2:], _STEEPEST)).max(axis=0)
     focal_px = SHARE_PX * camera.focal_px
-    width_px, height_px = (2 * int(np.ceil(side * focal_px) + _MARGIN_PX) for side in reach)
+    width_px, height_px = (_STEP_PX * int(np.ceil(2 * (side * focal_px + _MARGIN_PX) / _STEP_PX)) for side in reach)
     position_m = world_from_camera.translation_m * (1, 1, -1) + (0, 0, 2 * height_m)
     pose = RigidTransform.from_parts("world", "camera", rotation, position_m)
     return replace(
@@ -104,9 +116,26 @@ def camera_below(camera: CameraRecord, height_m: float) -> CameraRecord | None:
     )
 
 
-def _facing(forward: Array, right: Array) -> Array:
-    """(3, 3) world from camera axes of who looks along `forward` and has about the same right."""
+def beyond_mirror(depth_m: FloatImage, camera: CameraRecord, height_m: float) -> tuple[FloatImage, CameraRecord]:
+    """The way from a mirror to what a camera from `camera_below` sees in it, as depth from a camera at its height."""
+    x, y, z = camera.world_from_camera.position_m
+    leg_m = np.float32(height_m - z) / np.maximum(_climb(camera), np.float32(1e-6))
+    pose = replace(camera.world_from_camera, position_m=(x, y, height_m))
+    return np.asarray(np.maximum(depth_m - leg_m, 0), dtype=np.float32), replace(camera, world_from_camera=pose)
+
+
+def _climb(camera: CameraRecord) -> _Floats:
+    """(h, w) by how much rays climb a metre of depth."""
+    x = (np.arange(camera.width_px, dtype=np.float32) + 0.5 - camera.width_px / 2) / camera.focal_px
+    y = (np.arange(camera.height_px, dtype=np.float32)[:, None] + 0.5 - camera.height_px / 2) / camera.focal_px
+    up = camera.world_from_camera_transform.rotation[2]
+    return np.asarray(up[0] * x + up[1] * y + up[2], dtype=np.float32)
+
+
+def _facing(forward: Array, rotation: Array) -> Array:
+    """(3, 3) world from camera axes of who looks along `forward` and keeps level; turned as before where that is up."""
     forward = forward / np.linalg.norm(forward)
-    right = right - forward * (right @ forward)
+    level = np.cross(forward, (0, 0, 1))
+    right = level if np.linalg.norm(level) > 0.1 else rotation[:, 0] - forward * (rotation[:, 0] @ forward)
     right = right / np.linalg.norm(right)
     return np.stack([right, np.cross(forward, right), forward], axis=1)

@@ -35,8 +35,10 @@ BOTTOM = 0.6
 FILM_F0, FILM_F90 = 0.03, 0.55
 """What damp ground mirrors from above and at a grazing angle: rough ground lets less of it be seen than a mirror."""
 
-LEVEL_M = 0.5
-"""So far from its height the ground mirrors about what a mirror at that height does."""
+LEVEL_M = (0.2, 0.5)
+"""So near its height ground mirrors what a mirror at that height does, and from so far on nothing of it."""
+
+_ALL = 0.999
 
 _OCTAVES = (32, 64, 128, 256)
 _SLOPE = 0.9
@@ -55,8 +57,8 @@ class Water:
         ripples: how much falling rain stirs it, 0..1.
         film: how wet the ground between puddles is, 0..1.
         mirrored: (rows, columns, 3) float32, light by the sine of its height (row 0 is level, the last one
-            overhead) and azimuth (column 0 is east, counter-clockwise); 1.0 is the frame's full scale. What puddles
-            show where there is no reflection.
+            overhead) and azimuth (column 0 is east, counter-clockwise); 1.0 is the frame's full scale. What water
+            shows where there is no reflection.
     """
 
     town: str
@@ -80,8 +82,8 @@ class Water:
             depth_m: (H, W) float32 planar z, NaN where nothing is.
             open_ground: (H, W) where water may be.
             camera: who looks.
-            reflection: the street, as ground at its height mirrors it. Without it there is no film, and puddles mirror
-                `mirrored`; so they do on ground at another height.
+            reflection: the street, as ground at its height mirrors it; ground at another height, and what is not known
+                of the street, mirrors `mirrored`. Without it puddles do, and there is no film.
 
         Returns:
             (H, W, 3) uint16, a new array, rounded.
@@ -93,39 +95,68 @@ class Water:
             return result
         position_m = camera.world_from_camera_transform.translation_m
         towards = _towards(rows, columns, depth_m[rows, columns], camera)
+        distance_m = np.sqrt(towards[0] ** 2 + towards[1] ** 2 + towards[2] ** 2)
+        sine = np.clip(-towards[2] / distance_m, 0, 1)
+        level = np.zeros(len(rows), np.float32)
+        if reflection is not None:
+            away_m = np.abs(towards[2] + np.float32(position_m[2] - reflection.height_m))
+            level = 1 - smooth_step(away_m, LEVEL_M[0], LEVEL_M[1] - LEVEL_M[0])
+        seen = linear_rgb[rows, columns].astype(np.float32)
+        mixed = seen.copy()
+        if reflection is not None and film > 0:
+            share = np.float32(film) * _fresnel(sine, FILM_F0, FILM_F90)[:, None]
+            soft = self._light(reflection, reflection.soft, towards[0], towards[1], sine * distance_m, level)
+            mixed += share * (soft - seen)
         at_px = [(towards[axis] + np.float32(position_m[axis] % TILE_M)) * (TILE_PX / TILE_M) for axis in (0, 1)]
         water = smooth_step(sampled(_pattern(self.town), *at_px), 1 - self.share, _EDGE)
-        distance_m = np.sqrt(towards[0] ** 2 + towards[1] ** 2 + towards[2] ** 2)
-        seen = linear_rgb[rows, columns].astype(np.float32)
-        mixed = seen
-        is_level = np.zeros(len(rows), bool)
-        if reflection is not None:
-            is_level = np.abs(towards[2] + np.float32(position_m[2] - reflection.height_m)) < LEVEL_M
-            if film > 0:
-                mixed = seen + self._filmed(seen, towards, distance_m, is_level, reflection)
         wet = np.flatnonzero(water > 0)
         if len(wet):
-            ways = [axis[wet] for axis in towards]
-            sine = self._stirred(np.clip(-ways[2] / distance_m[wet], 0, 1), distance_m[wet], [v[wet] for v in at_px])
-            light = self._light(sine, cv2.phase(ways[0], ways[1]).reshape(-1))
-            if reflection is not None:
-                level = np.flatnonzero(is_level[wet])
-                east, north, up = ways[0][level], ways[1][level], (sine * distance_m[wet])[level]
-                light[level] = reflection.at(reflection.sharp, east, north, up)
+            sine = self._stirred(sine[wet], distance_m[wet], [axis[wet] for axis in at_px])
+            up = sine * distance_m[wet]
+            sharp = None if reflection is None else reflection.sharp
+            light = self._light(reflection, sharp, towards[0][wet], towards[1][wet], up, level[wet])
             mirror = _fresnel(sine, WATER_F0, 1.0)[:, None]
-            under = seen[wet] * BOTTOM * (1 - mirror) + light * np.float32(LINEAR_FULL_SCALE) * mirror
+            under = seen[wet] * BOTTOM * (1 - mirror) + light * mirror
             mixed[wet] += water[wet, None] * (under - mixed[wet])
         result[rows, columns] = np.minimum(mixed + 0.5, LINEAR_FULL_SCALE).astype(np.uint16)
         return result
 
-    def _filmed(
-        self, seen: _Floats, towards: list[_Floats], distance_m: _Floats, is_level: _Mask, reflection: Reflection
+    def _light(
+        self,
+        reflection: Reflection | None,
+        picture: _Floats | None,
+        east: _Floats,
+        north: _Floats,
+        up: _Floats,
+        level: _Floats,
     ) -> _Floats:
-        """(N, 3) what a film of water adds to pixels, in steps of the frame."""
-        sine = np.clip(-towards[2] / distance_m, 0, 1)
-        share = np.float32(self.film) * _fresnel(sine, FILM_F0, FILM_F90) * is_level
-        soft = reflection.at(reflection.soft, towards[0], towards[1], -towards[2])
-        return np.asarray(share[:, None] * (soft * np.float32(LINEAR_FULL_SCALE) - seen), dtype=np.float32)
+        """(N, 3) what comes from directions, in steps of the frame: of the street where it is known, else of the sky.
+
+        Args:
+            reflection: the street; None where nothing of it is known.
+            picture: of it, sharp or soft.
+            east, north, up: (N,) directions of any length.
+            level: (N,) how far what mirrors lies at the street's height, 0..1.
+        """
+        full = np.float32(LINEAR_FULL_SCALE)
+        if reflection is None or picture is None:
+            return self._sky(east, north, up) * full
+        found = reflection.at(picture, east, north, up) * level[:, None]
+        light, known = found[:, :3], found[:, 3]
+        missing = np.flatnonzero(known < _ALL)
+        light[missing] += (1 - known[missing, None]) * self._sky(east[missing], north[missing], up[missing])
+        return np.asarray(light * full, dtype=np.float32)
+
+    def _sky(self, east: _Floats, north: _Floats, up: _Floats) -> _Floats:
+        """(N, 3) of `mirrored`."""
+        if not len(east):
+            return np.zeros((0, 3), np.float32)
+        rows, columns = self.mirrored.shape[:2]
+        sine = up / np.sqrt(east * east + north * north + up * up)
+        # A little below the last row, so that the zenith does not wrap around to the horizon.
+        row = np.minimum(sine * (rows - 1), np.float32(rows - 1.001))
+        azimuth_rad = cv2.phase(east, north).reshape(-1)
+        return sampled(self.mirrored, azimuth_rad * np.float32(columns / (2 * np.pi)), row)
 
     def _stirred(self, sine: _Floats, distance_m: _Floats, at_px: list[_Floats]) -> _Floats:
         """(N,) sines of the heights that rays see in the water, moved by ripples."""
@@ -136,12 +167,6 @@ class Water:
         slope = _RIPPLE_SLOPE * self.ripples / (1 + distance_m / 6)
         ripple = sampled(_pattern("ripples"), at_px[0] * scale, at_px[1] * scale) - np.float32(0.5)
         return np.asarray(np.minimum(np.abs(sine + 2 * slope * ripple), 1), dtype=np.float32)
-
-    def _light(self, sine: _Floats, azimuth_rad: _Floats) -> _Floats:
-        rows, columns = self.mirrored.shape[:2]
-        # A little below the last row, so that the zenith does not wrap around to the horizon.
-        row = np.minimum(sine * (rows - 1), np.float32(rows - 1.001))
-        return sampled(self.mirrored, azimuth_rad * np.float32(columns / (2 * np.pi)), row)
 
 
 def _fresnel(sine: _Floats, above: float, grazing: float) -> _Floats:

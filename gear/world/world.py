@@ -28,7 +28,9 @@ from gear.world.memory import release_memory
 from gear.world.scene_spec import SceneSpec
 from gear.world.surfaces import Face, find_faces
 
-FACES_KEPT = 8
+FACES_KEPT, SHOWN_A_FACE = 8, 5
+"""Resampled faces are kept: so many in all, or so many of each, which in a sample may be seen with a patch, neutral,
+white, black and grey."""
 
 _OUT_OF_SIGHT_M = -1e5
 
@@ -278,7 +280,7 @@ class World:
         )
         if (face.name, key) not in self._shown:
             self._shown[face.name, key] = face.show(albedo)
-            if len(self._shown) > FACES_KEPT:
+            if len(self._shown) > max(FACES_KEPT, SHOWN_A_FACE * len(self.faces)):
                 self._shown.popitem(last=False)
         self._shown.move_to_end((face.name, key))
         return self._shown[face.name, key]

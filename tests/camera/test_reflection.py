@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gear.camera.reflection import Reflection, camera_below
+from gear.camera.reflection import Reflection, beyond_mirror, camera_below
 from gear.camera.water import Water
 from gear.contracts.rendering import RawView
 from gear.values.frames import LINEAR_FULL_SCALE
@@ -58,13 +58,18 @@ def hits(looking: CameraRecord) -> np.ndarray:
     return from_m + towards * ((WALL_M - from_m[0]) / towards[..., :1])
 
 
+def from_below(below: CameraRecord, light: np.ndarray, depth_m: np.ndarray) -> Reflection:
+    steps = np.round(light * LINEAR_FULL_SCALE).astype(np.uint16)
+    view = RawView(linear_rgb=steps, depth_m=depth_m.astype(np.float32), geom_id=np.zeros(depth_m.shape, np.int32))
+    return Reflection.of(view, below, HEIGHT_M)
+
+
 def seen_from_below(looking: CameraRecord) -> Reflection:
+    """The painted wall, which reaches down to below the ground, and is hidden by nothing there."""
     below = camera_below(looking, HEIGHT_M)
     assert below is not None
-    light = np.round(painted(hits(below)) * LINEAR_FULL_SCALE).astype(np.uint16)
-    flat = np.zeros(light.shape[:2])
-    view = RawView(linear_rgb=light, depth_m=flat.astype(np.float32), geom_id=flat.astype(np.int32))
-    return Reflection.of(view, below, HEIGHT_M)
+    depth_m = np.full((below.height_px, below.width_px), np.nan)
+    return from_below(below, painted(hits(below)), depth_m)
 
 
 LOOKS = [{}, {"pitch_deg": 12.0}, {"pitch_deg": -6.0, "roll_deg": 5.0}, {"yaw_deg": -20.0, "roll_deg": -3.0}]
@@ -82,21 +87,21 @@ def test_a_mirrored_ray_shows_what_it_comes_to(look: dict[str, float]) -> None:
     expected = painted(ground_m + mirrored * ((WALL_M - ground_m[:, :1]) / mirrored[:, :1]))
     reflection = seen_from_below(looking)
     east, north, up = mirrored.T.astype(np.float32)
-    error = np.abs(reflection.at(reflection.sharp, east, north, up) - expected)
+    found = reflection.at(reflection.sharp, east, north, up)
+    error = np.abs(found[:, :3] - expected)
+    assert (found[:, 3] == 1).all()
     assert down.sum() > 2000 and error.max() < 0.004
     for wrong in (expected[:, ::-1], painted(ground_m * (1, -1, 1))):
-        assert np.abs(reflection.at(reflection.sharp, east, north, up) - wrong).max() > 0.1
+        assert np.abs(found[:, :3] - wrong).max() > 0.1
 
 
 def test_damp_ground_draws_things_out_along_the_view_and_keeps_their_light() -> None:
     looking = camera(yaw_deg=0.0)
     below = camera_below(looking, HEIGHT_M)
     assert below is not None
-    light = np.zeros((below.height_px, below.width_px, 3), np.uint16)
-    light[below.height_px // 2, below.width_px // 2] = LINEAR_FULL_SCALE
-    flat = np.zeros(light.shape[:2])
-    view = RawView(linear_rgb=light, depth_m=flat.astype(np.float32), geom_id=flat.astype(np.int32))
-    soft = Reflection.of(view, below, HEIGHT_M).soft[..., 0]
+    light = np.zeros((below.height_px, below.width_px, 3))
+    light[below.height_px // 2, below.width_px // 2] = 1
+    soft = from_below(below, light, np.full(light.shape[:2], np.nan)).soft[..., 0]
     rows, columns = np.nonzero(soft > 0.1 * soft.max())
     assert np.ptp(rows) > 2 * np.ptp(columns)
     assert soft.sum() == pytest.approx(1, abs=0.02)
@@ -133,12 +138,15 @@ def test_puddles_and_damp_ground_mirror_more_at_a_grazing_angle() -> None:
 
 def test_ground_at_another_height_mirrors_the_sky_alone() -> None:
     looking = camera()
-    high = ground_depth(looking, HEIGHT_M + 0.8)
+    high, reflection = ground_depth(looking, HEIGHT_M + 0.8), seen_from_below(looking)
     grey = np.full((*SIZE, 3), 300, np.uint16)
     is_open = ~np.isnan(high)
-    with_street = wet(0.4, 1.0).lay(grey, high, is_open, looking, seen_from_below(looking))
-    without = wet(0.4, 1.0).lay(grey, high, is_open, looking)
+    with_street, without = (wet(0.4, 0.0).lay(grey, high, is_open, looking, seen) for seen in (reflection, None))
     assert np.array_equal(with_street, without) and not np.array_equal(without, grey)
+    damp = wet(0.0, 1.0).lay(grey, high, is_open, looking, reflection)
+    flat = wet(0.0, 1.0).lay(grey, ground_depth(looking), is_open, looking, reflection)
+    assert (damp[is_open] >= grey[is_open]).all() and (damp > grey).mean() > 0.2, "the sky is brighter"
+    assert not np.array_equal(damp, flat)
 
 
 def test_water_is_linear_in_what_lies_below_it() -> None:
@@ -161,4 +169,66 @@ def test_what_is_mirrored_lies_at_the_same_places_whatever_the_pictures_size() -
         direction = np.array([[0.9, 0.2, 0.3]], np.float32)
         from_m = np.array([1.0, -2.0, HEIGHT_M - 1.6])
         expected = painted(from_m + direction[0] * (WALL_M - 1) / 0.9)
-        assert np.abs(reflection.at(reflection.sharp, *direction.T)[0] - expected).max() < 0.004
+        assert np.abs(reflection.at(reflection.sharp, *direction.T)[0, :3] - expected).max() < 0.004
+
+
+def test_what_lies_under_the_mirror_hides_it_and_the_sky_is_mirrored_instead() -> None:
+    """As on a flyover, whose deck is no ground: its underside is before whatever a mirror on top of it would show."""
+    looking = camera()
+    below = camera_below(looking, HEIGHT_M)
+    assert below is not None
+    rise, low_m = rays(below)[..., 2], below.world_from_camera.position_m[2]
+    deck_m = np.where(rise > 0.01, (HEIGHT_M - 0.3 - low_m) / np.maximum(rise, 0.01), np.nan)
+    depth, grey = ground_depth(looking), np.full((*SIZE, 3), 300, np.uint16)
+    is_open = depth < 30
+    covered = from_below(below, painted(hits(below)), deck_m)
+    puddled = [wet(0.4, 0.0).lay(grey, depth, is_open, looking, seen) for seen in (covered, None)]
+    assert np.array_equal(*puddled)
+    damp = wet(0.0, 1.0).lay(grey, depth, is_open, looking, covered)[60:].astype(float)
+    assert (damp > 300)[is_open[60:]].all(), "brighter: `mirrored` is half of full scale everywhere"
+
+
+SIZES = [(1920, 1080, 90.0), (3840, 2160, 90.0), (1024, 1024, 120.0), (1242, 375, 81.0), (640, 384, 60.0)]
+
+
+@pytest.mark.parametrize(("width_px", "height_px", "hfov_deg"), SIZES)
+@pytest.mark.parametrize("look", [*LOOKS, {"roll_deg": 90.0}, {"pitch_deg": -30.0}])
+def test_the_look_from_below_covers_all_that_the_ground_mirrors(
+    width_px: int, height_px: int, hfov_deg: float, look: dict[str, float]
+) -> None:
+    focal_px = width_px / 2 / np.tan(np.radians(hfov_deg) / 2)
+    looking = replace(camera(**look), width_px=width_px, height_px=height_px, focal_px=focal_px)
+    below = camera_below(looking, HEIGHT_M)
+    assert below is not None
+    towards = rays(looking)[:: height_px // 90, :: width_px // 90].reshape(-1, 3)
+    towards = np.concatenate([towards, rays(looking)[[0, 0, -1, -1], [0, -1, 0, -1]]])
+    mirrored = towards[towards[:, 2] < 0] * (1, 1, -1) @ below.world_from_camera_transform.rotation
+    places = mirrored[:, :2] / mirrored[:, 2:] * below.focal_px
+    assert (mirrored[:, 2] > 0).all()
+    assert (np.abs(places) <= (np.array([below.width_px, below.height_px]) - 1) / 2).all()
+    assert (below.width_px % 32, below.height_px % 32) == (0, 0)
+
+
+def test_sizes_do_not_hang_on_the_last_digit_of_a_pose() -> None:
+    sizes = set()
+    for yaw_deg in np.linspace(0, 360, 97):
+        below = camera_below(replace(camera(yaw_deg=float(yaw_deg)), width_px=1536, height_px=768, focal_px=768), 0.0)
+        assert below is not None
+        sizes.add((below.width_px, below.height_px))
+    assert len(sizes) == 1
+
+
+def test_air_lies_between_the_mirror_and_what_it_shows_alone() -> None:
+    looking = camera(yaw_deg=0.0)
+    below = camera_below(looking, HEIGHT_M)
+    assert below is not None
+    towards = rays(below)
+    low_m = below.world_from_camera_transform.translation_m
+    wall_m = (WALL_M - low_m[0]) / towards[..., 0]
+    beyond_m, there = beyond_mirror(wall_m.astype(np.float32), below, HEIGHT_M)
+    climbs = towards[..., 2] > 0.02
+    leg_m = (HEIGHT_M - low_m[2]) / towards[..., 2]
+    expected = np.maximum(wall_m - leg_m, 0)[climbs]
+    assert np.abs(beyond_m[climbs] - expected).max() < 1e-3 and expected.max() > 10
+    assert there.world_from_camera.position_m[2] == HEIGHT_M
+    assert np.isnan(beyond_mirror(np.full_like(beyond_m, np.nan), below, HEIGHT_M)[0]).all()

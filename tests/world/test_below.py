@@ -90,7 +90,8 @@ def test_what_is_mirrored_does_not_know_the_patch() -> None:
             placed = world.place(shot, {face: shown})
             (raw,) = renderer.render(placed.stage, shot.cameras)
             (below,) = look_from_below(world, renderer, placed, shot, darkroom)
-            view = darkroom.view(raw, shot.cameras[0], shot, placed.geoms, below=below)
+            reflection = darkroom.reflection(below, shot)
+            view = darkroom.view(raw, shot.cameras[0], shot, placed.geoms, reflection=reflection)
             looks.append((raw, below, view))
     finally:
         renderer.close()

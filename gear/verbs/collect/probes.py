@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gear.camera.develop import Darkroom
-from gear.camera.reflection import Below
+from gear.camera.reflection import Reflection
 from gear.camera.response import face_light
 from gear.contracts.rendering import RawView, Renderer
 from gear.formats.probes import Probe, crop_probe
@@ -80,13 +80,17 @@ def _is_clipped(black: RawView, white: RawView) -> bool:
 
 
 def develop_probes(
-    darkroom: Darkroom, shot: ProbeShot, record: SceneRecord, geoms: GeomTable, below: Sequence[Below | None]
+    darkroom: Darkroom,
+    shot: ProbeShot,
+    record: SceneRecord,
+    geoms: GeomTable,
+    reflections: Sequence[Reflection | None],
 ) -> list[Probe]:
-    """Crops of developed frames; `below` is what wet ground mirrors in the sample itself, by camera."""
+    """Crops of developed frames; `reflections` are what wet ground mirrors in the sample itself, by camera."""
     quiet = replace(darkroom, effects=replace(darkroom.effects, shot_noise=0.0, read_noise=0.0))
     probes = []
     for number, camera in enumerate(record.cameras if shot.white else ()):
-        mirrored = below[number]
+        mirrored = reflections[number]
         lamps = quiet.night_light(shot.black[number], camera, record, geoms)
         black = quiet.view(shot.black[number], camera, record, geoms, lamps, mirrored).linear_rgb
         for surface, raws in shot.white.items():

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from gear.camera.develop import Darkroom
-from gear.camera.reflection import Below
+from gear.camera.reflection import Below, Reflection
 from gear.contracts.rendering import RawView, Renderer
 from gear.contracts.tasks import Encoded, Sample, Task
 from gear.dataset.given import check_encoded
@@ -77,21 +77,28 @@ class Session:
 
     def develop(self, shot: Shot) -> Frame:
         """Turns what the renderer saw into pictures; needs neither world nor renderer, so it can run beside them."""
+        return self._developed(shot, self._reflections(shot))
+
+    def _reflections(self, shot: Shot) -> list[Reflection | None]:
+        return [self.darkroom.reflection(below, shot.record) for below in shot.below]
+
+    def _developed(self, shot: Shot, reflections: Sequence[Reflection | None]) -> Frame:
         views = {
-            camera.name: self.darkroom.view(view, camera, shot.record, shot.geoms, below=below)
-            for camera, view, below in zip(shot.record.cameras, shot.raw, shot.below, strict=True)
+            camera.name: self.darkroom.view(view, camera, shot.record, shot.geoms, reflection=reflection)
+            for camera, view, reflection in zip(shot.record.cameras, shot.raw, reflections, strict=True)
         }
         return Frame(views=views, geoms=shot.geoms, objects=shot.objects)
 
     def finish(self, shot: Shot) -> tuple[Sample, Encoded, AuxiliaryFiles]:
         """Develops and measures a shot and turns it into files, beside the next one's rendering."""
-        frame = self.develop(shot)
+        reflections = self._reflections(shot)
+        frame = self._developed(shot, reflections)
         with blamed(self.plugin, f"sample {shot.record.index}"):
             sample = self.task.ground_truth(frame, shot.record)
             encoded = check_encoded(self.task.encode(sample, self.job.plan.info), "encode")
         if shot.probes is None:
             return sample, encoded, {}
-        probes = develop_probes(self.darkroom, shot.probes, shot.record, shot.geoms, shot.below)
+        probes = develop_probes(self.darkroom, shot.probes, shot.record, shot.geoms, reflections)
         return sample, encoded, probe_files(probes, self.job.plan.info.split, shot.record.index)
 
 

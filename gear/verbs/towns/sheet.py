@@ -95,7 +95,7 @@ def thumbnail(town: Town, name: str, scene: SceneSpec, options: SheetOptions) ->
         where = f"{np.nanmean(view.depth_m[pixels]):.0f} m ahead, " if pixels.any() else ""
         seen.append(f"{face.asset} {where}{pixels.mean():.1%} of the picture")
     others = len(record.actors) - 1
-    shown = darkroom.view(view, record.cameras[0], record, placed.geoms, below=below)
+    shown = darkroom.view(view, record.cameras[0], record, placed.geoms, reflection=darkroom.reflection(below, record))
     return shown.rgb, "; ".join([*seen, f"{others} other road users"])
 
 
