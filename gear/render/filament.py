@@ -27,6 +27,7 @@ import numpy.typing as npt
 from gear.camera.response import encode_srgb
 from gear.contracts.rendering import Quality, RawView, RendererInfo, Stage
 from gear.render.display import has_linear_colours
+from gear.render.draw_order import widen
 from gear.render.faces import checked_faces
 from gear.render.occlusion import openness, shade
 from gear.render.pinhole import FAR_M, NEAR_M, Frustum, depth_from_reversed
@@ -80,6 +81,7 @@ class FilamentRenderer:
             self._resources = mjrf.ModelResources(self._context, model)
             self._scene = self._context.create_scene(mjrf.SceneParams())
             self._scene.configure_from_model(model)
+            widen(mjrf, self._context, self._scene, model.ngeom)
             self._lights = mjrf.ModelLights(self._scene, self._resources)
             self._renderables = mjrf.ModelRenderables(self._scene, self._resources)
             self._renderables.set_options(geoms_only())
