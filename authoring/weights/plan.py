@@ -34,7 +34,7 @@ CROWDS = {"board": 2 / 3, "truck": 2 / 3}
 """Road users of the training streets, times those that the scenes have."""
 
 CROWDED = ("semseg", "detect2d", "stereo3d")
-"""Tasks whose training streets these are, and from which their shipped networks have learnt; depth has the scenes' own."""
+"""Tasks whose training streets these are, and whose shipped networks learnt from them; depth has the scenes' own."""
 
 FIRST_TRAINING_SEED, FIRST_HELD_OUT_SEED = 20_000, 30_000
 HELD_OUT_SAMPLES = 300

@@ -9,7 +9,8 @@ GEOMS = 12
 SLAB = '<geom type="box" size="1 1 0.1"/>'
 STACK = f"""
 <mujoco><worldbody>
-<light type="directional" dir="0 0 -1"/>{SLAB * 4}<body mocap="true">{SLAB * 4}</body><body mocap="true">{SLAB * 4}</body>
+<light type="directional" dir="0 0 -1"/>
+{SLAB * 4}<body mocap="true">{SLAB * 4}</body><body mocap="true">{SLAB * 4}</body>
 </worldbody></mujoco>
 """
 
