@@ -32,7 +32,7 @@ def add_collection_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", metavar="N", help="seed of the split, instead of the simulation config's")
     parser.add_argument("--weather", help="weather preset (ClearNoon)")
     parser.add_argument("--patch", help="none, random, a picture, or a patch folder (none)")
-    parser.add_argument("--renderer", help="filament or classic (filament)")
+    parser.add_argument("--renderer", help="raster, filament or classic (raster)")
     parser.add_argument("--quality", help="film or fast (film)")
     parser.add_argument(
         "--out", metavar="DIR", help="root of the dataset (data/<task>/<town>-<scene>-<weather>/<patch>)"

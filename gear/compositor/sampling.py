@@ -48,7 +48,7 @@ class Scan:
     """How a renderer and a camera take samples.
 
     Attributes:
-        supersampled: 2 x 2 samples a pixel (`filament`'s `film`).
+        supersampled: 2 x 2 samples a pixel (`film` of all but `classic`).
         extrapolates: what only touches a pixel is still sampled at the pixel's middle (OpenGL's multi-sampling).
         smooths: edges were smoothed by the filter of `fast`.
         effects: of the camera.

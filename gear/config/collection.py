@@ -133,7 +133,7 @@ class SimulationConfig:
                 raise FieldError("splits", f"{split!r} is not a split's name (lower case words joined by _)")
 
 
-RendererName = Literal["filament", "classic"]
+RendererName = Literal["raster", "filament", "classic"]
 
 MOST_CROWDED = 10.0
 
@@ -151,7 +151,7 @@ class CollectionConfig:
         root: folder of the dataset; empty for `data/<task>/<town>-<scene>-<weather>/<patch>`.
         patch: `none`, `random`, a picture, a patch folder, or the name of an installed patch.
         weather: a preset, or a preset and what differs.
-        renderer: `filament` (physically based) or `classic`.
+        renderer: `raster` (physically based), `filament` (the same look, slower) or `classic`.
         quality: `film` (2x2 supersampled) or `fast`.
         camera: optional effects: `shot_noise`, `read_noise` (percent), `vignette`, `shutter_s`, `lens` (`k1`, `k2`).
         seed, samples: instead of the simulation config's.
@@ -172,7 +172,7 @@ class CollectionConfig:
     root: str = ""
     patch: str = "none"
     weather: WeatherConfig = field(default_factory=WeatherConfig)
-    renderer: RendererName = "filament"
+    renderer: RendererName = "raster"
     quality: Quality = "film"
     camera: CameraEffects = field(default_factory=CameraEffects)
     seed: int | None = None

@@ -38,7 +38,7 @@ class RendererInfo:
     """Who renders. Written into every manifest.
 
     Attributes:
-        name: `filament` or `classic`.
+        name: `raster`, `filament` or `classic`.
         backend: graphics interface: `vulkan`, `osmesa`, `egl`.
         driver: what the driver calls itself, with version.
         device: what the device calls itself.

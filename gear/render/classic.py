@@ -20,7 +20,7 @@ from gear.contracts.rendering import Quality, RawView, RendererInfo, Stage
 from gear.render.culling import Mask, bounding_spheres, in_beam, in_frustum
 from gear.render.display import SHADOW_REACH_M, displayed_colour, displayed_model
 from gear.render.faces import checked_faces
-from gear.render.glcontext import choose_backend, driver_and_device, open_context
+from gear.render.glcontext import choose_backend, driver_and_device, is_software, open_context
 from gear.render.occlusion import openness, shade
 from gear.render.pinhole import FAR_M, NEAR_M, Frustum, depth_from_reversed
 from gear.render.samples import four_times, ids_from_rgb, smooth_edges
@@ -54,8 +54,8 @@ class ClassicRenderer:
         self._model.vis.quality.offsamples = _SAMPLES[quality]
         self._worn: dict[int, npt.NDArray[np.uint8]] = {}
         self._size = (0, 0)
-        backend = choose_backend()
-        self._gl = open_context(backend)
+        backend = choose_backend("classic")
+        self._gl = open_context(backend, "classic")
         try:
             self._context = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_100)
         except mujoco.FatalError as error:
@@ -65,7 +65,7 @@ class ClassicRenderer:
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
         driver, device = driver_and_device()
         self._info = RendererInfo(
-            name="classic", backend=backend, driver=driver, device=device, is_software=_is_software(device)
+            name="classic", backend=backend, driver=driver, device=device, is_software=is_software(device)
         )
         self._scene = mujoco.MjvScene(self._model, maxgeom=self._model.ngeom + _EXTRA_GEOMS)
         self._option = geoms_only()
@@ -229,11 +229,6 @@ class ClassicRenderer:
         viewport = mujoco.MjrRect(0, 0, camera.width_px, camera.height_px)
         mujoco.mjr_render(viewport, self._scene, self._context)
         mujoco.mjr_readPixels(pixels, depth, viewport, self._context)
-
-
-def _is_software(device: str) -> bool:
-    """Mesa's CPU drivers by the names they give themselves."""
-    return any(word in device.casefold() for word in ("llvmpipe", "softpipe", "swrast", "software"))
 
 
 def _shadow_centre(frustum: Frustum) -> Array:

@@ -13,8 +13,11 @@ _PLATFORM_DEVICE = 0x313F
 _MAX_DEVICES = 32
 
 
-def choose_backend() -> str:
+def choose_backend(renderer: str) -> str:
     """`egl` or `osmesa`: what `MUJOCO_GL` asks for, what this process uses already, or what is there.
+
+    Args:
+        renderer: who asks, for the error.
 
     Raises:
         BackendError: there is neither.
@@ -30,11 +33,15 @@ def choose_backend() -> str:
         return "egl"
     if _loads("libOSMesa.so.8") or _loads("libOSMesa.so.6") or _loads("libOSMesa.so"):
         return "osmesa"
-    raise BackendError("classic", "neither EGL nor OSMesa is installed", _REMEDY)
+    raise BackendError(renderer, "neither EGL nor OSMesa is installed", _REMEDY)
 
 
-def open_context(backend: str) -> Any:
+def open_context(backend: str, renderer: str) -> Any:
     """A current GL context of the backend: MuJoCo's own `GLContext`.
+
+    Args:
+        backend: `egl` or `osmesa`.
+        renderer: who asks, for the error.
 
     Raises:
         BackendError: the driver is missing.
@@ -49,7 +56,7 @@ def open_context(backend: str) -> Any:
     # PyOpenGL reports a missing library in many ways, AttributeError among them.
     except Exception as error:
         problem = f"{backend} does not start ({str(error).splitlines()[0] if str(error) else type(error).__name__})"
-        raise BackendError("classic", problem, _REMEDY) from error
+        raise BackendError(renderer, problem, _REMEDY) from error
     return context
 
 
@@ -91,3 +98,8 @@ def _egl_works() -> bool:
         if display and library.eglInitialize(display, None, None):
             return True
     return False
+
+
+def is_software(device: str) -> bool:
+    """Mesa's CPU drivers by the names they give themselves."""
+    return any(word in device.casefold() for word in ("llvmpipe", "softpipe", "swrast", "software"))

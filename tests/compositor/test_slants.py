@@ -104,6 +104,8 @@ def looks(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Twins]:
     [
         ("classic", "fast"),
         pytest.param("classic", "film", marks=pytest.mark.slow),
+        ("raster", "fast"),
+        pytest.param("raster", "film", marks=pytest.mark.slow),
         pytest.param("filament", "film", marks=pytest.mark.slow),
         pytest.param("filament", "fast", marks=pytest.mark.slow),
     ],

@@ -29,6 +29,9 @@ EXACT_DB = 40.0
         ("board", "classic", "film", "semseg"),
         ("double", "classic", "fast", "semseg"),
         ("truck", "classic", "fast", "stereo3d"),
+        ("board", "raster", "fast", "semseg"),
+        ("double", "raster", "film", "semseg"),
+        ("truck", "raster", "film", "stereo3d"),
         pytest.param("board", "filament", "fast", "semseg", marks=pytest.mark.slow),
         pytest.param("double", "filament", "film", "semseg", marks=pytest.mark.slow),
         pytest.param("truck", "filament", "film", "stereo3d", marks=pytest.mark.slow),
@@ -62,7 +65,7 @@ def test_what_weather_and_camera_add_is_in_the_composed_picture(twins: MakeTwins
     assert np.median([gap.psnr_db for gap in found]) >= EXACT_DB
 
 
-@pytest.mark.parametrize("renderer", ["classic", pytest.param("filament", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("renderer", ["classic", "raster", pytest.param("filament", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("quality", ["fast", "film"])
 def test_a_low_sun_full_on_the_board_makes_white_brighter_than_a_frame_can_be(
     twins: MakeTwins, renderer: str, quality: str

@@ -13,7 +13,7 @@ def test_the_task_alone_is_enough() -> None:
     config = load_collection(None, {"task": "stereo3d"})
     assert config == CollectionConfig(task="stereo3d", options=config.options)
     assert (config.town, config.scene, config.split, config.patch) == ("town10", "billboard01", "test", "none")
-    assert (config.weather.preset, config.renderer, config.quality) == ("ClearNoon", "filament", "film")
+    assert (config.weather.preset, config.renderer, config.quality) == ("ClearNoon", "raster", "film")
 
 
 def test_flags_go_before_the_file_and_settings_before_flags(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import pytest
 
 from gear.camera import face_light
 from gear.contracts.rendering import Quality, RawView, Renderer, Stage
-from gear.render import display, open_renderer, probe
+from gear.render import RENDERERS, display, open_renderer, probe
 from gear.values.frames import LINEAR_FULL_SCALE, UInt8Image, UInt16Image
 from tests.render.conftest import STREET, camera, geom, grey_face, posed
 
@@ -88,7 +88,7 @@ def test_shapes_that_are_known_are_not_drawn_again(renderer: Renderer, stage: St
         renderer.render(other, rig, shapes=shapes[:1])
 
 
-@pytest.mark.parametrize("name", ["filament", "classic"])
+@pytest.mark.parametrize("name", RENDERERS)
 def test_a_fresh_process_renders_the_same_bytes(name: str) -> None:
     code = f"from gear.render import probe; print(probe({name!r}).sha256)"
     fresh = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -225,7 +225,7 @@ def test_what_does_not_fit_is_refused(renderer: Renderer, stage: Stage) -> None:
         renderer.render(Stage(model=other, data=posed(other)), (camera(),))
 
 
-@pytest.mark.parametrize("name", ["filament", "classic"])
+@pytest.mark.parametrize("name", RENDERERS)
 def test_renderers_close_twice_and_open_again(name: str, model: mujoco.MjModel, stage: Stage) -> None:
     frames = []
     for _ in range(3):

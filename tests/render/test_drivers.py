@@ -30,16 +30,26 @@ def test_a_machine_without_opengl_is_told_what_to_install(monkeypatch: pytest.Mo
     monkeypatch.delenv("PYOPENGL_PLATFORM", raising=False)
     monkeypatch.setattr(glcontext, "_egl_works", lambda: False)
     monkeypatch.setattr(glcontext, "_loads", lambda library: True)
-    assert glcontext.choose_backend() == "osmesa"
+    assert glcontext.choose_backend("classic") == "osmesa"
     monkeypatch.setattr(glcontext, "_loads", lambda library: False)
     with pytest.raises(BackendError, match="apt-get install libegl1 libopengl0 libgl1-mesa-dri"):
-        glcontext.choose_backend()
+        glcontext.choose_backend("classic")
 
 
 def test_the_wish_of_the_environment_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     for wish in ("egl", "osmesa"):
         monkeypatch.setenv("MUJOCO_GL", wish)
-        assert glcontext.choose_backend() == wish
+        assert glcontext.choose_backend("classic") == wish
+
+
+def test_the_raster_renderer_says_that_it_needs_egl() -> None:
+    code = "from gear.render import probe; probe('raster')"
+    environment = {**os.environ, "MUJOCO_GL": "osmesa"}
+    environment.pop("PYOPENGL_PLATFORM", None)
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
+    last = done.stderr.strip().splitlines()[-1]
+    assert "BackendError: renderer raster: it needs EGL, and this process uses osmesa" in last
+    assert "--renderer filament" in last
 
 
 def test_osmesa_and_egl_render_the_same() -> None:
@@ -60,7 +70,7 @@ def test_osmesa_and_egl_render_the_same() -> None:
 def test_a_probe_says_who_renders(name: str, capfd: pytest.CaptureFixture[str]) -> None:
     result = probe(name)
     assert result.info.name == name
-    assert result.info.backend in {"filament": ("vulkan",), "classic": ("egl", "osmesa")}[name]
+    assert result.info.backend in {"filament": ("vulkan",), "raster": ("egl",), "classic": ("egl", "osmesa")}[name]
     assert result.info.driver and result.info.device
     assert len(result.sha256) == 64 and result.sha256 == probe(name).sha256 != probe(name, quality="fast").sha256
     assert result.start_s > 0 and result.frame_s > 0

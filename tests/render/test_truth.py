@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gear.contracts.rendering import Renderer, Stage
-from gear.render import open_renderer
+from gear.render import RENDERERS, open_renderer
 from gear.values.scene import CameraRecord
 from tests.render.conftest import camera, geom
 
@@ -78,16 +78,17 @@ def test_what_is_only_felt_is_not_seen(renderer: Renderer, stage: Stage) -> None
     }
 
 
-def test_both_renderers_see_the_same(model: mujoco.MjModel, stage: Stage) -> None:
+def test_all_renderers_see_the_same(model: mujoco.MjModel, stage: Stage) -> None:
     views = []
-    for name in ("filament", "classic"):
+    for name in RENDERERS:
         opened = open_renderer(name, model, quality="fast")
         try:
             views += opened.render(stage, (camera(320, 120),), colour=False)
         finally:
             opened.close()
-    first, second = views
-    assert agreement(first.geom_id, first.depth_m, second.geom_id, second.depth_m) > 0.997
+    first, *others = views
+    for other in others:
+        assert agreement(first.geom_id, first.depth_m, other.geom_id, other.depth_m) > 0.997
 
 
 def test_moved_bodies_are_where_they_were_moved(renderer: Renderer, model: mujoco.MjModel) -> None:

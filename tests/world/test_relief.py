@@ -90,25 +90,26 @@ def facing(normal: np.ndarray, middle: np.ndarray) -> CameraRecord:
     return CameraRecord(name="c", width_px=16, height_px=16, focal_px=40.0, world_from_camera=pose)
 
 
+@pytest.mark.parametrize("name", ["filament", "raster"])
 @pytest.mark.parametrize("sun", SUNS, ids=["40", "130", "220", "310"])
-def test_every_surface_is_as_bright_as_its_map_says(sun: np.ndarray) -> None:
+def test_every_surface_is_as_bright_as_its_map_says(sun: np.ndarray, name: str) -> None:
     model, places = town(sun)
     upright_relief(model)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     cameras = [facing(normal, middle) for _, normal, *middles in places for middle in middles]
-    renderer = open_renderer("filament", model, quality="fast")
+    renderer = open_renderer(name, model, quality="fast")
     try:
         views = renderer.render(Stage(model=model, data=data), cameras)
     finally:
         renderer.close()
     light = [float(view.linear_rgb[4:12, 4:12].mean()) for view in views if view.linear_rgb is not None]
     seen = 0
-    for (name, normal, *_), flat, leaning in zip(places, light[::2], light[1::2], strict=True):
-        right, up = sheets()[name]
+    for (place, normal, *_), flat, leaning in zip(places, light[::2], light[1::2], strict=True):
+        right, up = sheets()[place]
         lambert = [max(float(direction @ sun), 0.0) for direction in (normal, RIGHT * right + UP * up + OUT * normal)]
         if lambert[0] > 0.15:
-            assert leaning / flat == pytest.approx(lambert[1] / lambert[0], rel=0.05), name
+            assert leaning / flat == pytest.approx(lambert[1] / lambert[0], rel=0.05), place
             seen += 1
     assert seen >= 10
 

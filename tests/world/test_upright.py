@@ -43,7 +43,7 @@ def orientations() -> list[tuple[int, tuple[float, ...]]]:
     return found
 
 
-@pytest.mark.parametrize("name", ["classic", "filament"])
+@pytest.mark.parametrize("name", ["classic", "filament", "raster"])
 def test_a_box_is_taken_where_it_shows_its_patch_upright(name: str) -> None:
     camera = CameraRecord(
         name="rgb",

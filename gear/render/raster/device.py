@@ -1,0 +1,243 @@
+"""The little of OpenGL 4.5 that this renderer needs: programs, buffers, targets and textures."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from OpenGL import GL  # type: ignore[import-untyped]
+
+from gear.values.errors import BackendError
+
+_VERSION = "#version 450 core\n"
+_LEAST = (4, 5)
+_REMEDY = "update the driver, or use --renderer filament"
+
+
+def require_version() -> None:
+    """Refuses a current context that is too old.
+
+    Raises:
+        BackendError: it has less than OpenGL 4.5.
+    """
+    words = _text(GL.glGetString(GL.GL_VERSION))
+    found = re.match(r"(\d+)\.(\d+)", words)
+    if not found or (int(found[1]), int(found[2])) < _LEAST:
+        raise BackendError("raster", f"it needs OpenGL {_LEAST[0]}.{_LEAST[1]}, and the driver has {words}", _REMEDY)
+    if GL.glGetIntegerv(GL.GL_MAX_VERTEX_SHADER_STORAGE_BLOCKS) < 1:
+        raise BackendError("raster", "the driver's vertex shaders read no storage buffers", _REMEDY)
+
+
+class Program:
+    """A compiled pair of shaders with its uniforms by name."""
+
+    def __init__(self, vertex: str, fragment: str, flags: tuple[str, ...] = ()) -> None:
+        """Compiles two of this folder's shaders.
+
+        Args:
+            vertex, fragment: names of files, without `.glsl`.
+            flags: what is defined in both.
+
+        Raises:
+            BackendError: the driver does not take them; says what it said.
+        """
+        self.handle = GL.glCreateProgram()
+        head = _VERSION + "".join(f"#define {flag}\n" for flag in flags) + _source("frame")
+        for kind, name in ((GL.GL_VERTEX_SHADER, vertex), (GL.GL_FRAGMENT_SHADER, fragment)):
+            shader = GL.glCreateShader(kind)
+            GL.glShaderSource(shader, head + _source(name))
+            GL.glCompileShader(shader)
+            if not GL.glGetShaderiv(shader, GL.GL_COMPILE_STATUS):
+                raise BackendError("raster", f"{name}.glsl: {_text(GL.glGetShaderInfoLog(shader))}", _REMEDY)
+            GL.glAttachShader(self.handle, shader)
+            GL.glDeleteShader(shader)
+        GL.glLinkProgram(self.handle)
+        if not GL.glGetProgramiv(self.handle, GL.GL_LINK_STATUS):
+            said = _text(GL.glGetProgramInfoLog(self.handle))
+            raise BackendError("raster", f"{vertex}.glsl with {fragment}.glsl: {said}", _REMEDY)
+
+    def use(self, **matrices: npt.NDArray[np.float64]) -> None:
+        """Makes it current, with square matrices and a `corner` of four numbers as its uniforms."""
+        GL.glUseProgram(self.handle)
+        for name, matrix in matrices.items():
+            place = GL.glGetUniformLocation(self.handle, name)
+            values = np.ascontiguousarray(matrix, np.float32)
+            if matrix.shape == (4, 4):
+                GL.glUniformMatrix4fv(place, 1, True, values)
+            elif matrix.shape == (3, 3):
+                GL.glUniformMatrix3fv(place, 1, True, values)
+            else:
+                GL.glUniform4fv(place, 1, values)
+
+
+def buffer_of(content: npt.NDArray[Any]) -> int:
+    """A buffer that keeps its content."""
+    buffer = np.zeros(1, np.uint32)
+    GL.glCreateBuffers(1, buffer)
+    if content.nbytes:
+        GL.glNamedBufferStorage(int(buffer[0]), content.nbytes, np.ascontiguousarray(content), 0)
+    return int(buffer[0])
+
+
+class Stream:
+    """A buffer whose content comes anew with each frame."""
+
+    def __init__(self, target: int) -> None:
+        self._target = target
+        buffer = np.zeros(1, np.uint32)
+        GL.glCreateBuffers(1, buffer)
+        self.handle = int(buffer[0])
+
+    def fill(self, content: npt.NDArray[Any]) -> None:
+        """Binds it with this content."""
+        GL.glBindBuffer(self._target, self.handle)
+        GL.glBufferData(self._target, content.nbytes, np.ascontiguousarray(content), GL.GL_STREAM_DRAW)
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """What is drawn into: a frame buffer with a texture of colour, or ids, and one of depth.
+
+    Attributes:
+        handle, colour, depth: of OpenGL; the latter two are 0 where there is none.
+        width, height: in pixels.
+    """
+
+    handle: int
+    colour: int
+    depth: int
+    width: int
+    height: int
+
+    @staticmethod
+    def of(width: int, height: int, colour_format: int | None, depth: int | None = None) -> Target:
+        """A new one.
+
+        Args:
+            width: in pixels.
+            height: in pixels.
+            colour_format: of its colour; none for depth alone.
+            depth: a texture to share; 0 for none; without it a new one is made.
+        """
+        frame = np.zeros(1, np.uint32)
+        GL.glCreateFramebuffers(1, frame)
+        handle = int(frame[0])
+        colour = 0
+        if colour_format is not None:
+            colour = _plain_texture(width, height, colour_format)
+            GL.glNamedFramebufferTexture(handle, GL.GL_COLOR_ATTACHMENT0, colour, 0)
+        if depth is None:
+            depth = _plain_texture(width, height, GL.GL_DEPTH_COMPONENT32F)
+        if depth:
+            GL.glNamedFramebufferTexture(handle, GL.GL_DEPTH_ATTACHMENT, depth, 0)
+        return Target(handle, colour, depth, width, height)
+
+    def begin(self) -> None:
+        """All that follows is drawn here."""
+        GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self.handle)
+        GL.glViewport(0, 0, self.width, self.height)
+
+    def free(self) -> None:
+        """Lets the frame buffer go; textures stay."""
+        GL.glDeleteFramebuffers(1, np.array([self.handle], np.uint32))
+
+    def attach_layer(self, textures: int, layer: int) -> None:
+        """Takes one of an array of textures as its depth."""
+        GL.glNamedFramebufferTextureLayer(self.handle, GL.GL_DEPTH_ATTACHMENT, textures, 0, layer)
+
+
+def picture(content: npt.NDArray[np.uint8], *, is_srgb: bool) -> int:
+    """A texture of (H, W, 1 to 4) bytes with all its mip levels, that repeats and is filtered trilinearly."""
+    height, width, channels = content.shape
+    texture = _texture(GL.GL_TEXTURE_2D)
+    levels = max(height, width).bit_length()
+    GL.glTextureStorage2D(texture, levels, GL.GL_SRGB8_ALPHA8 if is_srgb else GL.GL_RGBA8, width, height)
+    GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
+    kind = {1: GL.GL_RED, 2: GL.GL_RG, 3: GL.GL_RGB, 4: GL.GL_RGBA}[channels]
+    GL.glTextureSubImage2D(
+        texture, 0, 0, 0, width, height, kind, GL.GL_UNSIGNED_BYTE, np.ascontiguousarray(content).reshape(-1)
+    )
+    if channels == 1:
+        for swizzle in (GL.GL_TEXTURE_SWIZZLE_G, GL.GL_TEXTURE_SWIZZLE_B):
+            GL.glTextureParameteri(texture, swizzle, GL.GL_RED)
+    GL.glTextureParameteri(texture, GL.GL_TEXTURE_MIN_FILTER, GL.GL_LINEAR_MIPMAP_LINEAR)
+    GL.glGenerateTextureMipmap(texture)
+    return texture
+
+
+def cube(levels: tuple[npt.NDArray[Any], ...]) -> int:
+    """A cube texture of (6, n, n, 3) levels, linear floats."""
+    texture = _texture(GL.GL_TEXTURE_CUBE_MAP)
+    size = levels[0].shape[1]
+    GL.glTextureStorage2D(texture, len(levels), GL.GL_RGBA16F, size, size)
+    for level, faces in enumerate(levels):
+        side = faces.shape[1]
+        content = np.ascontiguousarray(faces, np.float32)
+        GL.glTextureSubImage3D(texture, level, 0, 0, 0, side, side, 6, GL.GL_RGB, GL.GL_FLOAT, content)
+    smooth = GL.GL_LINEAR_MIPMAP_LINEAR if len(levels) > 1 else GL.GL_LINEAR
+    GL.glTextureParameteri(texture, GL.GL_TEXTURE_MIN_FILTER, smooth)
+    return texture
+
+
+def table(content: npt.NDArray[Any]) -> int:
+    """A texture of (H, W, 2) numbers that is filtered between its cells and clamped at its borders."""
+    height, width = content.shape[:2]
+    texture = _texture(GL.GL_TEXTURE_2D)
+    GL.glTextureStorage2D(texture, 1, GL.GL_RG16F, width, height)
+    values = np.ascontiguousarray(content, np.float32)
+    GL.glTextureSubImage2D(texture, 0, 0, 0, width, height, GL.GL_RG, GL.GL_FLOAT, values)
+    for name, value in (
+        (GL.GL_TEXTURE_MIN_FILTER, GL.GL_LINEAR),
+        (GL.GL_TEXTURE_WRAP_S, GL.GL_CLAMP_TO_EDGE),
+        (GL.GL_TEXTURE_WRAP_T, GL.GL_CLAMP_TO_EDGE),
+    ):
+        GL.glTextureParameteri(texture, name, value)
+    return texture
+
+
+def shadow_maps(size: int, count: int) -> int:
+    """An array of depth textures that are compared with when they are looked up; beyond their borders all is lit."""
+    texture = _texture(GL.GL_TEXTURE_2D_ARRAY)
+    GL.glTextureStorage3D(texture, 1, GL.GL_DEPTH_COMPONENT32F, size, size, count)
+    for name, value in (
+        (GL.GL_TEXTURE_MIN_FILTER, GL.GL_LINEAR),
+        (GL.GL_TEXTURE_MAG_FILTER, GL.GL_LINEAR),
+        (GL.GL_TEXTURE_WRAP_S, GL.GL_CLAMP_TO_BORDER),
+        (GL.GL_TEXTURE_WRAP_T, GL.GL_CLAMP_TO_BORDER),
+        (GL.GL_TEXTURE_COMPARE_MODE, GL.GL_COMPARE_REF_TO_TEXTURE),
+        (GL.GL_TEXTURE_COMPARE_FUNC, GL.GL_LEQUAL),
+    ):
+        GL.glTextureParameteri(texture, name, value)
+    GL.glTextureParameterfv(texture, GL.GL_TEXTURE_BORDER_COLOR, np.ones(4, np.float32))
+    return texture
+
+
+def free_textures(textures: list[int]) -> None:
+    """Lets textures go."""
+    GL.glDeleteTextures(len(textures), np.array(textures, np.uint32))
+
+
+def _plain_texture(width: int, height: int, kept_as: int) -> int:
+    texture = _texture(GL.GL_TEXTURE_2D)
+    GL.glTextureStorage2D(texture, 1, kept_as, width, height)
+    for name in (GL.GL_TEXTURE_MIN_FILTER, GL.GL_TEXTURE_MAG_FILTER):
+        GL.glTextureParameteri(texture, name, GL.GL_NEAREST)
+    return texture
+
+
+def _texture(kind: int) -> int:
+    texture = np.zeros(1, np.uint32)
+    GL.glCreateTextures(kind, 1, texture)
+    return int(texture[0])
+
+
+def _source(name: str) -> str:
+    return files("gear.render.raster").joinpath(f"{name}.glsl").read_text("utf-8")
+
+
+def _text(log: bytes | str) -> str:
+    return log.decode("utf-8", "replace").strip() if isinstance(log, bytes) else log.strip()

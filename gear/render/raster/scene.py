@@ -1,0 +1,205 @@
+"""A model on the device: its triangles, pictures and lights, and how parts of it are drawn."""
+
+from __future__ import annotations
+
+import ctypes
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+from OpenGL import GL  # type: ignore[import-untyped]
+
+from gear.contracts.rendering import Stage
+from gear.render.culling import Mask
+from gear.render.raster import device
+from gear.render.raster.geometry import COMMAND, VERTEX, Geometry, geometry_of
+from gear.render.raster.lights import MOST_LIGHTS, Environment, Lamps, environment_of
+from gear.render.raster.looks import ROLES, looks_of
+from gear.render.raster.pictures import Pictures, linear_cubes, sky_of
+from gear.render.raster.shadow_squares import Maps
+from gear.render.raster.split_sum import mirrored_shares
+from gear.values.geometry import Array
+
+Selection = npt.NDArray[np.intp]
+
+_SEEN_GROUPS, _LANDMARKS = 3, 24
+_MIRRORED_UNIT, _SHARES_UNIT = 5, 7
+_GEOM = np.dtype([("camera_from_geom", "<f4", (3, 4)), ("colour", "<f4", 4), ("surface", "<f4", 4)])
+_FRAME = np.dtype(
+    [
+        ("shadow_from_camera", "<f4", (3, 4, 4)),
+        ("forward", "<f4", 4),
+        ("shadow_end_m", "<f4", 4),
+        ("shadow_texel_m", "<f4", 4),
+        ("irradiance", "<f4", (4, 4)),
+        ("towards_light", "<f4", (MOST_LIGHTS, 4)),
+        ("light", "<f4", (MOST_LIGHTS, 4)),
+        ("environment", "<f4", 4),
+    ]
+)
+_FROM_CLIP = np.array([[0.5, 0, 0, 0.5], [0, -0.5, 0, 0.5], [0, 0, 1, 0], [0, 0, 0, 1]])
+
+
+class Scene:
+    """What of a model lies on the device of the current context."""
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        """Uploads a model."""
+        self._looks = looks_of(model)
+        drawn = (model.geom_group < _SEEN_GROUPS) & ~self._looks.is_clear
+        geometry = geometry_of(model, drawn)
+        self._commands = geometry.commands
+        self._drawn: Mask = drawn & (geometry.commands["count"] > 0)
+        self._vertex_array = _vertex_array(geometry, model.ngeom)
+        GL.glBindVertexArray(self._vertex_array)
+        self._landmarks_m = _landmarks(geometry, self._drawn)
+        self._pictures = Pictures(model, np.unique(self._looks.textures[self._drawn]).tolist())
+        self._batch_of_geom = np.unique(self._looks.textures, axis=0, return_inverse=True)[1].reshape(-1)
+        self._face_of_geom: dict[int, int] = {}
+        cubes = linear_cubes(model)
+        self._environment: Environment = environment_of(model, cubes)
+        self._mirrored = device.cube(self._environment.levels or (np.zeros((6, 1, 1, 3)),))
+        self._shares = device.table(mirrored_shares())
+        sky = sky_of(model)
+        self.sky = 0 if sky is None or sky not in cubes else device.cube((cubes[sky],))
+        self._geoms = device.Stream(GL.GL_SHADER_STORAGE_BUFFER)
+        self._frame = device.Stream(GL.GL_UNIFORM_BUFFER)
+        self._draws = device.Stream(GL.GL_DRAW_INDIRECT_BUFFER)
+        self._surfaces: dict[tuple[str, ...], device.Program] = {}
+
+    def dress(self, stage: Stage) -> None:
+        """Puts faces on, and takes off those of the last stage."""
+        self._face_of_geom = self._pictures.faces(stage.faces)
+
+    def pose(self, stage: Stage, camera_m: Array) -> None:
+        """Puts everything where the stage has it, in its colours, seen from a place in the world."""
+        geoms = np.zeros(stage.model.ngeom, _GEOM)
+        geoms["camera_from_geom"][..., :3] = stage.data.geom_xmat.reshape(-1, 3, 3)
+        geoms["camera_from_geom"][..., 3] = stage.data.geom_xpos - camera_m
+        geoms["colour"][:, :3] = self._looks.albedo
+        geoms["surface"] = self._looks.surface
+        for geom, rgb in stage.paint_rgb.items():
+            geoms["colour"][geom, :3] = rgb
+        for geom in stage.faces:
+            geoms["colour"][geom, :3] = 1.0
+        self._geoms.fill(geoms)
+        GL.glBindBufferBase(GL.GL_SHADER_STORAGE_BUFFER, 0, self._geoms.handle)
+
+    def light(self, lamps: Lamps, maps: Maps | None, camera_m: Array, forward: Array) -> None:
+        """Lights it for a camera.
+
+        Args:
+            lamps: all lights but the sky.
+            maps: of the first lamp's shadows, if it throws any.
+            camera_m: (3,) where the camera stands in the world.
+            forward: (3,) where it looks.
+        """
+        frame = np.zeros(1, _FRAME)
+        if maps is not None:
+            frame["shadow_from_camera"][0] = (_FROM_CLIP @ maps.map_from_camera).swapaxes(1, 2)
+            frame["shadow_end_m"][0, :2] = maps.end_m
+            frame["shadow_end_m"][0, 3] = 1.0
+            frame["shadow_texel_m"][0, :3] = maps.texel_m
+        frame["forward"][0, :3] = forward
+        frame["irradiance"][0, :, :3] = self._environment.irradiance
+        count = len(lamps.light)
+        frame["towards_light"][0, :count] = lamps.towards
+        frame["towards_light"][0, :count, :3] -= lamps.towards[:, 3:] * camera_m
+        frame["light"][0, :count, :3] = lamps.light
+        frame["light"][0, :, 3] = count
+        frame["environment"][0, :2] = (max(len(self._environment.levels) - 1, 0), bool(self._environment.levels))
+        self._frame.fill(frame)
+        GL.glBindBufferBase(GL.GL_UNIFORM_BUFFER, 0, self._frame.handle)
+        GL.glBindTextureUnit(_MIRRORED_UNIT, self._mirrored)
+        GL.glBindTextureUnit(_SHARES_UNIT, self._shares)
+
+    def near_to_far(self, chosen: Mask, depth_m: Array) -> Selection:
+        """Those of the chosen geoms that are drawn, by what lies nearest of them."""
+        selection = np.flatnonzero(self._drawn & chosen)
+        return np.asarray(selection[np.argsort(depth_m[selection], kind="stable")])
+
+    def landmarks(self, stage: Stage, chosen: Mask) -> Array:
+        """(N, 3) places in the world of some vertices of the chosen geoms that are drawn; the origin for none."""
+        places = [
+            marks_m @ stage.data.geom_xmat[geom].reshape(3, 3).T + stage.data.geom_xpos[geom]
+            for geom, marks_m in self._landmarks_m.items()
+            if chosen[geom]
+        ]
+        return np.concatenate(places or [np.zeros((1, 3))])
+
+    def draw(self, selection: Selection) -> None:
+        """Draws geoms with the current program, as shapes alone."""
+        self._submit([(selection, None)])
+
+    def draw_surfaces(self, selection: Selection, matrix: Array, flags: tuple[str, ...]) -> None:
+        """Draws geoms as they look.
+
+        Args:
+            selection: which, in this order within each kind of material.
+            matrix: (4, 4) to the picture from places relative to the camera.
+            flags: for all of the shaders.
+        """
+        faced = np.isin(selection, list(self._face_of_geom))
+        plain = selection[~faced]
+        batches = self._batch_of_geom[plain]
+        groups = [plain[batches == batch] for batch in dict.fromkeys(batches.tolist())]
+        groups += [selection[index : index + 1] for index in np.flatnonzero(faced)]
+        self._submit([(group, (matrix, flags)) for group in groups])
+
+    def _submit(self, groups: list[tuple[Selection, tuple[Array, tuple[str, ...]] | None]]) -> None:
+        """One draw a group, out of one buffer of commands."""
+        if not any(len(group) for group, _ in groups):
+            return
+        self._draws.fill(self._commands[np.concatenate([group for group, _ in groups])])
+        begin = 0
+        for group, look in groups:
+            if look is not None:
+                self._wear(int(group[0]), *look)
+            offset = ctypes.c_void_p(begin * COMMAND.itemsize)
+            GL.glMultiDrawElementsIndirect(GL.GL_TRIANGLES, GL.GL_UNSIGNED_INT, offset, len(group), COMMAND.itemsize)
+            begin += len(group)
+
+    def _wear(self, geom: int, matrix: Array, flags: tuple[str, ...]) -> None:
+        """Makes the program and the pictures of a geom's material current."""
+        pictures = [self._pictures.of(texture) for texture in self._looks.textures[geom].tolist()]
+        pictures[0] = self._face_of_geom.get(geom, pictures[0])
+        for unit, picture in enumerate(pictures):
+            if picture:
+                GL.glBindTextureUnit(unit, picture)
+        key = (*(flag for flag, picture in zip(ROLES, pictures, strict=True) if picture), *flags)
+        if key not in self._surfaces:
+            self._surfaces[key] = device.Program("surface.vert", "surface.frag", key)
+        self._surfaces[key].use(clip_from_place=matrix)
+
+
+def _landmarks(geometry: Geometry, drawn: Mask) -> dict[int, Array]:
+    """(n, 3) a few vertices of each geom that is drawn, in its frame."""
+    marks = {}
+    for geom in np.flatnonzero(drawn).tolist():
+        command = geometry.commands[geom]
+        some = np.unique(np.linspace(0, int(command["count"]) - 1, _LANDMARKS).astype(np.int64))
+        chosen = int(command["base"]) + geometry.indices[int(command["first"]) + some].astype(np.int64)
+        marks[geom] = geometry.vertices["position_m"][chosen].astype(np.float64)
+    return marks
+
+
+def _vertex_array(geometry: Geometry, geoms: int) -> int:
+    """Vertices with their indices, and geom ids as what comes once a draw."""
+    array = np.zeros(1, np.uint32)
+    GL.glCreateVertexArrays(1, array)
+    handle = int(array[0])
+    GL.glVertexArrayVertexBuffer(handle, 0, device.buffer_of(geometry.vertices), 0, VERTEX.itemsize)
+    GL.glVertexArrayVertexBuffer(handle, 1, device.buffer_of(np.arange(geoms, dtype=np.uint32)), 0, 4)
+    GL.glVertexArrayElementBuffer(handle, device.buffer_of(geometry.indices))
+    for place, (name, count, kind) in enumerate(
+        (("position_m", 3, GL.GL_FLOAT), ("normal", 3, GL.GL_SHORT), ("texcoord", 2, GL.GL_FLOAT))
+    ):
+        _, offset = VERTEX.fields[name][:2]  # type: ignore[index]
+        GL.glEnableVertexArrayAttrib(handle, place)
+        GL.glVertexArrayAttribFormat(handle, place, count, kind, kind == GL.GL_SHORT, offset)
+        GL.glVertexArrayAttribBinding(handle, place, 0)
+    GL.glEnableVertexArrayAttrib(handle, 3)
+    GL.glVertexArrayAttribIFormat(handle, 3, 1, GL.GL_UNSIGNED_INT, 0)
+    GL.glVertexArrayAttribBinding(handle, 3, 1)
+    GL.glVertexArrayBindingDivisor(handle, 1, 1)
+    return handle

@@ -1,0 +1,103 @@
+"""Where shadows of the sun are looked for: squares across its light."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from gear.render.pinhole import NEAR_M, Frustum
+from gear.values.geometry import Array
+
+ENDS_M = (40.0, 160.0)
+"""How far along the view two maps reach: one of everything, one of what moves."""
+
+TOWARDS_SUN_M = 600.0
+"""How far towards the sun a map tells depths apart; what stands farther away throws its shadow all the same."""
+
+_WIDEST_M = 500.0
+_OUTLIERS = 0.02
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Square:
+    """What a square map shows.
+
+    Attributes:
+        centre_m: (3,) of what it shows.
+        axes: (3, 3) rows: two directions across the sun's light, and towards the sun.
+        half_side_m: of the square.
+    """
+
+    centre_m: Array
+    axes: Array
+    half_side_m: float
+
+    def matrix(self, origin_m: Array) -> Array:
+        """(4, 4) from places relative to an origin to -1..1 across the map and 0..1 away from the sun.
+
+        Args:
+            origin_m: (3,) in the frame of the centre.
+        """
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = self.axes, -self.axes @ (self.centre_m - origin_m)
+        reach_m = TOWARDS_SUN_M + self.half_side_m
+        depth_m = reach_m + self.half_side_m
+        scale = np.diag([1 / self.half_side_m, 1 / self.half_side_m, -1 / depth_m, 1.0])
+        scale[2, 3] = reach_m / depth_m
+        return np.asarray(scale @ matrix)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Maps:
+    """What shaders have to know of the maps: of everything near, of what moves, of the town.
+
+    Attributes:
+        map_from_camera: (3, 4, 4) from places relative to the camera.
+        texel_m: (3,) sides of texels.
+        end_m: (2,) how far along the view the first two reach.
+    """
+
+    map_from_camera: Array
+    texel_m: Array
+    end_m: Array
+
+
+def squares_before(frustum: Frustum, towards_sun: Array) -> tuple[Square, ...]:
+    """Squares that hold whatever the frustum shows up to each of `ENDS_M`, whichever way the sun stands.
+
+    Args:
+        frustum: who looks.
+        towards_sun: (3,) unit vector in the world's axes.
+    """
+    axes = _axes(towards_sun)
+    made = []
+    begin_m = NEAR_M
+    slope2 = (frustum.half_width_m**2 + frustum.half_height_m**2) / NEAR_M**2
+    for end_m in ENDS_M:
+        # The smallest sphere about the part of the view between its two distances.
+        middle_m = min((begin_m + end_m) / 2 * (1 + slope2), end_m)
+        half_side_m = math.sqrt((end_m - middle_m) ** 2 + slope2 * end_m**2)
+        made.append(Square(frustum.position_world_m + frustum.forward_world * middle_m, axes, half_side_m))
+        begin_m = end_m
+    return tuple(made)
+
+
+def square_about(points_m: Array, towards_sun: Array) -> Square:
+    """A square over a whole town, but for what lies far outside.
+
+    Args:
+        points_m: (N, 3) some of its vertices.
+        towards_sun: (3,) unit vector in the world's axes.
+    """
+    axes = _axes(towards_sun)
+    low, high = np.quantile(points_m @ axes.T, (_OUTLIERS, 1 - _OUTLIERS), axis=0)
+    half_side_m = float(np.clip(((high - low)[:2] / 2).max(), 1.0, _WIDEST_M))
+    return Square((low + high) / 2 @ axes, axes, half_side_m)
+
+
+def _axes(towards_sun: Array) -> Array:
+    aside = np.cross((0.0, 0.0, 1.0) if abs(towards_sun[2]) < 0.99 else (0.0, 1.0, 0.0), towards_sun)
+    aside /= np.linalg.norm(aside)
+    return np.stack([aside, np.cross(towards_sun, aside), towards_sun])

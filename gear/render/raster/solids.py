@@ -1,0 +1,160 @@
+"""MuJoCo's primitive shapes as triangles, in the frames of their geoms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from gear.render.pinhole import FAR_M
+from gear.values.geometry import Array
+
+_AROUND, _UPWARDS = 48, 24
+_BOX_TEXTURE = ((1, 2), (0, 2), (0, 1))
+"""Along which axis u grows, and against which v does, on the sides of a box that look along x, y, z: as MuJoCo has it,
+on opposite sides the same."""
+
+_GEOM = mujoco.mjtGeom
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Triangles:
+    """An indexed surface.
+
+    Attributes:
+        positions_m, normals: (V, 3) each, the latter of unit length.
+        texcoords: (V, 2), v grows downwards.
+        corners: (T, 3) rows of the former, counter-clockwise from outside.
+    """
+
+    positions_m: Array
+    normals: Array
+    texcoords: Array
+    corners: npt.NDArray[np.int64]
+
+
+def solid(kind: int, size_m: Array) -> Triangles:
+    """A primitive of MuJoCo's.
+
+    Args:
+        kind: an `mjtGeom`: plane, sphere, capsule, ellipsoid, cylinder or box.
+        size_m: (3,) as `geom_size`.
+
+    Raises:
+        ValueError: it is no such shape.
+    """
+    x, y, z = (float(value) for value in size_m)
+    if kind == _GEOM.mjGEOM_PLANE:
+        return _sheet(x or FAR_M, y or FAR_M)
+    if kind == _GEOM.mjGEOM_BOX:
+        return _box(np.array([x, y, z]))
+    if kind == _GEOM.mjGEOM_SPHERE:
+        return _turned(_arc(x, 0.0), np.array([1.0, 1.0, 1.0]))
+    if kind == _GEOM.mjGEOM_ELLIPSOID:
+        return _turned(_arc(1.0, 0.0), np.array([x, y, z]))
+    if kind == _GEOM.mjGEOM_CAPSULE:
+        return _turned(_arc(x, y), np.array([1.0, 1.0, 1.0]))
+    if kind == _GEOM.mjGEOM_CYLINDER:
+        return _cylinder(x, y)
+    raise ValueError(f"no primitive shape: {_GEOM(kind).name}")
+
+
+def height_field(model: mujoco.MjModel, index: int) -> Triangles:
+    """The upper surface of a height field."""
+    rows, columns = int(model.hfield_nrow[index]), int(model.hfield_ncol[index])
+    radius_x, radius_y, top, _ = model.hfield_size[index].tolist()
+    begin = int(model.hfield_adr[index])
+    height = top * model.hfield_data[begin : begin + rows * columns].reshape(rows, columns).astype(np.float64)
+    across, up = np.linspace(-1, 1, columns), np.linspace(-1, 1, rows)
+    u, v = np.meshgrid(across, up)
+    positions = np.stack([u * radius_x, v * radius_y, height], axis=-1)
+    rise_y, rise_x = np.gradient(height, up * radius_y, across * radius_x)
+    normals = np.stack([-rise_x, -rise_y, np.ones_like(height)], axis=-1)
+    return _grid(positions, normals / np.linalg.norm(normals, axis=-1, keepdims=True))
+
+
+def _sheet(half_x_m: float, half_y_m: float) -> Triangles:
+    u, v = np.meshgrid([-1.0, 1.0], [-1.0, 1.0])
+    positions = np.stack([u * half_x_m, v * half_y_m, np.zeros_like(u)], axis=-1)
+    return _grid(positions, np.broadcast_to([0.0, 0.0, 1.0], positions.shape))
+
+
+def _box(half_m: Array) -> Triangles:
+    parts = []
+    for axis in range(3):
+        for sign in (-1.0, 1.0):
+            right, up = (axis + 1) % 3, (axis + 2) % 3
+            u, v = np.meshgrid([-1.0, 1.0], [-1.0, 1.0])
+            positions = np.empty((2, 2, 3))
+            positions[..., axis], positions[..., right], positions[..., up] = sign, sign * u, v
+            normals = np.zeros((2, 2, 3))
+            normals[..., axis] = sign
+            across, down = _BOX_TEXTURE[axis]
+            texcoords = np.stack([1 + positions[..., across], 1 - positions[..., down]], axis=-1) / 2
+            parts.append(replace(_grid(positions * half_m, normals), texcoords=texcoords.reshape(-1, 2)))
+    return _joined(parts)
+
+
+def _arc(radius_m: float, half_length_m: float) -> tuple[Array, Array]:
+    """Profile of a capsule: (N, 2) radius and height from the lower pole to the upper one, and its normals."""
+    angle = np.linspace(-np.pi / 2, np.pi / 2, _UPWARDS + 1)
+    normals = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    if half_length_m:
+        normals = np.insert(normals, _UPWARDS // 2, (1.0, 0.0), axis=0)
+    shift = np.zeros((len(normals), 2))
+    shift[:, 1] = half_length_m * np.where(np.arange(len(normals)) <= _UPWARDS // 2, -1.0, 1.0)
+    return radius_m * normals + shift, normals
+
+
+def _turned(profile: tuple[Array, Array], scale: Array) -> Triangles:
+    """A profile turned about z, then stretched."""
+    points, slopes = profile
+    around = np.linspace(0, 2 * np.pi, _AROUND + 1)
+    cosine, sine = np.cos(around), np.sin(around)
+    positions, normals = (
+        np.stack(
+            [each[:, :1] * cosine, each[:, :1] * sine, np.broadcast_to(each[:, 1:], (len(each), len(around)))], axis=-1
+        )
+        for each in (points, slopes)
+    )
+    normals = normals / scale
+    return _grid(positions * scale, normals / np.linalg.norm(normals, axis=-1, keepdims=True))
+
+
+def _cylinder(radius_m: float, half_length_m: float) -> Triangles:
+    level, outwards = np.array([0.0, 1.0]), np.array([1.0, 0.0])
+    rims = np.array([[radius_m, -half_length_m], [radius_m, half_length_m]])
+    one = np.ones(3)
+    side = _turned((rims, np.stack([outwards, outwards])), one)
+    caps = [
+        _turned((np.array([[0.0, -half_length_m], rims[0]]), np.stack([-level, -level])), one),
+        _turned((np.array([rims[1], [0.0, half_length_m]]), np.stack([level, level])), one),
+    ]
+    return _joined([side, *caps])
+
+
+def _grid(positions_m: Array, normals: Array) -> Triangles:
+    """(rows, columns, 3) points, columns to the right and rows upwards seen from outside."""
+    rows, columns = positions_m.shape[:2]
+    u, v = np.meshgrid(np.linspace(0, 1, columns), np.linspace(1, 0, rows))
+    first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).reshape(-1)
+    lower = np.stack([first, first + 1, first + columns + 1], axis=-1)
+    upper = np.stack([first, first + columns + 1, first + columns], axis=-1)
+    return Triangles(
+        positions_m=positions_m.reshape(-1, 3),
+        normals=np.asarray(normals).reshape(-1, 3),
+        texcoords=np.stack([u, v], axis=-1).reshape(-1, 2),
+        corners=np.concatenate([lower, upper]),
+    )
+
+
+def _joined(parts: list[Triangles]) -> Triangles:
+    starts = np.cumsum([0, *(len(part.positions_m) for part in parts)])
+    return Triangles(
+        positions_m=np.concatenate([part.positions_m for part in parts]),
+        normals=np.concatenate([part.normals for part in parts]),
+        texcoords=np.concatenate([part.texcoords for part in parts]),
+        corners=np.concatenate([part.corners + start for part, start in zip(parts, starts, strict=False)]),
+    )

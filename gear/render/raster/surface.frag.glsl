@@ -1,0 +1,131 @@
+// Light on a surface: Lambert's diffuse and the GGX specular term of Walter et al. (2007) with Smith's height-correlated
+// visibility in Hammon's form (2017) and Schlick's Fresnel term; light from the sky by its irradiance and by a mirrored
+// picture, split as by Karis (2013).
+
+in vec3 place_m;
+in vec3 smooth_normal;
+in vec3 tangent;
+in vec2 uv;
+flat in int id;
+flat in vec3 albedo;
+flat in vec4 surface;
+
+layout(binding = 0) uniform sampler2D base_map;
+layout(binding = 1) uniform sampler2D normal_map;
+layout(binding = 2) uniform sampler2D orm_map;
+layout(binding = 3) uniform sampler2D emissive_map;
+layout(binding = 4) uniform sampler2DArrayShadow near_shadows;
+layout(binding = 5) uniform samplerCube mirrored;
+layout(binding = 6) uniform isampler2D seen_id;
+layout(binding = 7) uniform sampler2D mirrored_shares;
+layout(binding = 8) uniform sampler2DArrayShadow town_shadows;
+
+layout(location = 0) out vec4 radiance;
+
+const float PI = 3.14159265358979;
+
+vec3 on_map(int map, vec3 facing) {
+    vec3 lifted = place_m + facing * 1.5 * shadow_texel_m[map];
+    vec3 at = (shadow_from_camera[map] * vec4(lifted, 1.0)).xyz;
+    at.z = min(at.z, 1.0); // what lies beyond a map is as far as what the map shows nothing of
+    return at;
+}
+
+float lit_near(int map, vec3 at, vec2 aside) {
+    return texture(near_shadows, vec4(at.xy + aside, map, at.z));
+}
+
+float lit_by_sun(vec3 facing) {
+    if (shadow_end_m.w == 0.0) return 1.0;
+    float ahead_m = dot(forward.xyz, place_m);
+    if (ahead_m < shadow_end_m.x) {
+        // Bilinear looks at the corners of a square blur an edge over three texels.
+        vec3 at = on_map(0, facing);
+        vec2 step = 0.75 / vec2(textureSize(near_shadows, 0).xy);
+#ifdef MANY_SAMPLES
+        // Two of them a sample, by turns the ones and the others: a pixel's four samples have all of them twice.
+        ivec2 odd = ivec2(gl_FragCoord.xy) & 1;
+        if (odd.x != odd.y) step.y = -step.y;
+        return 0.5 * (lit_near(0, at, step) + lit_near(0, at, -step));
+#else
+        vec2 other = vec2(step.x, -step.y);
+        float lit = lit_near(0, at, step) + lit_near(0, at, -step) + lit_near(0, at, other) + lit_near(0, at, -other);
+        return 0.25 * lit;
+#endif
+    }
+    vec3 at = on_map(2, facing);
+    float lit = texture(town_shadows, vec4(at.xy, 0, at.z));
+    if (ahead_m < shadow_end_m.y) {
+        at = on_map(1, facing);
+        lit = min(lit, lit_near(1, at, vec2(0.0)));
+    }
+    return lit;
+}
+
+vec3 from_sky(vec3 n) {
+    return max(irradiance[0].rgb + mat3(irradiance[1].rgb, irradiance[2].rgb, irradiance[3].rgb) * n, 0.0);
+}
+
+void main() {
+    vec3 base = albedo;
+    float roughness = surface.x, metallic = surface.y, open = 1.0;
+#ifdef HAS_BASE
+    base *= texture(base_map, uv).rgb;
+#endif
+#ifdef HAS_ORM
+    vec3 orm = texture(orm_map, uv).rgb;
+    open = orm.r;
+    roughness *= orm.g;
+    metallic *= orm.b;
+#endif
+    vec3 facing = normalize(smooth_normal);
+    vec3 n = facing;
+#ifdef HAS_NORMAL
+    vec3 t = normalize(tangent);
+    vec3 relief = texture(normal_map, uv).xyz * 2.0 - 1.0;
+    n = normalize(t * relief.x + cross(t, n) * relief.y + n * relief.z);
+#endif
+    vec3 v = -normalize(place_m);
+    float nv = max(dot(n, v), 1e-4);
+    roughness = max(roughness, 0.045);
+    float alpha = roughness * roughness;
+    vec3 f0 = mix(vec3(surface.w), base, metallic);
+    vec3 diffuse = base * (1.0 - metallic);
+
+    vec2 share = textureLod(mirrored_shares, vec2(nv, roughness), 0.0).rg;
+    vec3 mirrored_share = f0 * share.x + share.y;
+    // What is lost to light that meets several facets (Turquin 2019) comes back, and what is mirrored is not scattered.
+    vec3 regained = 1.0 + f0 * (1.0 / (share.x + share.y) - 1.0);
+    vec3 r = mix(reflect(-v, n), n, alpha * alpha); // wide lobes lean towards the normal (Lagarde 2014)
+    float blur = environment.x * roughness * (2.0 - roughness);
+    vec3 mirror = environment.y * textureLod(mirrored, vec3(r.x, r.z, -r.y), blur).rgb;
+    vec3 sum = (diffuse * from_sky(n) * (1.0 - mirrored_share) + mirror * mirrored_share * regained) * open;
+
+    for (int i = 0; i < int(light[0].w); ++i) {
+        vec3 l = towards_light[i].xyz;
+        vec3 arriving = light[i].rgb;
+        if (towards_light[i].w > 0.0) {
+            l -= place_m;
+            arriving /= max(dot(l, l), 1e-4);
+            l = normalize(l);
+        }
+        float nl = dot(n, l);
+        if (nl <= 0.0) continue;
+        float lit = i == 0 ? lit_by_sun(facing) : 1.0;
+        vec3 h = normalize(v + l);
+        float nh = clamp(dot(n, h), 0.0, 1.0), k = nh * alpha;
+        float d = alpha / (1.0 - nh * nh + k * k);
+        float grazing = 1.0 - clamp(dot(l, h), 0.0, 1.0), g2 = grazing * grazing;
+        vec3 fresnel = f0 + (1.0 - f0) * (g2 * g2 * grazing);
+        float visibility = 0.5 / mix(2.0 * nl * nv, nl + nv, alpha);
+        sum += (diffuse / PI + (d * d / PI) * visibility * fresnel * regained) * arriving * (nl * lit);
+    }
+#ifdef HAS_EMISSIVE
+    sum += texture(emissive_map, uv).rgb * surface.z;
+#else
+    sum += base * surface.z;
+#endif
+    // Of two surfaces at the very same depth the ids decide. Last, so that neighbours have told how fine the maps are.
+    if (texelFetch(seen_id, ivec2(gl_FragCoord.xy), 0).r != id) discard;
+    radiance = vec4(min(sum, 1.0), 1.0);
+}

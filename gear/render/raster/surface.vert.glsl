@@ -1,0 +1,32 @@
+// Geoms as they look.
+
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec3 normal;
+layout(location = 2) in vec2 texcoord;
+layout(location = 3) in uint geom;
+
+uniform mat4 clip_from_place;
+out vec3 place_m;
+out vec3 smooth_normal;
+out vec3 tangent;
+out vec2 uv;
+flat out int id;
+flat out vec3 albedo; // a geom's own: looked up once a triangle, not once a sample
+flat out vec4 surface;
+invariant gl_Position;
+
+void main() {
+    id = int(geom);
+    albedo = geoms[geom].colour.rgb;
+    surface = geoms[geom].surface;
+    uv = texcoord;
+    place_m = place(geom, position);
+    smooth_normal = turn(geom, normal);
+#ifdef HAS_NORMAL
+    // As Filament makes it of a normal alone; gear.world.relief turns meshes and maps for it.
+    float share = 1.0 / max(1.0 + normal.y, 1e-6);
+    vec3 red = vec3(-normal.x * normal.z * share, -normal.z, 1.0 - normal.z * normal.z * share);
+    tangent = turn(geom, 1.0 + normal.y < 1e-6 ? vec3(-1.0, 0.0, 0.0) : red);
+#endif
+    gl_Position = clip_from_place * vec4(place_m, 1.0);
+}

@@ -1,0 +1,338 @@
+"""What is particular to the raster renderer: its shapes, its light, and that it shows what Filament shows."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import subprocess
+import sys
+
+import mujoco
+import numpy as np
+import pytest
+
+from gear.camera import response_for
+from gear.contracts.rendering import Quality, Renderer, Stage
+from gear.render import open_renderer
+from gear.render.pinhole import Frustum
+from gear.render.raster.cubes import mirrored_levels
+from gear.render.raster.lights import irradiance_over_pi, lamps_of
+from gear.render.raster.shadow_squares import ENDS_M, square_about, squares_before
+from gear.render.raster.solids import Triangles, height_field, solid
+from gear.render.raster.split_sum import mirrored_shares
+from gear.values.geometry import RigidTransform
+from gear.values.scene import CameraRecord, Pose
+from gear.world.quiet_mjcf import mjcf
+from gear.world.weather import PRESETS, apply_weather
+from tests.render.conftest import STREET, camera, posed
+
+GEOM = mujoco.mjtGeom
+VOLUMES = {
+    (GEOM.mjGEOM_BOX, (1.0, 2.0, 3.0)): 48.0,
+    (GEOM.mjGEOM_SPHERE, (1.5, 0.0, 0.0)): 4 / 3 * math.pi * 1.5**3,
+    (GEOM.mjGEOM_ELLIPSOID, (1.0, 2.0, 0.5)): 4 / 3 * math.pi,
+    (GEOM.mjGEOM_CYLINDER, (0.5, 2.0, 0.0)): math.pi,
+    (GEOM.mjGEOM_CAPSULE, (0.5, 2.0, 0.0)): math.pi + 4 / 3 * math.pi * 0.125,
+}
+
+
+def outwards(shape: Triangles) -> np.ndarray:
+    """(T, 3) normals of triangles by the order of their corners, as long as twice their areas."""
+    corners = shape.positions_m[shape.corners]
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+@pytest.mark.parametrize(("kind", "size"), VOLUMES)
+def test_a_solid_is_closed_and_looks_outwards(kind: mujoco.mjtGeom, size: tuple[float, ...]) -> None:
+    shape = solid(int(kind), np.array(size))
+    across = outwards(shape)
+    volume = np.einsum("ij,ij->", shape.positions_m[shape.corners[:, 0]], across) / 6
+    assert volume == pytest.approx(VOLUMES[kind, size], rel=0.03)
+    assert np.abs(across.sum(axis=0)).max() < 1e-9, "a hole"
+    lean = np.einsum("ij,ij->i", across, shape.normals[shape.corners].mean(axis=1))
+    assert (lean[np.linalg.norm(across, axis=1) > 1e-9] > 0).all()
+    assert np.allclose(np.linalg.norm(shape.normals, axis=1), 1)
+    assert (shape.texcoords >= 0).all() and (shape.texcoords <= 1).all()
+
+
+def test_a_height_field_lies_where_rays_find_it() -> None:
+    xml = (
+        '<mujoco><asset><hfield name="h" nrow="5" ncol="7" size="3 2 1 0.1" '
+        f'elevation="{" ".join(str((3 * k) % 11) for k in range(35))}"/></asset>'
+        '<worldbody><geom type="hfield" hfield="h"/></worldbody></mujoco>'
+    )
+    model = mujoco.MjModel.from_xml_string(xml)
+    shape = height_field(model, 0)
+    assert (outwards(shape)[:, 2] > 0).all() and (shape.normals[:, 2] > 0).all()
+    stage = Stage(model=model, data=posed(model))
+    for middle in shape.positions_m[shape.corners].mean(axis=1)[::5]:
+        hit = np.zeros(1, np.int32)
+        down = np.array([0.0, 0.0, -1.0])
+        distance = mujoco.mj_ray(model, stage.data, middle - 5 * down, down, None, 1, -1, hit)
+        assert distance == pytest.approx(5, abs=0.35), "cells may be cut along either diagonal"
+
+
+def test_what_is_no_solid_is_refused() -> None:
+    with pytest.raises(ValueError, match="mjGEOM_MESH"):
+        solid(int(GEOM.mjGEOM_MESH), np.ones(3))
+
+
+def test_an_even_light_comes_from_everywhere_alike() -> None:
+    light = irradiance_over_pi(np.full((6, 32, 32, 3), 0.3))
+    assert np.allclose(light[0], 0.3) and np.allclose(light[1:], 0)
+    bright_top = np.zeros((6, 32, 32, 3))
+    bright_top[2] = 1.0
+    light = irradiance_over_pi(bright_top)
+    assert np.allclose(light[[1, 2]], 0) and (light[3] > 0.1).all()
+    north = np.zeros((6, 32, 32, 3))
+    north[5] = 1.0
+    assert (irradiance_over_pi(north)[2] > 0.1).all(), "the cube's back is north"
+
+
+def test_mirrored_light_gets_coarser_and_keeps_its_mean() -> None:
+    radiance = np.random.default_rng(0).random((6, 16, 16, 3))
+    levels = mirrored_levels(radiance)
+    assert [level.shape[1] for level in levels] == [16, 8, 4, 2, 1]
+    assert np.allclose(levels[-1][:, 0, 0], radiance.mean(axis=(1, 2)))
+
+
+def test_a_smooth_metal_mirrors_all_and_a_smooth_dielectric_its_reflectance() -> None:
+    shares = mirrored_shares()
+    smooth = shares[0, 3:]
+    assert np.allclose(smooth.sum(axis=-1), 1, atol=0.03)
+    assert 0.04 * shares[0, -1, 0] + shares[0, -1, 1] == pytest.approx(0.04, abs=1e-3)
+    grazing, straight = (0.04 * shares[8, k, 0] + shares[8, k, 1] for k in (2, -1))
+    assert grazing > 4 * straight
+    rough = shares[-1].sum(axis=-1)
+    assert (rough < 0.95).all(), "what meets several facets is lost, and added again by the shader"
+
+
+def test_shadows_are_looked_for_wherever_the_camera_looks() -> None:
+    record = camera(320, 192)
+    sun = np.array([0.3, -0.5, 0.8]) / np.linalg.norm([0.3, -0.5, 0.8])
+    squares = squares_before(Frustum.of(record), sun)
+    columns, rows = np.meshgrid([-0.5, 319.5], [-0.5, 191.5])
+    corners = np.stack([columns, rows], axis=-1).reshape(-1, 2)
+    begin_m = 0.1
+    for square, end_m in zip(squares, ENDS_M, strict=True):
+        for depth_m in (begin_m, end_m):
+            points = record.world_from_camera_transform.apply(record.intrinsics.unproject(corners, np.full(4, depth_m)))
+            placed = np.concatenate([points, np.ones((4, 1))], axis=1) @ square.matrix(np.zeros(3)).T
+            assert (np.abs(placed[:, :2]) <= 1 + 1e-9).all() and ((placed[:, 2] >= 0) & (placed[:, 2] <= 1)).all()
+        begin_m = end_m
+    nearer, farther = (squares[0].matrix(np.zeros(3)) @ [*point, 1.0] for point in (2 * sun, 0 * sun))
+    assert nearer[2] < farther[2], "depth grows away from the sun"
+    assert np.allclose(nearer[:2], farther[:2])
+
+
+def test_a_town_is_in_one_square_but_for_what_lies_far_outside() -> None:
+    points = np.random.default_rng(0).uniform(-100, 100, (1000, 3)) * [1, 1, 0.1]
+    points[0] = (1e5, 0, 0)
+    square = square_about(points, np.array([0.0, 0.6, 0.8]))
+    assert 90 < square.half_side_m < 110
+
+
+LAMBERT = """
+<mujoco>
+  <custom><text name="filament.material.base_color_type" data="linear"/></custom>
+  <asset><material name="white" rgba="0.5 0.5 0.5 1" metallic="0" roughness="1"/></asset>
+  <worldbody>
+    <light type="directional" dir="{sun}" diffuse="1 1 1" intensity="60000"/>
+    <geom type="box" size="0.01 3 3" pos="5 0 1.6" material="white"/>
+  </worldbody>
+</mujoco>
+"""
+
+
+@pytest.mark.parametrize("sun", [(1.0, 0.0, 0.0), (0.8, 0.6, 0.0), (0.5, 0.0, -0.8660254)])
+@pytest.mark.parametrize("quality", ["film", "fast"])
+def test_a_matte_wall_shows_what_lambert_says(sun: tuple[float, float, float], quality: Quality) -> None:
+    model = mujoco.MjModel.from_xml_string(LAMBERT.format(sun=" ".join(map(str, sun))))
+    renderer = open_renderer("raster", model, quality=quality)
+    try:
+        (view,) = renderer.render(Stage(model=model, data=posed(model)), (camera(32, 32, y_m=0.0, yaw_deg=0.0),))
+    finally:
+        renderer.close()
+    assert view.linear_rgb is not None
+    matte = 0.5 / math.pi * 60000 / 38400 * sun[0] * 1020
+    # Straight ahead a dielectric of this roughness adds some per cent of gloss.
+    assert matte * 0.99 <= view.linear_rgb[14:18, 14:18].mean() <= matte * 1.04
+
+
+def test_lights_are_taken_as_their_kinds_mean() -> None:
+    xml = """<mujoco><worldbody>
+      <light type="point" pos="0 0 3" diffuse="1 0 0" intensity="3840"/>
+      <light type="directional" dir="0 0 -2" diffuse="0 1 0" castshadow="false"/>
+      <light type="directional" dir="1 0 0" diffuse="0.5 0.5 0.5" intensity="38400"/>
+      <geom size="1"/></worldbody></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(xml)
+    lamps = lamps_of(model, posed(model))
+    assert lamps.casts and np.allclose(lamps.towards[0], (-1, 0, 0, 0)), "what throws shadows comes first"
+    assert np.allclose(lamps.light, [[0.5, 0.5, 0.5], [0.1, 0, 0], [0, math.pi, 0]])
+    assert np.allclose(lamps.towards[1:], [(0, 0, 3, 1), (0, 0, 1, 0)])
+
+
+def street(weather: str) -> mujoco.MjModel:
+    """The tests' street under a real sky, in materials of the kind that towns are made of."""
+    xml = re.sub(r'(<geom name="[a-z]+" type="box" [^>]*)rgba', r'\1material="matte" rgba', STREET)
+    xml = xml.replace('name="red"', 'name="red" metallic="0.2" roughness="0.4"')
+    xml = xml.replace("<asset>", '<asset><material name="matte" metallic="0" roughness="0.8"/>')
+    root = mjcf.from_xml_string(xml)
+    apply_weather(root, PRESETS[weather])
+    return mujoco.MjModel.from_xml_string(root.to_xml_string(), root.get_assets())
+
+
+@pytest.mark.parametrize("weather", ["ClearNoon", "CloudySunset"])
+@pytest.mark.parametrize("quality", ["film", "fast"])
+def test_it_shows_what_filament_shows(weather: str, quality: Quality) -> None:
+    pictures = {}
+    for name, sun in (("filament", weather), ("raster", weather), ("raster", "ClearSunset")):
+        model = street(sun)
+        renderer = open_renderer(name, model, quality=quality)
+        try:
+            (view,) = renderer.render(Stage(model=model, data=posed(model)), (camera(320, 192),))
+        finally:
+            renderer.close()
+        assert view.linear_rgb is not None
+        pictures[name, sun] = response_for(name, PRESETS[weather]).apply(view.linear_rgb).astype(float)
+    likeness = {
+        key: -10 * math.log10(((picture - pictures["filament", weather]) ** 2).mean() / 255**2 + 1e-9)
+        for key, picture in pictures.items()
+    }
+    assert likeness["raster", weather] > 34
+    assert likeness["raster", "ClearSunset"] < 26, "another sun would be noticed"
+
+
+def test_nothing_is_drawn_of_what_is_all_clear() -> None:
+    xml = STREET.replace('rgba="0.1 0.3 0.6 1"', 'rgba="0.1 0.3 0.6 0"')
+    model = mujoco.MjModel.from_xml_string(xml)
+    renderer = open_renderer("raster", model, quality="fast")
+    try:
+        (view,) = renderer.render(Stage(model=model, data=posed(model)), (camera(),), colour=False)
+    finally:
+        renderer.close()
+    assert int(model.geom("kiosk").id) not in view.geom_id
+
+
+def test_a_model_without_anything_is_an_empty_picture() -> None:
+    model = mujoco.MjModel.from_xml_string("<mujoco><worldbody/></mujoco>")
+    renderer = open_renderer("raster", model)
+    try:
+        (view,) = renderer.render(Stage(model=model, data=posed(model)), (camera(33, 17),))
+    finally:
+        renderer.close()
+    assert view.linear_rgb is not None and not view.linear_rgb.any()
+    assert (view.geom_id == -1).all() and np.isnan(view.depth_m).all()
+
+
+def test_two_of_them_do_not_disturb_each_other() -> None:
+    model = street("ClearNoon")
+    stage = Stage(model=model, data=posed(model))
+    first, second = (open_renderer("raster", model, quality=quality) for quality in ("film", "fast"))
+    try:
+        alone = first.render(stage, (camera(),))[0].linear_rgb
+        between = second.render(stage, (camera(yaw_deg=30),))[0].linear_rgb
+        again = first.render(stage, (camera(),))[0].linear_rgb
+        assert alone is not None and again is not None and between is not None
+        assert np.array_equal(alone, again) and not np.array_equal(alone, between)
+    finally:
+        first.close()
+        second.close()
+
+
+def test_a_picture_from_below_shows_what_stands_above() -> None:
+    """The cube of a sky is the right way round for whoever looks up."""
+    model = street("ClearNoon")
+    axes = np.stack([[0, -1, 0], [1, 0, 0], [0, 0, 1]], axis=1)
+    record = CameraRecord(
+        name="c",
+        width_px=33,
+        height_px=33,
+        focal_px=20.0,
+        world_from_camera=Pose.from_transform(RigidTransform.from_parts("world", "camera", axes, (500.0, 500.0, 0.0))),
+    )
+    frames = []
+    for name in ("filament", "raster"):
+        renderer = open_renderer(name, model, quality="fast")
+        try:
+            (view,) = renderer.render(Stage(model=model, data=posed(model)), (record,))
+        finally:
+            renderer.close()
+        assert view.linear_rgb is not None
+        frames.append(view.linear_rgb.astype(int))
+    assert np.median(np.abs(frames[0] - frames[1])) <= 4
+
+
+def rendered(renderer: Renderer, stage: Stage, record: CameraRecord) -> np.ndarray:
+    (view,) = renderer.render(stage, (record,))
+    assert view.linear_rgb is not None
+    return view.linear_rgb
+
+
+def test_a_picture_of_half_the_size_is_no_other_than_it_would_be_alone() -> None:
+    """One of them is as large as what the other's samples are kept in."""
+    model = street("ClearNoon")
+    stage = Stage(model=model, data=posed(model))
+    frames = []
+    for sizes in (((80, 48), (40, 24)), ((40, 24),)):
+        renderer = open_renderer("raster", model)
+        frames.append([rendered(renderer, stage, camera(*size)) for size in sizes][-1])
+        renderer.close()
+    assert np.array_equal(*frames)
+
+
+def test_what_lies_beyond_the_map_of_the_town_is_lit() -> None:
+    blocks = "".join(
+        f'<geom type="box" size="5 5 6" pos="{20 * x} {20 * y} 6"/>' for x in range(-3, 4) for y in range(-3, 4)
+    )
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><worldbody><light type="directional" dir="0.8 0 -0.35" diffuse="1 1 1"/>'
+        f'<geom name="ground" type="plane" size="2000 2000 1" rgba="0.5 0.5 0.5 1"/>{blocks}</worldbody></mujoco>'
+    )
+    renderer = open_renderer("raster", model, quality="fast")
+    try:
+        frame = rendered(renderer, Stage(model=model, data=posed(model)), camera(64, 64, x_m=300, yaw_deg=0))
+    finally:
+        renderer.close()
+    ground = frame[34:, 20:44]
+    assert 50 < ground.max() < 2 * int(ground.min()), "near the camera and kilometres away"
+
+
+def test_a_stage_may_have_more_faces_than_are_kept() -> None:
+    parts = "".join(
+        f'<texture name="t{k}" type="2d" builtin="flat" width="8" height="8" colorspace="sRGB"/>'
+        f'<material name="m{k}" texture="t{k}" metallic="0" roughness="1" emission="1"/>'
+        for k in range(18)
+    )
+    boxes = "".join(f'<geom type="box" size="0.01 0.4 0.4" pos="12 {8.5 - k} 1.6" material="m{k}"/>' for k in range(18))
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><asset>{parts}</asset><worldbody>{boxes}</worldbody></mujoco>")
+    faces = {k: np.full((8, 8, 3), 90 + 8 * k, np.uint8) for k in range(18)}
+    renderer = open_renderer("raster", model, quality="fast")
+    try:
+        stage = Stage(model=model, data=posed(model), faces=faces)
+        record = camera(640, 64, y_m=0.0, yaw_deg=0.0)
+        (view,) = renderer.render(stage, (record,))
+        again = rendered(renderer, stage, record)
+    finally:
+        renderer.close()
+    assert view.linear_rgb is not None and np.array_equal(again, view.linear_rgb)
+    shown = [float(np.median(view.linear_rgb[view.geom_id == k])) for k in range(18)]
+    expected = [1020 * ((value / 255 + 0.055) / 1.055) ** 2.4 for value in range(90, 90 + 8 * 18, 8)]
+    assert shown == pytest.approx(expected, abs=1.5)
+
+
+def test_a_closed_renderer_says_so() -> None:
+    model = street("ClearNoon")
+    renderer = open_renderer("raster", model)
+    renderer.close()
+    with pytest.raises(RuntimeError, match="closed"):
+        renderer.render(Stage(model=model, data=posed(model)), (camera(),))
+
+
+@pytest.mark.parametrize("names", [("raster",), ("raster", "classic"), ("classic", "raster")])
+def test_it_starts_in_a_process_that_says_nothing_of_opengl(names: tuple[str, ...]) -> None:
+    code = "; ".join(["from gear.render import probe", *(f"print(probe({name!r}).info.backend)" for name in names)])
+    environment = {key: value for key, value in os.environ.items() if key not in ("MUJOCO_GL", "PYOPENGL_PLATFORM")}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["egl"] * len(names)
