@@ -13,6 +13,7 @@ from gear.contracts.rendering import RawView
 from gear.values.frames import LINEAR_FULL_SCALE
 from gear.values.geometry import CAMERA_FROM_ACTOR_AXES, RigidTransform
 from gear.values.scene import CameraRecord, Pose
+from tests.pinhole import rays
 
 SIZE = (96, 160)
 WALL_M = 20.0
@@ -34,15 +35,6 @@ def camera(*, pitch_deg: float = 0.0, roll_deg: float = 0.0, yaw_deg: float = 7.
     return CameraRecord(
         name="c", width_px=SIZE[1], height_px=SIZE[0], focal_px=90.0, world_from_camera=Pose.from_transform(pose)
     )
-
-
-def rays(looking: CameraRecord) -> np.ndarray:
-    """(H, W, 3) directions in the world whose length is 1 along the view."""
-    columns, rows = np.meshgrid(np.arange(looking.width_px), np.arange(looking.height_px))
-    x = (columns - (looking.width_px - 1) / 2) / looking.focal_px
-    y = (rows - (looking.height_px - 1) / 2) / looking.focal_px
-    axes = np.stack([x, y, np.ones_like(x)], axis=-1)
-    return axes @ looking.world_from_camera_transform.rotation.T
 
 
 def painted(at_m: np.ndarray) -> np.ndarray:

@@ -9,12 +9,13 @@ from gear.render.opening import RENDERERS, open_renderer
 from gear.testing.tiny_town import SMALL_RIG, build_tiny_world
 from gear.testing.town_facts import SEEN_GROUPS, Rays
 from gear.values.labels import GROUND_CODES
-from gear.values.scene import ActorRecord, CameraRecord, Pose, SceneRecord
+from gear.values.scene import ActorRecord, Pose, SceneRecord
 from gear.world.air import darkroom_of
 from gear.world.below import look_from_below
 from gear.world.night import night_of
 from gear.world.weather import PRESETS
 from gear.world.world import World
+from tests.pinhole import rays
 
 EGO = Pose(position_m=(10.0, -1.75, 0.0), quat_wxyz=(0.9990482, 0.0, 0.0, 0.0436194))
 WET = PRESETS["WetNoon"]
@@ -29,14 +30,6 @@ def record(world: World) -> SceneRecord:
         weather=WET, actors=(ego, van), surfaces=world.surface_records(),
         cameras=SMALL_RIG.place(EGO.transform("world", "ego")),
     )  # fmt: skip
-
-
-def rays(camera: CameraRecord) -> np.ndarray:
-    """(H, W, 3) directions in the world whose length is 1 along the view."""
-    columns, rows = np.meshgrid(np.arange(camera.width_px), np.arange(camera.height_px))
-    x = (columns - (camera.width_px - 1) / 2) / camera.focal_px
-    y = (rows - (camera.height_px - 1) / 2) / camera.focal_px
-    return np.stack([x, y, np.ones_like(x)], axis=-1) @ camera.world_from_camera_transform.rotation.T
 
 
 @pytest.mark.parametrize("name", RENDERERS)
