@@ -14,8 +14,12 @@ Mask = npt.NDArray[np.bool_]
 
 def bounding_spheres(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Array, Array]:
     """Centres (ngeom, 3) and radii (ngeom,) in metres, world frame; what has no bounds is everywhere."""
-    radii = np.where(model.geom_rbound > 0, model.geom_rbound, np.inf)
-    return data.geom_xpos, radii
+    return data.geom_xpos, bounding_radii(model)
+
+
+def bounding_radii(model: mujoco.MjModel) -> Array:
+    """(ngeom,) in metres; what has no bounds is endless."""
+    return np.asarray(np.where(model.geom_rbound > 0, model.geom_rbound, np.inf))
 
 
 def in_frustum(frustum: Frustum, centres_m: Array, radii_m: Array) -> Mask:
@@ -41,3 +45,9 @@ def in_beam(centre_m: Array, direction: Array, half_side_m: float, centres_m: Ar
     towards = centres_m - centre_m
     across = towards - (towards @ unit)[:, None] * unit
     return np.asarray(np.linalg.norm(across, axis=1) < radii_m + np.sqrt(2) * half_side_m)
+
+
+def near_to_far(chosen: Mask, depth_m: Array) -> npt.NDArray[np.intp]:
+    """Indices of what is chosen by growing depth, equal ones in their own order."""
+    selection = np.flatnonzero(chosen)
+    return np.asarray(selection[np.argsort(depth_m[selection], kind="stable")])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import mujoco
 import numpy as np
@@ -15,28 +16,49 @@ from gear.values.geometry import Array
 VERTEX = np.dtype([("position_m", "<f4", 3), ("normal", "<i2", 4), ("texcoord", "<f4", 2)])
 """As it lies in memory; normals count to 32767."""
 
-COMMAND = np.dtype([(name, "<u4") for name in ("count", "instances", "first", "base", "geom")])
-"""What OpenGL wants to know to draw one geom."""
+COMMAND = np.dtype([(name, "<u4") for name in ("count", "instances", "first", "base", "piece")])
+"""What OpenGL wants to know to draw one piece of a geom."""
 
 _MESHES = (int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_SDF))
 _PLANE, _FIELD = int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD)
 _BITS = 21
+_CELL_M = 48.0
+_WHOLE = 512
+"""Triangles of a mesh that is not cut into pieces: what a draw costs by itself."""
+
 _Key = tuple[int, int, tuple[float, ...], tuple[float, ...]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Geometry:
-    """Triangles of all geoms.
+    """Triangles of all geoms, in pieces that are small enough to be left out where nobody looks.
 
     Attributes:
         vertices: (V,) `VERTEX`.
         indices: (I,) uint32, three for a triangle.
-        commands: (ngeom,) `COMMAND`; a count of 0 where a geom has no triangles.
+        commands: (P,) `COMMAND`, piece by piece, in the order of geoms.
+        geoms: (P,) whose piece it is.
+        centres_m: (P, 3) of spheres about the pieces, in the frames of their geoms.
+        radii_m: (P,) of these spheres.
     """
 
     vertices: npt.NDArray[np.void]
     indices: npt.NDArray[np.uint32]
     commands: npt.NDArray[np.void]
+    geoms: npt.NDArray[np.intp]
+    centres_m: Array
+    radii_m: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Shape:
+    """Triangles that geoms share, and their pieces as in `Geometry`, counted from the shape's own first index."""
+
+    vertices: npt.NDArray[np.void]
+    indices: npt.NDArray[np.uint32]
+    starts: npt.NDArray[np.int64]
+    centres_m: Array
+    radii_m: Array
 
 
 def geometry_of(model: mujoco.MjModel, drawn: npt.NDArray[np.bool_]) -> Geometry:
@@ -45,23 +67,35 @@ def geometry_of(model: mujoco.MjModel, drawn: npt.NDArray[np.bool_]) -> Geometry
     Raises:
         ValueError: a mesh has more than two million vertices.
     """
-    commands = np.zeros(model.ngeom, COMMAND)
-    commands["instances"], commands["geom"] = 1, np.arange(model.ngeom)
-    vertices, indices, places = [], [], {}
+    shapes: dict[_Key, tuple[_Shape, int, int]] = {}
+    commands, centres, radii = [np.zeros(0, COMMAND)], [np.zeros((0, 3))], [np.zeros(0)]
+    geoms: list[int] = []
     first = base = 0
     for geom in np.flatnonzero(drawn).tolist():
         key = _key(model, geom)
-        if key not in places:
-            made = _vertices(_triangles(model, geom))
-            places[key] = (len(made[1]), first, base)
-            vertices.append(made[0])
-            indices.append(made[1])
-            first, base = first + len(made[1]), base + len(made[0])
-        commands["count"][geom], commands["first"][geom], commands["base"][geom] = places[key]
+        if key not in shapes:
+            made = _shape(_triangles(model, geom))
+            shapes[key] = (made, first, base)
+            first, base = first + len(made.indices), base + len(made.vertices)
+        shape, shape_first, shape_base = shapes[key]
+        pieces = np.zeros(len(shape.radii_m), COMMAND)
+        pieces["count"] = np.diff(shape.starts)
+        pieces["first"] = shape_first + shape.starts[:-1]
+        pieces["instances"], pieces["base"] = 1, shape_base
+        commands.append(pieces)
+        geoms += [geom] * len(pieces)
+        centres.append(shape.centres_m)
+        radii.append(shape.radii_m)
+    all_commands = np.concatenate(commands)
+    all_commands["piece"] = np.arange(len(all_commands))
+    made_shapes = [shape for shape, _, _ in shapes.values()]
     return Geometry(
-        vertices=np.concatenate([np.zeros(0, VERTEX), *vertices]),
-        indices=np.concatenate([np.zeros(0, np.uint32), *indices]),
-        commands=commands,
+        vertices=np.concatenate([np.zeros(0, VERTEX), *(shape.vertices for shape in made_shapes)]),
+        indices=np.concatenate([np.zeros(0, np.uint32), *(shape.indices for shape in made_shapes)]),
+        commands=all_commands,
+        geoms=np.array(geoms, np.intp),
+        centres_m=np.concatenate(centres),
+        radii_m=np.concatenate(radii),
     )
 
 
@@ -118,9 +152,32 @@ def _mesh(model: mujoco.MjModel, index: int) -> Triangles:
     )
 
 
-def _vertices(triangles: Triangles) -> tuple[npt.NDArray[np.void], npt.NDArray[np.uint32]]:
+def _shape(triangles: Triangles) -> _Shape:
+    """For the device, in pieces of `_CELL_M`."""
     vertices = np.zeros(len(triangles.positions_m), VERTEX)
     vertices["position_m"] = triangles.positions_m
     vertices["normal"][:, :3] = np.round(32767 * triangles.normals)
     vertices["texcoord"] = triangles.texcoords
-    return vertices, triangles.corners.reshape(-1).astype(np.uint32)
+    corners = triangles.corners
+    starts = np.array([0, len(corners)])
+    if len(corners) > _WHOLE:
+        cells = np.floor(triangles.positions_m[corners[:, 0]] / _CELL_M).astype(np.int64)
+        cell = cells @ (1 << 2 * _BITS, 1 << _BITS, 1)
+        order = np.argsort(cell, kind="stable")
+        corners = corners[order]
+        starts = np.concatenate([[0], np.flatnonzero(np.diff(cell[order])) + 1, [len(corners)]])
+    starts = starts[: len(corners) + 1] if len(corners) else np.zeros(1, np.int64)
+    spheres = [_sphere(triangles.positions_m[corners[a:b]].reshape(-1, 3)) for a, b in pairwise(starts.tolist())]
+    return _Shape(
+        vertices=vertices,
+        indices=corners.reshape(-1).astype(np.uint32),
+        starts=3 * starts,
+        centres_m=np.array([centre for centre, _ in spheres]).reshape(-1, 3),
+        radii_m=np.array([radius for _, radius in spheres]),
+    )
+
+
+def _sphere(points_m: Array) -> tuple[Array, float]:
+    """About (N, 3) points: the middle of their box, and how far the farthest lies from it."""
+    middle = (points_m.min(axis=0) + points_m.max(axis=0)).astype(np.float64) / 2
+    return middle, float(np.sqrt(((points_m - middle) ** 2).sum(axis=1).max()))

@@ -1,4 +1,4 @@
 flat in int id;
-layout(location = 0) out int geom_id;
+layout(location = 0) out int piece;
 
-void main() { geom_id = id; }
+void main() { piece = id; }

@@ -7,10 +7,11 @@ from typing import Any
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 from OpenGL import GL  # type: ignore[import-untyped]
 
 from gear.contracts.rendering import Quality, RawView, RendererInfo, Stage
-from gear.render.culling import bounding_spheres, in_frustum
+from gear.render.culling import in_frustum, near_to_far
 from gear.render.faces import checked_faces
 from gear.render.glcontext import driver_and_device, is_software
 from gear.render.occlusion import openness, shade
@@ -53,6 +54,8 @@ class RasterRenderer:
             name="raster", backend="egl", driver=driver, device=name, is_software=is_software(name)
         )
         self._scene = Scene(model)
+        # What a pixel shows by the piece that it counts; nothing is -1, which finds the last entry.
+        self._geom_of_piece = np.append(self._scene.geom_of_piece, -1).astype(np.int32)
         self._truth_program = device.Program("shapes.vert", "ids.frag")
         self._sky_program = device.Program("whole.vert", "sky.frag")
         self._halve_program = device.Program("whole.vert", "halve.frag")
@@ -107,10 +110,10 @@ class RasterRenderer:
     def _view(self, stage: Stage, camera: CameraRecord, shape: RawView | None, *, colour: bool) -> RawView:
         frustum = Frustum.of(camera)
         size = (camera.width_px, camera.height_px)
-        centres_m, radii_m = bounding_spheres(stage.model, stage.data)
+        centres_m, radii_m = self._scene.spheres(stage)
         self._scene.pose(stage, frustum.position_world_m)
         distance_m = np.linalg.norm(centres_m - frustum.position_world_m, axis=1) - radii_m
-        seen = self._scene.near_to_far(in_frustum(frustum, centres_m, radii_m), distance_m)
+        seen = near_to_far(in_frustum(frustum, centres_m, radii_m), distance_m)
         truth = None
         if shape is None:
             truth = self._truth(size, seen, frustum)
@@ -128,7 +131,7 @@ class RasterRenderer:
         return RawView(linear_rgb=linear_rgb, depth_m=depth_m, geom_id=geom_id)
 
     def _truth(self, size: tuple[int, int], seen: Selection, frustum: Frustum) -> device.Target:
-        """Ids and depth of this many pixels, in a target that is current then."""
+        """Pieces and depth of this many pixels, in a target that is current then."""
         target = self._target("truth", size, GL.GL_R32I)
         target.begin()
         _depth_state(GL.GL_GREATER, writes=True)
@@ -141,11 +144,9 @@ class RasterRenderer:
 
     def _read(self, truth: device.Target) -> tuple[IdImage, FloatImage]:
         width, height = truth.width, truth.height
-        geom_id = np.empty((height, width), np.int32)
         reversed_depth = np.empty((height, width), np.float32)
-        GL.glReadPixels(0, 0, width, height, GL.GL_RED_INTEGER, GL.GL_INT, geom_id)
         GL.glReadPixels(0, 0, width, height, GL.GL_DEPTH_COMPONENT, GL.GL_FLOAT, reversed_depth)
-        return geom_id, depth_from_reversed(reversed_depth)
+        return self._geom_of_piece[_pieces(truth)], depth_from_reversed(reversed_depth)
 
     def _light(self, stage: Stage, frustum: Frustum) -> None:
         """Draws the maps of the sun's shadows, and tells the shaders of all lights."""
@@ -168,13 +169,16 @@ class RasterRenderer:
         samples = (2 * size[0], 2 * size[1]) if is_film else size
         if is_film or truth is None:
             truth = self._truth(samples, seen, frustum)
+        truth.begin()
+        is_seen = np.zeros(len(self._geom_of_piece), np.bool_)
+        is_seen[_pieces(truth)] = True
         target = self._target("colour", samples, GL.GL_RGBA16, truth.depth)
         target.begin()
-        # Only what is seen is shaded; of two surfaces at the very same depth the ids decide.
+        # Only what is seen is shaded; of two surfaces at the very same depth the pieces decide.
         _depth_state(GL.GL_EQUAL, writes=False)
         GL.glBindTextureUnit(_SEEN_UNIT, truth.colour)
         GL.glClearBufferfv(GL.GL_COLOR, 0, np.zeros(4, np.float32))
-        self._scene.draw_surfaces(seen, _clip_matrix(frustum), ("MANY_SAMPLES",) if is_film else ())
+        self._scene.draw_surfaces(seen[is_seen[seen]], _clip_matrix(frustum), ("MANY_SAMPLES",) if is_film else ())
         self._draw_sky(frustum)
         if is_film:
             target = self._halved(target)
@@ -209,6 +213,13 @@ class RasterRenderer:
         if key not in self._targets:
             self._targets[key] = device.Target.of(*size, kept_as, depth)
         return self._targets[key]
+
+
+def _pieces(truth: device.Target) -> npt.NDArray[np.int32]:
+    """(H, W) of a target that is current, -1 for nothing."""
+    pieces = np.empty((truth.height, truth.width), np.int32)
+    GL.glReadPixels(0, 0, truth.width, truth.height, GL.GL_RED_INTEGER, GL.GL_INT, pieces)
+    return pieces
 
 
 def _depth_state(compare: int, *, writes: bool) -> None:

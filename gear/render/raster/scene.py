@@ -22,7 +22,7 @@ from gear.values.geometry import Array
 
 Selection = npt.NDArray[np.intp]
 
-_SEEN_GROUPS, _LANDMARKS = 3, 24
+_SEEN_GROUPS, _LANDMARKS = 3, 8
 _MIRRORED_UNIT, _SHARES_UNIT = 5, 7
 _GEOM = np.dtype([("camera_from_geom", "<f4", (3, 4)), ("colour", "<f4", 4), ("surface", "<f4", 4)])
 _FRAME = np.dtype(
@@ -49,11 +49,12 @@ class Scene:
         drawn = (model.geom_group < _SEEN_GROUPS) & ~self._looks.is_clear
         geometry = geometry_of(model, drawn)
         self._commands = geometry.commands
-        self._drawn: Mask = drawn & (geometry.commands["count"] > 0)
-        self._vertex_array = _vertex_array(geometry, model.ngeom)
+        self.geom_of_piece = geometry.geoms
+        self._spheres = geometry.centres_m, geometry.radii_m
+        self._vertex_array = _vertex_array(geometry)
         GL.glBindVertexArray(self._vertex_array)
-        self._landmarks_m = _landmarks(geometry, self._drawn)
-        self._pictures = Pictures(model, np.unique(self._looks.textures[self._drawn]).tolist())
+        self._landmarks_m = _landmarks(geometry)
+        self._pictures = Pictures(model, np.unique(self._looks.textures[drawn]).tolist())
         self._batch_of_geom = np.unique(self._looks.textures, axis=0, return_inverse=True)[1].reshape(-1)
         self._face_of_geom: dict[int, int] = {}
         cubes = linear_cubes(model)
@@ -113,37 +114,36 @@ class Scene:
         GL.glBindTextureUnit(_MIRRORED_UNIT, self._mirrored)
         GL.glBindTextureUnit(_SHARES_UNIT, self._shares)
 
-    def near_to_far(self, chosen: Mask, depth_m: Array) -> Selection:
-        """Those of the chosen geoms that are drawn, by what lies nearest of them."""
-        selection = np.flatnonzero(self._drawn & chosen)
-        return np.asarray(selection[np.argsort(depth_m[selection], kind="stable")])
+    def spheres(self, stage: Stage) -> tuple[Array, Array]:
+        """(P, 3) centres in the world and (P,) radii in metres of spheres about the pieces that geoms are drawn in."""
+        centres_m, radii_m = self._spheres
+        turns = stage.data.geom_xmat.reshape(-1, 3, 3)[self.geom_of_piece]
+        return np.einsum("pij,pj->pi", turns, centres_m) + stage.data.geom_xpos[self.geom_of_piece], radii_m
 
     def landmarks(self, stage: Stage, chosen: Mask) -> Array:
-        """(N, 3) places in the world of some vertices of the chosen geoms that are drawn; the origin for none."""
-        places = [
-            marks_m @ stage.data.geom_xmat[geom].reshape(3, 3).T + stage.data.geom_xpos[geom]
-            for geom, marks_m in self._landmarks_m.items()
-            if chosen[geom]
-        ]
-        return np.concatenate(places or [np.zeros((1, 3))])
+        """(N, 3) places in the world of some vertices of the chosen pieces; the origin for none."""
+        marks_m = self._landmarks_m[chosen]
+        geoms = self.geom_of_piece[chosen]
+        turns = stage.data.geom_xmat.reshape(-1, 3, 3)[geoms]
+        places = np.einsum("pij,pkj->pki", turns, marks_m) + stage.data.geom_xpos[geoms][:, None]
+        return np.concatenate([places.reshape(-1, 3), np.zeros((int(len(geoms) == 0), 3))])
 
     def draw(self, selection: Selection) -> None:
-        """Draws geoms with the current program, as shapes alone."""
+        """Draws pieces with the current program, as shapes alone, in this order."""
         self._submit([(selection, None)])
 
     def draw_surfaces(self, selection: Selection, matrix: Array, flags: tuple[str, ...]) -> None:
-        """Draws geoms as they look.
+        """Draws pieces as they look.
 
         Args:
             selection: which, in this order within each kind of material.
             matrix: (4, 4) to the picture from places relative to the camera.
             flags: for all of the shaders.
         """
-        faced = np.isin(selection, list(self._face_of_geom))
-        plain = selection[~faced]
-        batches = self._batch_of_geom[plain]
-        groups = [plain[batches == batch] for batch in dict.fromkeys(batches.tolist())]
-        groups += [selection[index : index + 1] for index in np.flatnonzero(faced)]
+        geoms = self.geom_of_piece[selection]
+        # What wears a face is a kind of its own.
+        kinds = np.where(np.isin(geoms, list(self._face_of_geom)), -1 - geoms, self._batch_of_geom[geoms])
+        groups = [selection[kinds == kind] for kind in dict.fromkeys(kinds.tolist())]
         self._submit([(group, (matrix, flags)) for group in groups])
 
     def _submit(self, groups: list[tuple[Selection, tuple[Array, tuple[str, ...]] | None]]) -> None:
@@ -154,7 +154,7 @@ class Scene:
         begin = 0
         for group, look in groups:
             if look is not None:
-                self._wear(int(group[0]), *look)
+                self._wear(int(self.geom_of_piece[group[0]]), *look)
             offset = ctypes.c_void_p(begin * COMMAND.itemsize)
             GL.glMultiDrawElementsIndirect(GL.GL_TRIANGLES, GL.GL_UNSIGNED_INT, offset, len(group), COMMAND.itemsize)
             begin += len(group)
@@ -172,24 +172,23 @@ class Scene:
         self._surfaces[key].use(clip_from_place=matrix)
 
 
-def _landmarks(geometry: Geometry, drawn: Mask) -> dict[int, Array]:
-    """(n, 3) a few vertices of each geom that is drawn, in its frame."""
-    marks = {}
-    for geom in np.flatnonzero(drawn).tolist():
-        command = geometry.commands[geom]
-        some = np.unique(np.linspace(0, int(command["count"]) - 1, _LANDMARKS).astype(np.int64))
-        chosen = int(command["base"]) + geometry.indices[int(command["first"]) + some].astype(np.int64)
-        marks[geom] = geometry.vertices["position_m"][chosen].astype(np.float64)
-    return marks
+def _landmarks(geometry: Geometry) -> Array:
+    """(P, `_LANDMARKS`, 3) some vertices of each piece, in the frame of its geom."""
+    command = geometry.commands
+    shares = np.linspace(0, 1, _LANDMARKS)
+    chosen = command["first"][:, None] + ((command["count"][:, None] - 1) * shares).astype(np.int64)
+    vertices = command["base"][:, None].astype(np.int64) + geometry.indices[chosen]
+    return np.asarray(geometry.vertices["position_m"][vertices].astype(np.float64))
 
 
-def _vertex_array(geometry: Geometry, geoms: int) -> int:
-    """Vertices with their indices, and geom ids as what comes once a draw."""
+def _vertex_array(geometry: Geometry) -> int:
+    """Vertices with their indices, and, once a draw, which piece of which geom it is."""
+    pieces = np.stack([np.arange(len(geometry.geoms)), geometry.geoms], axis=1).astype(np.uint32)
     array = np.zeros(1, np.uint32)
     GL.glCreateVertexArrays(1, array)
     handle = int(array[0])
     GL.glVertexArrayVertexBuffer(handle, 0, device.buffer_of(geometry.vertices), 0, VERTEX.itemsize)
-    GL.glVertexArrayVertexBuffer(handle, 1, device.buffer_of(np.arange(geoms, dtype=np.uint32)), 0, 4)
+    GL.glVertexArrayVertexBuffer(handle, 1, device.buffer_of(pieces), 0, 8)
     GL.glVertexArrayElementBuffer(handle, device.buffer_of(geometry.indices))
     for place, (name, count, kind) in enumerate(
         (("position_m", 3, GL.GL_FLOAT), ("normal", 3, GL.GL_SHORT), ("texcoord", 2, GL.GL_FLOAT))
@@ -198,8 +197,9 @@ def _vertex_array(geometry: Geometry, geoms: int) -> int:
         GL.glEnableVertexArrayAttrib(handle, place)
         GL.glVertexArrayAttribFormat(handle, place, count, kind, kind == GL.GL_SHORT, offset)
         GL.glVertexArrayAttribBinding(handle, place, 0)
-    GL.glEnableVertexArrayAttrib(handle, 3)
-    GL.glVertexArrayAttribIFormat(handle, 3, 1, GL.GL_UNSIGNED_INT, 0)
-    GL.glVertexArrayAttribBinding(handle, 3, 1)
+    for place, offset in ((3, 0), (4, 4)):
+        GL.glEnableVertexArrayAttrib(handle, place)
+        GL.glVertexArrayAttribIFormat(handle, place, 1, GL.GL_UNSIGNED_INT, offset)
+        GL.glVertexArrayAttribBinding(handle, place, 1)
     GL.glVertexArrayBindingDivisor(handle, 1, 1)
     return handle

@@ -11,7 +11,7 @@ import numpy as np
 from OpenGL import GL  # type: ignore[import-untyped]
 
 from gear.contracts.rendering import Stage
-from gear.render.culling import Mask, bounding_spheres, in_beam
+from gear.render.culling import Mask, bounding_radii, in_beam, near_to_far
 from gear.render.pinhole import Frustum
 from gear.render.raster import device
 from gear.render.raster.scene import Scene
@@ -36,12 +36,13 @@ class SunShadows:
         self._program = device.Program("shapes.vert", "nothing.frag")
         self._near = device.shadow_maps(NEAR_PX, len(ENDS_M))
         self._near_target = device.Target.of(NEAR_PX, NEAR_PX, None, depth=0)
-        self._moves = _moves(model)
+        self._moves = _moves(model)[scene.geom_of_piece]
+        self._size_m = bounding_radii(model)[scene.geom_of_piece]
         self._town: tuple[Array, int, Square] | None = None
 
     def draw(self, stage: Stage, frustum: Frustum, towards_sun: Array) -> Maps:
         """Draws what is new, for a scene that is posed for this camera, and binds all maps."""
-        centres_m, radii_m = bounding_spheres(stage.model, stage.data)
+        centres_m, radii_m = self._scene.spheres(stage)
         squares = squares_before(frustum, towards_sun)
         if self._town is None or not np.array_equal(self._town[0], towards_sun):
             self._draw_town(towards_sun)
@@ -51,7 +52,7 @@ class SunShadows:
         for layer, (square, chosen) in enumerate(zip(squares, (np.ones_like(self._moves), self._moves), strict=True)):
             self._near_target.attach_layer(self._near, layer)
             in_light = in_beam(square.centre_m, towards_sun, square.half_side_m, centres_m, radii_m)
-            large = radii_m > _SEEN_TEXELS * _texel_m(square, NEAR_PX)
+            large = self._size_m > _SEEN_TEXELS * _texel_m(square, NEAR_PX)
             self._draw(self._near_target, square, frustum.position_world_m, chosen & in_light & large, centres_m)
         GL.glBindTextureUnit(_NEAR_UNIT, self._near)
         GL.glBindTextureUnit(_TOWN_UNIT, town_map)
@@ -66,13 +67,13 @@ class SunShadows:
         data = mujoco.MjData(self._model)
         mujoco.mj_kinematics(self._model, data)
         stage = Stage(model=self._model, data=data)
-        centres_m, radii_m = bounding_spheres(self._model, data)
+        centres_m, _ = self._scene.spheres(stage)
         square = square_about(self._scene.landmarks(stage, ~self._moves), towards_sun)
         maps = device.shadow_maps(TOWN_PX, 1)
         target = device.Target.of(TOWN_PX, TOWN_PX, None, depth=0)
         target.attach_layer(maps, 0)
         self._scene.pose(stage, square.centre_m)
-        large = radii_m > _SEEN_TEXELS * _texel_m(square, TOWN_PX)
+        large = self._size_m > _SEEN_TEXELS * _texel_m(square, TOWN_PX)
         self._draw(target, square, square.centre_m, ~self._moves & large, centres_m)
         target.free()
         if self._town is not None:
@@ -90,7 +91,7 @@ class SunShadows:
         GL.glClearBufferfv(GL.GL_DEPTH, 0, np.ones(1, np.float32))
         self._program.use(clip_from_place=square.matrix(origin_m))
         try:
-            self._scene.draw(self._scene.near_to_far(chosen, -(centres_m @ square.axes[2])))
+            self._scene.draw(near_to_far(chosen, -(centres_m @ square.axes[2])))
         finally:
             GL.glDisable(GL.GL_DEPTH_CLAMP)
             GL.glDisable(GL.GL_POLYGON_OFFSET_FILL)

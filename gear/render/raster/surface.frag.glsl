@@ -16,7 +16,7 @@ layout(binding = 2) uniform sampler2D orm_map;
 layout(binding = 3) uniform sampler2D emissive_map;
 layout(binding = 4) uniform sampler2DArrayShadow near_shadows;
 layout(binding = 5) uniform samplerCube mirrored;
-layout(binding = 6) uniform isampler2D seen_id;
+layout(binding = 6) uniform isampler2D seen_piece;
 layout(binding = 7) uniform sampler2D mirrored_shares;
 layout(binding = 8) uniform sampler2DArrayShadow town_shadows;
 
@@ -125,7 +125,7 @@ void main() {
 #else
     sum += base * surface.z;
 #endif
-    // Of two surfaces at the very same depth the ids decide. Last, so that neighbours have told how fine the maps are.
-    if (texelFetch(seen_id, ivec2(gl_FragCoord.xy), 0).r != id) discard;
+    // Of two surfaces at the very same depth the pieces decide. Last, so that neighbours have told how fine the maps are.
+    if (texelFetch(seen_piece, ivec2(gl_FragCoord.xy), 0).r != id) discard;
     radiance = vec4(min(sum, 1.0), 1.0);
 }

@@ -3,7 +3,8 @@
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in vec2 texcoord;
-layout(location = 3) in uint geom;
+layout(location = 3) in uint piece;
+layout(location = 4) in uint geom;
 
 uniform mat4 clip_from_place;
 out vec3 place_m;
@@ -16,7 +17,7 @@ flat out vec4 surface;
 invariant gl_Position;
 
 void main() {
-    id = int(geom);
+    id = int(piece);
     albedo = geoms[geom].colour.rgb;
     surface = geoms[geom].surface;
     uv = texcoord;
