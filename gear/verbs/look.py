@@ -36,6 +36,9 @@ HASH_LENGTH = 16
 PLANNED = (("town",), ("assets",), ("renderer", "name"), ("versions", "mujoco"))
 """What `look_of` reads in the content of plans, by key, and key in key: names and hashes."""
 
+ALIKE = {"raster": "filament"}
+"""Renderers that no network has been found to tell apart, and the name that their look goes by (docs/rendering.md)."""
+
 RAMP = (0.01, 0.05, 0.2, 0.5, 0.8)
 
 
@@ -45,7 +48,7 @@ class Look:
 
     Attributes:
         assets: sha256 of all that a town's pictures can show, by the town's name.
-        renderers: their names, sorted.
+        renderers: their names, sorted; one name for those that look alike.
         light: sha256 of what the weather presets make of sun and sky, and of the camera's response to them.
         mujoco: its minor release; renderers change with it.
     """
@@ -79,7 +82,7 @@ def look_of(plans: Iterable[Plan]) -> Look:
     contents = [plan.content for plan in plans]
     return Look(
         assets={content["town"]: content["assets"] for content in contents},
-        renderers=tuple(sorted({content["renderer"]["name"] for content in contents})),
+        renderers=tuple(sorted({_look_name(content["renderer"]["name"]) for content in contents})),
         light=light_digest(),
         mujoco=", ".join(sorted({_minor(content["versions"]["mujoco"]) for content in contents})),
     )
@@ -131,6 +134,10 @@ def light_digest() -> str:
         film = round(FILM_F90 * wetness(weather), 2)
         presets[name] = [to_json(weather), [f"{number:.3g}" for number in numbers], levels, ramp, hidden, film]
     return _digest(presets)
+
+
+def _look_name(renderer: str) -> str:
+    return ALIKE.get(renderer, renderer)
 
 
 def _minor(version: str) -> str:

@@ -31,6 +31,8 @@ def test_a_look_follows_from_plans_whatever_their_order() -> None:
     look = look_of(plans)
     assert look == dataclasses.replace(LOOK, light=light_digest())
     assert look.hash == look_of(reversed(plans)).hash and len(look.hash) == 16
+    assert look_of([plan("a", "1", "raster"), plan("b", "2")]).hash == look.hash, "they look alike"
+    assert look_of([plan("a", "1", "classic"), plan("b", "2")]).hash != look.hash
     mixed = look_of([*plans, plan("b", "2", "classic", "4.1.2")])
     assert mixed.renderers == ("classic", "filament") and mixed.mujoco == "4.0, 4.1"
 
