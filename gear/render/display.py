@@ -35,6 +35,11 @@ def has_linear_colours(model: mujoco.MjModel) -> bool:
     return bytes(model.text_data[begin : begin + size]).rstrip(b"\0") == b"linear"
 
 
+def has_own_colour(model: mujoco.MjModel) -> npt.NDArray[np.bool_]:
+    """(ngeom,) whether a geom shows its own colour; with a material and MuJoCo's default it shows the material's."""
+    return np.asarray((model.geom_matid < 0) | (model.geom_rgba != _DEFAULT_RGBA).any(axis=1))
+
+
 def displayed_model(model: mujoco.MjModel) -> mujoco.MjModel:
     """A copy whose colours are display values.
 
@@ -50,8 +55,7 @@ def displayed_model(model: mujoco.MjModel) -> mujoco.MjModel:
         bare = pictures < 0
         shown.mat_rgba[~bare, :3] = encode_srgb(shown.mat_rgba[~bare, :3])
         shown.mat_rgba[bare, :3] = displayed_colour(shown.mat_rgba[bare, :3])
-        # A geom with a material and this very colour shows the material's, so it must keep it.
-        own = (shown.geom_matid < 0) | (shown.geom_rgba != _DEFAULT_RGBA).any(axis=1)
+        own = has_own_colour(shown)
         shown.geom_rgba[own, :3] = displayed_colour(shown.geom_rgba[own, :3])
         strength = np.maximum(shown.light_diffuse.max(axis=1, keepdims=True), 1e-6)
         shown.light_diffuse[:] = strength * encode_srgb(shown.light_diffuse / strength)

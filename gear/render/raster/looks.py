@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.camera.response import decode_srgb
-from gear.render.display import has_linear_colours
+from gear.render.display import has_linear_colours, has_own_colour
 from gear.values.geometry import Array
 
 ROLES = {"HAS_BASE": "RGB", "HAS_NORMAL": "NORMAL", "HAS_ORM": "ORM", "HAS_EMISSIVE": "EMISSIVE"}
@@ -18,7 +18,6 @@ ROLES = {"HAS_BASE": "RGB", "HAS_NORMAL": "NORMAL", "HAS_ORM": "ORM", "HAS_EMISS
 DIELECTRIC = 0.04
 """What surfaces that are no metal mirror of light from straight ahead."""
 
-_DEFAULT_RGBA = np.array([0.5, 0.5, 0.5, 1.0], np.float32)
 _DEFAULT_SHININESS = 0.5
 _MOST_SHININESS = 128
 
@@ -48,7 +47,7 @@ def looks_of(model: mujoco.MjModel) -> Looks:
     """
     material = model.geom_matid
     bare = material < 0
-    own = bare | (model.geom_rgba != _DEFAULT_RGBA).any(axis=1)
+    own = has_own_colour(model)
     rgba: Array = model.geom_rgba.astype(np.float64)
     rgba[~own] = model.mat_rgba[material[~own]]
     albedo = rgba[:, :3] if has_linear_colours(model) else decode_srgb(rgba[:, :3])
