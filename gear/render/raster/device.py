@@ -40,7 +40,7 @@ class Program:
 
         Args:
             vertex, fragment: names of files, without `.glsl`.
-            flags: what is defined in both.
+            flags: what is defined in both, with a value after a space where it has one.
 
         Raises:
             BackendError: the driver does not take them; says what it said.
@@ -136,18 +136,12 @@ class Target:
             GL.glNamedFramebufferTexture(handle, GL.GL_DEPTH_ATTACHMENT, depth, 0)
         return Target(handle, colour, depth, width, height)
 
-    def begin(self) -> None:
-        """All that follows is drawn here."""
+    def begin(self, part: tuple[int, int, int, int] | None = None) -> None:
+        """All that follows is drawn here, or in a part of it: its corner and its size, in pixels."""
         GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self.handle)
-        GL.glViewport(0, 0, self.width, self.height)
-
-    def free(self) -> None:
-        """Lets the frame buffer go; textures stay."""
-        GL.glDeleteFramebuffers(1, np.array([self.handle], np.uint32))
-
-    def attach_layer(self, textures: int, layer: int) -> None:
-        """Takes one of an array of textures as its depth."""
-        GL.glNamedFramebufferTextureLayer(self.handle, GL.GL_DEPTH_ATTACHMENT, textures, 0, layer)
+        rectangle = part or (0, 0, self.width, self.height)
+        GL.glViewport(*rectangle)
+        GL.glScissor(*rectangle)
 
 
 def picture(content: npt.NDArray[np.uint8], *, is_srgb: bool) -> int:
@@ -199,10 +193,10 @@ def table(content: npt.NDArray[Any]) -> int:
     return texture
 
 
-def shadow_maps(size: int, count: int) -> int:
-    """An array of depth textures that are compared with when they are looked up; beyond their borders all is lit."""
-    texture = _texture(GL.GL_TEXTURE_2D_ARRAY)
-    GL.glTextureStorage3D(texture, 1, GL.GL_DEPTH_COMPONENT32F, size, size, count)
+def shadow_map(width: int, height: int) -> int:
+    """A depth texture that is compared with when it is looked up; beyond its borders all is lit."""
+    texture = _texture(GL.GL_TEXTURE_2D)
+    GL.glTextureStorage2D(texture, 1, GL.GL_DEPTH_COMPONENT32F, width, height)
     for name, value in (
         (GL.GL_TEXTURE_MIN_FILTER, GL.GL_LINEAR),
         (GL.GL_TEXTURE_MAG_FILTER, GL.GL_LINEAR),

@@ -63,6 +63,7 @@ class RasterRenderer:
         self._targets: dict[tuple[str, int, int], device.Target] = {}
         GL.glClipControl(GL.GL_UPPER_LEFT, GL.GL_ZERO_TO_ONE)
         GL.glEnable(GL.GL_DEPTH_TEST)
+        GL.glEnable(GL.GL_SCISSOR_TEST)
         GL.glEnable(GL.GL_TEXTURE_CUBE_MAP_SEAMLESS)
         GL.glDisable(GL.GL_DITHER)
         GL.glPixelStorei(GL.GL_PACK_ALIGNMENT, 1)
@@ -123,9 +124,10 @@ class RasterRenderer:
         linear_rgb = None
         if colour:
             self._light(stage, frustum)
-            raw = self._colour(size, seen, frustum, truth)
+            drawn = self._colour(size, seen, frustum, truth)
+            # While the driver draws.
             open_share = openness(depth_m, camera.focal_px) * np.float32(LINEAR_FULL_SCALE / _FULL)
-            linear_rgb = shade(raw, open_share)
+            linear_rgb = shade(_pixels(drawn), open_share)
             if self._quality == "fast":
                 linear_rgb = smooth_edges(linear_rgb, geom_id, depth_m)
         return RawView(linear_rgb=linear_rgb, depth_m=depth_m, geom_id=geom_id)
@@ -152,12 +154,12 @@ class RasterRenderer:
         """Draws the maps of the sun's shadows, and tells the shaders of all lights."""
         lamps = lamps_of(stage.model, stage.data)
         maps = self._shadows.draw(stage, frustum, lamps.towards[0, :3]) if lamps.casts else None
-        self._scene.light(lamps, maps, frustum.position_world_m, frustum.forward_world)
+        self._scene.light(lamps, maps, frustum.position_world_m)
 
     def _colour(
         self, size: tuple[int, int], seen: Selection, frustum: Frustum, truth: device.Target | None
-    ) -> UInt16Image:
-        """(H, W, 3) uint16, 65535 is full scale.
+    ) -> device.Target:
+        """Has the colour of these pixels drawn, in a target that is current then.
 
         Args:
             size: of the picture.
@@ -182,9 +184,8 @@ class RasterRenderer:
         self._draw_sky(frustum)
         if is_film:
             target = self._halved(target)
-        pixels = np.empty((target.height, target.width, 3), np.uint16)
-        GL.glReadPixels(0, 0, target.width, target.height, GL.GL_RGB, GL.GL_UNSIGNED_SHORT, pixels)
-        return pixels
+        GL.glFlush()
+        return target
 
     def _draw_sky(self, frustum: Frustum) -> None:
         """Where nothing was drawn: there the depth is still that of infinity."""
@@ -220,6 +221,13 @@ def _pieces(truth: device.Target) -> npt.NDArray[np.int32]:
     pieces = np.empty((truth.height, truth.width), np.int32)
     GL.glReadPixels(0, 0, truth.width, truth.height, GL.GL_RED_INTEGER, GL.GL_INT, pieces)
     return pieces
+
+
+def _pixels(colour: device.Target) -> UInt16Image:
+    """(H, W, 3) of a target that is current, 65535 is full scale."""
+    pixels = np.empty((colour.height, colour.width, 3), np.uint16)
+    GL.glReadPixels(0, 0, colour.width, colour.height, GL.GL_RGB, GL.GL_UNSIGNED_SHORT, pixels)
+    return pixels
 
 
 def _depth_state(compare: int, *, writes: bool) -> None:

@@ -27,17 +27,16 @@ _MIRRORED_UNIT, _SHARES_UNIT = 5, 7
 _GEOM = np.dtype([("camera_from_geom", "<f4", (3, 4)), ("colour", "<f4", 4), ("surface", "<f4", 4)])
 _FRAME = np.dtype(
     [
-        ("shadow_from_camera", "<f4", (3, 4, 4)),
-        ("forward", "<f4", 4),
+        ("sun_axes", "<f4", (3, 4)),
+        ("shadow_scale", "<f4", (3, 4)),
+        ("shadow_offset", "<f4", (3, 4)),
         ("shadow_end_m", "<f4", 4),
-        ("shadow_texel_m", "<f4", 4),
         ("irradiance", "<f4", (4, 4)),
         ("towards_light", "<f4", (MOST_LIGHTS, 4)),
         ("light", "<f4", (MOST_LIGHTS, 4)),
         ("environment", "<f4", 4),
     ]
 )
-_FROM_CLIP = np.array([[0.5, 0, 0, 0.5], [0, -0.5, 0, 0.5], [0, 0, 1, 0], [0, 0, 0, 1]])
 
 
 class Scene:
@@ -67,6 +66,7 @@ class Scene:
         self._frame = device.Stream(GL.GL_UNIFORM_BUFFER)
         self._draws = device.Stream(GL.GL_DRAW_INDIRECT_BUFFER)
         self._surfaces: dict[tuple[str, ...], device.Program] = {}
+        self._light_flags: tuple[str, ...] = ("LIGHTS 0",)
 
     def dress(self, stage: Stage) -> None:
         """Puts faces on, and takes off those of the last stage."""
@@ -86,33 +86,32 @@ class Scene:
         self._geoms.fill(geoms)
         GL.glBindBufferBase(GL.GL_SHADER_STORAGE_BUFFER, 0, self._geoms.handle)
 
-    def light(self, lamps: Lamps, maps: Maps | None, camera_m: Array, forward: Array) -> None:
+    def light(self, lamps: Lamps, maps: Maps | None, camera_m: Array) -> None:
         """Lights it for a camera.
 
         Args:
             lamps: all lights but the sky.
             maps: of the first lamp's shadows, if it throws any.
             camera_m: (3,) where the camera stands in the world.
-            forward: (3,) where it looks.
         """
         frame = np.zeros(1, _FRAME)
         if maps is not None:
-            frame["shadow_from_camera"][0] = (_FROM_CLIP @ maps.map_from_camera).swapaxes(1, 2)
-            frame["shadow_end_m"][0, :2] = maps.end_m
-            frame["shadow_end_m"][0, 3] = 1.0
-            frame["shadow_texel_m"][0, :3] = maps.texel_m
-        frame["forward"][0, :3] = forward
+            frame["sun_axes"][0, :, :3] = maps.axes
+            frame["shadow_scale"][0, :, :3] = maps.scale
+            frame["shadow_scale"][0, :, 3] = maps.texel_m
+            frame["shadow_offset"][0, :, :3] = maps.offset
+            frame["shadow_end_m"][0, :3] = (*maps.end_m, maps.town_ends)
         frame["irradiance"][0, :, :3] = self._environment.irradiance
         count = len(lamps.light)
         frame["towards_light"][0, :count] = lamps.towards
         frame["towards_light"][0, :count, :3] -= lamps.towards[:, 3:] * camera_m
         frame["light"][0, :count, :3] = lamps.light
-        frame["light"][0, :, 3] = count
-        frame["environment"][0, :2] = (max(len(self._environment.levels) - 1, 0), bool(self._environment.levels))
+        frame["environment"][0, 0] = max(len(self._environment.levels) - 1, 0)
         self._frame.fill(frame)
         GL.glBindBufferBase(GL.GL_UNIFORM_BUFFER, 0, self._frame.handle)
         GL.glBindTextureUnit(_MIRRORED_UNIT, self._mirrored)
         GL.glBindTextureUnit(_SHARES_UNIT, self._shares)
+        self._light_flags = (f"LIGHTS {count}", *(("SHADOWS",) if maps is not None else ()))
 
     def spheres(self, stage: Stage) -> tuple[Array, Array]:
         """(P, 3) centres in the world and (P,) radii in metres of spheres about the pieces that geoms are drawn in."""
@@ -166,7 +165,7 @@ class Scene:
         for unit, picture in enumerate(pictures):
             if picture:
                 GL.glBindTextureUnit(unit, picture)
-        key = (*(flag for flag, picture in zip(ROLES, pictures, strict=True) if picture), *flags)
+        key = (*(flag for flag, picture in zip(ROLES, pictures, strict=True) if picture), *self._light_flags, *flags)
         if key not in self._surfaces:
             self._surfaces[key] = device.Program("surface.vert", "surface.frag", key)
         self._surfaces[key].use(clip_from_place=matrix)

@@ -34,19 +34,29 @@ class Square:
     axes: Array
     half_side_m: float
 
+    @property
+    def scale(self) -> Array:
+        """(3,) from metres along the axes to -1..1 across the map and 0..1 away from the sun."""
+        return np.array([1 / self.half_side_m, 1 / self.half_side_m, -1 / (TOWARDS_SUN_M + 2 * self.half_side_m)])
+
+    def offset(self, origin_m: Array) -> Array:
+        """(3,) what to add to scaled places that are relative to an origin.
+
+        Args:
+            origin_m: (3,) in the frame of the centre.
+        """
+        towards_sun = -self.scale[2] * (TOWARDS_SUN_M + self.half_side_m)
+        return np.asarray((0.0, 0.0, towards_sun) - self.scale * (self.axes @ (self.centre_m - origin_m)))
+
     def matrix(self, origin_m: Array) -> Array:
-        """(4, 4) from places relative to an origin to -1..1 across the map and 0..1 away from the sun.
+        """(4, 4) from places relative to an origin to the map.
 
         Args:
             origin_m: (3,) in the frame of the centre.
         """
         matrix = np.eye(4)
-        matrix[:3, :3], matrix[:3, 3] = self.axes, -self.axes @ (self.centre_m - origin_m)
-        reach_m = TOWARDS_SUN_M + self.half_side_m
-        depth_m = reach_m + self.half_side_m
-        scale = np.diag([1 / self.half_side_m, 1 / self.half_side_m, -1 / depth_m, 1.0])
-        scale[2, 3] = reach_m / depth_m
-        return np.asarray(scale @ matrix)
+        matrix[:3, :3], matrix[:3, 3] = self.scale[:, None] * self.axes, self.offset(origin_m)
+        return matrix
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,14 +64,20 @@ class Maps:
     """What shaders have to know of the maps: of everything near, of what moves, of the town.
 
     Attributes:
-        map_from_camera: (3, 4, 4) from places relative to the camera.
+        axes: (3, 3) rows: of all their squares.
+        scale: (3, 3) map by map, from metres along the axes to the texture, which is 1 wide and high, and to depth.
+        offset: (3, 3) what to add for places relative to the camera.
         texel_m: (3,) sides of texels.
         end_m: (2,) how far along the view the first two reach.
+        town_ends: where the town's map ends in the texture; what lies farther down belongs to the others.
     """
 
-    map_from_camera: Array
+    axes: Array
+    scale: Array
+    offset: Array
     texel_m: Array
     end_m: Array
+    town_ends: float
 
 
 def squares_before(frustum: Frustum, towards_sun: Array) -> tuple[Square, ...]:

@@ -18,10 +18,12 @@ from gear.render.raster.scene import Scene
 from gear.render.raster.shadow_squares import ENDS_M, Maps, Square, square_about, squares_before
 from gear.values.geometry import Array
 
-NEAR_PX, TOWN_PX = 2048, 4096
-"""Sides of the maps."""
+_NEAR_PX, _TOWN_PX = 2048, 4096
+_SIZE_PX = 4096, 6144
+_PARTS_PX = ((0, 4096, _NEAR_PX), (2048, 4096, _NEAR_PX), (0, 0, _TOWN_PX))
+"""Corners and sides of the maps in one texture: of everything near, of what moves, of the town."""
 
-_NEAR_UNIT, _TOWN_UNIT = 4, 8
+_UNIT = 4
 _SLOPE_BIAS, _UNIT_BIAS = 1.5, 2.0
 _SEEN_TEXELS = 2
 """What is smaller than so many texels of a map throws no shadow there."""
@@ -34,54 +36,44 @@ class SunShadows:
         """Makes room; the town's map is drawn when it is wanted first."""
         self._model, self._scene = model, scene
         self._program = device.Program("shapes.vert", "nothing.frag")
-        self._near = device.shadow_maps(NEAR_PX, len(ENDS_M))
-        self._near_target = device.Target.of(NEAR_PX, NEAR_PX, None, depth=0)
+        self._texture = device.shadow_map(*_SIZE_PX)
+        self._target = device.Target.of(*_SIZE_PX, None, depth=self._texture)
         self._moves = _moves(model)[scene.geom_of_piece]
         self._size_m = bounding_radii(model)[scene.geom_of_piece]
-        self._town: tuple[Array, int, Square] | None = None
+        self._town: tuple[Array, Square] | None = None
 
     def draw(self, stage: Stage, frustum: Frustum, towards_sun: Array) -> Maps:
         """Draws what is new, for a scene that is posed for this camera, and binds all maps."""
         centres_m, radii_m = self._scene.spheres(stage)
-        squares = squares_before(frustum, towards_sun)
         if self._town is None or not np.array_equal(self._town[0], towards_sun):
-            self._draw_town(towards_sun)
+            self._town = towards_sun, self._draw_town(towards_sun)
             self._scene.pose(stage, frustum.position_world_m)
-        assert self._town is not None
-        _, town_map, town = self._town
-        for layer, (square, chosen) in enumerate(zip(squares, (np.ones_like(self._moves), self._moves), strict=True)):
-            self._near_target.attach_layer(self._near, layer)
+        squares = (*squares_before(frustum, towards_sun), self._town[1])
+        for part, square, chosen in zip(
+            _PARTS_PX[:2], squares[:2], (np.ones_like(self._moves), self._moves), strict=True
+        ):
             in_light = in_beam(square.centre_m, towards_sun, square.half_side_m, centres_m, radii_m)
-            large = self._size_m > _SEEN_TEXELS * _texel_m(square, NEAR_PX)
-            self._draw(self._near_target, square, frustum.position_world_m, chosen & in_light & large, centres_m)
-        GL.glBindTextureUnit(_NEAR_UNIT, self._near)
-        GL.glBindTextureUnit(_TOWN_UNIT, town_map)
-        return Maps(
-            map_from_camera=np.stack([square.matrix(frustum.position_world_m) for square in (*squares, town)]),
-            texel_m=np.array([*(_texel_m(square, NEAR_PX) for square in squares), _texel_m(town, TOWN_PX)]),
-            end_m=np.array(ENDS_M),
-        )
+            self._draw(part, square, frustum.position_world_m, chosen & in_light, centres_m)
+        GL.glBindTextureUnit(_UNIT, self._texture)
+        return _maps(squares, frustum.position_world_m)
 
-    def _draw_town(self, towards_sun: Array) -> None:
+    def _draw_town(self, towards_sun: Array) -> Square:
         """The map of what stands still, where the model has it: it must not depend on what is looked at first."""
         data = mujoco.MjData(self._model)
         mujoco.mj_kinematics(self._model, data)
         stage = Stage(model=self._model, data=data)
         centres_m, _ = self._scene.spheres(stage)
         square = square_about(self._scene.landmarks(stage, ~self._moves), towards_sun)
-        maps = device.shadow_maps(TOWN_PX, 1)
-        target = device.Target.of(TOWN_PX, TOWN_PX, None, depth=0)
-        target.attach_layer(maps, 0)
         self._scene.pose(stage, square.centre_m)
-        large = self._size_m > _SEEN_TEXELS * _texel_m(square, TOWN_PX)
-        self._draw(target, square, square.centre_m, ~self._moves & large, centres_m)
-        target.free()
-        if self._town is not None:
-            device.free_textures([self._town[1]])
-        self._town = towards_sun, maps, square
+        self._draw(_PARTS_PX[2], square, square.centre_m, ~self._moves, centres_m)
+        return square
 
-    def _draw(self, target: device.Target, square: Square, origin_m: Array, chosen: Mask, centres_m: Array) -> None:
-        target.begin()
+    def _draw(
+        self, part: tuple[int, int, int], square: Square, origin_m: Array, chosen: Mask, centres_m: Array
+    ) -> None:
+        """Draws one map, for a scene that is posed for this origin."""
+        left, top, side = part
+        self._target.begin((left, top, side, side))
         GL.glDepthFunc(GL.GL_LESS)
         GL.glDepthMask(True)
         GL.glDisable(GL.GL_CULL_FACE)
@@ -90,15 +82,28 @@ class SunShadows:
         GL.glPolygonOffset(_SLOPE_BIAS, _UNIT_BIAS)
         GL.glClearBufferfv(GL.GL_DEPTH, 0, np.ones(1, np.float32))
         self._program.use(clip_from_place=square.matrix(origin_m))
+        is_large = self._size_m > _SEEN_TEXELS * 2 * square.half_side_m / side
         try:
-            self._scene.draw(near_to_far(chosen, -(centres_m @ square.axes[2])))
+            self._scene.draw(near_to_far(chosen & is_large, -(centres_m @ square.axes[2])))
         finally:
             GL.glDisable(GL.GL_DEPTH_CLAMP)
             GL.glDisable(GL.GL_POLYGON_OFFSET_FILL)
 
 
-def _texel_m(square: Square, size: int) -> float:
-    return 2 * square.half_side_m / size
+def _maps(squares: tuple[Square, ...], camera_m: Array) -> Maps:
+    """Where the three maps lie in the texture, for places relative to a camera."""
+    corners_px, sides_px = np.array(_PARTS_PX)[:, :2], np.array(_PARTS_PX)[:, 2:]
+    # OpenGL's square reaches from -1 to 1, the first row on top.
+    half = np.concatenate([sides_px * (0.5, -0.5) / _SIZE_PX, np.ones((3, 1))], axis=1)
+    middle = np.concatenate([(corners_px + sides_px / 2) / _SIZE_PX, np.zeros((3, 1))], axis=1)
+    return Maps(
+        axes=squares[0].axes,
+        scale=half * [square.scale for square in squares],
+        offset=half * [square.offset(camera_m) for square in squares] + middle,
+        texel_m=np.array([2 * square.half_side_m for square in squares]) / sides_px[:, 0],
+        end_m=np.array(ENDS_M),
+        town_ends=(_PARTS_PX[2][1] + _TOWN_PX) / _SIZE_PX[1],
+    )
 
 
 def _moves(model: mujoco.MjModel) -> Mask:

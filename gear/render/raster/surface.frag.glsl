@@ -6,6 +6,11 @@ in vec3 place_m;
 in vec3 smooth_normal;
 in vec3 tangent;
 in vec2 uv;
+#ifdef SHADOWS
+in vec3 near_at;
+in vec3 moving_at;
+in vec3 town_at;
+#endif
 flat in int id;
 flat in vec3 albedo;
 flat in vec4 surface;
@@ -14,53 +19,45 @@ layout(binding = 0) uniform sampler2D base_map;
 layout(binding = 1) uniform sampler2D normal_map;
 layout(binding = 2) uniform sampler2D orm_map;
 layout(binding = 3) uniform sampler2D emissive_map;
-layout(binding = 4) uniform sampler2DArrayShadow near_shadows;
+layout(binding = 4) uniform sampler2DShadow shadows;
 layout(binding = 5) uniform samplerCube mirrored;
 layout(binding = 6) uniform isampler2D seen_piece;
 layout(binding = 7) uniform sampler2D mirrored_shares;
-layout(binding = 8) uniform sampler2DArrayShadow town_shadows;
 
 layout(location = 0) out vec4 radiance;
 
 const float PI = 3.14159265358979;
 
-vec3 on_map(int map, vec3 facing) {
-    vec3 lifted = place_m + facing * 1.5 * shadow_texel_m[map];
-    vec3 at = (shadow_from_camera[map] * vec4(lifted, 1.0)).xyz;
-    at.z = min(at.z, 1.0); // what lies beyond a map is as far as what the map shows nothing of
-    return at;
-}
+#ifdef SHADOWS
+float lit(vec3 at, vec2 aside) { return texture(shadows, vec3(at.xy + aside, at.z)); }
 
-float lit_near(int map, vec3 at, vec2 aside) {
-    return texture(near_shadows, vec4(at.xy + aside, map, at.z));
-}
-
-float lit_by_sun(vec3 facing) {
-    if (shadow_end_m.w == 0.0) return 1.0;
-    float ahead_m = dot(forward.xyz, place_m);
-    if (ahead_m < shadow_end_m.x) {
-        // Bilinear looks at the corners of a square blur an edge over three texels.
-        vec3 at = on_map(0, facing);
-        vec2 step = 0.75 / vec2(textureSize(near_shadows, 0).xy);
+// Drivers that run on processors take all branches: there are no more looks than are needed anywhere.
+float lit_by_sun() {
+    float ahead_m = 1.0 / gl_FragCoord.w;
+    bool is_near = ahead_m < shadow_end_m.x;
+    vec3 at = is_near ? near_at : town_at, other = is_near ? near_at : moving_at;
+    // What lies beyond a map is as far as what the map shows nothing of; beside the town's there is another one.
+    at.z = !is_near && at.y > shadow_end_m.z ? 0.0 : min(at.z, 1.0);
+    other.z = min(other.z, 1.0);
+    // Bilinear looks at the corners of a square blur an edge over three texels.
+    vec2 aside = (is_near ? 0.75 : 0.0) / vec2(textureSize(shadows, 0));
 #ifdef MANY_SAMPLES
-        // Two of them a sample, by turns the ones and the others: a pixel's four samples have all of them twice.
-        ivec2 odd = ivec2(gl_FragCoord.xy) & 1;
-        if (odd.x != odd.y) step.y = -step.y;
-        return 0.5 * (lit_near(0, at, step) + lit_near(0, at, -step));
+    // Two of them a sample, by turns the ones and the others: a pixel's four samples have all of them twice.
+    ivec2 odd = ivec2(gl_FragCoord.xy) & 1;
+    if (odd.x != odd.y) aside.y = -aside.y;
+    float a = lit(at, aside), b = lit(other, -aside);
 #else
-        vec2 other = vec2(step.x, -step.y);
-        float lit = lit_near(0, at, step) + lit_near(0, at, -step) + lit_near(0, at, other) + lit_near(0, at, -other);
-        return 0.25 * lit;
+    float a = 0.0, b = 0.0, share = is_near ? 0.5 : 1.0;
+    for (int turn = is_near ? 2 : 1; turn > 0; --turn) {
+        a += share * lit(at, aside);
+        b += share * lit(other, -aside);
+        aside.y = -aside.y;
+    }
 #endif
-    }
-    vec3 at = on_map(2, facing);
-    float lit = texture(town_shadows, vec4(at.xy, 0, at.z));
-    if (ahead_m < shadow_end_m.y) {
-        at = on_map(1, facing);
-        lit = min(lit, lit_near(1, at, vec2(0.0)));
-    }
-    return lit;
+    if (is_near) return 0.5 * (a + b);
+    return ahead_m < shadow_end_m.y ? min(a, b) : a;
 }
+#endif
 
 vec3 from_sky(vec3 n) {
     return max(irradiance[0].rgb + mat3(irradiance[1].rgb, irradiance[2].rgb, irradiance[3].rgb) * n, 0.0);
@@ -98,27 +95,26 @@ void main() {
     vec3 regained = 1.0 + f0 * (1.0 / (share.x + share.y) - 1.0);
     vec3 r = mix(reflect(-v, n), n, alpha * alpha); // wide lobes lean towards the normal (Lagarde 2014)
     float blur = environment.x * roughness * (2.0 - roughness);
-    vec3 mirror = environment.y * textureLod(mirrored, vec3(r.x, r.z, -r.y), blur).rgb;
+    vec3 mirror = textureLod(mirrored, vec3(r.x, r.z, -r.y), blur).rgb;
     vec3 sum = (diffuse * from_sky(n) * (1.0 - mirrored_share) + mirror * mirrored_share * regained) * open;
 
-    for (int i = 0; i < int(light[0].w); ++i) {
-        vec3 l = towards_light[i].xyz;
-        vec3 arriving = light[i].rgb;
-        if (towards_light[i].w > 0.0) {
-            l -= place_m;
-            arriving /= max(dot(l, l), 1e-4);
-            l = normalize(l);
-        }
-        float nl = dot(n, l);
-        if (nl <= 0.0) continue;
-        float lit = i == 0 ? lit_by_sun(facing) : 1.0;
+    for (int i = 0; i < LIGHTS; ++i) {
+        // From a direction, whose length is 1, or from a place.
+        vec3 l = towards_light[i].xyz - towards_light[i].w * place_m;
+        float squared = max(dot(l, l), 1e-4);
+        vec3 arriving = light[i].rgb / squared;
+        l *= inversesqrt(squared);
+        float nl = max(dot(n, l), 1e-6), lit_share = 1.0;
+#ifdef SHADOWS
+        if (i == 0) lit_share = lit_by_sun();
+#endif
         vec3 h = normalize(v + l);
         float nh = clamp(dot(n, h), 0.0, 1.0), k = nh * alpha;
         float d = alpha / (1.0 - nh * nh + k * k);
         float grazing = 1.0 - clamp(dot(l, h), 0.0, 1.0), g2 = grazing * grazing;
         vec3 fresnel = f0 + (1.0 - f0) * (g2 * g2 * grazing);
         float visibility = 0.5 / mix(2.0 * nl * nv, nl + nv, alpha);
-        sum += (diffuse / PI + (d * d / PI) * visibility * fresnel * regained) * arriving * (nl * lit);
+        sum += (diffuse / PI + (d * d / PI) * visibility * fresnel * regained) * arriving * (nl * lit_share);
     }
 #ifdef HAS_EMISSIVE
     sum += texture(emissive_map, uv).rgb * surface.z;
@@ -127,5 +123,5 @@ void main() {
 #endif
     // Of two surfaces at the very same depth the pieces decide. Last, so that neighbours have told how fine the maps are.
     if (texelFetch(seen_piece, ivec2(gl_FragCoord.xy), 0).r != id) discard;
-    radiance = vec4(min(sum, 1.0), 1.0);
+    radiance = vec4(sum, 1.0);
 }
