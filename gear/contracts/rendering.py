@@ -6,6 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, Protocol
 
+import numpy as np
+import numpy.typing as npt
+
 from gear.values.frames import FloatImage, IdImage, UInt8Image, UInt16Image
 from gear.values.scene import CameraRecord, Vec3
 
@@ -14,6 +17,12 @@ if TYPE_CHECKING:
 
 Quality = Literal["film", "fast"]
 """`film`: 2x2 supersampled, averaged in linear light. `fast`: one sample a pixel, gear's own edge filter."""
+
+FULL_SCALE_LUX = 38400.0
+"""A radiance of so many cd/m² is full scale: Filament's fixed exposure (f/16, 1/125 s, ISO 100)."""
+
+NO_OWN_RGBA = (0.5, 0.5, 0.5, 1.0)
+"""MuJoCo's default: a geom of this colour wears its material's."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -66,6 +75,12 @@ class RawView:
     linear_rgb: UInt16Image | None
     depth_m: FloatImage
     geom_id: IdImage
+
+
+def has_own_colour(model: mujoco.MjModel) -> npt.NDArray[np.bool_]:
+    """(ngeom,) whether a geom's own rgba colours it, and not its material's: as MuJoCo draws them."""
+    is_said = (model.geom_rgba != np.array(NO_OWN_RGBA, np.float32)).any(axis=1)
+    return np.asarray(is_said | (model.geom_matid < 0), np.bool_)
 
 
 class Renderer(Protocol):

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.camera.response import encode_srgb
+from gear.contracts.rendering import has_own_colour
 
 SHADOW_REACH_M = 50.0
 """Half the side of the square on which classic's sun casts shadows; the renderer lays it before the camera."""
@@ -23,8 +24,6 @@ Display values cannot be brightened by more light: white, such as that of a patc
 lifted instead; what a face shows is left as it is.
 """
 
-_DEFAULT_RGBA = np.array([0.5, 0.5, 0.5, 1.0], np.float32)
-
 
 def has_linear_colours(model: mujoco.MjModel) -> bool:
     """Whether the model says that its colours (`rgba`) are linear albedo; MuJoCo's habit is sRGB."""
@@ -33,11 +32,6 @@ def has_linear_colours(model: mujoco.MjModel) -> bool:
         return False
     begin, size = int(model.text_adr[index]), int(model.text_size[index])
     return bytes(model.text_data[begin : begin + size]).rstrip(b"\0") == b"linear"
-
-
-def has_own_colour(model: mujoco.MjModel) -> npt.NDArray[np.bool_]:
-    """(ngeom,) whether a geom shows its own colour; with a material and MuJoCo's default it shows the material's."""
-    return np.asarray((model.geom_matid < 0) | (model.geom_rgba != _DEFAULT_RGBA).any(axis=1))
 
 
 def displayed_model(model: mujoco.MjModel) -> mujoco.MjModel:

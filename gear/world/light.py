@@ -22,8 +22,6 @@ Floats = npt.NDArray[np.float64]
 WHITE_ALBEDO = 0.7
 WHITE_LEVEL = 0.85
 SKY_LEVEL = 0.9
-FILAMENT_LUX = 38400.0
-"""Filament's fixed exposure (f/16, 1/125 s, ISO 100) shows a radiance of so many cd/m² as 1.0."""
 
 SKY_FACE_PX = 512
 STREET_FACE_PX = 128

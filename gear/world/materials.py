@@ -6,8 +6,8 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
+from gear.contracts.rendering import has_own_colour
 from gear.values.errors import TownError
 from gear.values.geometry import Array
 from gear.world.classes import FIRST_HIDDEN_GROUP
@@ -21,15 +21,6 @@ TEXTURE_KINDS = {
 
 LARGEST_SIDE_PX = 16384
 """Of a texture, for Vulkan and OpenGL as Mesa has them."""
-
-NO_OWN_RGBA = (0.5, 0.5, 0.5, 1.0)
-"""MuJoCo's default: a geom of this colour wears its material's."""
-
-
-def has_own_colour(model: mujoco.MjModel) -> npt.NDArray[np.bool_]:
-    """(ngeom,) whether a geom's own rgba colours it, and not its material's: as MuJoCo draws them."""
-    is_said = (model.geom_rgba != np.array(NO_OWN_RGBA, np.float32)).any(axis=1)
-    return np.asarray(is_said | (model.geom_matid < 0), np.bool_)
 
 
 def effective_rgba(model: mujoco.MjModel) -> Array:

@@ -10,11 +10,12 @@ import numpy as np
 
 from gear.config.nodes import Mapping, Scalar, parse_file
 from gear.config.reader import read_node
+from gear.contracts.rendering import FULL_SCALE_LUX
 from gear.values.frames import UInt8Image
 from gear.values.resources import data_dir
 from gear.values.scene import Weather
 from gear.world.instances import free_name
-from gear.world.light import FACE_ORDER, FILAMENT_LUX, Floats, Lighting, encode_srgb, lighting_of
+from gear.world.light import FACE_ORDER, Floats, Lighting, encode_srgb, lighting_of
 from gear.world.quiet_mjcf import mjcf
 from gear.world.wet import Worn, wet_materials
 
@@ -89,7 +90,7 @@ def _add_sky(root: mjcf.RootElement, lighting: Lighting) -> None:
     """The sky as a picture, and as light what a street gets of it."""
     _add_cube(root, "sky", "skybox", lighting.sky_faces)
     street = _add_cube(root, "street_light", "cube", lighting.street_faces)
-    root.worldbody.add("light", name="sky", type="image", texture=street, intensity=FILAMENT_LUX, diffuse=(0, 0, 0))
+    root.worldbody.add("light", name="sky", type="image", texture=street, intensity=FULL_SCALE_LUX, diffuse=(0, 0, 0))
 
 
 def _add_cube(root: mjcf.RootElement, name: str, kind: str, faces: UInt8Image) -> Any:
@@ -125,7 +126,7 @@ def _add_sun(root: mjcf.RootElement, lighting: Lighting, night: float) -> None:
         diffuse=tuple(strength * lighting.sun / lighting.sun.max()),
         ambient=(0, 0, 0),
         specular=(0.1 * (1 - night),) * 3,
-        intensity=float(lighting.sun.max() * FILAMENT_LUX / strength),
+        intensity=float(lighting.sun.max() * FULL_SCALE_LUX / strength),
         castshadow=True,
     )
     tint = (lighting.ambient / lighting.ambient.mean()) ** _CLASSIC_TINT

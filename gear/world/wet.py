@@ -12,9 +12,9 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from gear.contracts.rendering import has_own_colour
 from gear.values.labels import LABEL_BY_NAME
 from gear.world.instances import class_name
-from gear.world.materials import has_own_colour
 from gear.world.quiet_mjcf import mjcf
 
 WET_LABELS = frozenset({"road", "road_marking", "sidewalk", "parking", "ground"})

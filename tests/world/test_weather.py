@@ -11,14 +11,13 @@ import numpy as np
 import pytest
 
 from gear.config.collection import WeatherConfig
-from gear.contracts.rendering import Stage
+from gear.contracts.rendering import FULL_SCALE_LUX, Stage
 from gear.render import RENDERERS, open_renderer
 from gear.values.geometry import Intrinsics, RigidTransform
 from gear.values.scene import CameraRecord, Pose, Weather
 from gear.world.air import RAIN_PER_M, air_of, darkroom_of, fogs_of
 from gear.world.light import (
     FACE_ORDER,
-    FILAMENT_LUX,
     WHITE_ALBEDO,
     face_directions,
     horizon_light,
@@ -231,7 +230,7 @@ def test_at_night_classic_has_no_sun_in_which_white_would_clip(name: str) -> Non
     assert sun.diffuse.max() * 1020 < 2 and sun.specular.max() == 0, "nothing casts a shadow"
     lighting = lighting_of(PRESETS[name], sky_face_px=16)
     shown = sun.diffuse * model.light_intensity[sun.id]
-    assert shown == pytest.approx(lighting.sun * FILAMENT_LUX, rel=1e-4), "Filament's is the weather's"
+    assert shown == pytest.approx(lighting.sun * FULL_SCALE_LUX, rel=1e-4), "Filament's is the weather's"
 
 
 def test_a_weather_replaces_the_light_of_its_town() -> None:

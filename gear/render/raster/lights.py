@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from gear.contracts.rendering import FULL_SCALE_LUX
 from gear.render.culling import Mask
 from gear.render.raster.cubes import mirrored_levels
 from gear.values.geometry import Array
@@ -14,9 +15,6 @@ from gear.values.geometry import Array
 MOST_LIGHTS = 4
 LEAST_SUN = 1e-3
 """Irradiance whose shadows nobody sees: a tenth of a step of eight bits."""
-
-LUX_OF_FULL_SCALE = 38400.0
-"""Filament's fixed exposure (f/16, 1/125 s, ISO 100) shows so many cd/m² as full scale."""
 
 _TYPE = mujoco.mjtLightType
 
@@ -62,7 +60,7 @@ def environment_of(model: mujoco.MjModel, faces_of: dict[int, Array]) -> Environ
     for light in np.flatnonzero((model.light_type == _TYPE.mjLIGHT_IMAGE) & model.light_active).tolist():
         faces = faces_of.get(int(model.light_texid[light]))
         if faces is not None:
-            radiance = faces * (float(model.light_intensity[light]) / LUX_OF_FULL_SCALE)
+            radiance = faces * (float(model.light_intensity[light]) / FULL_SCALE_LUX)
             return Environment(irradiance_over_pi(radiance), mirrored_levels(radiance))
     return Environment(np.zeros((4, 3)), ())
 
@@ -95,7 +93,7 @@ def lamps_of(model: mujoco.MjModel, data: mujoco.MjData) -> Lamps:
     directions = data.light_xdir[lit] / np.linalg.norm(data.light_xdir[lit], axis=1, keepdims=True)
     towards[:, :3] = np.where(is_far[:, None], -directions, data.light_xpos[lit])
     towards[:, 3] = ~is_far
-    strength = model.light_intensity[lit, None] / LUX_OF_FULL_SCALE
+    strength = model.light_intensity[lit, None] / FULL_SCALE_LUX
     light = model.light_diffuse[lit] * np.where(strength > 0, strength, np.pi)
     return Lamps(
         towards=towards, light=np.asarray(light, np.float64), casts=bool(casts[:1].any() and light[0].max() > LEAST_SUN)

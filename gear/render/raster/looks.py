@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.camera.response import decode_srgb
-from gear.render.display import has_linear_colours, has_own_colour
+from gear.contracts.rendering import has_own_colour
+from gear.render.display import has_linear_colours
 from gear.values.geometry import Array
 
 ROLES = {"HAS_BASE": "RGB", "HAS_NORMAL": "NORMAL", "HAS_ORM": "ORM", "HAS_EMISSIVE": "EMISSIVE"}

@@ -111,7 +111,7 @@ class RasterRenderer:
     def _view(self, stage: Stage, camera: CameraRecord, shape: RawView | None, *, colour: bool) -> RawView:
         frustum = Frustum.of(camera)
         size = (camera.width_px, camera.height_px)
-        centres_m, radii_m = self._scene.spheres(stage)
+        centres_m, radii_m = spheres = self._scene.spheres(stage)
         self._scene.pose(stage, frustum.position_world_m)
         distance_m = np.linalg.norm(centres_m - frustum.position_world_m, axis=1) - radii_m
         seen = near_to_far(in_frustum(frustum, centres_m, radii_m), distance_m)
@@ -123,7 +123,7 @@ class RasterRenderer:
             geom_id, depth_m = shape.geom_id, shape.depth_m
         linear_rgb = None
         if colour:
-            self._light(stage, frustum)
+            self._light(stage, frustum, spheres)
             drawn = self._colour(size, seen, frustum, truth)
             # While the driver draws.
             open_share = openness(depth_m, camera.focal_px) * np.float32(LINEAR_FULL_SCALE / _FULL)
@@ -150,10 +150,10 @@ class RasterRenderer:
         GL.glReadPixels(0, 0, width, height, GL.GL_DEPTH_COMPONENT, GL.GL_FLOAT, reversed_depth)
         return self._geom_of_piece[_pieces(truth)], depth_from_reversed(reversed_depth)
 
-    def _light(self, stage: Stage, frustum: Frustum) -> None:
+    def _light(self, stage: Stage, frustum: Frustum, spheres: tuple[Array, Array]) -> None:
         """Draws the maps of the sun's shadows, and tells the shaders of all lights."""
         lamps = lamps_of(stage.model, stage.data)
-        maps = self._shadows.draw(stage, frustum, lamps.towards[0, :3]) if lamps.casts else None
+        maps = self._shadows.draw(stage, frustum, lamps.towards[0, :3], spheres) if lamps.casts else None
         self._scene.light(lamps, maps, frustum.position_world_m)
 
     def _colour(

@@ -16,6 +16,9 @@ ENDS_M = (40.0, 160.0)
 TOWARDS_SUN_M = 600.0
 """How far towards the sun a map tells depths apart; what stands farther away throws its shadow all the same."""
 
+_ROOM = 1.005
+"""How much larger than what they must show maps are: looks beside a place, and in front of it, stay on them."""
+
 _WIDEST_M = 500.0
 _OUTLIERS = 0.02
 
@@ -94,7 +97,7 @@ def squares_before(frustum: Frustum, towards_sun: Array) -> tuple[Square, ...]:
     for end_m in ENDS_M:
         # The smallest sphere about the part of the view between its two distances.
         middle_m = min((begin_m + end_m) / 2 * (1 + slope2), end_m)
-        half_side_m = math.sqrt((end_m - middle_m) ** 2 + slope2 * end_m**2)
+        half_side_m = _ROOM * math.sqrt((end_m - middle_m) ** 2 + slope2 * end_m**2)
         made.append(Square(frustum.position_world_m + frustum.forward_world * middle_m, axes, half_side_m))
         begin_m = end_m
     return tuple(made)

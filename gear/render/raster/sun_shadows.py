@@ -42,9 +42,16 @@ class SunShadows:
         self._size_m = bounding_radii(model)[scene.geom_of_piece]
         self._town: tuple[Array, Square] | None = None
 
-    def draw(self, stage: Stage, frustum: Frustum, towards_sun: Array) -> Maps:
-        """Draws what is new, for a scene that is posed for this camera, and binds all maps."""
-        centres_m, radii_m = self._scene.spheres(stage)
+    def draw(self, stage: Stage, frustum: Frustum, towards_sun: Array, spheres: tuple[Array, Array]) -> Maps:
+        """Draws what is new, for a scene that is posed for this camera, and binds all maps.
+
+        Args:
+            stage: what throws shadows.
+            frustum: who looks.
+            towards_sun: (3,) unit vector.
+            spheres: of the stage, as `Scene.spheres` has them.
+        """
+        centres_m, radii_m = spheres
         if self._town is None or not np.array_equal(self._town[0], towards_sun):
             self._town = towards_sun, self._draw_town(towards_sun)
             self._scene.pose(stage, frustum.position_world_m)

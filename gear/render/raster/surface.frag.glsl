@@ -75,8 +75,7 @@ void main() {
     roughness *= orm.g;
     metallic *= orm.b;
 #endif
-    vec3 facing = normalize(smooth_normal);
-    vec3 n = facing;
+    vec3 n = normalize(smooth_normal);
 #ifdef HAS_NORMAL
     vec3 t = normalize(tangent);
     vec3 relief = texture(normal_map, uv).xyz * 2.0 - 1.0;
