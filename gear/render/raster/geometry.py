@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import mujoco
 import numpy as np
@@ -166,18 +165,22 @@ def _shape(triangles: Triangles) -> _Shape:
         order = np.argsort(cell, kind="stable")
         corners = corners[order]
         starts = np.concatenate([[0], np.flatnonzero(np.diff(cell[order])) + 1, [len(corners)]])
-    starts = starts[: len(corners) + 1] if len(corners) else np.zeros(1, np.int64)
-    spheres = [_sphere(triangles.positions_m[corners[a:b]].reshape(-1, 3)) for a, b in pairwise(starts.tolist())]
+    starts = 3 * starts if len(corners) else np.zeros(1, np.int64)
+    centres_m, radii_m = _spheres(triangles.positions_m[corners.reshape(-1)], starts)
     return _Shape(
         vertices=vertices,
         indices=corners.reshape(-1).astype(np.uint32),
-        starts=3 * starts,
-        centres_m=np.array([centre for centre, _ in spheres]).reshape(-1, 3),
-        radii_m=np.array([radius for _, radius in spheres]),
+        starts=starts,
+        centres_m=centres_m,
+        radii_m=radii_m,
     )
 
 
-def _sphere(points_m: Array) -> tuple[Array, float]:
-    """About (N, 3) points: the middle of their box, and how far the farthest lies from it."""
-    middle = (points_m.min(axis=0) + points_m.max(axis=0)).astype(np.float64) / 2
-    return middle, float(np.sqrt(((points_m - middle) ** 2).sum(axis=1).max()))
+def _spheres(points_m: Array, starts: npt.NDArray[np.int64]) -> tuple[Array, Array]:
+    """About the points from each start to the next: (P, 3) middles of their boxes, (P,) how far the farthest lies."""
+    if len(starts) < 2:
+        return np.zeros((0, 3)), np.zeros(0)
+    low, high = (ufunc.reduceat(points_m, starts[:-1]) for ufunc in (np.minimum, np.maximum))
+    middles_m = (low + high).astype(np.float64) / 2
+    away2 = ((points_m - np.repeat(middles_m, np.diff(starts), axis=0)) ** 2).sum(axis=1)
+    return middles_m, np.asarray(np.sqrt(np.maximum.reduceat(away2, starts[:-1])))
