@@ -73,12 +73,7 @@ class HiddenSky:
         Args:
             shape: in the actor frame, standing on z = 0.
         """
-        length_m, width_m, _ = shape.box_size_m
-        top_m = float(shape.box_centre_m[2] + shape.box_size_m[2] / 2)
-        cells_per_m = _CELLS_PER_M["large" if max(length_m, width_m) > _LARGE_M else "small"]
-        reach_m = min(max(_REACH_HEIGHTS * top_m, _LEAST_REACH_M), _MOST_REACH_M)
-        half_m = np.abs(shape.box_centre_m[:2]) + shape.box_size_m[:2] / 2 + reach_m
-        columns, rows = (2 * math.ceil(side * cells_per_m) + 1 for side in half_m)
+        rows, columns, cells_per_m = _grid(shape)
         layers = _layers(_points(shape, 1.5 * cells_per_m) * cells_per_m, rows, columns)
         hidden = np.zeros((rows, columns), np.float32)
         for to_east, to_north in _slopes():
@@ -86,9 +81,23 @@ class HiddenSky:
         hidden = cv2.blur(hidden / np.float32(DIRECTIONS), (3, 3), borderType=cv2.BORDER_CONSTANT)
         for axis, size in ((0, rows), (1, columns)):
             from_border = (np.minimum(np.arange(size), np.arange(size)[::-1]) / cells_per_m).astype(np.float32)
-            rim = smooth_step(from_border, 0, _RIM * reach_m)
+            rim = smooth_step(from_border, 0, _RIM * _reach_m(shape))
             hidden *= rim[:, None] if axis == 0 else rim
         return HiddenSky(hidden, cells_per_m)
+
+
+def _reach_m(shape: Shape) -> float:
+    """How far beside an asset ground is shaded."""
+    top_m = float(shape.box_centre_m[2] + shape.box_size_m[2] / 2)
+    return min(max(_REACH_HEIGHTS * top_m, _LEAST_REACH_M), _MOST_REACH_M)
+
+
+def _grid(shape: Shape) -> tuple[int, int, float]:
+    """Rows and columns of an asset's `HiddenSky`, and how many there are to a metre."""
+    cells_per_m = _CELLS_PER_M["large" if max(shape.box_size_m[:2]) > _LARGE_M else "small"]
+    half_m = np.abs(shape.box_centre_m[:2]) + shape.box_size_m[:2] / 2 + _reach_m(shape)
+    columns, rows = (2 * math.ceil(side * cells_per_m) + 1 for side in half_m)
+    return rows, columns, cells_per_m
 
 
 def _layers(points: Array, rows: int, columns: int) -> list[Mask]:
@@ -126,7 +135,7 @@ def _points(shape: Shape, per_m: float) -> Array:
     """(N, 3) points on all triangles, about so many to a metre along and across; the same every time."""
     corners = shape.vertices_m[shape.faces]
     steps = np.maximum(np.ceil(longest_edges(corners) * per_m).astype(np.int64), 1)
-    found = [np.unique(corners.reshape(-1, 3), axis=0), *points_on(corners, steps)]
+    found = [shape.vertices_m[np.unique(shape.faces)], *points_on(corners, steps)]
     points = np.concatenate(found)
     return points[:: 1 + len(points) // _MOST_POINTS]
 
@@ -180,10 +189,10 @@ class GroundShade:
             shape = self.shapes.get(actor.asset)
             if shape is None:
                 continue
-            sky = self._sky(actor.asset, shape)
-            box = _box_in_picture(actor, sky, camera)
+            box = _box_in_picture(actor, shape, camera)
             if box is None or not is_ground[box].any():
                 continue
+            sky = self._sky(actor.asset, shape)
             if left is None:
                 left = np.ones(depth_m.shape, np.float32)
             for top in range(box[0].start, box[0].stop, _BAND_ROWS):
@@ -236,9 +245,10 @@ def _rays(size_px: int, part: slice, camera: CameraRecord) -> FloatImage:
     return ((np.arange(part.start, part.stop) + 0.5 - size_px / 2) / camera.focal_px).astype(np.float32)
 
 
-def _box_in_picture(actor: ActorRecord, sky: HiddenSky, camera: CameraRecord) -> tuple[slice, slice] | None:
+def _box_in_picture(actor: ActorRecord, shape: Shape, camera: CameraRecord) -> tuple[slice, slice] | None:
     """Rows and columns that hold all ground near an actor; None where the camera sees none of it."""
-    half_m = (np.array(sky.share.shape[::-1]) // 2) / sky.cells_per_m
+    rows, columns, cells_per_m = _grid(shape)
+    half_m = np.array((columns // 2, rows // 2)) / cells_per_m
     corners = _CUBE * (*half_m, _STEP_M + _FADE_M)
     camera_from_actor = camera.world_from_camera_transform.inverse() @ actor.world_from_actor.transform(
         "world", "actor"
