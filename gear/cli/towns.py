@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 EXAMPLE = """examples:
   gear towns                                    the towns that come with gear, and their scenes
   gear towns town10 --out maps/                 a map, and a picture of every scene
-  gear towns my/towns/port.xml --scenes port.yml --out maps/ --renderer raster
+  gear towns my/towns/port.xml --scenes port.yml --out maps/ --renderer classic
 """
 
 
@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scenes", metavar="FILE", help="scene library of the town, instead of gear's own")
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument("--out", metavar="DIR", help="write a map and a sheet of thumbnails there")
-    parser.add_argument("--renderer", default="classic", help="of the thumbnails: raster, filament, classic (classic)")
+    parser.add_argument("--renderer", default="raster", help="of the thumbnails: raster, filament, classic (raster)")
     parser.add_argument("--quality", default="fast", help="of the thumbnails: film or fast (fast)")
     parser.add_argument("--weather", default="ClearNoon", help="of the thumbnails: a weather preset (ClearNoon)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the places they look from (0)")

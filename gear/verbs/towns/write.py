@@ -51,7 +51,7 @@ def write_town(
     out: str | Path,
     *,
     scenes: str | Path | None = None,
-    renderer: str = "classic",
+    renderer: str = "raster",
     quality: str = "fast",
     weather: str = "ClearNoon",
     seed: int = 0,
