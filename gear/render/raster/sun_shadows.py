@@ -109,7 +109,8 @@ def _maps(squares: tuple[Square, ...], camera_m: Array) -> Maps:
         offset=half * [square.offset(camera_m) for square in squares] + middle,
         texel_m=np.array([2 * square.half_side_m for square in squares]) / sides_px[:, 0],
         end_m=np.array(ENDS_M),
-        town_ends=(_PARTS_PX[2][1] + _TOWN_PX) / _SIZE_PX[1],
+        # A texel earlier, since looks take in the next one.
+        town_ends=(_PARTS_PX[2][1] + _TOWN_PX - 1) / _SIZE_PX[1],
     )
 
 
