@@ -6,8 +6,8 @@
 EfficientNet-Lite0 with its ImageNet weights is shown crops of the objects of `detect2d` datasets, those that are hardly
 hidden and large enough, and of the traffic lights and signs of `semseg` datasets. Printed are, by category, how many
 crops there are and how often one of the category's ImageNet classes is the first answer, or among the first five of the
-thousand. `--sheet` shows the crops with the answers. ImageNet has no class for people: `--people` writes crops of them,
-and as many of where nobody stands, for `recognise_people.py`.
+thousand. `--sheet` shows the crops with the answers. ImageNet has no class for people: `--people` writes crops of those
+in `detect2d` datasets, and crops of their size where nobody stands, for `recognise_people.py`.
 """
 
 from __future__ import annotations
@@ -33,13 +33,14 @@ CLASSES: dict[str, frozenset[int]] = {
     "bicycle": frozenset({444, 671, 870, 880}),
     "traffic light": frozenset({920}),
     "stop sign": frozenset({919}),
-    "traffic sign": frozenset({919}),
+    "light by label": frozenset({920}),
+    "sign by label": frozenset({919}),
     "parking meter": frozenset({704}),
     "bench": frozenset({703}),
 }
 """ImageNet's indices that are right for a COCO category, parts that fill a crop (grille, wheel, helmet) among them."""
 
-REGIONS = {19: "traffic light", 20: "traffic sign"}
+REGIONS = {19: "light by label", 20: "sign by label"}
 """Cityscapes' ids of what is cut out by its label."""
 
 SLIMMEST = 1 / 3
@@ -128,6 +129,8 @@ def write_people(roots: list[str], folder: Path, least_px: int, visible: float) 
     for name in ("people", "nobody"):
         (folder / name).mkdir(parents=True, exist_ok=True)
     for sample in (sample for root in roots for sample in gear.open_dataset(root)):
+        if not hasattr(sample, "objects"):
+            continue
         picture = sample.images["left"]
         boxes = np.array([thing.box_px for thing in sample.objects]).reshape(-1, 4)
         for thing in sample.objects:

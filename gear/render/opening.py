@@ -15,8 +15,8 @@ RENDERERS = ("raster", "filament", "classic")
 
 _SUMMARIES = {
     "filament": "physically based, MuJoCo's, through Vulkan: a GPU, or the CPU with Mesa's llvmpipe",
-    "raster": "physically based, gear's own, through EGL: what Filament shows, in 0.4 of its time on a CPU",
-    "classic": "MuJoCo's OpenGL renderer, through EGL or OSMesa: plainer pictures, three times as fast on a CPU",
+    "raster": "physically based, gear's own, through EGL: what Filament shows, in a quarter of its time on a CPU",
+    "classic": "MuJoCo's OpenGL renderer, through EGL or OSMesa: plainer pictures, in the time of raster",
 }
 
 

@@ -299,6 +299,31 @@ def test_what_lies_beyond_the_map_of_the_town_is_lit() -> None:
     assert 50 < ground.max() < 2 * int(ground.min()), "near the camera and kilometres away"
 
 
+@pytest.mark.parametrize("front_first", [True, False])
+def test_a_sheet_shows_the_side_that_looks_at_the_camera(*, front_first: bool) -> None:
+    """Both sides lie at the very same depth, and in one mesh."""
+    sides = ["0 1 2 0 2 3", "4 6 5 4 7 6"]
+    corners = "0 -1 -1 0 1 -1 0 1 1 0 -1 1"
+    normals = "1 0 0 " * 4 + "-1 0 0 " * 4
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><asset><mesh name="sheet" inertia="shell" vertex="{corners} {corners}" normal="{normals}"'
+        f' face="{" ".join(sides if front_first else sides[::-1])}"/></asset><worldbody>'
+        '<light type="directional" dir="1 0.2 -0.3" diffuse="1 1 1"/>'
+        '<geom type="mesh" mesh="sheet" pos="5 0 1.6" rgba="0.6 0.6 0.6 1" contype="0" conaffinity="0"/>'
+        "</worldbody></mujoco>"
+    )
+    stage, cameras = Stage(model=model, data=posed(model)), (camera(),)
+    renderer = open_renderer("raster", model, quality="fast")
+    try:
+        (first,) = renderer.render(stage, cameras)
+        (again,) = renderer.render(stage, cameras, shapes=(first,))
+    finally:
+        renderer.close()
+    assert first.linear_rgb is not None and again.linear_rgb is not None
+    assert first.linear_rgb[first.geom_id == 0].min() > 100, "the sun shines on this side"
+    assert np.array_equal(first.linear_rgb, again.linear_rgb)
+
+
 def test_a_stage_may_have_more_faces_than_are_kept() -> None:
     parts = "".join(
         f'<texture name="t{k}" type="2d" builtin="flat" width="8" height="8" colorspace="sRGB"/>'

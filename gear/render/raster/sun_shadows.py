@@ -93,6 +93,7 @@ class SunShadows:
         try:
             self._scene.draw(near_to_far(chosen & is_large, -(centres_m @ square.axes[2])))
         finally:
+            GL.glEnable(GL.GL_CULL_FACE)
             GL.glDisable(GL.GL_DEPTH_CLAMP)
             GL.glDisable(GL.GL_POLYGON_OFFSET_FILL)
 

@@ -107,7 +107,8 @@ void main() {
 #ifdef SHADOWS
         if (i == 0) lit_share = lit_by_sun();
 #endif
-        vec3 h = normalize(v + l);
+        vec3 h = v + l;
+        h *= inversesqrt(max(dot(h, h), 1e-12)); // nothing is half way to a light straight behind
         float nh = clamp(dot(n, h), 0.0, 1.0), k = nh * alpha;
         float d = alpha / (1.0 - nh * nh + k * k);
         float grazing = 1.0 - clamp(dot(l, h), 0.0, 1.0), g2 = grazing * grazing;
