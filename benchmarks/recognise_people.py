@@ -6,8 +6,8 @@
 
 MediaPipe's pose network comes with its weights in the package, which wants older libraries than gear's, hence an
 environment of its own. Asked are crops in which a person fills four fifths of the height, and crops of the same places'
-sizes where nobody stands. Printed is in how many it finds a body, and in how many of these head and feet are where the
-person's are, to a tenth of the height.
+sizes where nobody stands. Printed is in how many it finds a body, and in how many one whose head and feet are where the
+person's are, to a tenth of the crop's height.
 """
 
 from __future__ import annotations

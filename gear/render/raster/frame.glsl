@@ -11,9 +11,9 @@ layout(std430, binding = 0) readonly buffer Geoms { Geom geoms[]; };
 
 layout(std140, binding = 0) uniform Frame {
     vec4 sun_axes[3];          // rows: two directions across the sun's light, and towards the sun
-    vec4 shadow_scale[3];      // near, what moves, the town: from metres along these axes to the texture; w: a texel in metres
+    vec4 shadow_scale[3];      // near, what moves, the town: from metres along them to the texture; w: metres a texel
     vec4 shadow_offset[3];     // to add
-    vec4 shadow_end_m;         // along the view, of the first two; z: where the town's map ends in the texture
+    vec4 shadow_end;           // of the first two, in metres along the view; z: of the town's, in the texture
     vec4 irradiance[4];        // over pi: by itself, and by the normal's x, y and z
     vec4 towards_light[4];     // w is 0 for light from one direction, 1 for a place
     vec4 light[4];             // irradiance from a direction, intensity of a place

@@ -30,7 +30,7 @@ _FRAME = np.dtype(
         ("sun_axes", "<f4", (3, 4)),
         ("shadow_scale", "<f4", (3, 4)),
         ("shadow_offset", "<f4", (3, 4)),
-        ("shadow_end_m", "<f4", 4),
+        ("shadow_end", "<f4", 4),
         ("irradiance", "<f4", (4, 4)),
         ("towards_light", "<f4", (MOST_LIGHTS, 4)),
         ("light", "<f4", (MOST_LIGHTS, 4)),
@@ -100,7 +100,7 @@ class Scene:
             frame["shadow_scale"][0, :, :3] = maps.scale
             frame["shadow_scale"][0, :, 3] = maps.texel_m
             frame["shadow_offset"][0, :, :3] = maps.offset
-            frame["shadow_end_m"][0, :3] = (*maps.end_m, maps.town_ends)
+            frame["shadow_end"][0, :3] = (*maps.end_m, maps.town_ends)
         frame["irradiance"][0, :, :3] = self._environment.irradiance
         count = len(lamps.light)
         frame["towards_light"][0, :count] = lamps.towards

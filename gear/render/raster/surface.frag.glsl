@@ -34,10 +34,10 @@ float lit(vec3 at, vec2 aside) { return texture(shadows, vec3(at.xy + aside, at.
 // Drivers that run on processors take all branches: there are no more looks than are needed anywhere.
 float lit_by_sun() {
     float ahead_m = 1.0 / gl_FragCoord.w;
-    bool is_near = ahead_m < shadow_end_m.x;
+    bool is_near = ahead_m < shadow_end.x;
     vec3 at = is_near ? near_at : town_at, other = is_near ? near_at : moving_at;
     // What lies beyond a map is as far as what the map shows nothing of; beside the town's there is another one.
-    at.z = !is_near && at.y > shadow_end_m.z ? 0.0 : min(at.z, 1.0);
+    at.z = !is_near && at.y > shadow_end.z ? 0.0 : min(at.z, 1.0);
     other.z = min(other.z, 1.0);
     // Bilinear looks at the corners of a square blur an edge over three texels.
     vec2 aside = (is_near ? 0.75 : 0.0) / vec2(textureSize(shadows, 0));
@@ -55,7 +55,7 @@ float lit_by_sun() {
     }
 #endif
     if (is_near) return 0.5 * (a + b);
-    return ahead_m < shadow_end_m.y ? min(a, b) : a;
+    return ahead_m < shadow_end.y ? min(a, b) : a;
 }
 #endif
 

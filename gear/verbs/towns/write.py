@@ -70,6 +70,7 @@ def write_town(
 
     Raises:
         UnknownNameError: there is no such town, file, renderer or weather.
+        BackendError: the renderer does not start here; says what to install.
         TownError: the town breaks the conventions.
         DatasetError: `out` cannot be written.
     """
