@@ -59,7 +59,7 @@ class RasterRenderer:
         self._truth_program = device.Program("shapes.vert", "ids.frag")
         self._sky_program = device.Program("whole.vert", "sky.frag")
         self._halve_program = device.Program("whole.vert", "halve.frag")
-        self._shadows = SunShadows(model, self._scene)
+        self._shadows: SunShadows | None = None
         self._targets: dict[tuple[str, int, int], device.Target] = {}
         GL.glClipControl(GL.GL_UPPER_LEFT, GL.GL_ZERO_TO_ONE)
         GL.glEnable(GL.GL_DEPTH_TEST)
@@ -153,7 +153,11 @@ class RasterRenderer:
     def _light(self, stage: Stage, frustum: Frustum, spheres: tuple[Array, Array]) -> None:
         """Draws the maps of the sun's shadows, and tells the shaders of all lights."""
         lamps = lamps_of(stage.model, stage.data)
-        maps = self._shadows.draw(stage, frustum, lamps.towards[0, :3], spheres) if lamps.casts else None
+        maps = None
+        if lamps.casts:
+            # A hundred megabytes, that nights and models without a sun never need.
+            self._shadows = self._shadows or SunShadows(self._model, self._scene)
+            maps = self._shadows.draw(stage, frustum, lamps.towards[0, :3], spheres)
         self._scene.light(lamps, maps, frustum.position_world_m)
 
     def _colour(
