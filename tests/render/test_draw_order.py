@@ -6,6 +6,8 @@ import subprocess
 import sys
 
 GEOMS = 12
+PROCESSES = 12
+"""Of 90 processes 11 had some out of place; of three, two of them would come together once in forty times."""
 SLAB = '<geom type="box" size="1 1 0.1"/>'
 STACK = f"""
 <mujoco><worldbody>
@@ -41,8 +43,9 @@ renderer.close()
 def test_coincident_surfaces_are_seen_in_the_same_order_in_every_process() -> None:
     """By chance one of 12 may share a bucket; without room for them, no two processes agree on more than a few."""
     command = [sys.executable, "-c", PEEL, STACK]
-    orders = [subprocess.run(command, capture_output=True, text=True, check=True).stdout.split() for _ in range(3)]
+    runs = [subprocess.run(command, capture_output=True, text=True, check=True) for _ in range(PROCESSES)]
+    orders = [run.stdout.split() for run in runs]
     expected = [str(geom) for geom in range(GEOMS)]
     assert all(sorted(order, key=int) == expected for order in orders)
     in_place = sum(seen == geom for order in orders for seen, geom in zip(order, expected, strict=True))
-    assert in_place >= 2 * GEOMS
+    assert in_place >= PROCESSES * GEOMS * 2 / 3
