@@ -21,12 +21,12 @@ from functools import partial
 
 import torch
 
-from gear.attacking.borrowed import frozen
-from gear.attacking.loop import Problem, Seen, TextureOptimiser, batch_of, unit_gradients
 from gear.compositor.cache import Cache
 from gear.compositor.pasting import CACHE_BYTES, Prepared
 from gear.config.overrides import with_overrides
 from gear.contracts.models import Model
+from gear.plugins.attacks.optimisation.frozen_model import frozen
+from gear.plugins.attacks.optimisation.loop import Problem, Seen, TextureOptimiser, batch_of, unit_gradients
 from gear.plugins.attacks.scene_specific import SceneSpecific, SceneSpecificConfig
 from gear.plugins.build import NO_OPTIONS, build, find
 from gear.readers import open_all

@@ -28,11 +28,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gear.collecting.job import Job, resolve
+from gear.collecting.pipeline import collect_samples
+from gear.collecting.session import Session, open_session
 from gear.config.load import load_collection
 from gear.dataset.store import Store
-from gear.verbs.collect.job import Job, resolve
-from gear.verbs.collect.pipeline import collect_samples
-from gear.verbs.collect.session import Session, open_session
 
 ROUNDS = 3
 

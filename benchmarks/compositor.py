@@ -17,22 +17,22 @@ from typing import Any
 import numpy as np
 import torch
 
-from gear.camera.develop import Darkroom
+from gear.camera.pipeline import Darkroom
+from gear.collecting.job import Job, resolve
+from gear.collecting.lookup import scene_library
+from gear.collecting.pipeline import collect_samples
+from gear.collecting.session import Session
 from gear.compositor.opening import COMPOSITORS, open_compositor
 from gear.config.load import load_collection
 from gear.dataset.reading import Dataset
 from gear.dataset.store import Store
-from gear.opening import open_dataset
 from gear.plugins.build import build, find
+from gear.plugins.datasets import open_dataset
 from gear.render import RENDERERS, open_renderer
-from gear.verbs.collect.job import Job, resolve
-from gear.verbs.collect.names import scene_library
-from gear.verbs.collect.pipeline import collect_samples
 from gear.verbs.collect.run import manifest_facts
-from gear.verbs.collect.session import Session
 from gear.verbs.gap.figures import picture_gap, visible_mask
-from gear.world.air import darkroom_of
 from gear.world.planner import ScenePlanner
+from gear.world.weather.air import darkroom_of
 from gear.world.world import World
 
 

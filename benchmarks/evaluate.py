@@ -23,12 +23,12 @@ import torch
 import gear
 from gear.contracts.tasks import Sidecar
 from gear.dataset.reading import Dataset
-from gear.nn.network import as_batch
-from gear.verbs.evaluate.choice import chosen_defense, chosen_model
-from gear.verbs.evaluate.player import Player
-from gear.verbs.evaluate.row import evaluate_row
-from gear.verbs.evaluate.scoring import TASK, Scorer
-from gear.verbs.evaluate.spread import draw, gather
+from gear.measuring.dataset_run import evaluate_row
+from gear.measuring.guarded_model import Player
+from gear.measuring.plugin_selection import chosen_defense, chosen_model
+from gear.measuring.scoring import TASK, Scorer
+from gear.measuring.statistics import draw, gather
+from gear.networks.network import as_batch
 
 
 class Part(Dataset[Any]):

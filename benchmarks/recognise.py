@@ -23,7 +23,7 @@ import torch
 
 import gear
 from gear.formats.coco import CATEGORY_NAMES
-from gear.nn import lite0, vision
+from gear.networks import efficientnet_lite0, torchvision_import
 
 CLASSES: dict[str, frozenset[int]] = {
     "car": frozenset({407, 436, 468, 479, 511, 581, 609, 627, 656, 661, 717, 734, 751, 817}),
@@ -86,14 +86,14 @@ def main() -> None:
 
 def classifier() -> torch.nn.Module:
     """EfficientNet-Lite0 with the ImageNet weights of the installed package."""
-    vision.need()
+    torchvision_import.need()
     import timm
 
-    published = lite0.published()
-    state = lite0.from_official(published)
+    published = efficientnet_lite0.published()
+    state = efficientnet_lite0.from_official(published)
     for old, new in (("_conv_head", "conv_head"), ("_bn1", "bn2"), ("_fc", "classifier")):
         state.update({key.replace(old, new, 1): value for key, value in published.items() if key.startswith(f"{old}.")})
-    network: torch.nn.Module = timm.create_model(lite0.NAME, pretrained=False)
+    network: torch.nn.Module = timm.create_model(efficientnet_lite0.NAME, pretrained=False)
     network.load_state_dict(state)
     return network.eval()
 

@@ -20,8 +20,8 @@ from gear.render import RENDERERS, open_renderer
 from gear.values.geometry import CAMERA_FROM_ACTOR_AXES, Intrinsics, RigidTransform
 from gear.values.resources import data_dir
 from gear.values.scene import CameraRecord, Pose
-from gear.world.quiet_mjcf import mjcf
-from gear.world.weather import PRESETS, apply_weather
+from gear.world.compilation.quiet_mjcf import mjcf
+from gear.world.weather.presets import PRESETS, apply_weather
 
 RIGS = {"semseg": (2048, 1024, 1), "detect2d": (1333, 800, 1), "stereo3d": (1224, 370, 2), "depth": (1224, 370, 1)}
 QUALITIES: tuple[Quality, ...] = ("film", "fast")

@@ -18,9 +18,9 @@ import numpy.typing as npt
 
 import gear
 from gear.formats import cityscapes
+from gear.measuring.guarded_model import Player
+from gear.measuring.plugin_selection import chosen_model
 from gear.plugins.build import NO_OPTIONS, build, find
-from gear.verbs.evaluate.choice import chosen_model
-from gear.verbs.evaluate.player import Player
 
 Picture = npt.NDArray[np.uint8]
 

@@ -15,7 +15,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gear.opening import Dataset, Twins, open_dataset, open_twins
+    from gear.plugins.datasets import Dataset, Twins, open_dataset, open_twins
     from gear.values.errors import GearError
     from gear.verbs.attack.report import AttackReport
     from gear.verbs.attack.run import attack
@@ -67,14 +67,14 @@ _HOME = {
     "BenchReport": "gear.verbs.bench.report",
     "CollectReport": "gear.verbs.collect.run",
     "ConvertReport": "gear.verbs.weights.convert",
-    "Dataset": "gear.opening",
+    "Dataset": "gear.plugins.datasets",
     "DefendReport": "gear.verbs.defend",
     "EvaluateReport": "gear.verbs.evaluate.report",
     "GapReport": "gear.verbs.gap.report",
     "GearError": "gear.values.errors",
     "ModelFacts": "gear.verbs.models",
     "TrainReport": "gear.verbs.train.run",
-    "Twins": "gear.opening",
+    "Twins": "gear.plugins.datasets",
     "ViewReport": "gear.view.write",
     "attack": "gear.verbs.attack.run",
     "bench": "gear.verbs.bench.run",
@@ -85,8 +85,8 @@ _HOME = {
     "evaluate": "gear.verbs.evaluate.run",
     "gap": "gear.verbs.gap.run",
     "list_models": "gear.verbs.models",
-    "open_dataset": "gear.opening",
-    "open_twins": "gear.opening",
+    "open_dataset": "gear.plugins.datasets",
+    "open_twins": "gear.plugins.datasets",
     "train": "gear.verbs.train.run",
     "write_view": "gear.view.write",
 }

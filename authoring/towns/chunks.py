@@ -1,7 +1,7 @@
 """Cuts a town's triangles into chunks: one mesh a label, material and cell, so that what is out of view is skipped.
 
 Pitched roofs are cut by the side that they face instead: of a mesh whose slopes face one way the normal map is lit from
-the side that it says (`gear.world.relief`).
+the side that it says (`gear.world.compilation.normal_maps`).
 """
 
 from __future__ import annotations

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from authoring.weights.ship import MADE_BY, MODELS, TRAINING, Measured, head, wrapped
 from gear.dataset.files import write_alone
-from gear.nn.weights import read, write
+from gear.measuring.appearance_hash import look_now, read_look
+from gear.networks.weights import read, write
 from gear.values.errors import GearError
-from gear.verbs.look import look_now, read_look
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from gear.dataset.files import sha256, write_alone
-from gear.nn.shipped import CHECKOUT
-from gear.nn.weights import read, write
+from gear.measuring.guarded_model import weights_digest
+from gear.measuring.plugin_selection import chosen_model
+from gear.networks.shipped import CHECKOUT
+from gear.networks.weights import read, write
 from gear.plugins.build import build
 from gear.values.errors import GearError
-from gear.verbs.evaluate.choice import chosen_model
-from gear.verbs.evaluate.player import weights_digest
 from gear.verbs.train.results import HISTORY, WEIGHTS
 
 MODELS = CHECKOUT / "models"

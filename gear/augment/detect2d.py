@@ -9,7 +9,7 @@ import numpy as np
 from gear.augment.geometry import Geometry, Window, cut_box, cut_map, cut_picture, flip_array, flip_box
 from gear.formats import rle
 from gear.plugins.tasks.detect2d import VIEW, Detect2dSample, Object2d
-from gear.values.truth import BoxPx
+from gear.values.ground_truth import BoxPx
 
 LEAST_KEPT = 0.3
 """What shows a smaller share of its seen pixels in a window is to be ignored there."""

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from gear.contracts.tasks import Sample
 from gear.values.frames import UInt8Image
-from gear.values.truth import BoxPx
+from gear.values.ground_truth import BoxPx
 
 SampleT = TypeVar("SampleT", bound=Sample)
 PADDING_LEVEL = 114

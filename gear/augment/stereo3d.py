@@ -15,7 +15,7 @@ from gear.formats.kitti_object import Calibration, clip_box, truncation
 from gear.groundtruth.boxes import Box3d, project_box
 from gear.plugins.tasks.stereo3d import LEFT, RIGHT, Object3d, Stereo3dSample
 from gear.values.geometry import Intrinsics, wrap_angle_rad
-from gear.values.truth import BoxPx
+from gear.values.ground_truth import BoxPx
 
 EVERYWHERE: BoxPx = (-math.inf, -math.inf, math.inf, math.inf)
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.camera.beams import Lamps
-from gear.camera.own_light import places
+from gear.camera.light_sources import places
 from gear.values.frames import FloatImage, IdImage
 from gear.values.geometry import Array
 from gear.values.scene import CameraRecord

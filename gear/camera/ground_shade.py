@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 from gear.camera.noise import smooth_step
 from gear.camera.response import DISPLAY_POWER
-from gear.camera.spread import longest_edges, points_on
+from gear.camera.surface_points import longest_edges, points_on
 from gear.values.frames import FloatImage, Shape, UInt16Image
 from gear.values.geometry import Array
 from gear.values.scene import ActorRecord, CameraRecord, SceneRecord

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from gear.camera.beams import Lamps
 from gear.camera.shadow_map import Floats, Layout, Outlook, ShadowMap, first_met, lengths, stop_behind
-from gear.camera.spread import longest_edges, points_on
+from gear.camera.surface_points import longest_edges, points_on
 from gear.values.frames import FloatImage, Shape
 from gear.values.scene import ActorRecord, SceneRecord
 

@@ -21,9 +21,9 @@ import numpy.typing as npt
 from gear.camera.beams import Headlamps, Lamps, headlamps
 from gear.camera.glow import Shine, Windows
 from gear.camera.lamp_shadows import SHADOWED_WITHIN_M, LampShadow, LampShadows
-from gear.camera.own_light import INSIDE_LIGHT, board_light, inside_light, lens_light
+from gear.camera.light_sources import INSIDE_LIGHT, board_light, inside_light, lens_light
+from gear.camera.normals import STRIP_ROWS, Strip, strips_of
 from gear.camera.response import DISPLAY_POWER
-from gear.camera.slant import STRIP_ROWS, Strip, strips_of
 from gear.camera.spots import Spots
 from gear.contracts.rendering import RawView
 from gear.values.frames import LINEAR_FULL_SCALE, FloatImage, GeomTable, IdImage, UInt16Image

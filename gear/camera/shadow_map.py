@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from gear.camera.spread import longest_edges
+from gear.camera.surface_points import longest_edges
 from gear.values.frames import FloatImage
 from gear.values.geometry import Array
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from gear.camera.beams import Lamps, sides_of
 from gear.camera.lamp_shadows import LampShadow
-from gear.camera.slant import Strip
+from gear.camera.normals import Strip
 from gear.values.frames import FloatImage
 from gear.values.geometry import Array
 from gear.values.scene import CameraRecord

@@ -22,8 +22,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Probes the renderers; 0 if at least one works (or the one asked for does), else 2."""
-    from gear.render.opening import RENDERERS, describe
     from gear.render.probing import probe
+    from gear.render.registry import RENDERERS, describe
     from gear.values.errors import BackendError
 
     results: dict[str, dict[str, object]] = {}

@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Lists the installed networks."""
-    from gear.nn.shipped import shipped_networks
+    from gear.networks.shipped import shipped_networks
     from gear.verbs.models import list_models
 
     models = list_models(args.task)

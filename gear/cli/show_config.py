@@ -20,9 +20,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Prints the collection config that these flags and files make, once all that it names is there."""
+    from gear.collecting.lookup import look_up
     from gear.config.dump import to_yaml
     from gear.config.load import load_collection
-    from gear.verbs.collect.names import look_up
 
     names = ("task", "town", "scene", "split", "samples", "seed", "weather", "patch", "renderer", "quality")
     flags = {name: getattr(args, name) for name in names} | {"root": args.out}

@@ -18,7 +18,7 @@ from gear.dataset.layout import sidecar_path
 from gear.dataset.reading import Dataset
 from gear.values.errors import DatasetError
 from gear.values.frames import UInt8Image
-from gear.values.truth import SurfaceTruth
+from gear.values.ground_truth import SurfaceTruth
 
 Sizes = tuple[tuple[int, int], ...]
 """Height and width of each patch."""

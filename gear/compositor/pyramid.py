@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.values.geometry import Array, frozen
-from gear.world.faces import FACE_SIZE_PX, box_matrix
+from gear.world.surfaces.face_texture import FACE_SIZE_PX, box_matrix
 
 if TYPE_CHECKING:
     from torch import Tensor

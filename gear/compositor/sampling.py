@@ -16,10 +16,10 @@ import numpy.typing as npt
 from gear.camera.optics import BLUR_STEPS, lens_map
 from gear.contracts.rendering import Quality
 from gear.values.geometry import Array, RigidTransform
+from gear.values.ground_truth import SurfaceTruth
 from gear.values.optics import CameraEffects
 from gear.values.scene import CameraRecord, SurfaceRecord, Vec3
-from gear.values.truth import SurfaceTruth
-from gear.world.faces import FACE_SIZE_PX
+from gear.world.surfaces.face_texture import FACE_SIZE_PX
 
 Mask = npt.NDArray[np.bool_]
 _QUARTERS = ((-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25))

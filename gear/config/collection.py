@@ -9,9 +9,9 @@ from typing import ClassVar, Literal
 from gear.config.nodes import Mapping, Node, Place
 from gear.contracts.rendering import Quality
 from gear.values.errors import FieldError
-from gear.values.mix import check_mix
 from gear.values.optics import CameraEffects
 from gear.values.serial import PLACES
+from gear.values.vehicle_mix import check_mix
 
 SPLIT_NAME = re.compile(r"(?!(gear|patches|scratch)$)[a-z][a-z0-9]*(_[a-z0-9]+)*")
 """Folders of gear's own are no splits."""

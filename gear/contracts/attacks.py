@@ -91,10 +91,10 @@ class Attack(Protocol):
     """Optimises patches against a model.
 
     Two methods more are used where an attack has them, each of one sample of the data set: `objective(sample)`, a
-    `gear.attacking.objectives.Objective` by which patches are judged on validation samples (untargeted harm to the
-    task otherwise), and `settings(sample)`, a dataclass with the options as they are used, where those depend on the
-    task. A third, `read_sha256()`, is the hash of files that its options name, or None: patches that were
-    made from other files are others.
+    `gear.plugins.attacks.optimisation.objectives.Objective` by which patches are judged on validation samples
+    (untargeted harm to the task otherwise), and `settings(sample)`, a dataclass with the options as they are used,
+    where those depend on the task. A third, `read_sha256()`, is the hash of files that its options name, or
+    None: patches that were made from other files are others.
     """
 
     def optimise(

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from gear.values.frames import Frame, UInt8Image
+from gear.values.ground_truth import SurfaceTruth
 from gear.values.rig import Rig
 from gear.values.scene import SceneRecord
 from gear.values.serial import Json
-from gear.values.truth import SurfaceTruth
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

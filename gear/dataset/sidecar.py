@@ -9,11 +9,11 @@ from pathlib import Path
 
 from gear.contracts.tasks import Auxiliary, Sidecar
 from gear.dataset.files import read_bytes
-from gear.dataset.plausible import check_numbers, check_sidecar
+from gear.dataset.sidecar_validation import check_numbers, check_sidecar
 from gear.values.errors import DatasetError, FieldError
+from gear.values.ground_truth import SurfaceTruth
 from gear.values.scene import SceneRecord
 from gear.values.serial import Json, from_json, to_json
-from gear.values.truth import SurfaceTruth
 
 
 def dump_json(value: Json) -> bytes:

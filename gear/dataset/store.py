@@ -11,9 +11,9 @@ from typing import Any
 from gear.contracts.tasks import Auxiliary, Encoded, Sample, Sidecar, Task
 from gear.dataset.files import clear_scratch, explained, inside, read_bytes, sha256, sync_folder, write_whole
 from gear.dataset.layout import GEAR, begun_path, manifest_path, patch_path, plan_path, sidecar_path, split_folder
+from gear.dataset.locks import at_work, is_at_work, turn
 from gear.dataset.plan import Plan, begin, read_plan, refuse_copy, refuse_other_tasks
 from gear.dataset.sidecar import dump_json, load_json, no_sidecar, read_sidecar, sidecar_bytes
-from gear.dataset.turns import at_work, is_at_work, turn
 from gear.values.errors import DatasetError, FieldError, ReplaceableError
 from gear.values.serial import Json
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from gear.values.ground_truth import BoxPx
 from gear.values.serial import Json
-from gear.values.truth import BoxPx
 
 SUPERCATEGORIES: tuple[tuple[str, str], ...] = (
     ("person", "1 person"),

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gear.values.geometry import Array, Intrinsics
-from gear.values.truth import BoxPx
+from gear.values.ground_truth import BoxPx
 
 TYPES = ("Car", "Van", "Truck", "Pedestrian", "Person_sitting", "Cyclist", "Tram", "Misc", "DontCare")
 

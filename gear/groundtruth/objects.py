@@ -12,8 +12,8 @@ from gear.groundtruth.raster import Window, bounds, count, fill, project_mesh
 from gear.groundtruth.visible import PartKey, VisiblePart, visible_parts
 from gear.values.frames import GeomTable, SceneObject, View
 from gear.values.geometry import Array
+from gear.values.ground_truth import BoxPx, ObjectTruth
 from gear.values.scene import CameraRecord
-from gear.values.truth import BoxPx, ObjectTruth
 
 MOST_ROWS = 4096
 """Of a silhouette that reaches further beyond one side of the picture, so many rows stand for all that lie there."""

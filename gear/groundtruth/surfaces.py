@@ -12,8 +12,8 @@ from gear.groundtruth.bent import Bend
 from gear.groundtruth.raster import NEAR_M
 from gear.values.frames import GeomTable, View
 from gear.values.geometry import Array
+from gear.values.ground_truth import SurfaceTruth
 from gear.values.scene import SceneRecord, SurfaceRecord
-from gear.values.truth import SurfaceTruth
 
 UNIT_CORNERS = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
 """Patch coordinates of the corners: top left, top right, bottom right, bottom left."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gear.values.errors import FieldError
-from gear.values.truth import ObjectTruth
+from gear.values.ground_truth import ObjectTruth
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

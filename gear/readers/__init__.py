@@ -1,10 +1,13 @@
-"""Readers: datasets of any task as torch wants them. Needs torch; opening a dataset without it is `gear.opening`."""
+"""Readers: datasets of any task as torch wants them.
 
-from gear.readers.ahead import read_ahead
+They need torch; `gear.plugins.datasets` opens a dataset without it.
+"""
+
 from gear.readers.batches import Batch, as_pictures, batches, collate, stacked
-from gear.readers.finding import open_all
-from gear.readers.kept import Kept
+from gear.readers.find_splits import open_all
+from gear.readers.in_memory import Kept
 from gear.readers.order import order
+from gear.readers.prefetch import read_ahead
 from gear.readers.samples import Samples, all_of
 from gear.readers.torch_dataset import Change, Item, TorchDataset, picture_tensor
 

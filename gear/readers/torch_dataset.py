@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from gear.opening import Dataset, open_dataset
+from gear.plugins.datasets import Dataset, open_dataset
 from gear.values.errors import UnknownNameError
 from gear.values.frames import UInt8Image
 from gear.values.rng import derive_rng

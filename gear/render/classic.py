@@ -18,13 +18,13 @@ import numpy.typing as npt
 
 from gear.contracts.rendering import Quality, RawView, RendererInfo, Stage
 from gear.render.culling import Mask, bounding_spheres, in_beam, in_frustum
-from gear.render.display import SHADOW_REACH_M, displayed_colour, displayed_model
-from gear.render.faces import checked_faces
+from gear.render.display_colours import SHADOW_REACH_M, displayed_colour, displayed_model
+from gear.render.face_textures import checked_faces
 from gear.render.glcontext import choose_backend, driver_and_device, is_software, open_context
+from gear.render.linear_samples import four_times, ids_from_rgb, smooth_edges
 from gear.render.occlusion import openness, shade
 from gear.render.pinhole import FAR_M, NEAR_M, Frustum, depth_from_reversed
-from gear.render.samples import four_times, ids_from_rgb, smooth_edges
-from gear.render.visible import geoms_only
+from gear.render.visible_groups import geoms_only
 from gear.values.errors import BackendError
 from gear.values.frames import FloatImage, IdImage, UInt8Image
 from gear.values.geometry import Array

@@ -26,14 +26,14 @@ import numpy.typing as npt
 
 from gear.camera.response import encode_srgb
 from gear.contracts.rendering import Quality, RawView, RendererInfo, Stage
-from gear.render.display import has_linear_colours
+from gear.render.display_colours import has_linear_colours
 from gear.render.draw_order import widen
-from gear.render.faces import checked_faces
+from gear.render.face_textures import checked_faces
+from gear.render.linear_samples import four_times, ids_from_rgb, smooth_edges, sum_2x2
+from gear.render.native_output import native_output
 from gear.render.occlusion import openness, shade
 from gear.render.pinhole import FAR_M, NEAR_M, Frustum, depth_from_reversed
-from gear.render.quiet import native_output
-from gear.render.samples import four_times, ids_from_rgb, smooth_edges, sum_2x2
-from gear.render.visible import geoms_only
+from gear.render.visible_groups import geoms_only
 from gear.render.vulkan import VulkanUnavailableError, vulkan_devices
 from gear.values.errors import BackendError
 from gear.values.frames import FloatImage, IdImage, UInt8Image, UInt16Image

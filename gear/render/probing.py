@@ -12,8 +12,8 @@ import mujoco
 import numpy as np
 
 from gear.contracts.rendering import Quality, RawView, RendererInfo, Stage
-from gear.render.opening import open_renderer
-from gear.render.quiet import native_output
+from gear.render.native_output import native_output
+from gear.render.registry import open_renderer
 from gear.values.geometry import CAMERA_FROM_ACTOR_AXES, Intrinsics, RigidTransform
 from gear.values.scene import CameraRecord, Pose
 

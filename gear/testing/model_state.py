@@ -7,7 +7,7 @@ from typing import Any
 
 import torch
 
-from gear.attacking.borrowed import networks_of
+from gear.plugins.attacks.optimisation.frozen_model import networks_of
 
 
 def state_of(model: Any) -> dict[str, str]:

@@ -15,7 +15,7 @@ from torch.nn import functional
 
 from gear.contracts.tasks import Sample
 from gear.formats import rle
-from gear.values.truth import SurfaceTruth
+from gear.values.ground_truth import SurfaceTruth
 
 
 class TinyCompositor:

@@ -10,7 +10,7 @@ import numpy as np
 
 from gear.testing.town_facts import DOWN, LOOK_FROM_M, Rays, TownUnderTest
 from gear.values.geometry import Array
-from gear.world.polyline import Polyline
+from gear.world.roads.polyline import Polyline
 
 CAR_HEIGHTS_M = (0.3, 0.7, 1.3, 1.9)
 """Above the road: over a kerb that a bend cuts, at a bumper, at a windscreen, at a van's."""

@@ -20,8 +20,8 @@ from typing import ClassVar
 from gear.testing import town_clear, town_materials, town_scenes, town_streets
 from gear.testing.town_facts import TownUnderTest, town_under_test
 from gear.values.labels import LABEL_BY_NAME
-from gear.world.classes import FIRST_HIDDEN_GROUP, own_class
-from gear.world.models import COLLISION_CLASS
+from gear.world.assets.geom_classes import FIRST_HIDDEN_GROUP, own_class
+from gear.world.compilation.model_compilation import COLLISION_CLASS
 
 MESSAGES_SHOWN = 12
 

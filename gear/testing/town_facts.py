@@ -17,9 +17,9 @@ from gear.testing.tiny_town import CLEAR
 from gear.values.errors import TownError, UnknownNameError
 from gear.values.geometry import Array
 from gear.values.resources import data_dir
-from gear.world.assets import AssetLibrary
-from gear.world.lanes import LaneGraph
-from gear.world.models import GROUND_GROUP, OBSTACLE_GROUP
+from gear.world.assets.library import AssetLibrary
+from gear.world.compilation.model_compilation import GROUND_GROUP, OBSTACLE_GROUP
+from gear.world.roads.lanes import LaneGraph
 from gear.world.scene_spec import SceneLibrary
 from gear.world.world import World
 

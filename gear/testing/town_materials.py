@@ -8,8 +8,8 @@ import numpy.typing as npt
 
 from gear.camera.response import decode_srgb
 from gear.values.geometry import Array
-from gear.world.classes import FIRST_HIDDEN_GROUP
-from gear.world.materials import TEXTURE_KINDS, effective_rgba, seen_materials, textures_of
+from gear.world.assets.geom_classes import FIRST_HIDDEN_GROUP
+from gear.world.compilation.materials import TEXTURE_KINDS, effective_rgba, seen_materials, textures_of
 
 Mask = npt.NDArray[np.bool_]
 

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from gear.config.collection import SplitConfig
-from gear.render.opening import open_renderer
+from gear.render.registry import open_renderer
 from gear.testing.town_facts import SEEN_GROUPS, Rays, TownUnderTest
 from gear.values.errors import GearError
 from gear.values.frames import FloatImage, IdImage

@@ -9,9 +9,9 @@ import numpy as np
 
 from gear.testing.town_facts import DOWN, LOOK_FROM_M, Rays, TownUnderTest
 from gear.values.geometry import Array, wrap_angle_rad
-from gear.world.classes import own_class
-from gear.world.lanes import Lane, LaneGraph, ParkingBay
-from gear.world.polyline import Polyline
+from gear.world.assets.geom_classes import own_class
+from gear.world.roads.lanes import Lane, LaneGraph, ParkingBay
+from gear.world.roads.polyline import Polyline
 
 STEP_M = 2.0
 BUMPER_M = 0.6

@@ -9,7 +9,7 @@ from pathlib import Path
 from gear.dataset.files import clear_scratch, explained, inside, read_bytes, write_whole
 from gear.dataset.store import plan_of, splits_of
 from gear.formats.exports import SplitRecords, layouts
-from gear.opening import open_dataset
+from gear.plugins.datasets import open_dataset
 from gear.values.errors import DatasetError, UnknownNameError
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gear.contracts.specs import ModelSpec
-from gear.nn.shipped import WeightsFile, inspect, shipped
+from gear.networks.shipped import WeightsFile, inspect, shipped
 from gear.plugins.catalogue import Found
 from gear.plugins.manager import catalogue
 from gear.values.serial import Json, to_json
@@ -120,7 +120,7 @@ def _changes(file: WeightsFile, digests: dict[str, str]) -> tuple[str, ...] | No
     if value is None:
         return None
     # Comparing looks reads the towns' assets; nobody pays for it who has no shipped weights.
-    from gear.verbs.look import look_now, read_look
+    from gear.measuring.appearance_hash import look_now, read_look
 
     look = read_look(value)
     return None if look is None else tuple(look.differences(look_now(look, digests)))

@@ -9,9 +9,9 @@ import numpy as np
 
 from gear.contracts.tasks import Sample
 from gear.dataset.files import refuse_folder, write_alone
-from gear.dataset.given import check_previews
-from gear.opening import open_dataset
+from gear.dataset.output_checks import check_previews
 from gear.plugins.build import blamed, find, name_of_task
+from gear.plugins.datasets import open_dataset
 from gear.values.frames import UInt8Image
 
 CELL_WIDTH_PX = 640

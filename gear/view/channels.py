@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from gear.contracts.tasks import Sample, Task
-from gear.dataset.given import check_previews
+from gear.dataset.output_checks import check_previews
 from gear.values.frames import UInt8Image
 
 

@@ -7,12 +7,12 @@ from typing import Any
 
 from gear.contracts.tasks import Sidecar
 from gear.values.geometry import RigidTransform
+from gear.values.ground_truth import SurfaceTruth
 from gear.values.scene import CameraRecord, SceneRecord, SurfaceRecord
 from gear.values.serial import Json, to_json
-from gear.values.truth import SurfaceTruth
 from gear.view.counts import count
-from gear.view.faces import hidden
 from gear.view.measures import measures
+from gear.view.surface_occlusion import hidden
 
 
 def row(sidecar: Sidecar) -> dict[str, Json]:

@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 from gear.dataset.files import explained, refuse_folder
 from gear.dataset.reading import Dataset
-from gear.opening import open_dataset
+from gear.plugins.datasets import open_dataset
 from gear.values.serial import Json
 from gear.view.build import Builder, Progress, fitting_scale
 from gear.view.document import document

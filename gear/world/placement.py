@@ -16,9 +16,9 @@ import numpy.typing as npt
 
 from gear.values.geometry import Array, RigidTransform
 from gear.values.scene import Pose
-from gear.world.catalogue import ActorType
-from gear.world.compose import PARKED_DEPTH_M
-from gear.world.models import ACTOR_GROUP, GROUND_GROUP, OBSTACLE_GROUP
+from gear.world.assets.actor_types import ActorType
+from gear.world.compilation.compose import PARKED_DEPTH_M
+from gear.world.compilation.model_compilation import ACTOR_GROUP, GROUND_GROUP, OBSTACLE_GROUP
 
 EVEN_M = 0.005
 """Four feet within this of one plane stand evenly; no simulation is needed."""

@@ -10,12 +10,12 @@ from gear.values.frames import STATIC_OBJECT_BASE
 from gear.values.geometry import RigidTransform
 from gear.values.rig import Rig
 from gear.values.scene import POSE_DIGITS, ActorRecord, Pose, SceneRecord, Vec3
-from gear.world.cast import Cast, Crowd, HidingTest
-from gear.world.leads import Leads
 from gear.world.placement import PlacementSpace
-from gear.world.sequence import Director, Moment
-from gear.world.spawn import Draft, Spawner
-from gear.world.view_limits import reference_camera
+from gear.world.surfaces.view_limits import reference_camera
+from gear.world.traffic.crowd import Cast, Crowd, HidingTest
+from gear.world.traffic.ego_sampling import Leads
+from gear.world.traffic.sequence import Director, Moment
+from gear.world.traffic.spawn import Draft, Spawner
 from gear.world.world import World
 
 SEQUENCES_KEPT = 4

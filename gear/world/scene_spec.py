@@ -10,9 +10,9 @@ from typing import TypeVar
 from gear.config.nodes import Place
 from gear.config.reader import WHOLE
 from gear.values.errors import FieldError
-from gear.values.mix import check_mix, product_of
 from gear.values.scene import Vec3
 from gear.values.serial import PLACES
+from gear.values.vehicle_mix import check_mix, product_of
 
 Range = tuple[float, float]
 CountRange = tuple[int, int]

@@ -17,16 +17,16 @@ from gear.values.errors import PlacementError
 from gear.values.frames import GeomTable, SceneObject, Shape, UInt8Image
 from gear.values.labels import GROUND_CODES
 from gear.values.scene import ActorRecord, SceneRecord, SurfaceRecord, Vec3, Weather
-from gear.world.assets import AssetLibrary
-from gear.world.catalogue import ActorType, StaticObjects, actor_types, static_objects, visible_geoms
-from gear.world.classes import GeomClasses
-from gear.world.compiled import Compiled, compile_world
-from gear.world.compose import PARKED_DEPTH_M, Slot
-from gear.world.faces import SurfaceAlbedo, SurfaceAlbedos
-from gear.world.lanes import LaneGraph
-from gear.world.memory import release_memory
+from gear.world.assets.actor_types import ActorType, StaticObjects, actor_types, static_objects, visible_geoms
+from gear.world.assets.geom_classes import GeomClasses
+from gear.world.assets.library import AssetLibrary
+from gear.world.compilation.compiled_world import Compiled, compile_world
+from gear.world.compilation.compose import PARKED_DEPTH_M, Slot
+from gear.world.compilation.memory import release_memory
+from gear.world.roads.lanes import LaneGraph
 from gear.world.scene_spec import SceneSpec
-from gear.world.surfaces import Face, find_faces
+from gear.world.surfaces.face_texture import SurfaceAlbedo, SurfaceAlbedos
+from gear.world.surfaces.patch_faces import Face, find_faces
 
 FACES_KEPT, SHOWN_A_FACE = 8, 5
 """Resampled faces are kept: so many in all, or so many of each, which in a sample may be seen with a patch, neutral,

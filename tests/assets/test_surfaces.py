@@ -15,7 +15,7 @@ import pytest
 
 from authoring.surfaces.billboard import write_billboard
 from authoring.surfaces.face import FACE_SIZE_PX
-from gear.world.quiet_mjcf import mjcf
+from gear.world.compilation.quiet_mjcf import mjcf
 
 SURFACES = Path(__file__).parents[2] / "mjcf" / "surfaces"
 BILLBOARD = SURFACES / "billboard.xml"

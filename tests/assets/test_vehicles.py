@@ -13,7 +13,7 @@ import pytest
 from authoring.vehicles.catalogue import CATALOGUE, write
 from authoring.vehicles.trucks import FACE_SIZE_M
 from gear.values.labels import LABEL_BY_NAME
-from gear.world.quiet_mjcf import mjcf
+from gear.world.compilation.quiet_mjcf import mjcf
 
 VEHICLES = Path(__file__).parents[2] / "mjcf" / "vehicles"
 NAMES = sorted(CATALOGUE)

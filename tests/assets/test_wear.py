@@ -17,7 +17,7 @@ from authoring.towns.markings import LIFT_M
 from authoring.towns.network import Network, Node, Profile, Street
 from authoring.towns.regions import Regions, canal_polygon
 from authoring.towns.wear import LANE_LIFT_M, PATCH_LIFT_M, SEAL_LIFT_M, of_street, wear_streets
-from gear.world.wet import WET_LABELS
+from gear.world.weather.wet_ground import WET_LABELS
 
 Array = npt.NDArray[np.float64]
 TOWNS = Path(__file__).parents[2] / "mjcf" / "towns"

@@ -22,6 +22,8 @@ from authoring.weights.patches.run import EFFECT, make_patch, measure_again
 from authoring.weights.patches.summary import is_clearly_worse, table
 from authoring.weights.plan import TRAINING_OPTIONS, held_out, training
 from gear.cli.main import main
+from gear.collecting.job import resolve
+from gear.collecting.patch_sources import resolve_patch
 from gear.config.collection import SimulationConfig
 from gear.config.load import find_config, load_collection
 from gear.config.nodes import parse_file
@@ -34,8 +36,6 @@ from gear.plugins.manager import discover
 from gear.testing.tiny_networks import tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import GearError, UnknownNameError
-from gear.verbs.collect.job import resolve
-from gear.verbs.collect.patches import resolve_patch
 from gear.verbs.evaluate.report import Difference, Estimate, EvaluateReport, PairedTest, RowReport
 from gear.verbs.gap.figures import PictureGap
 from gear.verbs.gap.report import GapReport, SampleGap
@@ -292,7 +292,7 @@ def test_a_patch_is_made_measured_taken_up_again_and_installed(
     assert sorted(path.name for path in target.iterdir()) == ["attack.json", "effect.json", "patch_0.png"]
     assert json.loads((target / "effect.json").read_text()) == found
     assert str(tmp_path) not in (target / "effect.json").read_text()
-    monkeypatch.setattr("gear.nn.shipped.shipped_folders", lambda: (tmp_path / "package",))
+    monkeypatch.setattr("gear.networks.shipped.shipped_folders", lambda: (tmp_path / "package",))
     installed = resolve_patch(plan.name, surfaces=1, seed=0)
     assert installed.label == patched["dataset"]["patch"], "gear collect --patch NAME shows what was measured"
 

@@ -19,11 +19,11 @@ from authoring.weights.plan import (
     held_out,
     training,
 )
+from gear.collecting.job import resolve
 from gear.config.collection import SimulationConfig
 from gear.config.load import find_config, load_collection
 from gear.config.nodes import parse_file
 from gear.config.reader import read_node
-from gear.verbs.collect.job import resolve
 
 ROOT = Path(__file__).parents[2]
 TASKS = tuple(TRAINING_OPTIONS)

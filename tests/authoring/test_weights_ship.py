@@ -11,14 +11,14 @@ import torch
 
 from authoring.weights.renew import renew
 from authoring.weights.ship import ship
-from gear.nn.options import SegmentationOptions
-from gear.nn.shipped import inspect
-from gear.nn.weights import read, write
+from gear.measuring.appearance_hash import Look, look_now
+from gear.measuring.guarded_model import weights_digest
+from gear.networks.options import SegmentationOptions
+from gear.networks.shipped import inspect
+from gear.networks.weights import read, write
 from gear.plugins.models.ddrnet23_slim import build
 from gear.values.errors import GearError
 from gear.values.serial import to_json
-from gear.verbs.evaluate.player import weights_digest
-from gear.verbs.look import Look, look_now
 from gear.verbs.weights.average import average_weights
 
 MODEL = "ddrnet23_slim"

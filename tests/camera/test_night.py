@@ -11,9 +11,9 @@ import pytest
 from gear.camera.beams import Headlamps, Lamps, headlamps, low_beam, street_beam
 from gear.camera.glow import Shine, Windows
 from gear.camera.lamp_shadows import Casters, LampShadows
+from gear.camera.light_sources import INSIDE_LIGHT
 from gear.camera.night import Night, NightLight
-from gear.camera.own_light import INSIDE_LIGHT
-from gear.camera.slant import strips_of
+from gear.camera.normals import strips_of
 from gear.camera.spots import Spots
 from gear.contracts.rendering import RawView
 from gear.values.frames import LINEAR_FULL_SCALE, GeomTable

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from gear.camera import IDENTITY, Response, face_light, response_for, torch_response
 from gear.values.frames import LINEAR_FULL_SCALE
-from gear.world.weather import PRESETS
+from gear.world.weather.presets import PRESETS
 
 RESPONSES = st.builds(
     Response,

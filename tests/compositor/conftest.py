@@ -13,9 +13,9 @@ import torch
 from torch import Tensor
 
 import gear
+from gear.collecting.patch_sources import random_patch
 from gear.dataset.reading import Dataset
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
-from gear.verbs.collect.patches import random_patch
 from gear.verbs.collect.run import collect
 from gear.verbs.gap.figures import PictureGap, picture_gap, visible_mask
 

@@ -12,7 +12,7 @@ from gear.compositor.sampling import Samples
 from gear.compositor.sparse import SparseMatrix, stacked_product
 from gear.compositor.warp import warp_matrix
 from gear.values.geometry import Array
-from gear.world.faces import resample_linear
+from gear.world.surfaces.face_texture import resample_linear
 
 SIZES = [(150, 300), (37, 50), (37, 75), (600, 1200), (700, 1300), (4, 4)]
 HALVINGS: tuple[Halving, ...] = ("middles", "areas")

@@ -13,6 +13,9 @@ import numpy as np
 import pytest
 
 import gear
+from gear.collecting.job import resolve
+from gear.collecting.pipeline import collect_samples
+from gear.collecting.session import Session, open_session
 from gear.compositor.transport import TransportCompositor
 from gear.config.load import load_collection
 from gear.dataset.reading import Dataset
@@ -20,10 +23,7 @@ from gear.dataset.store import Store
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.geometry import RigidTransform
 from gear.values.scene import Pose, SceneRecord
-from gear.verbs.collect.job import resolve
-from gear.verbs.collect.pipeline import collect_samples
 from gear.verbs.collect.run import manifest_facts
-from gear.verbs.collect.session import Session, open_session
 
 from .conftest import Twins, gaps
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gear.dataset.store import Store
-from gear.opening import open_dataset
+from gear.plugins.datasets import open_dataset
 from gear.values.errors import DatasetError
 from tests.dataset.splits import fill, plan, tree
 

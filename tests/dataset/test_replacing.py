@@ -14,7 +14,7 @@ from gear.dataset import store
 from gear.dataset.plan import Plan, read_plan
 from gear.dataset.store import Store, remove_split
 from gear.formats.png import encode_rgb
-from gear.opening import open_dataset
+from gear.plugins.datasets import open_dataset
 from gear.plugins.tasks.common import read_plain, read_rgb
 from gear.values.errors import DatasetError, ReplaceableError
 from tests.dataset.test_store import fill, plan, tree

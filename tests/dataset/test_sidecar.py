@@ -16,8 +16,8 @@ from gear.contracts.tasks import SplitInfo
 from gear.dataset.plan import Plan
 from gear.dataset.sidecar import load_json, read_sidecar
 from gear.dataset.store import Store
-from gear.opening import open_dataset
 from gear.plugins.build import build_task
+from gear.plugins.datasets import open_dataset
 from gear.testing.synthetic import synthetic_frame
 from gear.values.errors import DatasetError
 from gear.verbs.sheet import contact_sheet

@@ -18,8 +18,8 @@ from gear.config.load import load_collection
 from gear.config.nodes import parse_text
 from gear.dataset.plan import Plan
 from gear.dataset.store import Store, plan_of, remove_split, splits_of
-from gear.opening import open_dataset, open_twins, roots_of
 from gear.plugins.build import build_task
+from gear.plugins.datasets import open_dataset, open_twins, roots_of
 from gear.plugins.manager import catalogue
 from gear.testing.synthetic import synthetic_frame
 from gear.values.errors import DatasetError, GearError

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
-from gear.dataset.turns import turn
+from gear.dataset.locks import turn
 from tests.shared import shared_folder
 
 ROOT = Path(__file__).parents[2]

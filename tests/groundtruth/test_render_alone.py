@@ -16,7 +16,7 @@ from gear.values.frames import GeomTable, SceneObject, Shape, View
 from gear.values.geometry import RigidTransform
 from gear.values.rig import CameraMount, Rig
 from gear.values.scene import CameraRecord
-from gear.world.shapes import geom_triangles
+from gear.world.assets.geom_triangles import geom_triangles
 
 VEHICLES = Path(__file__).parents[2] / "mjcf/vehicles"
 PRIMITIVES = """

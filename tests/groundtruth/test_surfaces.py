@@ -10,9 +10,9 @@ from gear.groundtruth.surfaces import observe_surfaces
 from gear.testing.synthetic import behind_lens, synthetic_frame
 from gear.testing.things import CAR, Part, Thing, board
 from gear.values.geometry import Intrinsics
+from gear.values.ground_truth import SurfaceTruth
 from gear.values.optics import Lens
 from gear.values.rig import CameraMount, Rig
-from gear.values.truth import SurfaceTruth
 
 RIG = Rig(cameras=(CameraMount(name="left", width_px=612, height_px=306),))
 

@@ -5,7 +5,7 @@ import pytest
 
 from gear.groundtruth.visibility import VisibilityLimits
 from gear.values.errors import FieldError
-from gear.values.truth import ObjectTruth
+from gear.values.ground_truth import ObjectTruth
 
 
 def truth(**changes: Any) -> ObjectTruth:

@@ -10,6 +10,7 @@ import pytest
 
 from gear.formats.coco import Annotation, Detection, Picture
 from gear.formats.kitti_object import KittiLabel, dont_care
+from gear.measuring.statistics import draw, gather
 from gear.metrics.coco_ap import CocoEvaluator
 from gear.metrics.coco_reference import TallObjects
 from gear.metrics.depth import DepthEvaluator, NearDepth
@@ -17,7 +18,6 @@ from gear.metrics.kitti_ap import KittiEvaluator
 from gear.metrics.kitti_reference import NearCars
 from gear.metrics.semantic import PresentClasses, SemanticEvaluator
 from gear.values.rng import derive_rng
-from gear.verbs.evaluate.spread import draw, gather
 
 CATEGORIES = (1, 3, 6)
 

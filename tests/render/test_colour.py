@@ -13,7 +13,7 @@ import pytest
 
 from gear.camera import face_light
 from gear.contracts.rendering import Quality, RawView, Renderer, Stage
-from gear.render import RENDERERS, display, open_renderer, probe
+from gear.render import RENDERERS, display_colours, open_renderer, probe
 from gear.values.frames import LINEAR_FULL_SCALE, UInt8Image, UInt16Image
 from tests.render.conftest import STREET, camera, geom, grey_face, posed
 
@@ -174,8 +174,8 @@ def test_a_face_equals_the_same_texture_in_the_model(
     def lift_others(model: mujoco.MjModel, textures: np.ndarray) -> None:
         lift_textures(model, textures[textures != face_texture])
 
-    lift_textures = display._lift_textures
-    monkeypatch.setattr(display, "_lift_textures", lift_others)
+    lift_textures = display_colours._lift_textures
+    monkeypatch.setattr(display_colours, "_lift_textures", lift_others)
     quality: Quality = "film" if renderer_is_film(renderer) else "fast"
     other = open_renderer(renderer.info.name, compiled, quality=quality)
     try:

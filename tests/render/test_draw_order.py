@@ -20,7 +20,7 @@ PEEL = """
 import sys
 import mujoco
 from gear.contracts.rendering import Stage
-from gear.render.opening import open_renderer
+from gear.render.registry import open_renderer
 from gear.values.scene import CameraRecord, Pose
 
 model = mujoco.MjModel.from_xml_string(sys.argv[1])

@@ -11,7 +11,7 @@ import sys
 import pytest
 
 from gear.render import RENDERERS, describe, glcontext, open_renderer, probe
-from gear.render.quiet import native_output
+from gear.render.native_output import native_output
 from gear.values.errors import BackendError, UnknownNameError
 
 
@@ -117,7 +117,7 @@ def test_what_c_keeps_in_its_buffers_is_caught_too(quiet: bool) -> None:
     """Into a pipe C prints late: after the block, past the one who reads a command's JSON, unless it is made to."""
     code = (
         "import contextlib, ctypes\n"
-        "from gear.render.quiet import native_output\n"
+        "from gear.render.native_output import native_output\n"
         f"with native_output() if {quiet} else contextlib.nullcontext([]) as chatter:\n"
         "    ctypes.CDLL(None).puts(b'Backend feature level: 3')\n"
         "print(chatter)\n"

@@ -16,15 +16,15 @@ from gear.camera import response_for
 from gear.contracts.rendering import Quality, Renderer, Stage
 from gear.render import open_renderer
 from gear.render.pinhole import Frustum
-from gear.render.raster.cubes import mirrored_levels
+from gear.render.raster.environment import mirrored_levels
 from gear.render.raster.lights import irradiance_over_pi, lamps_of
+from gear.render.raster.primitives import Triangles, height_field, solid
 from gear.render.raster.shadow_squares import ENDS_M, square_about, squares_before
-from gear.render.raster.solids import Triangles, height_field, solid
 from gear.render.raster.split_sum import mirrored_shares
 from gear.values.geometry import RigidTransform
 from gear.values.scene import CameraRecord, Pose
-from gear.world.quiet_mjcf import mjcf
-from gear.world.weather import PRESETS, apply_weather
+from gear.world.compilation.quiet_mjcf import mjcf
+from gear.world.weather.presets import PRESETS, apply_weather
 from tests.render.conftest import STREET, camera, posed
 
 GEOM = mujoco.mjtGeom

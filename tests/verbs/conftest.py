@@ -15,7 +15,7 @@ import pytest
 
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import AttackSpec, DefenseSpec, ModelSpec
-from gear.dataset.turns import turn
+from gear.dataset.locks import turn
 from gear.plugins import build as building
 from gear.plugins.manager import discover
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_depth, tiny_segmenter

@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 
 import gear
+from gear.collecting.job import resolve
 from gear.config.load import load_collection
 from gear.formats import rle
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
@@ -32,7 +33,6 @@ from gear.values.errors import (
     TownError,
     UnknownNameError,
 )
-from gear.verbs.collect.job import resolve
 from gear.verbs.collect.run import CollectReport
 from tests.dataset.splits import tree
 from tests.verbs.conftest import Copy

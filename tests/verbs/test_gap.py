@@ -14,12 +14,12 @@ import pytest
 
 import gear
 from gear.cli.main import main
+from gear.collecting.patch_sources import read_patch
 from gear.compositor.opening import open_compositor
+from gear.measuring import plugin_selection
 from gear.testing.tiny_networks import tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import DatasetError, GearError
-from gear.verbs.collect.patches import read_patch
-from gear.verbs.evaluate import choice
 from gear.verbs.gap.figures import PERFECT_DB, picture_gap
 from gear.verbs.gap.run import sample_gaps, shown_patches
 from tests.verbs.conftest import Copy
@@ -78,7 +78,7 @@ def test_a_models_figures_are_taken_digitally_and_rendered(
     pair: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     owner = SimpleNamespace(package="mujoco-gear", version="0")
-    monkeypatch.setattr(choice, "find", lambda kind, name: SimpleNamespace(spec=tiny_segmenter, owner=owner))
+    monkeypatch.setattr(plugin_selection, "find", lambda kind, name: SimpleNamespace(spec=tiny_segmenter, owner=owner))
     clean, twin = pair
     report = gear.gap(clean, twin=twin, model="tiny", compositors=("transport",), samples=1)
     assert set(report.effect) == {"clean", "transport", "rendered"}

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 import gear
+from gear.collecting.lookup import look_up
 from gear.config.load import load_collection
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import ConfigError
-from gear.verbs.collect.names import look_up
 from gear.verbs.collect.run import CollectReport
 
 Collect = Callable[..., CollectReport]

@@ -11,12 +11,12 @@ import torch
 
 from gear.cli.main import main
 from gear.contracts.specs import ModelSpec
-from gear.nn import shipped
-from gear.nn.weights import write
+from gear.measuring.appearance_hash import Look, look_now
+from gear.networks import shipped
+from gear.networks.weights import write
 from gear.plugins.manager import catalogue
 from gear.values.serial import to_json
 from gear.verbs import models
-from gear.verbs.look import Look, look_now
 from gear.verbs.models import list_models
 
 

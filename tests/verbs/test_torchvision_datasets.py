@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import gear
-from gear.nn.vision import prepare
+from gear.networks.torchvision_import import prepare
 from gear.verbs.export import export
 from tests.verbs.conftest import Copy
 

@@ -23,9 +23,9 @@ from gear.verbs.towns import ground_layer, scene_layer, town_map, traffic_layer
 from gear.verbs.towns.canvas import Canvas, round_step_m
 from gear.verbs.towns.facts import Town, read_town
 from gear.verbs.towns.sheet import SheetOptions, draw_sheet
-from gear.world.assets import AssetLibrary
-from gear.world.lanes import LaneGraph
-from gear.world.regions import Region
+from gear.world.assets.library import AssetLibrary
+from gear.world.roads.lanes import LaneGraph
+from gear.world.roads.regions import Region
 from gear.world.scene_spec import BoardSpec
 
 OPTIONS = SheetOptions(renderer="classic", quality="fast", weather=CLEAR, seed=3, width_px=160, height_px=80)

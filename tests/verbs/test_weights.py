@@ -10,10 +10,10 @@ import torch
 
 from gear.cli.main import main
 from gear.config.overrides import with_overrides
-from gear.nn import shipped
-from gear.nn.bisenet import BiSeNetX39
-from gear.nn.ddrnet import DDRNet23Slim
-from gear.nn.weights import read, write
+from gear.networks import shipped
+from gear.networks.segmentation.bisenet import BiSeNetX39
+from gear.networks.segmentation.ddrnet import DDRNet23Slim
+from gear.networks.weights import read, write
 from gear.plugins.build import NO_OPTIONS, build, find
 from gear.values.errors import GearError, UnknownNameError
 from gear.verbs.weights.average import average_weights

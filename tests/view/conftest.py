@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from gear.dataset.reading import Dataset
-from gear.opening import open_dataset
 from gear.plugins.build import find
+from gear.plugins.datasets import open_dataset
 from gear.values.serial import to_json
 
 from .view_datasets import OPTIONS, store_samples

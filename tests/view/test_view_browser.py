@@ -19,7 +19,7 @@ from gear.dataset.files import write_whole
 from gear.dataset.layout import manifest_path, sidecar_path
 from gear.dataset.reading import Dataset
 from gear.dataset.sidecar import dump_json, sidecar_bytes
-from gear.opening import open_dataset
+from gear.plugins.datasets import open_dataset
 from gear.values.frames import Frame, UInt8Image
 from gear.values.rig import CameraMount, Rig
 from gear.values.scene import SceneRecord

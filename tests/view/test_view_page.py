@@ -58,7 +58,7 @@ class Blocks(HTMLParser):
 
 @pytest.mark.parametrize("task", TASKS)
 def test_every_sample_is_there_with_every_picture(task: str, write_dataset: Any, tmp_path: Path) -> None:
-    from gear.opening import open_dataset
+    from gear.plugins.datasets import open_dataset
 
     root = write_dataset(task, 2)
     report = write_view(root, tmp_path / "page.html")

@@ -24,9 +24,9 @@ from gear.view.channels import Channel, PreviewError, aligned_with, previews
 from gear.view.counts import count, without_identifiers
 from gear.view.document import embedded
 from gear.view.encoding import LEAST_WIDTH_PX, SCALES, encode, largest_scale
-from gear.view.faces import area_px2, clipped, hidden
 from gear.view.measures import measures
 from gear.view.rows import finite, row
+from gear.view.surface_occlusion import area_px2, clipped, hidden
 
 RIG = Rig(cameras=(CameraMount(name="left", width_px=320, height_px=160),))
 BUSY = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])

@@ -7,8 +7,8 @@ import pytest
 
 from gear.testing.tiny_town import CLEAR, TINY_TOWN, tiny_scenes, tiny_world
 from gear.values.geometry import RigidTransform
-from gear.world.footprints import Footprint
 from gear.world.placement import PlacementSpace
+from gear.world.traffic.footprints import Footprint
 from gear.world.world import World
 
 WORLD = tiny_world("no_billboard")

@@ -19,11 +19,11 @@ from gear.values.errors import PlacementError
 from gear.values.geometry import wrap_angle_rad
 from gear.values.scene import ActorRecord, SceneRecord
 from gear.values.serial import from_json, to_json
-from gear.world import spawn
-from gear.world.cast import Cast
 from gear.world.planner import ScenePlanner
 from gear.world.scene_spec import EgoLimits, NpcLimits, SceneSpec, VehicleLimits
-from gear.world.sequence import Director
+from gear.world.traffic import spawn
+from gear.world.traffic.crowd import Cast
+from gear.world.traffic.sequence import Director
 from gear.world.world import World
 
 SCENES = ("board", "double", "truck", "no_billboard")

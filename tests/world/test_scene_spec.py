@@ -8,8 +8,8 @@ from gear.config.nodes import parse_file
 from gear.config.reader import read_node
 from gear.testing.tiny_town import tiny_scenes
 from gear.values.errors import ConfigError, FieldError
-from gear.values.mix import VEHICLE_KINDS
 from gear.values.serial import from_json, to_json
+from gear.values.vehicle_mix import VEHICLE_KINDS
 from gear.world.scene_spec import BoardSpec, EgoLimits, NpcLimits, SceneLibrary, SceneSpec, TruckSpec, VehicleLimits
 
 

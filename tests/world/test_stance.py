@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gear.testing.tiny_town import tiny_world
-from gear.world.models import FOOT_GROUP, FOOT_RADIUS_M
+from gear.world.compilation.model_compilation import FOOT_GROUP, FOOT_RADIUS_M
 
 
 @pytest.mark.parametrize("scene", ["no_billboard", "truck"])

@@ -11,20 +11,20 @@ import numpy as np
 import pytest
 
 from gear.contracts.rendering import RawView
-from gear.render.opening import open_renderer
+from gear.render.registry import open_renderer
 from gear.testing.tiny_town import CLEAR, SMALL_RIG, TINY_TOWN, build_tiny_world, tiny_scenes, tiny_world
 from gear.values.errors import PlacementError, TownError, UnknownNameError
 from gear.values.frames import STATIC_OBJECT_BASE
 from gear.values.labels import GROUND_CODES, LABEL_BY_NAME
 from gear.values.optics import CameraEffects
 from gear.values.scene import ActorRecord, Pose, SceneRecord, Weather
-from gear.world.ahead import AssetsAhead
-from gear.world.air import darkroom_of
-from gear.world.classes import NEVER_SEEN
-from gear.world.faces import FACE_SIZE_PX
-from gear.world.instances import AssetParts
-from gear.world.quiet_mjcf import mjcf
-from gear.world.weather import PRESETS
+from gear.world.assets.geom_classes import NEVER_SEEN
+from gear.world.compilation.asset_prefetch import AssetsAhead
+from gear.world.compilation.instances import AssetParts
+from gear.world.compilation.quiet_mjcf import mjcf
+from gear.world.surfaces.face_texture import FACE_SIZE_PX
+from gear.world.weather.air import darkroom_of
+from gear.world.weather.presets import PRESETS
 from gear.world.world import World
 
 MJCF = Path(__file__).parents[2] / "mjcf"

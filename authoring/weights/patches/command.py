@@ -17,7 +17,7 @@ from authoring.weights.patches.summary import table
 from authoring.weights.plan import TOWNS, TRAINING_OPTIONS
 from gear.dataset.files import write_alone
 from gear.dataset.sidecar import dump_json
-from gear.nn.options import SHIPPED
+from gear.networks.options import SHIPPED
 from gear.values.errors import GearError
 from gear.values.serial import Json
 

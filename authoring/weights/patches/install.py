@@ -6,7 +6,7 @@ from pathlib import Path
 
 from gear.dataset.files import write_alone
 from gear.dataset.sidecar import dump_json
-from gear.nn.shipped import CHECKOUT
+from gear.networks.shipped import CHECKOUT
 from gear.values.serial import Json
 
 PATCHES = CHECKOUT / "patches"

@@ -18,8 +18,8 @@ from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
 from gear.contracts.evaluation import Maskable
 from gear.contracts.specs import ModelSpec, TaskSpec
-from gear.nn.options import SHIPPED
-from gear.nn.shipped import trained_option
+from gear.networks.options import SHIPPED
+from gear.networks.shipped import trained_option
 from gear.plugins.build import NO_OPTIONS, build, find
 from gear.values.errors import GearError, UnknownNameError
 from gear.world.scene_spec import SceneLibrary

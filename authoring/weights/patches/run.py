@@ -14,8 +14,8 @@ from authoring.weights.patches.install import PATCHES
 from authoring.weights.patches.plan import PatchPlan
 from gear.dataset.files import sha256, write_alone
 from gear.dataset.sidecar import dump_json, load_json
-from gear.nn.options import SHIPPED
-from gear.nn.shipped import resolve
+from gear.networks.options import SHIPPED
+from gear.networks.shipped import resolve
 from gear.plugins.build import find
 from gear.values.errors import DatasetError, GearError
 from gear.values.machine import cores

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from gear.nn import vision
+from gear.networks import torchvision_import
 
-vision.prepare()  # before transformers: torchvision may not fit this torch
+torchvision_import.prepare()  # before transformers: torchvision may not fit this torch
 
 import transformers  # noqa: E402
 

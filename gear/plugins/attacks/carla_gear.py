@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from gear.attacking.settings import Appearance, Settings
 from gear.contracts.attacks import Budget, Compositor, Patch, Watch
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec
+from gear.plugins.attacks.optimisation.settings import Appearance, Settings
 
 if TYPE_CHECKING:
-    from gear.attacking.objectives import Objective
+    from gear.plugins.attacks.optimisation.objectives import Objective
 
 IMAGENET_STD = (0.229, 0.224, 0.225)
 PaperTask = Literal["semseg", "depth", "detect2d", "stereo3d"]
@@ -64,7 +64,7 @@ class CarlaGear:
         The paper's budget is 51 passes over 100 samples: 2550 steps for segmentation, which takes two samples a step,
         5100 for the others.
         """
-        from gear.attacking.loop import Problem, climb, unit_gradients
+        from gear.plugins.attacks.optimisation.loop import Problem, climb, unit_gradients
 
         objective, settings = self.objective(dataset[0]), self.settings(dataset[0])
         problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=settings)
@@ -85,7 +85,7 @@ class CarlaGear:
 
     def objective(self, sample: Any) -> Objective:
         """What the paper makes large, by the task that the sample is of."""
-        from gear.attacking.objectives import DepthObjective, LossObjective, SemsegObjective
+        from gear.plugins.attacks.optimisation.objectives import DepthObjective, LossObjective, SemsegObjective
 
         task = task_of(sample)
         if task == "semseg":
@@ -106,7 +106,7 @@ BRIGHTNESS: dict[PaperTask, float] = {"semseg": 0.02 / 0.224, "depth": 0.02, "de
 
 def task_of(sample: Any) -> PaperTask:
     """Which of the paper's tasks a sample is of."""
-    from gear.attacking.objectives import kind_of
+    from gear.plugins.attacks.optimisation.objectives import kind_of
 
     kind = kind_of(sample)
     if kind != "losses":

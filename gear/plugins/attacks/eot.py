@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from gear.attacking.settings import Appearance, Settings
 from gear.contracts.attacks import Budget, Compositor, Patch, Watch
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec
+from gear.plugins.attacks.optimisation.settings import Appearance, Settings
 from gear.values.errors import FieldError
 
 
@@ -69,9 +69,9 @@ class Eot:
         watch: Watch | None = None,
     ) -> tuple[Patch, ...]:
         """One patch a surface, all pasted into every picture."""
-        from gear.attacking.loop import Problem, climb, unit_gradients
-        from gear.attacking.objectives import default_objective
-        from gear.attacking.upright import Upright
+        from gear.plugins.attacks.optimisation.loop import Problem, climb, unit_gradients
+        from gear.plugins.attacks.optimisation.objectives import default_objective
+        from gear.plugins.attacks.optimisation.upright_pasting import Upright
 
         config = self._config
         seed = int(rng.integers(2**62))

@@ -69,10 +69,10 @@ class Nes:
         watch: Watch | None = None,
     ) -> tuple[Patch, ...]:
         """One patch a surface."""
-        from gear.attacking.loop import batch_of
-        from gear.attacking.objectives import default_objective
-        from gear.attacking.queries import Oracle, as_patches
-        from gear.attacking.saved import check_saved
+        from gear.plugins.attacks.optimisation.checkpoint_state import check_saved
+        from gear.plugins.attacks.optimisation.loop import batch_of
+        from gear.plugins.attacks.optimisation.objectives import default_objective
+        from gear.plugins.attacks.optimisation.queries import Oracle, as_patches
 
         config, count = self._config, len(dataset[0].record.surfaces)
         oracle = Oracle(model, dataset, compositor, default_objective(dataset[0]), budget)

@@ -12,19 +12,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gear.attacking.settings import Appearance, TextureSettings
 from gear.contracts.attacks import Budget, Compositor, Patch, Watch
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec
 from gear.plugins.attacks.classes import LABEL_IDS, check_classes, check_seen
+from gear.plugins.attacks.optimisation.settings import Appearance, TextureSettings
 from gear.values.errors import FieldError, GearError
 
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from gear.attacking.loop import Seen
-    from gear.attacking.objectives import Objective
+    from gear.plugins.attacks.optimisation.loop import Seen
+    from gear.plugins.attacks.optimisation.objectives import Objective
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,7 +85,7 @@ class Rp2:
         watch: Watch | None = None,
     ) -> tuple[Patch, ...]:
         """One patch a surface."""
-        from gear.attacking.loop import Problem, climb, one_gradient
+        from gear.plugins.attacks.optimisation.loop import Problem, climb, one_gradient
 
         problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=self._config)
         objective = self.objective(dataset[0])
@@ -98,7 +98,7 @@ class Rp2:
 
     def objective(self, sample: Any) -> Objective:
         """To the target class, or untargeted."""
-        from gear.attacking.objectives import SemsegObjective, default_objective, kind_of
+        from gear.plugins.attacks.optimisation.objectives import SemsegObjective, default_objective, kind_of
 
         config = self._config
         if kind_of(sample) != "semseg":
@@ -113,7 +113,7 @@ class Rp2:
     def _harm(self, model: Model, objective: Objective, seen: Seen) -> Mapping[str, Tensor]:
         import torch
 
-        from gear.attacking.objectives import weighted
+        from gear.plugins.attacks.optimisation.objectives import weighted
 
         terms = weighted(objective, model, seen.views, seen.samples, seen.indexes)
         return {"harm": torch.stack(terms).sum()} if terms else {}
@@ -121,7 +121,7 @@ class Rp2:
     def _penalties(self, textures: Tensor) -> Mapping[str, Tensor]:
         import torch
 
-        from gear.attacking.regularisers import non_printability, smoothness
+        from gear.plugins.attacks.optimisation.regularisers import non_printability, smoothness
 
         config, pixels = self._config, textures[:, 0].numel()
         return {

@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from gear.attacking.settings import USUAL_RATE, Settings
 from gear.contracts.attacks import Budget, Compositor, Patch, Watch
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec
 from gear.formats.coco import CATEGORY_NAMES
 from gear.plugins.attacks.classes import LABEL_IDS, check_classes, check_seen
+from gear.plugins.attacks.optimisation.settings import USUAL_RATE, Settings
 from gear.values.errors import FieldError, GearError
 
 if TYPE_CHECKING:
-    from gear.attacking.objectives import Objective
+    from gear.plugins.attacks.optimisation.objectives import Objective
 
 CATEGORY_IDS = {name: number for number, name in CATEGORY_NAMES.items()}
 APPEARS = "person"
@@ -93,7 +93,7 @@ class SceneSpecific:
         watch: Watch | None = None,
     ) -> tuple[Patch, ...]:
         """One patch a surface."""
-        from gear.attacking.loop import Problem, climb, unit_gradients
+        from gear.plugins.attacks.optimisation.loop import Problem, climb, unit_gradients
 
         objective, settings = self.objective(dataset[0]), self.settings(dataset[0])
         check_seen(self._config.attacked, dataset)
@@ -103,7 +103,7 @@ class SceneSpecific:
 
     def settings(self, sample: Any) -> SceneSpecificConfig:
         """With the learning rate that suits the task that the sample is of."""
-        from gear.attacking.objectives import kind_of
+        from gear.plugins.attacks.optimisation.objectives import kind_of
 
         if self._config.learning_rate is not None:
             return self._config
@@ -115,7 +115,7 @@ class SceneSpecific:
         Raises:
             GearError: an option is set that is for samples of another task.
         """
-        from gear.attacking.objectives import DepthObjective, LossObjective, SemsegObjective, kind_of
+        from gear.plugins.attacks.optimisation.objectives import DepthObjective, LossObjective, SemsegObjective, kind_of
 
         config, kind = self._config, kind_of(sample)
         self._check(kind)
@@ -145,7 +145,7 @@ class SceneSpecific:
                 raise GearError(f"option {name} of the attack is for {whose}; these are other samples")
 
     def _check_losses(self, model: Model, sample: Any) -> None:
-        from gear.attacking.objectives import loss_names
+        from gear.plugins.attacks.optimisation.objectives import loss_names
 
         if not self._config.losses:
             return

@@ -12,18 +12,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gear.attacking.settings import Appearance, TextureSettings
 from gear.contracts.attacks import Budget, Compositor, Patch, Watch
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec
+from gear.plugins.attacks.optimisation.settings import Appearance, TextureSettings
 from gear.values.errors import GearError
 
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from gear.attacking.loop import Seen
-    from gear.attacking.objectives import Objective, Term
+    from gear.plugins.attacks.optimisation.loop import Seen
+    from gear.plugins.attacks.optimisation.objectives import Objective, Term
 
 SCORES = ("objectness", "cls_logits")
 """Raw outputs of detectors that a sigmoid makes scores of."""
@@ -76,7 +76,7 @@ class Thys:
         Raises:
             GearError: the model has no output of objectness.
         """
-        from gear.attacking.loop import Problem, climb, one_gradient
+        from gear.plugins.attacks.optimisation.loop import Problem, climb, one_gradient
 
         problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=self._config)
         objective = self.objective(dataset[0])
@@ -93,7 +93,7 @@ class Thys:
     def _harm(self, model: Model, objective: Objective, seen: Seen) -> Mapping[str, Tensor]:
         import torch
 
-        from gear.attacking.objectives import weighted
+        from gear.plugins.attacks.optimisation.objectives import weighted
 
         harm = weighted(objective, model, seen.views, seen.samples, seen.indexes)
         return {"objectness": torch.stack(harm).sum()}
@@ -101,7 +101,7 @@ class Thys:
     def _penalties(self, textures: Tensor) -> Mapping[str, Tensor]:
         import torch
 
-        from gear.attacking.regularisers import non_printability
+        from gear.plugins.attacks.optimisation.regularisers import non_printability
 
         config = self._config
         down = (textures[:, :, 1:] - textures[:, :, :-1]).abs().sum()
@@ -122,7 +122,7 @@ class SurestObjective:
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> Mapping[str, Term]:
         """`objectness`."""
-        from gear.attacking.objectives import Term
+        from gear.plugins.attacks.optimisation.objectives import Term
 
         return {"objectness": Term(value=-surest(model.forward(views)).mean())}
 

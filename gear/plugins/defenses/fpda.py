@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 from gear.contracts.defenses import Defense
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import DefenseSpec
-from gear.guarding.options import DetectorConfig
+from gear.plugins.defenses.activations.options import DetectorConfig
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -34,7 +34,7 @@ def build(config: FpdaConfig) -> Defense:
     """The detector."""
     from torch.nn import functional
 
-    from gear.guarding.detector import Detector
+    from gear.plugins.defenses.activations.score_detector import Detector
 
     def compress(features: Tensor) -> Tensor:
         return (features if config.compress == "mean" else features.abs()).mean(dim=0)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 from gear.contracts.defenses import Defense
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import DefenseSpec
-from gear.guarding.options import DetectorConfig
+from gear.plugins.defenses.activations.options import DetectorConfig
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -32,7 +32,7 @@ class HyperNeuronConfig(DetectorConfig):
 
 def build(config: HyperNeuronConfig) -> Defense:
     """The detector."""
-    from gear.guarding.detector import Detector
+    from gear.plugins.defenses.activations.score_detector import Detector
 
     def compress(features: Tensor) -> Tensor:
         return features if config.statistics == "neuron" else features.mean(dim=(1, 2))

@@ -5,12 +5,12 @@ from __future__ import annotations
 from gear.contracts.defenses import Defense
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import DefenseSpec
-from gear.guarding.zmask_options import ZMaskConfig
+from gear.plugins.defenses.activations.zmask_options import ZMaskConfig
 
 
 def build(config: ZMaskConfig) -> Defense:
     """The defense."""
-    from gear.guarding.zmask import ZMask
+    from gear.plugins.defenses.activations.zmask import ZMask
 
     return ZMask(config)
 

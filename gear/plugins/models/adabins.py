@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model, PublishedWeights, Recipe
 from gear.contracts.specs import ModelSpec
-from gear.nn.depth_options import AdaBinsOptions
+from gear.networks.depth.options import AdaBinsOptions
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -22,10 +22,10 @@ def build(options: AdaBinsOptions) -> Model:
     Raises:
         GearError: timm, torchvision or the weights are not there.
     """
-    from gear.nn.adabins import AdaBins
-    from gear.nn.adabins_graph import AdaBinsGraph
-    from gear.nn.input_scale import input_scale_of
-    from gear.nn.weights import build_graph
+    from gear.networks.depth.adabins import AdaBins
+    from gear.networks.depth.adabins_graph import AdaBinsGraph
+    from gear.networks.input_scale import input_scale_of
+    from gear.networks.weights import build_graph
 
     graph = build_graph(lambda: AdaBinsGraph(options), options, NAME)
     return AdaBins(graph, options, input_scale=input_scale_of(options, NAME))
@@ -33,7 +33,7 @@ def build(options: AdaBinsOptions) -> Model:
 
 def convert(state: Mapping[str, Tensor]) -> Mapping[str, Any]:
     """The authors' checkpoints under the graph's keys."""
-    from gear.nn.adabins import from_official
+    from gear.networks.depth.adabins import from_official
 
     return from_official(state)
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import PublishedWeights, Recipe
 from gear.contracts.specs import ModelSpec
-from gear.nn.options import SegmentationOptions
+from gear.networks.options import SegmentationOptions
 
 if TYPE_CHECKING:
-    from gear.nn.semseg import SemsegNetwork
+    from gear.networks.segmentation.network import SemsegNetwork
 
 NAME = "ddrnet23_slim"
 
@@ -22,11 +22,11 @@ AUXILIARY_WEIGHT = 0.4
 
 def build(options: SegmentationOptions) -> SemsegNetwork:
     """The network with its weights."""
-    from gear.losses.semantic import SegmentationLosses
-    from gear.nn.ddrnet import DDRNet23Slim
-    from gear.nn.input_scale import input_scale_of
-    from gear.nn.semseg import CLASSES, SemsegNetwork
-    from gear.nn.weights import build_graph
+    from gear.networks.input_scale import input_scale_of
+    from gear.networks.segmentation.ddrnet import DDRNet23Slim
+    from gear.networks.segmentation.losses import SegmentationLosses
+    from gear.networks.segmentation.network import CLASSES, SemsegNetwork
+    from gear.networks.weights import build_graph
 
     return SemsegNetwork(
         build_graph(lambda: DDRNet23Slim(CLASSES, auxiliary=options.auxiliary), options, NAME),
@@ -37,8 +37,8 @@ def build(options: SegmentationOptions) -> SemsegNetwork:
 
 
 def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
-    """See `gear.nn.ddrnet.from_official`."""
-    from gear.nn.ddrnet import from_official
+    """See `gear.networks.segmentation.ddrnet.from_official`."""
+    from gear.networks.segmentation.ddrnet import from_official
 
     return from_official(state)
 

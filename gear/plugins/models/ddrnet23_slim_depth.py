@@ -5,7 +5,7 @@ from __future__ import annotations
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model, Recipe
 from gear.contracts.specs import ModelSpec
-from gear.nn.depth_options import DepthOptions
+from gear.networks.depth.options import DepthOptions
 
 NAME = "ddrnet23_slim_depth"
 
@@ -19,9 +19,9 @@ def build(options: DepthOptions) -> Model:
     Raises:
         GearError: the weights are not there.
     """
-    from gear.nn.ddrnet_depth import DdrnetDepth, ddrnet_depth_graph
-    from gear.nn.input_scale import input_scale_of
-    from gear.nn.weights import build_graph
+    from gear.networks.depth.ddrnet_depth import DdrnetDepth, ddrnet_depth_graph
+    from gear.networks.input_scale import input_scale_of
+    from gear.networks.weights import build_graph
 
     graph = build_graph(ddrnet_depth_graph, options, NAME)
     return DdrnetDepth(graph, options, input_scale=input_scale_of(options, NAME, HABIT))

@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Any
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import PublishedWeights, Recipe
 from gear.contracts.specs import ModelSpec
-from gear.nn.detectors_options import OfficialDetectorOptions
+from gear.networks.detection.options import OfficialDetectorOptions
 
 if TYPE_CHECKING:
-    from gear.nn.detectors_fasterrcnn import FasterRcnnDetector
+    from gear.networks.detection.fasterrcnn import FasterRcnnDetector
 
 NAME = "fasterrcnn_r50_fpn"
 
 
 def build(options: OfficialDetectorOptions) -> FasterRcnnDetector:
     """The network with its weights."""
-    from gear.nn.detectors import OFFICIAL_CATEGORIES, Sizing, fitted
-    from gear.nn.detectors_fasterrcnn import FasterRcnnDetector
-    from gear.nn.detectors_graphs import fasterrcnn_r50_fpn
-    from gear.nn.weights import build_graph
+    from gear.networks.detection.fasterrcnn import FasterRcnnDetector
+    from gear.networks.detection.graphs import fasterrcnn_r50_fpn
+    from gear.networks.detection.network import OFFICIAL_CATEGORIES, Sizing, fitted
+    from gear.networks.weights import build_graph
 
     return FasterRcnnDetector(
         build_graph(lambda: fasterrcnn_r50_fpn(options.least_score), options, NAME),
@@ -32,8 +32,8 @@ def build(options: OfficialDetectorOptions) -> FasterRcnnDetector:
 
 
 def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
-    """See `gear.nn.detectors_official.from_official`."""
-    from gear.nn.detectors_official import from_official
+    """See `gear.networks.detection.official.from_official`."""
+    from gear.networks.detection.official import from_official
 
     return from_official(state)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model, PublishedWeights, Recipe
 from gear.contracts.specs import ModelSpec
-from gear.nn.depth_options import GlpnOptions
+from gear.networks.depth.options import GlpnOptions
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -22,9 +22,9 @@ def build(options: GlpnOptions) -> Model:
     Raises:
         GearError: transformers or the weights are not there.
     """
-    from gear.nn.glpn import Glpn, glpn_graph
-    from gear.nn.input_scale import input_scale_of
-    from gear.nn.weights import build_graph
+    from gear.networks.depth.glpn import Glpn, glpn_graph
+    from gear.networks.input_scale import input_scale_of
+    from gear.networks.weights import build_graph
 
     graph = build_graph(lambda: glpn_graph(options), options, NAME)
     return Glpn(graph, options, input_scale=input_scale_of(options, NAME))
@@ -32,7 +32,7 @@ def build(options: GlpnOptions) -> Model:
 
 def convert(state: Mapping[str, Tensor]) -> Mapping[str, Any]:
     """The authors' checkpoints and transformers' folders under the graph's keys."""
-    from gear.nn.glpn_official import from_official
+    from gear.networks.depth.glpn_official import from_official
 
     return from_official(state)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model, Recipe
 from gear.contracts.specs import ModelSpec
-from gear.nn.depth_options import GlpnB0Options
+from gear.networks.depth.options import GlpnB0Options
 from gear.plugins.models.glpdepth import convert
 
 NAME = "glpn_b0"
@@ -17,9 +17,9 @@ def build(options: GlpnB0Options) -> Model:
     Raises:
         GearError: transformers or the weights are not there.
     """
-    from gear.nn.glpn import Glpn, glpn_graph
-    from gear.nn.input_scale import input_scale_of
-    from gear.nn.weights import build_graph
+    from gear.networks.depth.glpn import Glpn, glpn_graph
+    from gear.networks.input_scale import input_scale_of
+    from gear.networks.weights import build_graph
 
     graph = build_graph(lambda: glpn_graph(options), options, NAME)
     return Glpn(graph, options, input_scale=input_scale_of(options, NAME))

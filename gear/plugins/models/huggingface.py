@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Recipe
 from gear.contracts.specs import ModelSpec
-from gear.nn.huggingface_options import DepthFolderOptions, DetectorFolderOptions, FolderOptions
+from gear.networks.huggingface.options import DepthFolderOptions, DetectorFolderOptions, FolderOptions
 
 if TYPE_CHECKING:
-    from gear.nn.huggingface import FolderDepth, FolderDetector, FolderSegmenter
+    from gear.networks.huggingface.network import FolderDepth, FolderDetector, FolderSegmenter
 
 SEGMENTER = "AutoModelForSemanticSegmentation"
 DEPTH = "AutoModelForDepthEstimation"
@@ -24,24 +24,24 @@ RECIPE = Recipe(learning_rate=6e-5, weight_decay=1e-2, batch=8, epochs=20, gradi
 
 def build_semseg(options: FolderOptions) -> FolderSegmenter:
     """SegFormer and its like."""
-    from gear.nn.huggingface import FolderSegmenter
-    from gear.nn.huggingface_folder import open_folder
+    from gear.networks.huggingface.folder import open_folder
+    from gear.networks.huggingface.network import FolderSegmenter
 
     return FolderSegmenter(open_folder(options, SEGMENTER), options)
 
 
 def build_depth(options: DepthFolderOptions) -> FolderDepth:
     """GLPN, Depth Anything and their like."""
-    from gear.nn.huggingface import FolderDepth
-    from gear.nn.huggingface_folder import open_folder
+    from gear.networks.huggingface.folder import open_folder
+    from gear.networks.huggingface.network import FolderDepth
 
     return FolderDepth(open_folder(options, DEPTH), options)
 
 
 def build_detect2d(options: DetectorFolderOptions) -> FolderDetector:
     """DETR, RT-DETR and their like."""
-    from gear.nn.huggingface import FolderDetector
-    from gear.nn.huggingface_folder import open_folder
+    from gear.networks.huggingface.folder import open_folder
+    from gear.networks.huggingface.network import FolderDetector
 
     return FolderDetector(open_folder(options, DETECTOR), options)
 
@@ -50,7 +50,7 @@ def _start(auto: str) -> Mapping[str, Callable[[Any], None]]:
     """`gear train --init folder`: go on from the folder's own weights."""
 
     def begin(model: Any) -> None:
-        from gear.nn.huggingface_folder import start_from
+        from gear.networks.huggingface.folder import start_from
 
         start_from(model, auto)
 

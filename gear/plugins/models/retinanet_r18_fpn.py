@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Recipe
 from gear.contracts.specs import ModelSpec
-from gear.nn.detectors_options import ReferenceDetectorOptions
+from gear.networks.detection.options import ReferenceDetectorOptions
 
 if TYPE_CHECKING:
-    from gear.nn.detectors_retinanet import RetinaNetDetector
+    from gear.networks.detection.retinanet import RetinaNetDetector
 
 R18, LITE0 = "retinanet_r18_fpn", "retinanet_lite0_fpn"
 
@@ -33,10 +33,10 @@ RECIPE = Recipe(
 
 def build_r18(options: ReferenceDetectorOptions) -> RetinaNetDetector:
     """The network with ResNet-18 and its weights."""
-    from gear.nn.detectors import Sizing, scaled
-    from gear.nn.detectors_graphs import retinanet_r18_fpn
-    from gear.nn.detectors_retinanet import RetinaNetDetector
-    from gear.nn.weights import build_graph
+    from gear.networks.detection.graphs import retinanet_r18_fpn
+    from gear.networks.detection.network import Sizing, scaled
+    from gear.networks.detection.retinanet import RetinaNetDetector
+    from gear.networks.weights import build_graph
 
     return RetinaNetDetector(
         build_graph(lambda: retinanet_r18_fpn(len(CATEGORIES), options.least_score), options, R18),
@@ -48,11 +48,11 @@ def build_r18(options: ReferenceDetectorOptions) -> RetinaNetDetector:
 
 def build_lite0(options: ReferenceDetectorOptions) -> RetinaNetDetector:
     """The network with EfficientNet-Lite0 and its weights."""
-    from gear.nn.detectors import Sizing, scaled
-    from gear.nn.detectors_graphs import retinanet_lite0_fpn
-    from gear.nn.detectors_retinanet import LiteRetinaNetDetector
-    from gear.nn.lite0 import MEAN, STD
-    from gear.nn.weights import build_graph
+    from gear.networks.detection.graphs import retinanet_lite0_fpn
+    from gear.networks.detection.network import Sizing, scaled
+    from gear.networks.detection.retinanet import LiteRetinaNetDetector
+    from gear.networks.efficientnet_lite0 import MEAN, STD
+    from gear.networks.weights import build_graph
 
     return LiteRetinaNetDetector(
         build_graph(lambda: retinanet_lite0_fpn(len(CATEGORIES), options.least_score), options, LITE0),
@@ -64,14 +64,14 @@ def build_lite0(options: ReferenceDetectorOptions) -> RetinaNetDetector:
 
 def scale_of(options: ReferenceDetectorOptions, name: str) -> float:
     """The input's scale: what the options say, or else the weights, or else one half."""
-    from gear.nn.input_scale import input_scale_of
+    from gear.networks.input_scale import input_scale_of
 
     return input_scale_of(options, name, INPUT_SCALE)
 
 
 def start_from_imagenet(model: Any) -> None:
-    """See `gear.nn.lite0.start_from_imagenet`."""
-    from gear.nn.lite0 import start_from_imagenet
+    """See `gear.networks.efficientnet_lite0.start_from_imagenet`."""
+    from gear.networks.efficientnet_lite0 import start_from_imagenet
 
     start_from_imagenet(model.graph.get_submodule("backbone"))
 

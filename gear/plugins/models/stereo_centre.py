@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Recipe
 from gear.contracts.specs import ModelSpec
-from gear.nn.stereo_options import INPUT_SCALE, LEFT, RIGHT, StereoCentreOptions
+from gear.networks.stereo.options import INPUT_SCALE, LEFT, RIGHT, StereoCentreOptions
 
 if TYPE_CHECKING:
-    from gear.nn.stereo_centre_network import StereoCentreNetwork
+    from gear.networks.stereo.centre_network import StereoCentreNetwork
 
 RESNET, LITE0 = "stereo_centre", "stereo_centre_lite0"
 
@@ -23,27 +23,27 @@ RECIPE = Recipe(learning_rate=1e-3, weight_decay=1e-2, batch=4, epochs=20, gradi
 
 def build_resnet(options: StereoCentreOptions) -> StereoCentreNetwork:
     """The network on its ResNet-18, with its weights."""
-    from gear.nn.network import Normalise
-    from gear.nn.stereo_centre_network import StereoCentreNetwork
-    from gear.nn.stereo_centre_resnet import StereoCentre
+    from gear.networks.network import Normalise
+    from gear.networks.stereo.centre_network import StereoCentreNetwork
+    from gear.networks.stereo.centre_resnet import StereoCentre
 
     return StereoCentreNetwork(options, RESNET, StereoCentre, Normalise(), dict(zip(TAPS, TAPS, strict=True)))
 
 
 def build_lite0(options: StereoCentreOptions) -> StereoCentreNetwork:
     """The network on EfficientNet-Lite0, with its weights."""
-    from gear.nn.lite0 import MEAN, STD
-    from gear.nn.network import Normalise
-    from gear.nn.stereo_centre_lite0 import StereoCentreLite0
-    from gear.nn.stereo_centre_network import StereoCentreNetwork
+    from gear.networks.efficientnet_lite0 import MEAN, STD
+    from gear.networks.network import Normalise
+    from gear.networks.stereo.centre_lite0 import StereoCentreLite0
+    from gear.networks.stereo.centre_network import StereoCentreNetwork
 
     taps = dict(zip(TAPS, LITE0_TAPS, strict=True))
     return StereoCentreNetwork(options, LITE0, StereoCentreLite0, Normalise(MEAN, STD), taps)
 
 
 def start_from_imagenet(model: Any) -> None:
-    """See `gear.nn.lite0.start_from_imagenet`."""
-    from gear.nn.lite0 import start_from_imagenet
+    """See `gear.networks.efficientnet_lite0.start_from_imagenet`."""
+    from gear.networks.efficientnet_lite0 import start_from_imagenet
 
     start_from_imagenet(model.graph)
 

@@ -8,19 +8,19 @@ from typing import Any
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model, PublishedWeights, Recipe
 from gear.contracts.specs import ModelSpec
-from gear.nn.stereo_options import LEFT, RIGHT, StereoRcnnOptions
+from gear.networks.stereo.options import LEFT, RIGHT, StereoRcnnOptions
 
 
 def build(options: StereoRcnnOptions) -> Model:
     """The network with its weights."""
-    from gear.nn.stereo_rcnn_network import StereoRcnnNetwork
+    from gear.networks.stereo.rcnn_network import StereoRcnnNetwork
 
     return StereoRcnnNetwork(options)
 
 
 def from_official(state: Mapping[str, Any]) -> Mapping[str, Any]:
     """The authors' keys are the graph's own; the variances of the losses are added where they are missing."""
-    from gear.nn.stereo_rcnn_graph import from_official
+    from gear.networks.stereo.rcnn_graph import from_official
 
     return from_official(state)
 

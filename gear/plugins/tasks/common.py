@@ -14,15 +14,15 @@ import numpy.typing as npt
 
 from gear.contracts.tasks import Sample
 from gear.dataset.files import inside
-from gear.dataset.plausible import check_numbers
+from gear.dataset.sidecar_validation import check_numbers
 from gear.formats.png import decode_plain, decode_rgb
 from gear.groundtruth.surfaces import observe_surfaces
 from gear.values.errors import DatasetError, FieldError
 from gear.values.frames import Frame, UInt8Image
+from gear.values.ground_truth import BoxPx, SurfaceTruth
 from gear.values.rig import CameraMount
 from gear.values.scene import SceneRecord, Vec3
 from gear.values.serial import Json
-from gear.values.truth import BoxPx, SurfaceTruth
 
 REPAIR = "delete its sample's sidecar (gear/<split>/samples/<number>.json) and run the same collection again"
 """What to do about a file that is gone or damaged."""

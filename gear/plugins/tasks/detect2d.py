@@ -33,11 +33,11 @@ from gear.plugins.tasks.common import (
 )
 from gear.values.errors import FieldError
 from gear.values.frames import Frame, UInt8Image
+from gear.values.ground_truth import BoxPx
 from gear.values.labels import LABELS
 from gear.values.rig import Rig
 from gear.values.scene import CameraRecord, SceneRecord
 from gear.values.serial import Json, from_json, to_json
-from gear.values.truth import BoxPx
 
 VIEW = "left"
 

@@ -46,11 +46,11 @@ from gear.plugins.tasks.common import (
 )
 from gear.values.errors import FieldError
 from gear.values.frames import Frame, SceneObject, UInt8Image, View
+from gear.values.ground_truth import BoxPx, ObjectTruth
 from gear.values.labels import KittiType
 from gear.values.rig import Rig
 from gear.values.scene import SceneRecord
 from gear.values.serial import Json, from_json, to_json
-from gear.values.truth import BoxPx, ObjectTruth
 
 LEFT, RIGHT = "left", "right"
 LEAST_BASELINE_M, MOST_BASELINE_M = 0.01, 10.0

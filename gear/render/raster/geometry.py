@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.render.pinhole import FAR_M
-from gear.render.raster.solids import Triangles, height_field, solid
+from gear.render.raster.primitives import Triangles, height_field, solid
 from gear.values.geometry import Array
 
 VERTEX = np.dtype([("position_m", "<f4", 3), ("normal", "<i2", 4), ("texcoord", "<f4", 2)])

@@ -9,7 +9,7 @@ import numpy as np
 
 from gear.contracts.rendering import FULL_SCALE_LUX
 from gear.render.culling import Mask
-from gear.render.raster.cubes import mirrored_levels
+from gear.render.raster.environment import mirrored_levels
 from gear.values.geometry import Array
 
 MOST_LIGHTS = 4

@@ -12,15 +12,15 @@ from OpenGL import GL  # type: ignore[import-untyped]
 
 from gear.contracts.rendering import Quality, RawView, RendererInfo, Stage
 from gear.render.culling import in_frustum, near_to_far
-from gear.render.faces import checked_faces
+from gear.render.face_textures import checked_faces
 from gear.render.glcontext import driver_and_device, is_software
+from gear.render.linear_samples import smooth_edges
 from gear.render.occlusion import openness, shade
 from gear.render.pinhole import FAR_M, NEAR_M, Frustum, depth_from_reversed
-from gear.render.raster import device
+from gear.render.raster import gl
 from gear.render.raster.lights import lamps_of
 from gear.render.raster.scene import Scene, Selection
 from gear.render.raster.sun_shadows import SunShadows
-from gear.render.samples import smooth_edges
 from gear.values.frames import LINEAR_FULL_SCALE, FloatImage, IdImage, UInt16Image
 from gear.values.geometry import Array
 from gear.values.scene import CameraRecord
@@ -48,7 +48,7 @@ class RasterRenderer:
         self._model = model
         self._quality = quality
         self._gl = context
-        device.require_version()
+        gl.require_version()
         driver, name = driver_and_device()
         self._info = RendererInfo(
             name="raster", backend="egl", driver=driver, device=name, is_software=is_software(name)
@@ -56,11 +56,11 @@ class RasterRenderer:
         self._scene = Scene(model)
         # What a pixel shows by the piece that it counts; nothing is -1, which finds the last entry.
         self._geom_of_piece = np.append(self._scene.geom_of_piece, -1).astype(np.int32)
-        self._truth_program = device.Program("shapes.vert", "ids.frag")
-        self._sky_program = device.Program("whole.vert", "sky.frag")
-        self._halve_program = device.Program("whole.vert", "halve.frag")
+        self._truth_program = gl.Program("shapes.vert", "ids.frag")
+        self._sky_program = gl.Program("fullscreen.vert", "sky.frag")
+        self._halve_program = gl.Program("fullscreen.vert", "downsample.frag")
         self._shadows: SunShadows | None = None
-        self._targets: dict[tuple[str, int, int], device.Target] = {}
+        self._targets: dict[tuple[str, int, int], gl.Target] = {}
         GL.glClipControl(GL.GL_UPPER_LEFT, GL.GL_ZERO_TO_ONE)
         GL.glEnable(GL.GL_DEPTH_TEST)
         GL.glEnable(GL.GL_SCISSOR_TEST)
@@ -133,7 +133,7 @@ class RasterRenderer:
                 linear_rgb = smooth_edges(linear_rgb, geom_id, depth_m)
         return RawView(linear_rgb=linear_rgb, depth_m=depth_m, geom_id=geom_id)
 
-    def _truth(self, size: tuple[int, int], seen: Selection, frustum: Frustum) -> device.Target:
+    def _truth(self, size: tuple[int, int], seen: Selection, frustum: Frustum) -> gl.Target:
         """Pieces and depth of this many pixels, in a target that is current then."""
         target = self._target("truth", size, GL.GL_R32I)
         target.begin()
@@ -144,7 +144,7 @@ class RasterRenderer:
         self._scene.draw(seen)
         return target
 
-    def _read(self, truth: device.Target) -> tuple[IdImage, FloatImage]:
+    def _read(self, truth: gl.Target) -> tuple[IdImage, FloatImage]:
         width, height = truth.width, truth.height
         reversed_depth = np.empty((height, width), np.float32)
         GL.glReadPixels(0, 0, width, height, GL.GL_DEPTH_COMPONENT, GL.GL_FLOAT, reversed_depth)
@@ -160,9 +160,7 @@ class RasterRenderer:
             maps = self._shadows.draw(stage, frustum, lamps.towards[0, :3], spheres)
         self._scene.light(lamps, maps, frustum.position_world_m)
 
-    def _colour(
-        self, size: tuple[int, int], seen: Selection, frustum: Frustum, truth: device.Target | None
-    ) -> device.Target:
+    def _colour(self, size: tuple[int, int], seen: Selection, frustum: Frustum, truth: gl.Target | None) -> gl.Target:
         """Has the colour of these pixels drawn, in a target that is current then.
 
         Args:
@@ -203,7 +201,7 @@ class RasterRenderer:
         self._sky_program.use(camera_axes=axes, corner=corner)
         GL.glDrawArrays(GL.GL_TRIANGLES, 0, 3)
 
-    def _halved(self, samples: device.Target) -> device.Target:
+    def _halved(self, samples: gl.Target) -> gl.Target:
         """The means of blocks of four, in a target that is current then."""
         half = self._target("half", (samples.width // 2, samples.height // 2), GL.GL_RGBA16, 0)
         half.begin()
@@ -213,21 +211,21 @@ class RasterRenderer:
         GL.glDrawArrays(GL.GL_TRIANGLES, 0, 3)
         return half
 
-    def _target(self, purpose: str, size: tuple[int, int], kept_as: int, depth: int | None = None) -> device.Target:
+    def _target(self, purpose: str, size: tuple[int, int], kept_as: int, depth: int | None = None) -> gl.Target:
         key = (purpose, *size)
         if key not in self._targets:
-            self._targets[key] = device.Target.of(*size, kept_as, depth)
+            self._targets[key] = gl.Target.of(*size, kept_as, depth)
         return self._targets[key]
 
 
-def _pieces(truth: device.Target) -> npt.NDArray[np.int32]:
+def _pieces(truth: gl.Target) -> npt.NDArray[np.int32]:
     """(H, W) of a target that is current, -1 for nothing."""
     pieces = np.empty((truth.height, truth.width), np.int32)
     GL.glReadPixels(0, 0, truth.width, truth.height, GL.GL_RED_INTEGER, GL.GL_INT, pieces)
     return pieces
 
 
-def _pixels(colour: device.Target) -> UInt16Image:
+def _pixels(colour: gl.Target) -> UInt16Image:
     """(H, W, 3) of a target that is current, 65535 is full scale."""
     pixels = np.empty((colour.height, colour.width, 3), np.uint16)
     GL.glReadPixels(0, 0, colour.width, colour.height, GL.GL_RGB, GL.GL_UNSIGNED_SHORT, pixels)

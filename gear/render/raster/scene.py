@@ -11,13 +11,13 @@ from OpenGL import GL  # type: ignore[import-untyped]
 
 from gear.contracts.rendering import Stage
 from gear.render.culling import Mask
-from gear.render.raster import device
+from gear.render.raster import gl
 from gear.render.raster.geometry import COMMAND, VERTEX, Geometry, geometry_of
 from gear.render.raster.lights import MOST_LIGHTS, Environment, Lamps, environment_of
-from gear.render.raster.looks import ROLES, looks_of
-from gear.render.raster.pictures import Pictures, linear_cubes, sky_of
+from gear.render.raster.materials import ROLES, looks_of
 from gear.render.raster.shadow_squares import Maps
 from gear.render.raster.split_sum import mirrored_shares
+from gear.render.raster.textures import Pictures, linear_cubes, sky_of
 from gear.values.geometry import Array
 
 Selection = npt.NDArray[np.intp]
@@ -58,14 +58,14 @@ class Scene:
         self._face_of_geom: dict[int, int] = {}
         cubes = linear_cubes(model)
         self._environment: Environment = environment_of(model, cubes)
-        self._mirrored = device.cube(self._environment.levels or (np.zeros((6, 1, 1, 3)),))
-        self._shares = device.table(mirrored_shares())
+        self._mirrored = gl.cube(self._environment.levels or (np.zeros((6, 1, 1, 3)),))
+        self._shares = gl.table(mirrored_shares())
         sky = sky_of(model)
-        self.sky = 0 if sky is None or sky not in cubes else device.cube((cubes[sky],))
-        self._geoms = device.Stream(GL.GL_SHADER_STORAGE_BUFFER)
-        self._frame = device.Stream(GL.GL_UNIFORM_BUFFER)
-        self._draws = device.Stream(GL.GL_DRAW_INDIRECT_BUFFER)
-        self._surfaces: dict[tuple[str, ...], device.Program] = {}
+        self.sky = 0 if sky is None or sky not in cubes else gl.cube((cubes[sky],))
+        self._geoms = gl.Stream(GL.GL_SHADER_STORAGE_BUFFER)
+        self._frame = gl.Stream(GL.GL_UNIFORM_BUFFER)
+        self._draws = gl.Stream(GL.GL_DRAW_INDIRECT_BUFFER)
+        self._surfaces: dict[tuple[str, ...], gl.Program] = {}
         self._light_flags: tuple[str, ...] = ("LIGHTS 0",)
 
     def dress(self, stage: Stage) -> None:
@@ -167,7 +167,7 @@ class Scene:
                 GL.glBindTextureUnit(unit, picture)
         key = (*(flag for flag, picture in zip(ROLES, pictures, strict=True) if picture), *self._light_flags, *flags)
         if key not in self._surfaces:
-            self._surfaces[key] = device.Program("surface.vert", "surface.frag", key)
+            self._surfaces[key] = gl.Program("surface.vert", "surface.frag", key)
         self._surfaces[key].use(clip_from_place=matrix)
 
 
@@ -186,9 +186,9 @@ def _vertex_array(geometry: Geometry) -> int:
     array = np.zeros(1, np.uint32)
     GL.glCreateVertexArrays(1, array)
     handle = int(array[0])
-    GL.glVertexArrayVertexBuffer(handle, 0, device.buffer_of(geometry.vertices), 0, VERTEX.itemsize)
-    GL.glVertexArrayVertexBuffer(handle, 1, device.buffer_of(pieces), 0, 8)
-    GL.glVertexArrayElementBuffer(handle, device.buffer_of(geometry.indices))
+    GL.glVertexArrayVertexBuffer(handle, 0, gl.buffer_of(geometry.vertices), 0, VERTEX.itemsize)
+    GL.glVertexArrayVertexBuffer(handle, 1, gl.buffer_of(pieces), 0, 8)
+    GL.glVertexArrayElementBuffer(handle, gl.buffer_of(geometry.indices))
     for place, (name, count, kind) in enumerate(
         (("position_m", 3, GL.GL_FLOAT), ("normal", 3, GL.GL_SHORT), ("texcoord", 2, GL.GL_FLOAT))
     ):

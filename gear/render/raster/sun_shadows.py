@@ -13,7 +13,7 @@ from OpenGL import GL  # type: ignore[import-untyped]
 from gear.contracts.rendering import Stage
 from gear.render.culling import Mask, bounding_radii, in_beam, near_to_far
 from gear.render.pinhole import Frustum
-from gear.render.raster import device
+from gear.render.raster import gl
 from gear.render.raster.scene import Scene
 from gear.render.raster.shadow_squares import ENDS_M, Maps, Square, square_about, squares_before
 from gear.values.geometry import Array
@@ -35,9 +35,9 @@ class SunShadows:
     def __init__(self, model: mujoco.MjModel, scene: Scene) -> None:
         """Makes room; the town's map is drawn when it is wanted first."""
         self._model, self._scene = model, scene
-        self._program = device.Program("shapes.vert", "nothing.frag")
-        self._texture = device.shadow_map(*_SIZE_PX)
-        self._target = device.Target.of(*_SIZE_PX, None, depth=self._texture)
+        self._program = gl.Program("shapes.vert", "depth_only.frag")
+        self._texture = gl.shadow_map(*_SIZE_PX)
+        self._target = gl.Target.of(*_SIZE_PX, None, depth=self._texture)
         self._moves = _moves(model)[scene.geom_of_piece]
         self._size_m = bounding_radii(model)[scene.geom_of_piece]
         self._town: tuple[Array, Square] | None = None

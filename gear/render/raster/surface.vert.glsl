@@ -34,7 +34,7 @@ void main() {
     place_m = place(geom, position);
     smooth_normal = turn(geom, normal);
 #ifdef HAS_NORMAL
-    // As Filament makes it of a normal alone; gear.world.relief turns meshes and maps for it.
+    // As Filament makes it of a normal alone; gear.world.compilation.normal_maps turns meshes and maps for it.
     float share = 1.0 / max(1.0 + normal.y, 1e-6);
     vec3 red = vec3(-normal.x * normal.z * share, -normal.z, 1.0 - normal.z * normal.z * share);
     tangent = turn(geom, 1.0 + normal.y < 1e-6 ? vec3(-1.0, 0.0, 0.0) : red);

@@ -12,6 +12,7 @@ from typing import Any
 from safetensors import SafetensorError
 from safetensors.numpy import load as from_bytes
 
+from gear.collecting.patch_sources import read_patch
 from gear.contracts.attacks import Patch, surface_of
 from gear.dataset.files import clear_scratch, explained, read_bytes, sha256, write_whole
 from gear.dataset.plan import differences
@@ -19,8 +20,7 @@ from gear.dataset.sidecar import dump_json
 from gear.dataset.store import refuse_dataset
 from gear.values.errors import DatasetError, FieldError, OutdatedError, ReplaceableError
 from gear.values.serial import Json, from_json
-from gear.verbs.attack.watch import CHECKPOINT, is_picture
-from gear.verbs.collect.patches import read_patch
+from gear.verbs.attack.monitor import CHECKPOINT, is_picture
 
 VERIFY = "verify"
 """Folder of the rendered check, in that of the patches."""

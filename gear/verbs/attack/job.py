@@ -16,17 +16,17 @@ from gear.dataset.files import sha256
 from gear.dataset.reading import Dataset, scenes_of
 from gear.dataset.sidecar import dump_json
 from gear.dataset.store import plan_of, splits_of
-from gear.opening import root_and_split, roots_of
+from gear.measuring.calibration import Calibration, Progress, opened_calibration
+from gear.measuring.plugin_selection import Chosen
 from gear.plugins.build import NO_OPTIONS, find
 from gear.plugins.catalogue import Found
+from gear.plugins.datasets import root_and_split, roots_of
 from gear.readers import open_all
 from gear.values.errors import DatasetError, GearError
 from gear.values.rng import check_seed
 from gear.values.serial import Json
 from gear.verbs.attack.data import check_joined
 from gear.verbs.attack.models import FLAG, check_attack, choose_defense, choose_models
-from gear.verbs.evaluate.calibration import Calibration, Progress, opened_calibration
-from gear.verbs.evaluate.choice import Chosen
 
 STEPS = 300
 """Where neither steps nor queries are given."""

@@ -6,18 +6,18 @@ from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import Any
 
-from gear.attacking.group import Cleaned, Defended, Group
 from gear.contracts.defenses import Defense, Taught
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec, DefenseSpec, ModelSpec
 from gear.dataset.reading import Dataset
+from gear.measuring.calibration import Calibration
+from gear.measuring.guard import Guard
+from gear.measuring.plugin_selection import Chosen, check_defense, check_model, chosen_defense, chosen_model
+from gear.plugins.attacks.optimisation.model_group import Cleaned, Defended, Group
 from gear.plugins.build import blamed, build
 from gear.plugins.catalogue import Found
 from gear.values.errors import GearError
 from gear.values.rng import derive_rng
-from gear.verbs.defend import Guard
-from gear.verbs.evaluate.calibration import Calibration
-from gear.verbs.evaluate.choice import Chosen, check_defense, check_model, chosen_defense, chosen_model
 
 FLAG = "--model-set "
 """How the user sets one of the models' options; `--set` is for the attack's."""

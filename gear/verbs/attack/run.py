@@ -11,16 +11,18 @@ from typing import Any
 import numpy as np
 import torch
 
-from gear.attacking.group import device_name
-from gear.attacking.objectives import Objective, default_objective
 from gear.compositor.cache import Cache
 from gear.compositor.pasting import CACHE_BYTES, Prepared
 from gear.config.dump import to_plain
 from gear.contracts.attacks import Budget, Patch
 from gear.contracts.models import Model
 from gear.dataset.files import sha256
+from gear.dataset.locks import alone_at_work
 from gear.dataset.sidecar import dump_json
-from gear.dataset.turns import alone_at_work
+from gear.measuring.guarded_model import weights_digest
+from gear.measuring.shown_size import size_note
+from gear.plugins.attacks.optimisation.model_group import device_name
+from gear.plugins.attacks.optimisation.objectives import Objective, default_objective
 from gear.plugins.build import blamed, build, traced
 from gear.plugins.catalogue import Found
 from gear.values.errors import GearError, PluginError
@@ -29,13 +31,11 @@ from gear.values.serial import Json
 from gear.verbs.attack.folder import begin, read_patches, tidy
 from gear.verbs.attack.job import Job, Paths, resolve
 from gear.verbs.attack.models import FLAG, build_model
+from gear.verbs.attack.monitor import Recorder
+from gear.verbs.attack.output_checks import check_patches
 from gear.verbs.attack.outputs import as_picture, write_curves, write_patches, write_samples
-from gear.verbs.attack.promise import check_patches
 from gear.verbs.attack.report import AttackReport
 from gear.verbs.attack.scenes import Scenes
-from gear.verbs.attack.watch import Recorder
-from gear.verbs.evaluate.player import weights_digest
-from gear.verbs.evaluate.shown_size import size_note
 
 Progress = Callable[[int, int], None]
 """Called with (steps done, steps in all)."""

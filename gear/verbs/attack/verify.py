@@ -7,7 +7,7 @@ from pathlib import Path
 
 from gear.dataset.reading import scenes_of
 from gear.dataset.sidecar import load_json
-from gear.opening import open_dataset, root_and_split
+from gear.plugins.datasets import open_dataset, root_and_split
 from gear.readers import open_all
 from gear.values.errors import DatasetError, GearError
 from gear.verbs.attack.data import check_joined

@@ -12,14 +12,14 @@ import numpy as np
 
 from gear.contracts.tasks import NO_PATCH
 from gear.formats.png import decode_rgb
-from gear.opening import open_dataset
+from gear.plugins.datasets import open_dataset
 from gear.values.frames import UInt8Image
 from gear.verbs.bench.chart import chart
-from gear.verbs.bench.contestants import Contest
-from gear.verbs.bench.places import Scene
 from gear.verbs.bench.plan import Plan, Weather
 from gear.verbs.bench.report import BenchReport, TaskResult
+from gear.verbs.bench.scenes import Scene
 from gear.verbs.bench.table import columns, legend, title
+from gear.verbs.bench.validation import Contest
 
 PICTURE_PX, PATCH_PX, QUALITY = 560, 220, 82
 """Widths that pictures are shown at, and their JPEG quality."""

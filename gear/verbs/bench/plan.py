@@ -12,12 +12,12 @@ from gear.config.dump import to_plain
 from gear.contracts.evaluation import Maskable, Reports
 from gear.contracts.specs import AttackSpec
 from gear.contracts.tasks import NO_PATCH, RANDOM_PATCH
+from gear.measuring.plugin_selection import OUTSIDE_PATCH
 from gear.plugins.build import build, find
 from gear.values.rng import derive_rng
 from gear.verbs.bench.config import BenchConfig, settings_of
-from gear.verbs.bench.contestants import Contest, Entrant
-from gear.verbs.bench.places import Scene
-from gear.verbs.evaluate.choice import OUTSIDE_PATCH
+from gear.verbs.bench.scenes import Scene
+from gear.verbs.bench.validation import Contest, Entrant
 
 RANDOM, PATCH, ADAPTIVE = RANDOM_PATCH, "patch", "adaptive patch"
 """Kinds of patches beside none: one against the network itself, and one made through the defense before it."""

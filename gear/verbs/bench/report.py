@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gear.contracts.tasks import NO_PATCH
+from gear.measuring.plugin_selection import OUTSIDE_PATCH
+from gear.measuring.scoring import TASK
 from gear.values.serial import Json
 from gear.verbs.bench.plan import RANDOM
-from gear.verbs.evaluate.choice import OUTSIDE_PATCH
 from gear.verbs.evaluate.report import Difference, Estimate, EvaluateReport, Figures, PairedTest, Pool
-from gear.verbs.evaluate.scoring import TASK
 from gear.verbs.evaluate.table import figure_title
 
 FOUND_SHARE = "found_share"

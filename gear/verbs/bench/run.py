@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, Protocol
 
+from gear.collecting.job import versions
+from gear.collecting.lookup import find_weather
 from gear.config.dump import to_plain, to_yaml
 from gear.config.load import find_config, load_collection
 from gear.config.nodes import Node, parse_file
@@ -18,20 +20,18 @@ from gear.contracts.specs import AttackSpec
 from gear.dataset.files import clear_scratch, explained, write_whole
 from gear.dataset.sidecar import dump_json
 from gear.dataset.store import refuse_dataset
+from gear.measuring.plugin_selection import check_optics
 from gear.values.errors import GearError, OutdatedError, ReplaceableError
 from gear.verbs.attack.run import attack
 from gear.verbs.bench.chart import chart
 from gear.verbs.bench.config import BenchConfig
-from gear.verbs.bench.contestants import contests, find_attack
 from gear.verbs.bench.page import page
-from gear.verbs.bench.places import calibration_scene, located, measured_scenes
 from gear.verbs.bench.plan import Match, Plan, Step, Verb
 from gear.verbs.bench.report import COLUMNS, BenchReport, Figure, Result, SceneFigure, TaskResult
+from gear.verbs.bench.scenes import calibration_scene, located, measured_scenes
 from gear.verbs.bench.table import text
-from gear.verbs.collect.job import versions
-from gear.verbs.collect.names import find_weather
+from gear.verbs.bench.validation import contests, find_attack
 from gear.verbs.collect.run import collect
-from gear.verbs.evaluate.choice import check_optics
 from gear.verbs.evaluate.report import EvaluateReport
 from gear.verbs.evaluate.run import OtherLessonsError, evaluate
 

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gear.collecting.job import Job, resolve
+from gear.collecting.pipeline import collect_samples
+from gear.collecting.session import open_session
+from gear.collecting.workers import collect_in_processes
 from gear.config.collection import CollectionConfig
 from gear.config.dump import to_plain
 from gear.config.load import load_collection
 from gear.dataset.store import Store
 from gear.plugins.build import blamed, build, find
 from gear.values.serial import Json, to_json
-from gear.verbs.collect.job import Job, resolve
-from gear.verbs.collect.pipeline import collect_samples
-from gear.verbs.collect.session import open_session
-from gear.verbs.collect.workers import collect_in_processes
 
 Progress = Callable[[int, int], None]
 """Called with (samples finished, samples of the split)."""

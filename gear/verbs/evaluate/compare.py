@@ -12,11 +12,9 @@ import numpy as np
 from gear.contracts.evaluation import Draws
 from gear.contracts.tasks import CONTROLS, NO_PATCH
 from gear.dataset.reading import Dataset, scenes_of
-from gear.values.errors import DatasetError
-from gear.verbs.evaluate.figures import said_of
-from gear.verbs.evaluate.report import Difference, Estimate, PairedTest, RowReport, Together
-from gear.verbs.evaluate.scoring import Note, Scorer
-from gear.verbs.evaluate.spread import (
+from gear.measuring.metric_checks import said_of
+from gear.measuring.scoring import Note, Scorer
+from gear.measuring.statistics import (
     Figures,
     Values,
     auroc,
@@ -27,6 +25,8 @@ from gear.verbs.evaluate.spread import (
     gather,
     paired_p,
 )
+from gear.values.errors import DatasetError
+from gear.verbs.evaluate.report import Difference, Estimate, PairedTest, RowReport, Together
 
 Street = tuple[str, int, int]
 """What a sample shows, in whatever weather: `town/scene`, the seed, the sample's number."""

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from gear.measuring.metric_json import known_json
 from gear.values.serial import Json
 
 
@@ -113,7 +114,7 @@ class PairedTest:
 
     Attributes:
         mean: of the differences, over the pairs; NaN without any.
-        p: two-sided, by `gear.verbs.evaluate.spread.paired_p`; NaN without pairs.
+        p: two-sided, by `gear.measuring.statistics.paired_p`; NaN without pairs.
         pairs: samples that have a figure in both.
     """
 
@@ -238,8 +239,3 @@ class EvaluateReport:
 def figures_json(figures: Figures) -> Json:
     """By report, then by figure."""
     return {report: {name: one.as_json() for name, one in rows.items()} for report, rows in figures.items()}
-
-
-def known_json(figures: Mapping[str, float]) -> Json:
-    """null for what is not finite, which JSON cannot say."""
-    return {name: float(value) if math.isfinite(value) else None for name, value in figures.items()}

@@ -10,27 +10,27 @@ from pathlib import Path
 
 from gear.config.dump import to_plain
 from gear.dataset.files import clear_scratch, inside, write_whole
+from gear.dataset.locks import alone_at_work
 from gear.dataset.plan import differences
 from gear.dataset.sidecar import dump_json, load_json
 from gear.dataset.store import refuse_dataset
-from gear.dataset.turns import alone_at_work
-from gear.values.errors import DatasetError, GearError
-from gear.values.rng import check_seed
-from gear.values.serial import Json
-from gear.verbs.evaluate.calibration import opened_calibration
-from gear.verbs.evaluate.choice import (
+from gear.measuring.calibration import opened_calibration
+from gear.measuring.dataset_run import evaluate_row
+from gear.measuring.guarded_model import Player
+from gear.measuring.open_datasets import opened, row_names
+from gear.measuring.plugin_selection import (
     check_defense,
     chosen_defense,
     chosen_model,
 )
+from gear.measuring.scoring import Scorer
+from gear.measuring.shown_size import size_note
+from gear.values.errors import DatasetError, GearError
+from gear.values.rng import check_seed
+from gear.values.serial import Json
 from gear.verbs.evaluate.compare import Measured, compared, drive_note, row_report, streets_of, together
-from gear.verbs.evaluate.opened import opened, row_names
-from gear.verbs.evaluate.player import Player
 from gear.verbs.evaluate.pools import Pools, check_pools, pooled
 from gear.verbs.evaluate.report import EvaluateReport
-from gear.verbs.evaluate.row import evaluate_row
-from gear.verbs.evaluate.scoring import Scorer
-from gear.verbs.evaluate.shown_size import size_note
 from gear.verbs.evaluate.table import table
 
 Progress = Callable[[int, int], None]

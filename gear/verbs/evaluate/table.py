@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
+from gear.measuring.scoring import TASK
 from gear.verbs.evaluate.report import Difference, Estimate, EvaluateReport, RowReport
-from gear.verbs.evaluate.scoring import TASK
 
 COLUMNS, FURTHER = 4, 2
 """Figures that are shown, of the task's own and of each report; all are in results.json."""

@@ -12,12 +12,12 @@ from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Evaluator
 from gear.dataset.plan import Plan
 from gear.dataset.reading import Dataset
+from gear.measuring.calibration import Progress, opened_calibration
+from gear.measuring.guarded_model import Player
+from gear.measuring.metric_checks import said_of
+from gear.measuring.plugin_selection import check_defense, check_model, chosen_defense, chosen_model
+from gear.measuring.shown_size import size_note
 from gear.plugins.build import find, name_of_task
-from gear.verbs.evaluate.calibration import Progress, opened_calibration
-from gear.verbs.evaluate.choice import check_defense, check_model, chosen_defense, chosen_model
-from gear.verbs.evaluate.figures import said_of
-from gear.verbs.evaluate.player import Player
-from gear.verbs.evaluate.shown_size import size_note
 
 CLEAN, RENDERED = "clean", "rendered"
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from gear.formats import rle
 from gear.values.frames import UInt8Image
-from gear.values.truth import SurfaceTruth
+from gear.values.ground_truth import SurfaceTruth
 
 Mask = npt.NDArray[np.bool_]
 

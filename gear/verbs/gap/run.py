@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gear.collecting.patch_sources import digest_of, read_patch
 from gear.dataset.files import clear_scratch, explained, inside, write_whole
 from gear.dataset.layout import patch_path
 from gear.dataset.reading import Dataset, Twins, pair_twins
 from gear.dataset.sidecar import dump_json
 from gear.dataset.store import refuse_dataset
-from gear.opening import open_dataset
+from gear.plugins.datasets import open_dataset
 from gear.values.errors import DatasetError
 from gear.values.frames import UInt8Image
 from gear.values.rng import check_seed
-from gear.verbs.collect.patches import digest_of, read_patch
 from gear.verbs.gap.effect import RENDERED, Effect
 from gear.verbs.gap.figures import picture_gap, visible_mask
 from gear.verbs.gap.report import GapReport, SampleGap

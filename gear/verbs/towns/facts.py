@@ -7,15 +7,15 @@ from pathlib import Path
 
 import mujoco
 
+from gear.collecting.lookup import find_scenes
 from gear.values.errors import TownError, UnknownNameError
 from gear.values.resources import data_dir
 from gear.values.serial import Json, to_json
-from gear.verbs.collect.names import find_scenes
-from gear.world.assets import AssetLibrary, read_numbers
-from gear.world.bearers import check_assets
-from gear.world.lanes import LaneGraph
-from gear.world.mjspec import read_spec
+from gear.world.assets.library import AssetLibrary, read_numbers
+from gear.world.assets.mjspec import read_spec
+from gear.world.roads.lanes import LaneGraph
 from gear.world.scene_spec import SceneLibrary
+from gear.world.surfaces.surface_carriers import check_assets
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

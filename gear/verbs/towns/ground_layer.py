@@ -15,11 +15,11 @@ from gear.values.errors import TownError
 from gear.values.geometry import Array
 from gear.values.labels import LABEL_BY_NAME
 from gear.verbs.towns.canvas import Canvas, Colour
-from gear.world.classes import FIRST_HIDDEN_GROUP, GeomClasses, classify
-from gear.world.mjspec import read_spec
-from gear.world.models import GROUND_PREFIX
-from gear.world.refusals import without_breaks
-from gear.world.shapes import geom_triangles
+from gear.world.assets.geom_classes import FIRST_HIDDEN_GROUP, GeomClasses, classify
+from gear.world.assets.geom_triangles import geom_triangles
+from gear.world.assets.mjspec import read_spec
+from gear.world.compilation.model_compilation import GROUND_PREFIX
+from gear.world.compilation.mujoco_errors import without_breaks
 
 Bounds = tuple[float, float, float, float]
 """xmin, ymin, xmax, ymax."""

@@ -11,11 +11,11 @@ import numpy as np
 from gear.values.errors import TownError
 from gear.values.geometry import Array
 from gear.verbs.towns.canvas import Canvas, Colour
-from gear.world.assets import AssetLibrary
-from gear.world.classes import own_class
-from gear.world.mjspec import read_spec
+from gear.world.assets.geom_classes import own_class
+from gear.world.assets.geom_triangles import geom_triangles
+from gear.world.assets.library import AssetLibrary
+from gear.world.assets.mjspec import read_spec
 from gear.world.scene_spec import BoardSpec, NpcLimits, Range, SceneSpec
-from gear.world.shapes import geom_triangles
 
 PALETTE: tuple[Colour, ...] = (
     (200, 30, 60), (20, 110, 190), (20, 140, 70), (150, 60, 170), (225, 110, 0), (0, 140, 150), (165, 85, 30),

@@ -9,7 +9,7 @@ import numpy as np
 
 from gear.config.collection import SplitConfig
 from gear.contracts.rendering import Quality
-from gear.render.opening import open_renderer
+from gear.render.registry import open_renderer
 from gear.values.errors import PlacementError
 from gear.values.frames import UInt8Image
 from gear.values.rig import CameraMount, Rig
@@ -17,11 +17,11 @@ from gear.values.scene import Weather
 from gear.verbs.collect.run import Progress
 from gear.verbs.towns.canvas import Canvas
 from gear.verbs.towns.facts import Town
-from gear.world.air import darkroom_of
-from gear.world.below import look_from_below
-from gear.world.night import night_of
 from gear.world.planner import ScenePlanner
 from gear.world.scene_spec import SceneSpec
+from gear.world.weather.air import darkroom_of
+from gear.world.weather.mirror_view import look_from_below
+from gear.world.weather.night import night_of
 from gear.world.world import World
 
 COLUMNS = 3

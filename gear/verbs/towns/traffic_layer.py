@@ -6,8 +6,8 @@ import numpy as np
 
 from gear.values.geometry import Array
 from gear.verbs.towns.canvas import Canvas, Colour
-from gear.world.lanes import Lane, LaneGraph, ParkingBay, Walk
-from gear.world.polyline import Polyline
+from gear.world.roads.lanes import Lane, LaneGraph, ParkingBay, Walk
+from gear.world.roads.polyline import Polyline
 
 LANE: Colour = (52, 84, 140)
 JUNCTION: Colour = (214, 128, 38)

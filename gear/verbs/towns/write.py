@@ -10,7 +10,7 @@ import cv2
 
 from gear.contracts.rendering import Quality
 from gear.dataset.files import explained, write_alone
-from gear.render.opening import describe
+from gear.render.registry import describe
 from gear.values.errors import GearError, PlacementError, UnknownNameError
 from gear.values.frames import UInt8Image
 from gear.verbs.collect.run import Progress
@@ -18,7 +18,7 @@ from gear.verbs.towns.facts import Town, read_town
 from gear.verbs.towns.ground_layer import Relief
 from gear.verbs.towns.sheet import SheetOptions, draw_sheet
 from gear.verbs.towns.town_map import draw_map
-from gear.world.weather import PRESETS
+from gear.world.weather.presets import PRESETS
 
 QUALITIES: tuple[Quality, ...] = ("film", "fast")
 

@@ -25,7 +25,7 @@ from gear.plugins.build import blamed, build, find
 from gear.readers import Samples
 from gear.values.errors import GearError
 from gear.values.rng import derive_rng
-from gear.verbs.attack.promise import check_patches
+from gear.verbs.attack.output_checks import check_patches
 from gear.verbs.train.config import Adversarial
 
 CACHE_BYTES = 1 << 30

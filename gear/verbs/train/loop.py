@@ -16,7 +16,7 @@ from torch import nn
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Task
 from gear.dataset.files import sha256
-from gear.nn.runtime import autocast, device_of, seeded
+from gear.networks.runtime import autocast, device_of, seeded
 from gear.plugins.build import blamed
 from gear.plugins.catalogue import Found
 from gear.readers import Batch

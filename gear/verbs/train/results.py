@@ -18,13 +18,13 @@ from gear.config.dump import to_plain
 from gear.config.nodes import Mapping
 from gear.config.reader import read_node
 from gear.dataset.files import explained, read_bytes, sha256, write_whole
-from gear.nn.options import CIRCUMSTANCES
-from gear.nn.weights import serialised
+from gear.measuring.appearance_hash import Look
+from gear.networks.options import CIRCUMSTANCES
+from gear.networks.weights import serialised
 from gear.plugins.catalogue import Found
 from gear.readers import Samples
 from gear.values.errors import DatasetError
 from gear.values.serial import to_json
-from gear.verbs.look import Look
 from gear.verbs.train.checkpoint import FILE as CHECKPOINT
 from gear.verbs.train.checkpoint import Progress
 from gear.verbs.train.config import TrainConfig

@@ -13,17 +13,17 @@ import numpy as np
 from gear.config.dump import to_plain
 from gear.contracts.specs import ModelSpec, TaskSpec
 from gear.dataset.files import clear_scratch
+from gear.dataset.locks import alone_at_work
 from gear.dataset.reading import scenes_of
 from gear.dataset.store import refuse_dataset
-from gear.dataset.turns import alone_at_work
-from gear.nn.runtime import device_of, prepare
+from gear.measuring.appearance_hash import PLANNED, look_of
+from gear.measuring.plugin_selection import Chosen, check_camera
+from gear.networks.runtime import device_of, prepare
 from gear.plugins.build import blamed, find
 from gear.plugins.catalogue import Found
 from gear.readers import Kept, Samples, all_of, open_all
 from gear.values.errors import GearError
 from gear.values.serial import Json
-from gear.verbs.evaluate.choice import Chosen, check_camera
-from gear.verbs.look import PLANNED, look_of
 from gear.verbs.train.adversary import Adversary
 from gear.verbs.train.checkpoint import begun_config
 from gear.verbs.train.config import TrainConfig, read_config

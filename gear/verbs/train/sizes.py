@@ -8,8 +8,8 @@ from dataclasses import replace
 from gear.augment.registry import geometry_of
 from gear.config.nodes import Mapping
 from gear.contracts.specs import ModelSpec
-from gear.nn.input_scale import OPTION
-from gear.nn.runtime import device_of
+from gear.networks.input_scale import OPTION
+from gear.networks.runtime import device_of
 from gear.plugins.catalogue import Found
 from gear.readers import Samples
 from gear.values.errors import GearError

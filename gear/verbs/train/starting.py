@@ -9,11 +9,11 @@ from typing import Any, Literal
 from gear.config.nodes import Mapping, Place, Scalar
 from gear.config.overrides import with_value
 from gear.contracts.specs import ModelSpec, TaskSpec
-from gear.nn.lite0 import freeze_trunks
-from gear.nn.options import NONE, SHIPPED
-from gear.nn.runtime import device_of, is_quick_in_half, seeded
-from gear.nn.shipped import resolve, shipped, shipped_networks, trained_option
-from gear.nn.weights import load_into, load_trunk
+from gear.networks.efficientnet_lite0 import freeze_trunks
+from gear.networks.options import NONE, SHIPPED
+from gear.networks.runtime import device_of, is_quick_in_half, seeded
+from gear.networks.shipped import resolve, shipped, shipped_networks, trained_option
+from gear.networks.weights import load_into, load_trunk
 from gear.plugins.build import blamed, build
 from gear.plugins.catalogue import Found
 from gear.readers import Samples

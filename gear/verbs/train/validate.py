@@ -11,7 +11,7 @@ import torch
 from gear.contracts.evaluation import Reports
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Task
-from gear.dataset.given import check_figures
+from gear.dataset.output_checks import check_figures
 from gear.plugins.build import blamed
 from gear.plugins.catalogue import Found
 from gear.readers import TorchDataset, as_pictures

@@ -16,8 +16,8 @@ from typing import Any
 from torch import Tensor
 
 from gear.dataset.files import read_bytes, sha256
-from gear.nn.shipped import inspect
-from gear.nn.weights import OPTIONAL, mismatches, read, write
+from gear.networks.shipped import inspect
+from gear.networks.weights import OPTIONAL, mismatches, read, write
 from gear.values.errors import GearError
 from gear.values.serial import Json
 from gear.verbs.weights.convert import ConvertReport, check_target

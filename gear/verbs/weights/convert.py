@@ -15,10 +15,10 @@ from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
 from gear.contracts.specs import ModelSpec
 from gear.dataset.files import read_bytes, sha256
-from gear.nn.checkpoints import read_published
-from gear.nn.options import CIRCUMSTANCES, NONE
-from gear.nn.shipped import inspect
-from gear.nn.weights import mismatches, write
+from gear.networks.checkpoints import read_published
+from gear.networks.options import CIRCUMSTANCES, NONE
+from gear.networks.shipped import inspect
+from gear.networks.weights import mismatches, write
 from gear.plugins.build import NO_OPTIONS, blamed, build, find
 from gear.plugins.catalogue import Found
 from gear.plugins.manager import DISTRIBUTION

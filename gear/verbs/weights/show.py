@@ -6,8 +6,8 @@ import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 
-from gear.nn.options import SHIPPED
-from gear.nn.shipped import WeightsFile, inspect, resolve
+from gear.networks.options import SHIPPED
+from gear.networks.shipped import WeightsFile, inspect, resolve
 from gear.plugins.build import find
 from gear.values.serial import Json
 

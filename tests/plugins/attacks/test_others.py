@@ -13,21 +13,21 @@ import pytest
 import torch
 from safetensors.numpy import save_file
 
-from gear.attacking.group import Group
-from gear.attacking.objectives import default_objective
-from gear.attacking.regularisers import palette_srgb
-from gear.attacking.upright import Upright
 from gear.config.nodes import Mapping as MappingNode
 from gear.config.nodes import Place
 from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
 from gear.contracts.attacks import Budget, Patch
 from gear.formats import rle
-from gear.nn.stereo_rcnn_graph import LOSSES
+from gear.networks.stereo.rcnn_graph import LOSSES
 from gear.plugins.attacks.carla_gear import STEREO_LOSSES_LEFT_OUT, carla_gear
 from gear.plugins.attacks.control import ControlConfig, control, matched, read_exact
 from gear.plugins.attacks.eot import EotConfig, eot
 from gear.plugins.attacks.nes import NesConfig, nes
+from gear.plugins.attacks.optimisation.model_group import Group
+from gear.plugins.attacks.optimisation.objectives import default_objective
+from gear.plugins.attacks.optimisation.regularisers import palette_srgb
+from gear.plugins.attacks.optimisation.upright_pasting import Upright
 from gear.plugins.attacks.rp2 import Rp2, Rp2Config, rp2
 from gear.plugins.attacks.square import SquareConfig, square
 from gear.plugins.attacks.thys import ThysConfig, surest, thys

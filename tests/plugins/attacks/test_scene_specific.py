@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import torch
 
-from gear.attacking.objectives import SemsegObjective
-from gear.attacking.settings import Settings
 from gear.contracts.attacks import Patch
 from gear.plugins.attacks.carla_gear import carla_gear
+from gear.plugins.attacks.optimisation.objectives import SemsegObjective
+from gear.plugins.attacks.optimisation.settings import Settings
 from gear.plugins.attacks.scene_specific import SceneSpecific, SceneSpecificConfig, scene_specific
 from gear.testing.attack_contract import AttackContract, Counted
 from gear.testing.tiny_compositor import TinyCompositor
@@ -114,7 +114,7 @@ class WithLosses(TinySegmenter):
 
 
 def test_names_of_losses_are_those_of_the_model(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gear.attacking.objectives.kind_of", lambda sample: "losses")
+    monkeypatch.setattr("gear.plugins.attacks.optimisation.objectives.kind_of", lambda sample: "losses")
 
     class Contract(AttackContract):
         spec = scene_specific

@@ -10,8 +10,8 @@ import torch
 from torch import nn
 
 from gear.contracts.models import Model
-from gear.guarding.zmask import FILL
 from gear.plugins.defenses import fpda, hyperneuron, zmask
+from gear.plugins.defenses.activations.zmask import FILL
 from gear.testing.defense_contract import SEED, DefenseContract, noisy_patch, street_picture
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter
 from gear.values.errors import FieldError, GearError

@@ -7,7 +7,7 @@ from gear.testing.model_contract import ModelContract
 
 
 class TestAdabins(ModelContract):
-    """The graph at a size that a test can afford; the published size is held to its keys in tests/nn."""
+    """The graph at a size that a test can afford; the published size is held to its keys in tests/networks."""
 
     spec = spec
     options: ClassVar[dict[str, Any]] = {

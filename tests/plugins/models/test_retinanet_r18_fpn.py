@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 from gear.plugins.models.retinanet_r18_fpn import CATEGORIES, retinanet_lite0, retinanet_r18
 from gear.testing.model_contract import ModelContract
 from gear.values.labels import LABELS
-from tests.nn.detector_samples import SMALL
+from tests.networks.detector_samples import SMALL
 
 OPTIONS: dict[str, Any] = {"weights": "none", "device": "cpu", "least_score": 0.01}
 

@@ -6,7 +6,7 @@ import pytest
 
 from gear.plugins.models.retinanet_r50_fpn import retinanet
 from gear.testing.model_contract import ModelContract
-from tests.nn.detector_samples import SMALL
+from tests.networks.detector_samples import SMALL
 
 
 @pytest.mark.slow

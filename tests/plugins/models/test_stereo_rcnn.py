@@ -3,9 +3,9 @@ from __future__ import annotations
 from typing import ClassVar
 
 from gear.contracts.models import Model
-from gear.nn.stereo_options import StereoRcnnOptions
-from gear.nn.stereo_rcnn_graph import StereoRcnnShape
-from gear.nn.stereo_rcnn_network import StereoRcnnNetwork
+from gear.networks.stereo.options import StereoRcnnOptions
+from gear.networks.stereo.rcnn_graph import StereoRcnnShape
+from gear.networks.stereo.rcnn_network import StereoRcnnNetwork
 from gear.plugins.models.stereo_rcnn import stereo_rcnn
 from gear.testing.model_contract import ModelContract
 

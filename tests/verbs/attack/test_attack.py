@@ -17,7 +17,6 @@ from safetensors.numpy import load_file
 from safetensors.numpy import save as to_bytes
 
 import gear
-from gear.attacking.objectives import SemsegObjective
 from gear.cli.main import main
 from gear.compositor.cache import Cache
 from gear.config.overrides import with_overrides
@@ -25,15 +24,16 @@ from gear.config.reader import read_node
 from gear.contracts.attacks import Patch
 from gear.contracts.specs import AttackSpec
 from gear.plugins import build as building
+from gear.plugins.attacks.optimisation.objectives import SemsegObjective
 from gear.plugins.attacks.scene_specific import SceneSpecificConfig
 from gear.testing.compare import difference
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_segmenter
 from gear.values.errors import DatasetError, GearError, PluginError
 from gear.verbs.attack import folder
 from gear.verbs.attack.folder import read_patches
+from gear.verbs.attack.monitor import CHECKPOINT, Recorder
 from gear.verbs.attack.run import attack
 from gear.verbs.attack.scenes import Scenes
-from gear.verbs.attack.watch import CHECKPOINT, Recorder
 from tests.verbs.attack.conftest import SMALL
 from tests.verbs.conftest import Install, Nothing, Small
 
@@ -136,7 +136,7 @@ def test_a_killed_attack_goes_on(
     small: Small, install: Install, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = attack(small(), model="tiny_segmenter", out=tmp_path / "whole", steps=5, settings=SMALL)
-    monkeypatch.setattr("gear.verbs.attack.watch.SECONDS_BETWEEN", 0.0)
+    monkeypatch.setattr("gear.verbs.attack.monitor.SECONDS_BETWEEN", 0.0)
 
     def killed(done: int, total: int) -> None:
         if done == 3:

@@ -9,8 +9,8 @@ import pytest
 
 from gear.values.errors import OutdatedError, ReplaceableError
 from gear.verbs.attack.folder import BEGUN, begin, tidy
+from gear.verbs.attack.monitor import CHECKPOINT, Recorder
 from gear.verbs.attack.run import attack
-from gear.verbs.attack.watch import CHECKPOINT, Recorder
 from tests.verbs.attack.conftest import SMALL
 from tests.verbs.conftest import Install, Small
 
@@ -54,7 +54,7 @@ def test_without_a_plan_the_checkpoint_decides(tmp_path: Path, text: str | None)
 def test_a_stopped_attack_on_other_data(
     small: Small, install: Install, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gear.verbs.attack.watch.SECONDS_BETWEEN", 0.0)
+    monkeypatch.setattr("gear.verbs.attack.monitor.SECONDS_BETWEEN", 0.0)
 
     def stopped(done: int, total: int) -> None:
         if done == 2:

@@ -15,8 +15,8 @@ from gear.plugins.defenses.per_picture import PerPicture
 from gear.testing.compare import difference
 from gear.testing.tiny_networks import tiny_segmenter
 from gear.values.errors import GearError
+from gear.verbs.attack.monitor import Recorder
 from gear.verbs.attack.run import attack
-from gear.verbs.attack.watch import Recorder
 from tests.verbs.attack.conftest import SMALL
 from tests.verbs.conftest import Install, Nothing, Small
 
@@ -100,7 +100,7 @@ def test_a_killed_search_pays_no_query_twice(
     settings = [*SMALL[:2], "pairs=2"] if name == "nes" else SMALL[:2]
     facts: dict[str, Any] = {"model": "tiny_depth", "attack": name, "queries": 40, "settings": settings}
     whole = attack(small("depth"), out=tmp_path / "whole", **facts)
-    monkeypatch.setattr("gear.verbs.attack.watch.SECONDS_BETWEEN", 0.0)
+    monkeypatch.setattr("gear.verbs.attack.monitor.SECONDS_BETWEEN", 0.0)
 
     def killed(done: int, total: int) -> None:
         if done > 15:
@@ -130,7 +130,7 @@ def test_a_damaged_search_is_refused(
     facts: dict[str, Any] = {"model": "tiny_segmenter", "attack": name, "queries": 40, "settings": SMALL[:2]}
     whole: list[dict[str, Any]] = []
     monkeypatch.setattr(Recorder, "save", lambda self, done, state: whole.append(dict(state)))
-    monkeypatch.setattr("gear.verbs.attack.watch.SECONDS_BETWEEN", 0.0)
+    monkeypatch.setattr("gear.verbs.attack.monitor.SECONDS_BETWEEN", 0.0)
     attack(small(), out=tmp_path / "whole", **facts)
     damaged = {key: value for key, value in (whole[0] | damage).items() if value is not None}
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import gear
-from gear.dataset.turns import turn
+from gear.dataset.locks import turn
 from gear.testing.tiny_networks import tiny_depth, tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from tests.shared import shared_folder

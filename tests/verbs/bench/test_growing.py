@@ -82,7 +82,7 @@ class Leaves(Looks):
 def test_more_pictures_to_an_attack_that_was_stopped(
     tmp_path: Path, written: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gear.verbs.attack.watch.SECONDS_BETWEEN", 0.0)
+    monkeypatch.setattr("gear.verbs.attack.monitor.SECONDS_BETWEEN", 0.0)
     out, looks = tmp_path / "out", Leaves(0)
     with pytest.raises(KeyboardInterrupt):
         gear.bench(written(*FEW), out=out, watch=Leaves(1))

@@ -7,8 +7,8 @@ import tracemalloc
 import numpy as np
 import pytest
 
+from gear.measuring.statistics import Values, auroc, auroc_interval, bounds, draw
 from gear.values.rng import derive_rng
-from gear.verbs.evaluate.spread import Values, auroc, auroc_interval, bounds, draw
 
 
 def by_pairs(positives: Values, negatives: Values) -> float:

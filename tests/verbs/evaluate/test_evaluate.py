@@ -25,10 +25,10 @@ from gear.cli.main import main
 from gear.contracts.defenses import DefenseResult
 from gear.contracts.specs import DefenseSpec
 from gear.formats.kitti_object import parse_labels
-from gear.nn.weights import write as write_weights
+from gear.measuring.patch_area import patch_masks
+from gear.networks.weights import write as write_weights
 from gear.testing.tiny_networks import tiny_depth, tiny_segmenter
 from gear.values.errors import ConfigError, DatasetError, FieldError, GearError, PluginError, UnknownNameError
-from gear.verbs.evaluate.patch_area import patch_masks
 from gear.verbs.evaluate.run import evaluate
 from tests.verbs.conftest import Install, Small
 from tests.verbs.evaluate.conftest import Config, Oracle, Views, model_spec

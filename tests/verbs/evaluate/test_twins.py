@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 import gear
+from gear.measuring.patch_area import patch_masks
 from gear.metrics.depth import DepthEvaluator
 from gear.plugins.tasks.depth import DepthTask
 from gear.testing.tiny_networks import tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import DatasetError, GearError
 from gear.verbs.collect.run import collect
-from gear.verbs.evaluate.patch_area import patch_masks
 from gear.verbs.evaluate.pools import check_pools
 from gear.verbs.evaluate.run import evaluate
 from tests.verbs.conftest import Install, Small, size_settings

@@ -9,8 +9,8 @@ import pytest
 import torch
 
 from gear.contracts.specs import ModelSpec
-from gear.nn.detectors_options import ReferenceDetectorOptions
-from gear.nn.weights import read, write
+from gear.networks.detection.options import ReferenceDetectorOptions
+from gear.networks.weights import read, write
 from gear.plugins.build import find
 from gear.plugins.models.retinanet_r18_fpn import build_lite0
 from gear.verbs.train.config import read_config

@@ -25,7 +25,7 @@ import gear
 from gear.cli.main import main
 from gear.cli.train import budget
 from gear.config.reader import read_node
-from gear.nn.weights import load_into, read, write
+from gear.networks.weights import load_into, read, write
 from gear.plugins.build import find
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_segmenter
 from gear.values.errors import DatasetError, GearError, PluginError, UnknownNameError

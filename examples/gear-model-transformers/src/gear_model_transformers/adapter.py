@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 import torch
-from gear.nn import vision
-from gear.nn.huggingface_labels import match
-from gear.nn.runtime import device_of
+from gear.networks import torchvision_import
+from gear.networks.huggingface.labels import match
+from gear.networks.runtime import device_of
 from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
 from torch import Tensor, nn
@@ -84,7 +84,8 @@ def open_folder(folder: Path, kinds: Sequence[str]) -> tuple[nn.Module, Any]:
     """
     if not (folder / "config.json").is_file():
         raise GearError(f"folder {str(folder)!r} has no config.json; set folder to what save_pretrained wrote")
-    vision.need()  # before transformers: its image processors import torchvision, which may not fit this torch
+    # Before transformers: its image processors import torchvision, which may not fit this torch.
+    torchvision_import.need()
     import transformers
 
     transformers.utils.logging.disable_progress_bar()

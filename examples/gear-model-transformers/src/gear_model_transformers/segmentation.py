@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import torch
 from gear.formats.cityscapes import LABELS
-from gear.losses.semantic import train_ids
+from gear.networks.segmentation.losses import train_ids
 from torch import Tensor
 from torch.nn import functional
 

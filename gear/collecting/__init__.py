@@ -1,0 +1,1 @@
+"""What collects samples: jobs, patch sources, sessions (one world and renderer a worker), workers."""

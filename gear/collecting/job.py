@@ -1,0 +1,179 @@
+"""One run of `collect`, resolved: everything a worker needs, as data."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import platform
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import mujoco
+import numpy as np
+
+from gear.camera.optics import lens_map
+from gear.camera.response import response_for
+from gear.collecting.lookup import look_up
+from gear.collecting.patch_sources import PatchSet
+from gear.config.collection import CollectionConfig, SplitConfig
+from gear.config.dump import to_plain
+from gear.contracts.rendering import RendererInfo
+from gear.contracts.tasks import SplitInfo
+from gear.dataset.plan import Plan
+from gear.plugins.build import blamed, build
+from gear.plugins.catalogue import Found
+from gear.render.probing import renderer_info
+from gear.values.errors import ConfigError
+from gear.values.scene import Weather
+from gear.values.serial import Json, to_json
+from gear.world.assets.asset_hash import assets_digest
+from gear.world.scene_spec import SceneSpec
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Job:
+    """A resolved collection.
+
+    Attributes:
+        config: as the user wrote it, defaults filled in.
+        split: seeds and counts.
+        scene: boards, truck and limits, capped by the simulation config.
+        weather: every parameter.
+        patch: pictures of this run.
+        root: folder of the dataset.
+        plan: what decides the bytes.
+        renderer: who renders.
+    """
+
+    config: CollectionConfig
+    split: SplitConfig
+    scene: SceneSpec
+    weather: Weather
+    patch: PatchSet
+    root: Path
+    plan: Plan
+    renderer: RendererInfo
+
+    @property
+    def note(self) -> str:
+        """What the user may not have meant, or nothing: a patch in a foreign scene is an experiment or a slip."""
+        here = f"{self.plan.info.town}/{self.plan.info.scene}"
+        if not self.patch.made_for or here in self.patch.made_for:
+            return ""
+        return f"the patches of {self.patch.source} were made for {', '.join(self.patch.made_for)}; this is {here}"
+
+    @property
+    def frames(self) -> int:
+        """Samples of the whole split."""
+        return self.split.samples * self.split.frames
+
+
+def resolve(config: CollectionConfig) -> Job:
+    """Looks up every name in a config and asks for the renderer, before anything is rendered.
+
+    Raises:
+        UnknownNameError, PatchError: as `look_up`.
+        ConfigError: likewise, or the lens folds its pictures over.
+        BackendError: the renderer cannot start here.
+    """
+    named = look_up(config)
+    spec, owner = named.task.spec, named.task.owner
+    config, library, split, weather, patch = named.config, named.library, named.split, named.weather, named.patch
+    _check_lens(config, named.task)
+    info = SplitInfo(
+        town=library.town_name, scene=config.scene, split=config.split, seed=split.seed, patch_label=patch.label
+    )
+    renderer = renderer_info(config.renderer)
+    response = response_for(renderer.name, weather)
+    content: Json = {
+        "town": library.town_name,
+        "scene_name": config.scene,
+        "split": config.split,
+        "seed": split.seed,
+        "frames": split.frames,
+        "interval_s": split.interval_s,
+        "scene": _scene_content(named.scene),
+        "weather": to_json(weather),
+        "renderer": to_json(renderer),
+        "quality": config.quality,
+        "camera": to_json(config.camera),
+        "response": {"exposure": response.exposure, "contrast": response.contrast, "encoding": response.encoding},
+        "assets": assets_digest(library),
+        "versions": versions(),
+    }
+    plan = Plan(
+        task={"name": spec.name, "package": owner.package, "version": owner.version},
+        options=to_plain(named.options),
+        content=content,
+        patch={"label": patch.label, "sha256": patch.digest},
+        info=info,
+        samples=split.samples * split.frames,
+        auxiliary=("probes",) if config.probes else (),
+    )
+    return Job(
+        config=config,
+        split=split,
+        scene=named.scene,
+        weather=weather,
+        patch=patch,
+        root=dataset_root(config, info, weather),
+        plan=plan,
+        renderer=renderer,
+    )
+
+
+def _scene_content(scene: SceneSpec) -> Json:
+    """Of a scene; a mix only where there is one, so that datasets from before there were any go on."""
+    content: Json = to_json(scene)
+    if not scene.npc_vehicles.mix:
+        del content["npc_vehicles"]["mix"]
+    return content
+
+
+def _check_lens(config: CollectionConfig, task: Found) -> None:
+    lens = config.camera.lens
+    if not lens.bends:
+        return
+    product = build(task, config.options)
+    with blamed(task, "rig"):
+        rig = product.rig()
+    for camera in rig.cameras:
+        try:
+            lens_map(lens, camera.width_px, camera.height_px, camera.intrinsics.focal_px)
+        except ValueError as error:
+            problem = f"{error}; take k1 and k2 nearer to 0, or a narrower field of view"
+            place = config.places.get("camera")
+            if place is not None and place.line:
+                raise place.error("camera.lens", problem) from error
+            raise ConfigError("camera", 0, 0, "lens", problem) from error
+
+
+def dataset_root(config: CollectionConfig, info: SplitInfo, weather: Weather) -> Path:
+    """Where the dataset goes: what the user said, or `data/<task>/<town>-<scene>-<weather>/<patch>`."""
+    if config.root:
+        return Path(config.root)
+    name = weather.name
+    if name.endswith("*"):
+        name = f"{name[:-1]}-{hashlib.sha256(repr(weather).encode()).hexdigest()[:6]}"
+    folders = (config.task, f"{info.town}-{info.scene}-{name}", info.patch_label)
+    return Path("data", *(folder.replace("/", "-") for folder in folders))  # a scene may be called ../../x
+
+
+def versions() -> dict[str, str]:
+    """Of what decides the bytes of pictures and labels."""
+    return {
+        "gear": _version("mujoco-gear"),
+        "mujoco": mujoco.__version__,
+        "dm_control": _version("dm-control"),
+        "numpy": np.__version__,
+        "opencv": cv2.__version__,
+        "machine": platform.machine(),
+    }
+
+
+def _version(distribution: str) -> str:
+    try:
+        return importlib.metadata.version(distribution)
+    except importlib.metadata.PackageNotFoundError:
+        return "source"

@@ -1,0 +1,190 @@
+"""Everything that a collection config names, looked up: before anything is rendered, and without a renderer."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gear.collecting.patch_sources import PatchSet, resolve_patch
+from gear.config.collection import CollectionConfig, SplitConfig, WeatherConfig
+from gear.config.load import load_simulation, split_of
+from gear.config.nodes import Place, parse_file
+from gear.config.reader import read_node, told_at
+from gear.plugins.build import find
+from gear.plugins.catalogue import Found
+from gear.values.errors import ConfigError, FieldError, UnknownNameError
+from gear.values.resources import data_dir
+from gear.values.scene import Weather
+from gear.values.serial import holds_places
+from gear.world.assets.library import AssetLibrary
+from gear.world.scene_spec import SceneLibrary, SceneSpec
+from gear.world.surfaces.surface_carriers import check_assets
+from gear.world.weather.presets import PRESETS
+
+ROOMY_FACTOR = 100
+"""Scenes without a board take so many times the vehicles, as in the original: they are not bound to one corner."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Named:
+    """What the names in a collection config stand for.
+
+    Attributes:
+        config: with a scene that was given as a file taken apart.
+        task: its plugin.
+        options: the task's own, read.
+        library: the town.
+        scene: boards, truck and limits, capped by the simulation config.
+        split: seeds and counts.
+        weather: every parameter.
+        patch: pictures of the run.
+    """
+
+    config: CollectionConfig
+    task: Found
+    options: Any
+    library: AssetLibrary
+    scene: SceneSpec
+    split: SplitConfig
+    weather: Weather
+    patch: PatchSet
+
+
+def look_up(config: CollectionConfig) -> Named:
+    """Looks up every name in a config.
+
+    Raises:
+        UnknownNameError: a task, town, scene, split or weather is not known; says what may have been meant.
+        ConfigError: likewise, of a name that a file has; or a scene library or the task's options cannot be read.
+        PatchError: the patch cannot be used.
+    """
+    with told_at(config.places, "scene"):
+        config = with_scene_file(config)
+    with told_at(config.places, "task"):
+        task = find("task", config.task)
+    options = read_node(task.spec.config, config.options, "options")
+    with told_at(config.places, "town"):
+        library = AssetLibrary.for_town(config.town)
+    with told_at(config.places, "simulation"):
+        simulation = load_simulation(config.simulation)
+    with told_at(config.places, "scenes" if config.scenes else "town"):
+        scenes = find_scenes(library, config.scenes)
+    with told_at(config.places, "scene"):
+        scene = find_scene(config, scenes)
+        check_assets(library, scene, f"scenes.{config.scene}")
+    roomy = 1 if scene.boards else ROOMY_FACTOR
+    scene = scene.capped(simulation.max_vehicles * roomy, simulation.max_pedestrians)
+    scene = _mixed(scene.crowded(config.crowd), config)
+    with told_at(config.places, "split"):
+        split = split_of(simulation, config.split)
+    split = dataclasses.replace(
+        split,
+        seed=split.seed if config.seed is None else config.seed,
+        samples=split.samples if config.samples is None else config.samples,
+    )
+    with told_at(config.weather.places, "preset", "weather"):
+        weather = find_weather(config.weather)
+    surfaces = len(scene.boards) if scene.truck is None else 1
+    with told_at(config.places, "patch"):
+        patch = resolve_patch(config.patch, surfaces=surfaces, seed=config.patch_seed)
+    return Named(
+        config=config,
+        task=task,
+        options=options,
+        library=library,
+        scene=scene,
+        split=split,
+        weather=weather,
+        patch=patch,
+    )
+
+
+def _mixed(scene: SceneSpec, config: CollectionConfig) -> SceneSpec:
+    """A scene with the config's mix on top of its own.
+
+    Raises:
+        ConfigError: both together are too much, or leave nothing.
+    """
+    try:
+        return scene.mixed(config.mix)
+    except FieldError as error:
+        place = config.places.get(error.field) or config.places.get("mix") or Place("collection")
+        raise place.error(error.field, f"{error.problem} (with the scene's own mix)") from error
+
+
+def with_scene_file(config: CollectionConfig) -> CollectionConfig:
+    """Takes a scene given as a file apart: `my.yml:corner`, or `my.yml` where it holds only one.
+
+    Raises:
+        UnknownNameError: the file holds several scenes and none was named.
+    """
+    path, _, name = config.scene.rpartition(":") if ":" in config.scene else (config.scene, "", "")
+    if not path.endswith((".yml", ".yaml")):
+        return config
+    scenes = scene_library(path).scenes
+    if not name and len(scenes) > 1:
+        raise UnknownNameError("scene", config.scene, scenes, f"(say which: --scene {path}:{next(iter(scenes))})")
+    return dataclasses.replace(config, scenes=path, scene=name or next(iter(scenes)))
+
+
+def find_scenes(town: AssetLibrary, scenes: str = "") -> SceneLibrary:
+    """The scene library of that name or path, or the town's own.
+
+    Raises:
+        UnknownNameError: there is none.
+        ConfigError: it cannot be read, or is another town's.
+    """
+    library = scene_library(scenes or town.town_name)
+    if scenes and library.town != town.town_name:
+        problem = f"its boards stand in {library.town}, not in {town.town_name}; name that town, or scenes of this one"
+        raise library.places.get("town", Place(scenes)).error("town", problem)
+    return library
+
+
+def find_scene(config: CollectionConfig, library: SceneLibrary) -> SceneSpec:
+    """The scene by name."""
+    if config.scene not in library.scenes:
+        raise UnknownNameError(f"scene of {library.town}", config.scene, library.scenes)
+    return library.scenes[config.scene]
+
+
+def scene_library(name: str) -> SceneLibrary:
+    """A scene library by the name of its town, or by path.
+
+    Raises:
+        UnknownNameError: there is none.
+        ConfigError: it cannot be read.
+    """
+    folder, is_path = data_dir("configs") / "scenes", Path(name).suffix in (".yml", ".yaml")
+    path = Path(name) if is_path else folder / f"{name}.yml"
+    try:
+        is_there = path.exists()
+    except OSError as error:
+        raise ConfigError(name, 0, 0, "", f"cannot read it: {error.strerror}") from error
+    if not is_there and is_path:
+        raise UnknownNameError("scene library", name, hint="(that file does not exist)")
+    if not is_there:
+        hint = "(write one and give its file, FILE.yml)"
+        raise UnknownNameError("scene library for town", name, (p.stem for p in folder.glob("*.yml")), hint)
+    return read_node(SceneLibrary, parse_file(path))
+
+
+def find_weather(config: WeatherConfig) -> Weather:
+    """The preset with what the config changes in it.
+
+    Raises:
+        UnknownNameError: there is no such preset.
+    """
+    if config.preset not in PRESETS:
+        raise UnknownNameError("weather", config.preset, PRESETS)
+    changes: dict[str, Any] = {
+        field.name: getattr(config, field.name)
+        for field in dataclasses.fields(config)
+        if field.name != "preset" and not holds_places(field) and getattr(config, field.name) is not None
+    }
+    preset = PRESETS[config.preset]
+    if all(getattr(preset, name) == value for name, value in changes.items()):
+        return preset
+    return dataclasses.replace(preset, name=f"{preset.name}*", **changes)

@@ -1,0 +1,186 @@
+"""From what the user calls a patch to one picture a surface."""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from gear.contracts.tasks import NO_PATCH, RANDOM_PATCH
+from gear.dataset.sidecar import load_json
+from gear.networks.shipped import shipped_patches
+from gear.values.errors import DatasetError, PatchError
+from gear.values.frames import UInt8Image
+from gear.values.rng import derive_rng
+
+RANDOM_SIZE_PX = (300, 150)
+"""Width and height of a random patch: 2.5 cm pixels on a board of 7.4 m, as in the paper."""
+
+SIDE_PX = (2, 8192)
+MAX_BYTES = 256 << 20
+NUMBERED = re.compile(r".*_(\d+)\.(?i:png)")
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PatchSet:
+    """The patches of one run.
+
+    Attributes:
+        label: `none`, `random`, or name and hash: the name of its folder in a dataset.
+        images: sRGB pictures, (H, W, 3) uint8, in surface order: none, or one for each surface.
+        digest: sha256 of the pictures.
+        files: what is copied into the dataset, by name.
+        source: what the user said.
+        made_for: `town/scene` of the scenes that the pictures were optimised in, where an `attack.json` says so.
+    """
+
+    label: str
+    images: tuple[UInt8Image, ...]
+    digest: str
+    files: Mapping[str, bytes] = field(default_factory=dict)
+    source: str = ""
+    made_for: tuple[str, ...] = ()
+
+    def by_surface(self, names: tuple[str, ...]) -> dict[str, UInt8Image]:
+        """The picture of each surface; nothing where there is no patch."""
+        return dict(zip(names, self.images, strict=True)) if self.images else {}
+
+
+def resolve_patch(patch: str, *, surfaces: int, seed: int) -> PatchSet:
+    """Finds the patches that `--patch` asks for.
+
+    Args:
+        patch: `none`, `random`, a picture, a folder with `patch_0.png`, `patch_1.png`, … (or `<anything>_0.png`), or
+            the name of a pre-computed patch of an installed weights package.
+        surfaces: how many the scene has.
+        seed: of random patches.
+
+    Raises:
+        PatchError: it is not there, cannot be read, is not a picture, of an absurd size, or numbered with a gap; or
+            the scene has nothing to show it on, or more surfaces than there are pictures.
+    """
+    try:
+        found = _resolved(patch, surfaces, seed)
+    except OSError as error:
+        raise PatchError(patch, f"cannot be read: {error.strerror}") from error
+    if found.label != NO_PATCH and not surfaces:
+        raise PatchError(patch, "the scene has no surface for a patch; say none, or name a scene with a board or truck")
+    if found.label != NO_PATCH and len(found.images) < surfaces:
+        problem = f"has {len(found.images)} of the {surfaces} pictures that the scene needs, one for each surface"
+        raise PatchError(patch, f"{problem}; give a folder with patch_0.png to patch_{surfaces - 1}.png")
+    return found
+
+
+def _resolved(patch: str, surfaces: int, seed: int) -> PatchSet:
+    if patch in ("", NO_PATCH):
+        return PatchSet(label=NO_PATCH, images=(), digest="", source=NO_PATCH)
+    if patch == RANDOM_PATCH:
+        images = tuple(random_patch(seed, i) for i in range(surfaces))
+        return _patch_set(RANDOM_PATCH, images, RANDOM_PATCH, is_hashed=False)
+    path = Path(patch)
+    if not path.exists() and path.name == patch:
+        path = shipped_patches().get(patch, path)
+    if path.is_dir():
+        found = _numbered(path)
+        images = tuple(read_patch(p) for p in found[: max(1, surfaces)])
+        return replace(_patch_set(path.resolve().name, images, patch), made_for=_scenes(path / "attack.json"))
+    if not path.exists():
+        near = difflib.get_close_matches(patch, shipped_patches(), n=1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise PatchError(
+            patch, f"is not there; say none, random, a picture, a folder with patch_0.png, or a shipped patch{hint}"
+        )
+    return _patch_set(path.stem, (read_patch(path),), patch)
+
+
+def random_patch(seed: int, index: int) -> UInt8Image:
+    """Every pixel and channel drawn evenly from 0..255."""
+    width, height = RANDOM_SIZE_PX
+    rng = derive_rng(seed, "patch", "random", index)
+    return rng.integers(0, 256, (height, width, 3), dtype=np.uint8)
+
+
+def read_patch(path: Path) -> UInt8Image:
+    """A patch picture as (H, W, 3) uint8 sRGB. Grey becomes RGB, 16 bits become 8, transparency is refused.
+
+    Raises:
+        PatchError: it is not a picture that can be printed.
+    """
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise PatchError(path, f"is larger than {MAX_BYTES >> 20} MiB")
+        data = path.read_bytes()
+    except OSError as error:
+        raise PatchError(path, f"cannot be read: {error.strerror}") from error
+    try:
+        picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
+    except cv2.error:
+        picture = None
+    if picture is None:
+        raise PatchError(path, "is not a picture that can be read; use an 8-bit RGB PNG")
+    height, width = picture.shape[:2]
+    if not all(SIDE_PX[0] <= side <= SIDE_PX[1] for side in (height, width)):
+        raise PatchError(path, f"is {width} x {height} px; sides of {SIDE_PX[0]} to {SIDE_PX[1]} px are possible")
+    if picture.ndim == 3 and picture.shape[2] == 4:
+        if not bool((picture[..., 3] == np.iinfo(picture.dtype).max).all()):
+            raise PatchError(path, "is transparent in places; a printed patch is opaque")
+        picture = picture[..., :3]
+    if picture.dtype == np.uint16:
+        picture = (picture.astype(np.uint32) * 255 + 32767) // 65535
+    elif picture.dtype != np.uint8:
+        raise PatchError(path, f"has {picture.dtype} pixels; use an 8-bit RGB PNG")
+    picture = np.asarray(picture, np.uint8)
+    if picture.ndim == 2:
+        picture = np.repeat(picture[..., None], 3, axis=2)
+    return np.ascontiguousarray(picture[..., ::-1])
+
+
+def digest_of(images: Iterable[UInt8Image]) -> str:
+    """Hex sha256 of patches: sizes and pixels, in surface order."""
+    digest = hashlib.sha256()
+    for image in images:
+        digest.update(repr(image.shape).encode() + image.tobytes())
+    return digest.hexdigest()
+
+
+def _numbered(folder: Path) -> list[Path]:
+    """`patch_0.png`, `patch_1.png`, … of a folder, or the original tool's `<anything>_0.png`, or its only picture."""
+    pictures = sorted(p for p in folder.iterdir() if p.suffix.lower() == ".png" and p.is_file())
+    own = [p for p in pictures if re.fullmatch(r"patch_\d+\.(?i:png)", p.name)]
+    if len(pictures) == 1 and not own:
+        return pictures
+    numbered: dict[int, Path] = {}
+    for path in own or pictures:
+        match = NUMBERED.fullmatch(path.name)
+        if match is None:
+            continue
+        if int(match[1]) in numbered:
+            raise PatchError(folder, f"has two patches of number {match[1]}; name them patch_0.png, patch_1.png, …")
+        numbered[int(match[1])] = path
+    if not numbered:
+        raise PatchError(folder, "has no patch_0.png")
+    if sorted(numbered) != list(range(len(numbered))):
+        raise PatchError(folder, f"lacks patch_{next(i for i in range(len(numbered) + 1) if i not in numbered)}.png")
+    return [numbered[i] for i in range(len(numbered))]
+
+
+def _scenes(notes: Path) -> tuple[str, ...]:
+    """Where an attack's patches were made; nothing without its notes, or where somebody changed them."""
+    try:
+        return tuple(sorted({str(one["scene"]) for one in load_json(notes)["data"]}))
+    except (DatasetError, KeyError, TypeError):
+        return ()
+
+
+def _patch_set(name: str, images: tuple[UInt8Image, ...], source: str, *, is_hashed: bool = True) -> PatchSet:
+    digest = digest_of(images)
+    files = {f"patch_{i}.png": cv2.imencode(".png", image[..., ::-1])[1].tobytes() for i, image in enumerate(images)}
+    safe = re.sub(r"[^A-Za-z0-9.]+", "-", name).strip("-.") or "patch"
+    label = f"{safe}-{digest[:8]}" if is_hashed else name
+    return PatchSet(label=label, images=images, digest=digest, files=files, source=source)

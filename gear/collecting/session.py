@@ -1,0 +1,133 @@
+"""One worker's world: compiled once, then one sample after another."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from gear.camera.pipeline import Darkroom
+from gear.camera.reflection import Below, Reflection
+from gear.collecting.job import Job
+from gear.collecting.probes import ProbeShot, develop_probes, shoot_probes
+from gear.contracts.rendering import RawView, Renderer
+from gear.contracts.tasks import Encoded, Sample, Task
+from gear.dataset.output_checks import check_encoded
+from gear.formats.probes import AuxiliaryFiles, probe_files
+from gear.plugins.build import blamed, build, find
+from gear.plugins.catalogue import Found
+from gear.render.registry import open_renderer
+from gear.values.frames import Frame, GeomTable, SceneObject
+from gear.values.scene import SceneRecord
+from gear.world.compilation.memory import forget_shown, map_large_buffers, release_memory
+from gear.world.compilation.world_cache import ready_world
+from gear.world.planner import ScenePlanner
+from gear.world.weather.air import darkroom_of
+from gear.world.weather.mirror_view import look_from_below
+from gear.world.weather.night import night_of
+from gear.world.world import World
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Shot:
+    """What the renderer saw of one scene.
+
+    Attributes:
+        record: the scene.
+        raw: one view a camera, in the record's order.
+        below: what wet ground mirrors, one a camera; None for dry ground.
+        geoms, objects: the tables to read it, as in `Frame`.
+        probes: the same scene with black and with white surfaces, where that was asked for.
+    """
+
+    record: SceneRecord
+    raw: tuple[RawView, ...]
+    below: tuple[Below | None, ...]
+    geoms: GeomTable
+    objects: Mapping[int, SceneObject]
+    probes: ProbeShot | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Session:
+    """Everything that makes samples of one job."""
+
+    job: Job
+    plugin: Found
+    task: Task[Any, Any]
+    world: World
+    planner: ScenePlanner
+    renderer: Renderer
+    darkroom: Darkroom
+
+    def record(self, index: int) -> SceneRecord:
+        """The scene of one sample: a pure function of the job and the index."""
+        return self.darkroom.recorded(self.planner.plan(index))
+
+    def shoot(self, record: SceneRecord) -> Shot:
+        """Places the scene with the run's patch in it and renders it."""
+        names = tuple(surface.name for surface in record.surfaces)
+        placed = self.world.place(record, self.job.patch.by_surface(names))
+        raw = self.renderer.render(placed.stage, record.cameras)
+        below = look_from_below(self.world, self.renderer, placed, record, self.darkroom)
+        is_probed = self.job.config.probes
+        probes = shoot_probes(self.world, self.renderer, placed, record, raw) if is_probed else None
+        return Shot(record=record, raw=raw, below=below, geoms=placed.geoms, objects=placed.objects, probes=probes)
+
+    def develop(self, shot: Shot) -> Frame:
+        """Turns what the renderer saw into pictures; needs neither world nor renderer, so it can run beside them."""
+        return self._developed(shot, self._reflections(shot))
+
+    def _reflections(self, shot: Shot) -> list[Reflection | None]:
+        return [self.darkroom.reflection(below, shot.record) for below in shot.below]
+
+    def _developed(self, shot: Shot, reflections: Sequence[Reflection | None]) -> Frame:
+        views = {
+            camera.name: self.darkroom.view(view, camera, shot.record, shot.geoms, reflection=reflection)
+            for camera, view, reflection in zip(shot.record.cameras, shot.raw, reflections, strict=True)
+        }
+        return Frame(views=views, geoms=shot.geoms, objects=shot.objects)
+
+    def finish(self, shot: Shot) -> tuple[Sample, Encoded, AuxiliaryFiles]:
+        """Develops and measures a shot and turns it into files, beside the next one's rendering."""
+        reflections = self._reflections(shot)
+        frame = self._developed(shot, reflections)
+        with blamed(self.plugin, f"sample {shot.record.index}"):
+            sample = self.task.ground_truth(frame, shot.record)
+            encoded = check_encoded(self.task.encode(sample, self.job.plan.info), "encode")
+        if shot.probes is None:
+            return sample, encoded, {}
+        probes = develop_probes(self.darkroom, shot.probes, shot.record, shot.geoms, reflections)
+        return sample, encoded, probe_files(probes, self.job.plan.info.split, shot.record.index)
+
+
+@contextlib.contextmanager
+def open_session(job: Job) -> Iterator[Session]:
+    """Builds a worker's world and renderer, and closes the renderer at the end."""
+    map_large_buffers()
+    plugin = find("task", job.config.task)
+    task: Task[Any, Any] = build(plugin, job.config.options)
+    with blamed(plugin, "rig"):
+        rig = task.rig()
+    world = ready_world(town=job.config.town, scene_name=job.config.scene, scene=job.scene, weather=job.weather)
+    night = night_of(world, job.weather, job.config.renderer)
+    renderer = open_renderer(job.config.renderer, world.model, quality=job.config.quality)
+    forget_shown(world.model)
+    release_memory()
+    try:
+        planner = ScenePlanner(world, rig, job.split, split_name=job.config.split)
+        darkroom = darkroom_of(
+            job.weather, job.config.renderer, world.town_name, job.config.camera, night, world.shapes
+        )
+        yield Session(
+            job=job,
+            plugin=plugin,
+            task=task,
+            world=world,
+            planner=planner,
+            renderer=renderer,
+            darkroom=darkroom,
+        )
+    finally:
+        renderer.close()

@@ -1,1 +1,0 @@
-"""Task losses, in torch: for training and for attacks."""

@@ -1,0 +1,153 @@
+"""What a defense learns from before it guards a model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from gear.contracts.defenses import Defense
+from gear.contracts.models import Model
+from gear.contracts.tasks import NO_PATCH
+from gear.dataset.reading import Dataset, scenes_of
+from gear.measuring.plugin_selection import Chosen, check_model
+from gear.plugins.build import blamed
+from gear.plugins.datasets import open_dataset
+from gear.values.errors import GearError
+from gear.values.frames import UInt8Image
+from gear.values.rng import derive_rng
+from gear.values.serial import Json
+
+Views = Mapping[str, UInt8Image]
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Calibration:
+    """Datasets to learn from.
+
+    Attributes:
+        clean: without patches; None where nothing was given.
+        patched: with them.
+        told: of (samples read for the first time, samples of both).
+    """
+
+    clean: Dataset[Any] | None = None
+    patched: Dataset[Any] | None = None
+    told: Progress | None = None
+
+    def fit(self, defense: Chosen, product: Defense, model: Model, cameras: Sequence[str], seed: int) -> Any:
+        """What the defense makes of them for a model that looks through these cameras; None where there are none.
+
+        Raises:
+            GearError: they do not suit it, or a third party's code fails.
+        """
+        if self.clean is None:
+            return None
+        given = [one for one in (self.clean, self.patched) if one is not None]
+        read: set[tuple[int, int]] = set()
+
+        def took(side: int, index: int) -> None:
+            read.add((side, index))
+            if self.told is not None:
+                self.told(len(read), sum(map(len, given)))
+
+        clean, *others = (CalibrationViews(one, cameras, partial(took, side)) for side, one in enumerate(given))
+        patched: Sequence[Views] = others[0] if others else ()
+        with blamed(defense.found, "fit"):
+            return product.fit(clean, patched, model, derive_rng(seed, "calibrate", defense.found.spec.name))
+
+    def facts(self) -> list[str | None]:
+        """Content keys of both."""
+        return [None if one is None else one.plan.content_key for one in (self.clean, self.patched)]
+
+    def counted(self) -> Json:
+        """How many samples they have, which their keys do not say; nothing where nothing was given."""
+        if self.clean is None:
+            return {}
+        return {"calibration_samples": [None if one is None else len(one) for one in (self.clean, self.patched)]}
+
+    @property
+    def shows_patch(self) -> bool:
+        """Whether the pictures that are to be clean show one."""
+        return self.clean is not None and _label(self.clean) != NO_PATCH
+
+    def doubts(self) -> list[str]:
+        """A line for whatever the user may not have meant."""
+        clean, patched, lines = self.clean, self.patched, []
+        if clean is not None and self.shows_patch:
+            lines.append(f"{clean.root}: shows the patch {_label(clean)}, which the defense takes for clean")
+        if clean is not None and patched is not None and clean.plan.twin_key != patched.plan.twin_key:
+            lines.append(f"{patched.root}: is no twin of {clean.root}, so more than a patch differs in what was learnt")
+        return lines
+
+    def note(self, measured: Dataset[Any]) -> str | None:
+        """One line where a defense is measured on scenes that it learnt from."""
+        if self.clean is None or scenes_of(self.clean) != scenes_of(measured):
+            return None
+        return f"{measured.root}: the defense learnt from scenes that it is measured on; other scenes are harder for it"
+
+
+NOTHING = Calibration()
+
+
+def opened_calibration(
+    clean: str | Path | None,
+    patched: str | Path | None,
+    models: Sequence[Chosen],
+    defense: str | None,
+    *,
+    flag: str = "--set ",
+    told: Progress | None = None,
+) -> Calibration:
+    """Opens what is there.
+
+    Args:
+        clean, patched: roots of datasets; None for none.
+        models: that look at them.
+        defense: what is to learn.
+        flag: how the user sets one of the models' options.
+        told: of (samples that the defense has read for the first time, samples of both).
+
+    Raises:
+        GearError: they cannot be read or are swapped, models cannot look at them, or there is nothing to learn or
+            nobody to.
+    """
+    if clean is None and patched is None:
+        return NOTHING
+    if not defense:
+        raise GearError("defenses learn from calibration data, but there is no defense: name one with --defense")
+    if clean is None:
+        raise GearError("--calibration-patched is the twin of clean pictures: give them with --calibration DIR")
+    opened = [None if one is None else open_dataset(one) for one in (clean, patched)]
+    for dataset in opened:
+        for model in models:
+            if dataset is not None:
+                check_model(model, dataset, flag)
+    pair = Calibration(clean=opened[0], patched=opened[1], told=told)
+    if pair.shows_patch and pair.patched is not None and _label(pair.patched) == NO_PATCH:
+        raise GearError(f"{clean} shows a patch, {patched} none: --calibration and --calibration-patched are swapped")
+    return pair
+
+
+def _label(dataset: Dataset[Any]) -> str:
+    return dataset.plan.info.patch_label
+
+
+class CalibrationViews(Sequence[Views]):
+    """The pictures of a dataset, read when they are looked at; `took` is told which."""
+
+    def __init__(self, dataset: Dataset[Any], names: Sequence[str], took: Callable[[int], None]) -> None:
+        self._dataset, self._names, self._took = dataset, tuple(names), took
+
+    def __len__(self) -> int:
+        return len(self._dataset)
+
+    def __getitem__(self, index: Any) -> Any:
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        images = self._dataset[index].images
+        self._took(index % len(self))
+        return {name: images[name] for name in self._names}

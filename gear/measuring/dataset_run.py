@@ -1,0 +1,152 @@
+"""One dataset through the model: read ahead, predicted in batches, measured and written beside the next batch."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections import deque
+from collections.abc import Callable, Sequence, Set
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+from gear.dataset.reading import Dataset
+from gear.measuring.guarded_model import Player
+from gear.measuring.parallel_batches import lanes
+from gear.measuring.scoring import Note, Scorer
+from gear.readers import TorchDataset, read_ahead
+from gear.values.errors import DatasetError
+
+Told = Callable[[], None]
+"""Called after every sample that is whole."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """What became of one dataset.
+
+    Attributes:
+        notes: of every sample, in order.
+        made: how many of them were predicted now.
+        damaged: what a former run kept and could not be read: these samples were predicted again.
+    """
+
+    notes: list[Note]
+    made: int
+    damaged: tuple[DatasetError, ...]
+
+
+def evaluate_row(dataset: Dataset[Any], scorer: Scorer, player: Player, *, batch: int, workers: int, told: Told) -> Row:
+    """Takes up what is kept and predicts the rest.
+
+    Batches are always the same samples, those that are finished already among them, and there are as many lanes as the
+    whole dataset has work for: networks round a batch otherwise than one sample, and on several threads otherwise than
+    on one, and a run that was interrupted is to end with the same bytes. Each of several lanes takes a batch from its
+    files to its figures, since what changes hands less is done sooner; threads beside them wait for the disk. Else
+    pictures are decoded, and predictions measured and written, in threads beside the model. What waits is bounded, so
+    memory does not grow with the dataset.
+    """
+    desk = _Desk(2 * batch + workers, told)
+    items = TorchDataset(dataset)
+    with ThreadPoolExecutor(workers) as scorers:
+        notes, damaged = _taken_up(scorer, scorers, desk)
+        every = [range(begin, min(begin + batch, len(dataset))) for begin in range(0, len(dataset), batch)]
+        blocks = [block for block in every if not notes.keys() >= set(block)]
+        made = len(dataset) - len(notes)
+        count = min(player.lanes, len(every))
+        if count > 1:
+            scored = _in_lanes(items, scorer, player, blocks, notes.keys(), count, desk, scorers)
+        else:
+            scored = {}
+            with contextlib.closing(read_ahead(items, blocks, workers=workers)) as reading:
+                for found in reading:
+                    answers = player.play([item.sample.images for item in found], [item.index for item in found])
+                    for item, answer in zip(found, answers, strict=True):
+                        if item.index not in notes:
+                            scored[item.index] = desk.submit(scorers, scorer.first, item.index, item.sample, answer)
+                    desk.check()
+        notes |= {index: future.result() for index, future in scored.items()}
+    desk.check()  # looked at again now that every callback has ended: that of the last sample may fail too
+    return Row(notes=[notes[index] for index in range(len(dataset))], made=made, damaged=tuple(damaged))
+
+
+def _in_lanes(
+    items: TorchDataset,
+    scorer: Scorer,
+    player: Player,
+    blocks: Sequence[range],
+    finished: Set[int],
+    count: int,
+    desk: _Desk,
+    writers: ThreadPoolExecutor,
+) -> dict[int, Future[Note]]:
+    """Batches side by side, each in one thread until there is nothing left to do but to wait for the disk."""
+
+    def worked_out(indices: Sequence[int]) -> dict[int, Future[Note]]:
+        found = [items[index] for index in indices]
+        answers = player.play([item.sample.images for item in found], indices)
+        return {
+            item.index: desk.submit(writers, scorer.write, scorer.measured(item.index, item.sample, answer))
+            for item, answer in zip(found, answers, strict=True)
+            if item.index not in finished
+        }
+
+    written: dict[int, Future[Note]] = {}
+    with lanes(count) as submit:
+        coming = deque(blocks)
+        played: deque[Future[dict[int, Future[Note]]]] = deque()
+        while coming or played:
+            while coming and len(played) <= count:
+                played.append(submit(worked_out, coming.popleft()))
+            written |= played.popleft().result()
+            desk.check()
+    return written
+
+
+class _Desk:
+    """Where samples wait to be measured: so many at a time, and the first failure is remembered."""
+
+    def __init__(self, most: int, told: Told) -> None:
+        self._waiting, self._one_tells, self._told = threading.Semaphore(most), threading.Lock(), told
+        self._failed = list[BaseException]()
+
+    def submit(self, pool: ThreadPoolExecutor, job: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Waits for a place."""
+        self._waiting.acquire()
+        future = pool.submit(job, *arguments)
+        future.add_done_callback(self._tell)
+        return future
+
+    def check(self) -> None:
+        """A sample that failed stops the run now, not at its end."""
+        if self._failed:
+            raise self._failed[0]
+
+    def _tell(self, done: Future[Any]) -> None:
+        self._waiting.release()
+        error = None if done.cancelled() else done.exception()
+        try:
+            if not done.cancelled() and error is None and isinstance(done.result(), Note):
+                with self._one_tells:
+                    self._told()
+        except BaseException as problem:  # futures keep what is raised here to themselves
+            error = problem
+        if error is not None:
+            self._failed.append(error)
+
+
+def _taken_up(scorer: Scorer, scorers: ThreadPoolExecutor, desk: _Desk) -> tuple[dict[int, Note], list[DatasetError]]:
+    """What a former run finished, and what of it cannot be read."""
+    futures: dict[int, Future[Note | DatasetError]] = {}
+    for index in sorted(scorer.kept()):
+        futures[index] = desk.submit(scorers, scorer.again, index)
+        desk.check()
+    notes: dict[int, Note] = {}
+    damaged: list[DatasetError] = []
+    for index, future in futures.items():
+        found = future.result()
+        if isinstance(found, Note):
+            notes[index] = found
+        else:
+            damaged.append(found)
+    return notes, damaged

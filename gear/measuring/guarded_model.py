@@ -1,0 +1,198 @@
+"""The model behind its defense: pictures in, answers with their cost out."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import inspect
+import sys
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.contracts.defenses import DefenseResult
+from gear.contracts.models import Model
+from gear.contracts.specs import DefenseSpec, ModelSpec
+from gear.dataset.reading import Dataset
+from gear.measuring.calibration import NOTHING, Calibration, Views
+from gear.measuring.guard import Guard
+from gear.measuring.parallel_batches import lanes_of
+from gear.measuring.plugin_selection import Chosen
+from gear.plugins.build import blamed, build
+from gear.plugins.catalogue import Found
+from gear.plugins.manager import DISTRIBUTION
+from gear.values.errors import PluginError
+from gear.values.rng import derive_rng
+
+SMALL_PX, MOST_TOGETHER = 1_400_000, 4
+"""More pixels at a time make no network of ours quicker on a CPU, and several slower."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Answer:
+    """What comes of one sample.
+
+    Attributes:
+        prediction: the task's.
+        model_s, defense_s: wall time; of a batch its share, also of the batches that went through beside it.
+        mask: where the defense sees the patch, (H, W) float32 in 0..1 by camera name.
+        score: how sure it is of an attack.
+    """
+
+    prediction: Any
+    model_s: float
+    defense_s: float
+    mask: Mapping[str, npt.NDArray[np.float32]] | None
+    score: float | None
+
+
+class Player:
+    """A built model with its defense, fitted where it must be.
+
+    Attributes:
+        model: defended, if there is a defense.
+        weights_sha256: of the bare model; None for what is no torch model.
+        lanes: how many threads may `play` at a time. Defenses and models of third parties are never asked to.
+    """
+
+    def __init__(
+        self,
+        model: Chosen,
+        defense: Chosen | None = None,
+        *,
+        calibration: Calibration = NOTHING,
+        seed: int = 0,
+    ) -> None:
+        """Builds and wraps; a defense learns before the first sample.
+
+        Raises:
+            GearError: options or weights do not fit, or a third party's code fails.
+        """
+        spec = model.found.spec
+        assert isinstance(spec, ModelSpec)
+        self._found, self._views, self._seed = model.found, spec.views, seed
+        bare: Model = build(model.found, model.options)
+        self.weights_sha256 = weights_digest(bare)
+        self.model: Model = bare
+        self._guard: Guard | None = None
+        self._guard_name = ""
+        if defense is not None:
+            self._guard_name = defense.found.spec.name
+            self._guard, self.model = self._guarded(defense, bare, calibration)
+        many = getattr(self.model, "predict_many", None)
+        # What a wrapper hands on of the bare model by `__getattr__` would pass the defense by.
+        is_own = self.model is bare or inspect.getattr_static(self.model, "predict_many", None) is not None
+        self._many = many if callable(many) and is_own else None
+        self._is_ours = model.found.owner.package == DISTRIBUTION and defense is None
+        self.lanes = lanes_of(bare) if self._is_ours else 1
+        self._at_work, self._counting = 0, threading.Lock()
+
+    def _guarded(self, defense: Chosen, bare: Model, calibration: Calibration) -> tuple[Guard, Model]:
+        found = defense.found
+        spec = found.spec
+        assert isinstance(spec, DefenseSpec)
+        product = build(found, defense.options)
+        with blamed(found, "wrap"):
+            wrapped: Model = product.wrap(bare)
+        learn = partial(calibration.fit, defense, product, bare, self._views, self._seed)
+        return Guard(found, product, bare if spec.needs_model or spec.taps else None, learn), wrapped
+
+    def usual_batch(self, dataset: Dataset[Any]) -> int:
+        """How many of a dataset's samples go through one of gear's own models together unless somebody says: as many
+        small ones as make `SMALL_PX`, at most `MOST_TOGETHER`. Third parties' models and defended ones take one.
+        """
+        if not self._is_ours or self._many is None or not len(dataset):
+            return 1
+        cameras = [camera for camera in dataset.sidecar(0).record.cameras if camera.name in self._views]
+        pixels = sum(camera.width_px * camera.height_px for camera in cameras)
+        return max(1, min(MOST_TOGETHER, SMALL_PX // max(pixels, 1)))
+
+    def play(self, pictures: Sequence[Views], indices: Sequence[int]) -> list[Answer]:
+        """Cleans and predicts a batch of samples, of which each has its number in the split.
+
+        Raises:
+            PluginError: a third party's model or defense fails.
+        """
+        if self._guard is not None:
+            _ = self._guard.state  # learns now, not on the first sample's time
+        results: list[DefenseResult | None] = []
+        spent: list[float] = []
+        shown: list[Views] = []
+        for views, index in zip(pictures, indices, strict=True):
+            seen = {name: views[name] for name in self._views}
+            for picture in seen.values():
+                picture.setflags(write=False)
+            begun = time.perf_counter()
+            result = None
+            if self._guard is not None:
+                rng = derive_rng(self._seed, "evaluate", self._guard_name, index)
+                result = self._guard.apply(seen, rng, index)
+            spent.append(time.perf_counter() - begun if result else 0.0)
+            results.append(result)
+            shown.append(result.views if result else seen)
+        begun, beside = time.perf_counter(), self._count(+1)
+        try:
+            predictions = self._predict(shown, indices)
+        finally:
+            beside += 1 + self._count(-1)
+        each_s = (time.perf_counter() - begun) / len(indices) / (beside / 2)
+        return [
+            Answer(
+                prediction=prediction,
+                model_s=each_s,
+                defense_s=defense_s,
+                mask=result.mask if result else None,
+                score=None if result is None or result.score is None else float(result.score),
+            )
+            for prediction, defense_s, result in zip(predictions, spent, results, strict=True)
+        ]
+
+    def _count(self, change: int) -> int:
+        """Takes note of who comes and goes; returns how many there are."""
+        with self._counting:
+            self._at_work += change
+            return self._at_work
+
+    def _predict(self, shown: Sequence[Views], indices: Sequence[int]) -> list[Any]:
+        stage = f"predict on sample {indices[0]}" + (f" to {indices[-1]}" if len(indices) > 1 else "")
+        with blamed(self._found, stage) if self.lanes == 1 else contextlib.nullcontext():
+            if self._many is None:
+                return [self.model.predict(views) for views in shown]
+            answers = list(self._many(list(shown)))
+        if len(answers) != len(shown):
+            raise accusation(self._found, stage, f"predict_many gave {len(answers)} answers to {len(shown)} samples")
+        return answers
+
+
+def accusation(found: Found, stage: str, problem: str) -> PluginError:
+    """An error that says whose plugin it is."""
+    return PluginError(f"{found.spec.name} ({found.owner.package} {found.owner.version})", stage, problem)
+
+
+def weights_digest(model: Any) -> str | None:
+    """sha256 over names and bytes of a torch model's parameters and buffers; None for what is no torch model."""
+    torch = sys.modules.get("torch")
+    if torch is None:
+        return None
+    digest, is_empty = hashlib.sha256(), True
+    for name, tensor in _tensors(model, torch):
+        plain = tensor.detach().cpu().contiguous()
+        digest.update(f"{name} {plain.dtype} {tuple(plain.shape)}".encode())
+        digest.update(plain.reshape(-1).view(torch.uint8).numpy().tobytes())
+        is_empty = False
+    return None if is_empty else digest.hexdigest()
+
+
+def _tensors(model: Any, torch: Any) -> Iterator[tuple[str, Any]]:
+    module = model.module() if callable(getattr(model, "module", None)) else model
+    parts = {"": module} if isinstance(module, torch.nn.Module) else vars(model) if hasattr(model, "__dict__") else {}
+    for part, network in parts.items():
+        if isinstance(network, torch.nn.Module):
+            for name, tensor in network.state_dict().items():
+                yield f"{part}.{name}", tensor

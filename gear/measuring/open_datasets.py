@@ -1,0 +1,55 @@
+"""The datasets of an evaluation: opened, of one task, each given once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+from gear.dataset.reading import Dataset
+from gear.measuring.plugin_selection import Chosen, check_model, check_reports
+from gear.plugins.datasets import open_dataset, root_and_split, roots_of
+from gear.values.errors import DatasetError, GearError
+
+
+def opened(paths: Sequence[str | Path], split: str | None, model: Chosen, reports: Sequence[str]) -> list[Dataset[Any]]:
+    """Opens them.
+
+    Args:
+        paths: roots, folders of roots, or `DIR:SPLIT`.
+        split: of those that do not say theirs; None where each has only one.
+        model: that must suit them.
+        reports: that must be there for them.
+
+    Raises:
+        GearError: there is none, one is empty or of another task, or the model or a report does not suit it.
+    """
+    if not paths:
+        raise GearError("there is nothing to evaluate on; give at least one dataset")
+    places = [root_and_split(path) for path in paths]
+    datasets = [open_dataset(root, own or split) for folder, own in places for root in roots_of(folder) or [folder]]
+    first = datasets[0].plan
+    for one in datasets:
+        if one.plan.task["name"] != first.task["name"]:
+            raise GearError(
+                f"{one.root} is a {one.plan.task['name']} dataset, {datasets[0].root} a {first.task['name']} one"
+            )
+        if not len(one):
+            raise DatasetError(one.root, "has no samples to evaluate on")
+        check_model(model, one)
+        check_reports(reports, one)
+    return datasets
+
+
+def row_names(datasets: Sequence[Dataset[Any]]) -> list[str]:
+    """Folders that stay the same however datasets are ordered.
+
+    Raises:
+        GearError: a dataset was given twice.
+    """
+    names = [f"{one.plan.info.split}-{one.plan.info.patch_label}-{one.plan.content_key[:8]}" for one in datasets]
+    for one, other in combinations(range(len(names)), 2):
+        if names[one] == names[other]:
+            raise GearError(f"{datasets[one].root} and {datasets[other].root} are the same data; give each once")
+    return names

@@ -1,0 +1,239 @@
+"""What is made of one answer: figures, result files, and the note that says that the sample is finished."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gear.contracts.evaluation import KeepsPredictions, Reports
+from gear.contracts.tasks import Sample
+from gear.dataset.files import explained, inside, read_bytes, sha256, write_whole
+from gear.dataset.output_checks import check_encoded
+from gear.dataset.reading import Dataset
+from gear.dataset.sidecar import dump_json, load_json
+from gear.measuring.guarded_model import Answer, accusation
+from gear.measuring.metric_checks import said_of
+from gear.measuring.metric_json import known_json
+from gear.measuring.patch_area import MASK_FIGURES, mask_figures, patch_masks, widened
+from gear.measuring.plugin_selection import OUTSIDE_PATCH
+from gear.measuring.statistics import AnyEvaluator
+from gear.plugins.catalogue import Found, one_line
+from gear.plugins.manager import DISTRIBUTION
+from gear.values.errors import DatasetError, FieldError, GearError
+from gear.values.serial import Json, from_json
+
+TASK = "task"
+"""The task's own evaluator, among its reports."""
+
+PREDICTIONS = "predictions"
+
+KEPT: Any = {
+    "facts": Any, "sha256": dict[str, str], "model_s": float, "defense_s": float, "score": float | None,
+    "mask": dict[str, float | None] | None,
+}  # fmt: skip
+"""What of a note is read again."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Note:
+    """One finished sample.
+
+    Attributes:
+        index: its number in the split.
+        figures: of this sample, by report.
+        parts: evaluators that have seen it alone, by report.
+        cost: `model_s` and `defense_s`.
+        score: of the defense, or None.
+        mask: how its mask lies on the patch, or None.
+        facts: what the task must know to read the prediction back; JSON.
+        sha256: of the prediction's files, by name.
+    """
+
+    index: int
+    figures: Mapping[str, Mapping[str, float]]
+    parts: Mapping[str, AnyEvaluator]
+    cost: Mapping[str, float]
+    score: float | None
+    mask: Mapping[str, float] | None
+    facts: Json
+    sha256: Mapping[str, str]
+
+    def as_json(self) -> Json:
+        """As written beside the predictions."""
+        return {
+            "index": self.index,
+            "figures": {name: known_json(one) for name, one in self.figures.items()},
+            **self.cost,
+            "score": self.score,
+            "mask": None if self.mask is None else known_json(self.mask),
+            "facts": self.facts,
+            "sha256": dict(self.sha256),
+        }
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Unwritten:
+    """A sample that is measured and not yet on the disk.
+
+    Attributes:
+        note: what will be said of it.
+        files: its prediction, content by name.
+    """
+
+    note: Note
+    files: Mapping[str, bytes]
+
+
+class Scorer:
+    """Measures and keeps the samples of one dataset; its methods may run in several threads."""
+
+    def __init__(self, dataset: Dataset[Any], root: Path, folder: str, reports: tuple[str, ...], model: Found) -> None:
+        """Args:
+        dataset: whose samples they are.
+        root: of the evaluation.
+        folder: of this dataset in it.
+        reports: further metrics by name.
+        model: whose predictions they are.
+        """
+        self._dataset, self._root, self._folder, self._model = dataset, root, folder, model
+        self._task = dataset.task
+        self._keeper = self._task if isinstance(self._task, KeepsPredictions) else None
+        self.makers: dict[str, Callable[[], AnyEvaluator]] = {TASK: self._task.evaluator}
+        for name in reports:
+            self.makers[name] = self._task.evaluator if name == OUTSIDE_PATCH else self._maker(name)
+
+    def _maker(self, name: str) -> Callable[[], AnyEvaluator]:
+        task = self._task
+        assert isinstance(task, Reports)
+        return lambda: task.reports()[name]
+
+    def kept(self) -> set[int]:
+        """Samples that are finished: their predictions need not be made again."""
+        folder = inside(self._root, f"{self._folder}/samples")
+        if self._keeper is None or not folder.is_dir():
+            return set()
+        return {int(p.stem) for p in folder.glob("*.json") if p.stem.isdecimal() and int(p.stem) < len(self._dataset)}
+
+    def measured(self, index: int, sample: Sample, answer: Answer) -> Unwritten:
+        """What there is to say of an answer, with the files that say it."""
+        with self._blamed(index):
+            figures, parts = self._measure(sample, answer.prediction)
+            encoded = self._keeper and check_encoded(
+                self._keeper.encode_prediction(sample, answer.prediction, self._dataset.plan.info), "encode_prediction"
+            )
+        files = encoded.files if encoded else {}
+        note = Note(
+            index=index,
+            figures=figures,
+            parts=parts,
+            cost={"model_s": answer.model_s, "defense_s": answer.defense_s},
+            score=answer.score,
+            mask=None if answer.mask is None else mask_figures(sample, answer.mask),
+            facts=encoded.facts if encoded else None,
+            sha256={name: sha256(data) for name, data in files.items()},
+        )
+        return Unwritten(note=note, files=files)
+
+    def write(self, unwritten: Unwritten) -> Note:
+        """Puts the prediction's files on the disk, the note last."""
+        note = unwritten.note
+        for relative, data in unwritten.files.items():
+            write_whole(self._root, f"{self._folder}/{PREDICTIONS}/{relative}", data)
+        write_whole(self._root, f"{self._folder}/samples/{note.index:06d}.json", dump_json(note.as_json()))
+        return note
+
+    def first(self, index: int, sample: Sample, answer: Answer) -> Note:
+        """Measures an answer and writes it."""
+        return self.write(self.measured(index, sample, answer))
+
+    def again(self, index: int) -> Note | DatasetError:
+        """Measures what a former run predicted; or what is wrong with its note or its prediction.
+
+        Raises:
+            DatasetError: the sample itself cannot be read.
+        """
+        assert self._keeper is not None
+        path = inside(self._root, f"{self._folder}/samples/{index:06d}.json")
+        sample = self._dataset[index]
+        folder = inside(self._root, f"{self._folder}/{PREDICTIONS}")
+        try:
+            there = _read_note(path)
+            for name, digest in there["sha256"].items():
+                if sha256(read_bytes(inside(folder, name))) != digest:
+                    raise DatasetError(inside(folder, name), "is not what was written")
+            with explained(path):
+                prediction = self._keeper.decode_prediction(folder, sample, there["facts"], self._dataset.plan.info)
+            figures, parts = self._measure(sample, prediction)  # which it could when it was written
+        except DatasetError as error:
+            return DatasetError(error.path, error.problem.partition(";")[0])
+        except (ValueError, KeyError, TypeError) as error:
+            return DatasetError(path, f"cannot be read again ({one_line(error)})")
+        return Note(
+            index=index,
+            figures=figures,
+            parts=parts,
+            cost={"model_s": there["model_s"], "defense_s": there["defense_s"]},
+            score=there["score"],
+            mask=None if there["mask"] is None else _with_nan(there["mask"]),
+            facts=there["facts"],
+            sha256=there["sha256"],
+        )
+
+    def finish(self, notes: list[Note]) -> None:
+        """Writes the split's own result files."""
+        if self._keeper is None:
+            return
+        rows = [(self._dataset.sidecar(note.index).record, note.facts) for note in notes]
+        for relative, data in self._keeper.finalise_predictions(rows, self._dataset.plan.info).items():
+            write_whole(self._root, f"{self._folder}/{PREDICTIONS}/{relative}", data)
+
+    def _measure(self, sample: Sample, prediction: Any) -> tuple[dict[str, dict[str, float]], dict[str, AnyEvaluator]]:
+        parts = {name: make() for name, make in self.makers.items()}
+        figures = {}
+        for name, part in parts.items():
+            seen = sample
+            if name == OUTSIDE_PATCH:
+                seen = self._task.without(sample, widened(patch_masks(sample)))  # type: ignore[attr-defined]
+            figures[name] = said_of(self._dataset.plan, part.update(seen, prediction), "update")
+        return figures, parts
+
+    @contextmanager
+    def _blamed(self, index: int) -> Iterator[None]:
+        """A prediction that does not suit the task is its model's fault, or, with one of gear's, that of its weights.
+
+        Threads must not share a redirected stdout, so this is not `gear.plugins.build.blamed`.
+        """
+        try:
+            yield
+        except GearError:
+            raise
+        except Exception as error:
+            if self._model.owner.package != DISTRIBUTION:
+                raise accusation(self._model, f"prediction of sample {index}", one_line(error)) from error
+            if isinstance(error, ValueError):
+                said = f"what {self._model.spec.name} says of sample {index}"
+                raise GearError(f"{said} cannot be measured ({one_line(error)}); see to its weights") from error
+            raise
+
+
+def _read_note(path: Path) -> dict[str, Any]:
+    """Raises:
+    DatasetError: it is none that gear wrote.
+    """
+    there = load_json(path)
+    if not isinstance(there, dict) or not there.keys() >= KEPT.keys():
+        raise DatasetError(path, "is no note of a sample")
+    try:
+        note: dict[str, Any] = {name: from_json(kind, there[name], name) for name, kind in KEPT.items()}
+    except FieldError as error:
+        raise DatasetError(path, f"is no note of a sample ({error})") from error
+    if note["mask"] is not None and note["mask"].keys() != set(MASK_FIGURES):
+        raise DatasetError(path, "is no note of a sample (mask: has other figures)")
+    return note
+
+
+def _with_nan(figures: Mapping[str, float | None]) -> dict[str, float]:
+    return {name: float("nan") if value is None else value for name, value in figures.items()}

@@ -1,0 +1,57 @@
+"""Whether a network sees things as large as it learnt them: what to say where pictures are not of the task's own size.
+
+Weights say at which share of the task's own pictures they work. A network applies that share to any picture, so one
+that learnt from small pictures sees small pictures smaller still. Weights that say nothing learnt from the task's own
+pictures, at the share that their network has by itself.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from gear.config.nodes import Place, Scalar
+from gear.config.overrides import with_value
+from gear.config.reader import read_node
+from gear.contracts.specs import ModelSpec, TaskSpec
+from gear.dataset.reading import Dataset
+from gear.measuring.plugin_selection import Chosen
+from gear.networks.input_scale import OPTION
+from gear.networks.options import NONE
+from gear.networks.shipped import trained_option
+from gear.plugins.build import find, name_of_task
+from gear.values.errors import ConfigError
+
+
+def size_note(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> str | None:
+    """One line where the dataset's pictures are not of the size that the weights' share belongs to; None where all is
+    well, nothing is known, or the user said the share.
+
+    Args:
+        model: with its options.
+        dataset: whose pictures it is shown.
+        flag: how the user sets one of the model's options.
+    """
+    spec = model.found.spec
+    assert isinstance(spec, ModelSpec)
+    config = read_node(spec.config, model.options, "")
+    task = find("task", name_of_task(dataset.plan.task)).spec
+    assert isinstance(task, TaskSpec)
+    width_px, usual_px = dataset.plan.options.get("width_px"), getattr(task.config(), "width_px", None)
+    if getattr(config, OPTION, 1.0) is not None or not width_px or not usual_px or width_px == usual_px:
+        return None
+    weights = getattr(config, "weights", NONE)
+    said = trained_option(weights, spec.name, OPTION)
+    share = spec.input_scale if said is None else said
+    if weights == NONE or not isinstance(share, (int, float)):
+        return None
+    wanted = round(share * usual_px / width_px, 4)
+    try:
+        read_node(spec.config, with_value(model.options, (OPTION,), Scalar(f"{wanted:g}", False, Place("size"))), "")
+        remedy = f"{flag}{OPTION}={wanted:g} shows it these so"
+    except ConfigError:
+        remedy = "collect larger ones"
+    look = "smaller" if width_px < usual_px else "larger"
+    return (
+        f"{dataset.root}: pictures are {width_px} px wide and {spec.name} sees them at {share * width_px:.0f} px; it "
+        f"learnt from {share * usual_px:.0f} px, so things look {look} than it knows them: {remedy}"
+    )

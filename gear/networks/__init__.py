@@ -1,0 +1,1 @@
+"""Networks: torch graphs under their official keys, their losses, and their weights on disk."""

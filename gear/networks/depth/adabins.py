@@ -1,0 +1,76 @@
+"""AdaBins behind the model protocol.
+
+Its transformer has a position encoding for at most 500 patches of 32 x 32 pixels, and needs one token more than it has
+queries. Pictures of more patches (2048 x 1024 has 2048) are made smaller, those of fewer larger, at their aspect ratio;
+the answer is brought back. KITTI's 1216 x 352 has 418 and is left alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from torch import Tensor, nn
+from torch.nn import functional
+
+from gear.networks.depth.adabins_graph import AdaBinsGraph, fitting
+from gear.networks.depth.losses import adabins_silog, bins_chamfer
+from gear.networks.depth.network import DEPTH, DepthNetwork, resized
+from gear.networks.depth.options import AdaBinsOptions
+from gear.networks.network import Normalise
+
+BINS = "bin_centres_m"
+CHAMFER_WEIGHT = 0.1
+"""The paper's beta."""
+
+OLD_NAMES = (
+    ("adaptive_bins_layer.embedding_conv.", "adaptive_bins_layer.conv3x3."),
+    (
+        "adaptive_bins_layer.patch_transformer.embedding_encoder.",
+        "adaptive_bins_layer.patch_transformer.embedding_convPxP.",
+    ),
+)
+"""Two layers are called otherwise in the published files than in the code that reads them."""
+
+
+class AdaBins(DepthNetwork):
+    """AdaBins: says `bin_centres_m` (B, bins) beside `depth_m`."""
+
+    options: AdaBinsOptions
+
+    def __init__(self, graph: AdaBinsGraph, options: AdaBinsOptions, *, input_scale: float = 1.0) -> None:
+        super().__init__(graph, options, input_scale=input_scale)
+        self._normalise = Normalise().to(self.device).eval()
+
+    def estimate(self, picture: Tensor) -> Mapping[str, Tensor]:
+        """Depth at the picture's size, and the picture's bins."""
+        height, width = (int(side) for side in picture.shape[2:])
+        seen = resized(picture, *fitting(height, width, least=self.options.queries + 1))
+        half_m, centres_m = self.graph(self._normalise(seen))
+        depth_m = functional.interpolate(half_m, (height, width), mode="bilinear", align_corners=True)
+        return {DEPTH: depth_m[:, 0], BINS: centres_m}
+
+    def depth_losses(self, outputs: Mapping[str, Tensor], depth_m: Tensor) -> Mapping[str, Tensor]:
+        """The paper's two: scale-invariant error of the pixels, and how well the bins lie among the depths."""
+        cap_m = self.options.max_depth_m
+        return {
+            "silog": adabins_silog(outputs[DEPTH], depth_m, cap_m=cap_m),
+            "bins": CHAMFER_WEIGHT * bins_chamfer(outputs[BINS], depth_m, cap_m=cap_m),
+        }
+
+    def taps(self) -> Mapping[str, nn.Module]:
+        """`stem` at half the picture's sides, `trunk` at a 32nd, `decoder` at half."""
+        return {
+            "stem": self.graph.get_submodule("encoder.original_model.blocks.0"),
+            "trunk": self.graph.get_submodule("encoder.original_model.conv_head"),
+            "decoder": self.graph.get_submodule("decoder.conv3"),
+        }
+
+
+def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    """A published state under the names of the graph."""
+    renamed = {}
+    for key, tensor in state.items():
+        for old, new in OLD_NAMES:
+            key = new + key.removeprefix(old) if key.startswith(old) else key
+        renamed[key] = tensor
+    return renamed

@@ -1,0 +1,187 @@
+"""AdaBins' graph (Bhat et al., CVPR 2021), written from the paper, under the key names of the published weights."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from gear.networks.depth.options import AdaBinsOptions
+from gear.networks.depth.packages import need_timm
+
+TAPPED = (0, 1, 2, 4)
+"""Blocks of the encoder whose outputs the decoder takes: 1/2, 1/4, 1/8 and 1/16 of the picture's sides."""
+
+WIDTH = 128
+"""Channels of the feature map and of the transformer's tokens."""
+
+PATCH_PX = 16
+"""Side of a token's patch in the feature map, which has half the picture's sides."""
+
+MOST_PATCHES = 500
+"""As many have a position encoding."""
+
+HIDDEN = 256
+LEAST_WIDTH = 0.1
+"""Added to every bin's width before the widths are normalised: no bin is empty."""
+
+
+class AdaBinsGraph(nn.Module):
+    """Encoder, decoder, and a small transformer that divides the range of depths into bins, picture by picture."""
+
+    def __init__(self, options: AdaBinsOptions) -> None:
+        super().__init__()
+        self.range_m = (options.min_depth_m, options.max_depth_m)
+        self.encoder = Encoder(options.encoder)
+        self.decoder = Decoder(self.encoder.widths(), options.features)
+        self.adaptive_bins_layer = AdaptiveBins(options.queries, options.bins)
+        self.conv_out = nn.Sequential(nn.Conv2d(options.queries, options.bins, 1), nn.Softmax(dim=1))
+
+    def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
+        """Depth and bins.
+
+        Args:
+            pictures: (B, 3, H, W), normalised, of `patches(H, W)` between queries + 1 and 500.
+
+        Returns:
+            (B, 1, ceil(H / 2), ceil(W / 2)) metres, and the (B, bins) ascending centres of the bins in metres.
+        """
+        widths, maps = self.adaptive_bins_layer(self.decoder(self.encoder(pictures)))
+        shares = self.conv_out(maps)
+        least_m, most_m = self.range_m
+        right_m = least_m + (most_m - least_m) * widths.float().cumsum(1)
+        centres_m = right_m - (most_m - least_m) * widths.float() / 2
+        return (shares.float() * centres_m[:, :, None, None]).sum(1, keepdim=True), centres_m
+
+
+class Encoder(nn.Module):
+    """An EfficientNet of timm's without its classifier."""
+
+    original_model: Any
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        need_timm()
+        import timm
+
+        self.original_model = timm.create_model(name, pretrained=False)
+        self.original_model.global_pool = nn.Identity()
+        self.original_model.classifier = nn.Identity()
+
+    def widths(self) -> list[int]:
+        """Channels of what `forward` gives."""
+        channels = {entry["module"]: entry["num_chs"] for entry in self.original_model.feature_info}
+        return [*(channels[f"blocks.{index}"] for index in TAPPED), self.original_model.conv_head.out_channels]
+
+    def forward(self, pictures: Tensor) -> list[Tensor]:
+        """Maps at 1/2, 1/4, 1/8, 1/16 and 1/32 of the sides; the last one before its normalisation."""
+        network = self.original_model
+        found = network.bn1(network.conv_stem(pictures))
+        maps = []
+        for index, block in enumerate(network.blocks):
+            found = block(found)
+            if index in TAPPED:
+                maps.append(found)
+        return [*maps, network.conv_head(found)]
+
+
+class Decoder(nn.Module):
+    """Four steps up, each with a map of the encoder beside it."""
+
+    def __init__(self, widths: Sequence[int], features: int) -> None:
+        super().__init__()
+        half, quarter, eighth, sixteenth, deepest = widths
+        # The padding around a 1x1 convolution makes its map two pixels larger. The published weights were trained so.
+        self.conv2 = nn.Conv2d(deepest, features, 1, padding=1)
+        self.up1 = Up(features + sixteenth, features // 2)
+        self.up2 = Up(features // 2 + eighth, features // 4)
+        self.up3 = Up(features // 4 + quarter, features // 8)
+        self.up4 = Up(features // 8 + half, features // 16)
+        self.conv3 = nn.Conv2d(features // 16, WIDTH, 3, padding=1)
+
+    def forward(self, maps: Sequence[Tensor]) -> Tensor:
+        """(B, 128, H / 2, W / 2) features."""
+        half, quarter, eighth, sixteenth, deepest = maps
+        found = self.up1(self.conv2(deepest), sixteenth)
+        found = self.up2(found, eighth)
+        found = self.up3(found, quarter)
+        features: Tensor = self.conv3(self.up4(found, half))
+        return features
+
+
+class Up(nn.Module):
+    """Interpolation to the size of the encoder's map, then two convolutions over both."""
+
+    def __init__(self, inputs: int, outputs: int) -> None:
+        super().__init__()
+        self._net = nn.Sequential(
+            nn.Conv2d(inputs, outputs, 3, padding=1), nn.BatchNorm2d(outputs), nn.LeakyReLU(),
+            nn.Conv2d(outputs, outputs, 3, padding=1), nn.BatchNorm2d(outputs), nn.LeakyReLU(),
+        )  # fmt: skip
+
+    def forward(self, coarse: Tensor, beside: Tensor) -> Tensor:
+        """(B, outputs, h, w) of the size of `beside`."""
+        enlarged = functional.interpolate(coarse, beside.shape[2:], mode="bilinear", align_corners=True)
+        found: Tensor = self._net(torch.cat([enlarged, beside], dim=1))
+        return found
+
+
+class AdaptiveBins(nn.Module):
+    """The paper's mini-ViT."""
+
+    def __init__(self, queries: int, bins: int) -> None:
+        super().__init__()
+        self.queries = queries
+        self.patch_transformer = PatchTransformer()
+        self.conv3x3 = nn.Conv2d(WIDTH, WIDTH, 3, padding=1)
+        self.regressor = nn.Sequential(
+            nn.Linear(WIDTH, HIDDEN), nn.LeakyReLU(), nn.Linear(HIDDEN, HIDDEN), nn.LeakyReLU(), nn.Linear(HIDDEN, bins)
+        )
+
+    def forward(self, features: Tensor) -> tuple[Tensor, Tensor]:
+        """(B, bins) shares of the range that sum to 1, and (B, queries, h, w) attention maps."""
+        tokens = self.patch_transformer(features)
+        widths = functional.relu(self.regressor(tokens[0])) + LEAST_WIDTH
+        queries = tokens[1 : self.queries + 1]
+        maps = torch.einsum("qbc,bchw->bqhw", queries, self.conv3x3(features))
+        return widths / widths.sum(1, keepdim=True), maps
+
+
+class PatchTransformer(nn.Module):
+    """Four layers of attention between the patches of a map."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        layer = nn.TransformerEncoderLayer(WIDTH, nhead=4, dim_feedforward=1024)
+        self.transformer_encoder = nn.TransformerEncoder(layer, num_layers=4, enable_nested_tensor=False)
+        self.embedding_convPxP = nn.Conv2d(WIDTH, WIDTH, PATCH_PX, stride=PATCH_PX)
+        self.positional_encodings = nn.Parameter(torch.rand(MOST_PATCHES, WIDTH))
+
+    def forward(self, features: Tensor) -> Tensor:
+        """(patches, B, 128) tokens, row by row."""
+        patches = self.embedding_convPxP(features).flatten(2).permute(2, 0, 1)
+        tokens: Tensor = self.transformer_encoder(patches + self.positional_encodings[: len(patches), None])
+        return tokens
+
+
+def patches(height: int, width: int) -> int:
+    """How many tokens a picture of this size gives."""
+    rows, columns = (-(-side // 2) // PATCH_PX for side in (height, width))
+    return rows * columns
+
+
+def fitting(height: int, width: int, least: int, most: int = MOST_PATCHES) -> tuple[int, int]:
+    """The size nearest to a picture's, at its aspect ratio, that gives `least` to `most` patches."""
+    count = patches(height, width)
+    if least <= count <= most:
+        return height, width
+    below, above = (0.0, 1.0) if count > most else (1.0, 64.0)
+    for _ in range(30):
+        middle = (below + above) / 2
+        enough = patches(round(height * middle), round(width * middle)) > (most if count > most else least - 1)
+        below, above = (below, middle) if enough else (middle, above)
+    scale = below if count > most else above
+    return round(height * scale), round(width * scale)

@@ -1,0 +1,64 @@
+"""A depth network on DDRNet-23-slim's trunk: one channel, the logarithm of the depth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import ClassVar
+
+from torch import Tensor, nn
+
+from gear.networks.depth.losses import log_l1, root_mean_square, silog
+from gear.networks.depth.network import DEPTH, DepthNetwork, resized
+from gear.networks.depth.options import DepthOptions
+from gear.networks.network import Normalise
+from gear.networks.segmentation.ddrnet import DDRNet23Slim
+
+MIDDLE_M = 10.0
+"""What a channel of 0 means; so that training begins near the depths of streets."""
+
+RANGE_M = (0.05, 1000.0)
+"""Answers are kept in it, for the sake of finite numbers."""
+
+LAST_STD = 0.05
+
+RMS_UNIT_M = 20.0
+"""An error of this size in metres weighs like one of the logarithm by a factor of e."""
+
+
+def ddrnet_depth_graph() -> DDRNet23Slim:
+    """The trunk with one channel and random weights; its last layer's are small, so that it begins near 10 m."""
+    graph = DDRNet23Slim(1, auxiliary=False)
+    nn.init.normal_(graph.final_layer.conv2.weight, std=LAST_STD)
+    return graph
+
+
+class DdrnetDepth(DepthNetwork):
+    """The fast one: depth = 10 m * exp(channel), interpolated before the exponential."""
+
+    multiple_px: ClassVar[int] = 8
+    graph: DDRNet23Slim
+
+    def __init__(self, graph: DDRNet23Slim, options: DepthOptions, *, input_scale: float = 1.0) -> None:
+        super().__init__(graph, options, input_scale=input_scale)
+        self._normalise = Normalise().to(self.device).eval()
+
+    def estimate(self, picture: Tensor) -> Mapping[str, Tensor]:
+        """`depth_m` at the size of the picture that it is shown."""
+        height, width = (int(side) for side in picture.shape[2:])
+        (channel,) = self.graph(self._normalise(picture))
+        least, most = (math.log(limit_m / MIDDLE_M) for limit_m in RANGE_M)
+        return {DEPTH: MIDDLE_M * resized(channel.float(), height, width)[:, 0].clamp(least, most).exp()}
+
+    def depth_losses(self, outputs: Mapping[str, Tensor], depth_m: Tensor) -> Mapping[str, Tensor]:
+        """Scale-invariant error, which outliers rule, the mean relative one, which they do not, and that in metres."""
+        cap_m = self.options.max_depth_m
+        return {
+            "silog": silog(outputs[DEPTH], depth_m, cap_m=cap_m),
+            "log_l1": log_l1(outputs[DEPTH], depth_m, cap_m=cap_m),
+            "rms": root_mean_square(outputs[DEPTH], depth_m, cap_m=cap_m) / RMS_UNIT_M,
+        }
+
+    def taps(self) -> Mapping[str, nn.Module]:
+        """Those of the trunk."""
+        return self.graph.taps()

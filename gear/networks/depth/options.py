@@ -1,0 +1,101 @@
+"""Options of the depth networks. No torch here: specs are cheap."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from gear.networks.options import LARGEST_SCALE, NetworkOptions
+from gear.values.errors import FieldError
+
+STAGES = 4
+"""Stages of a mix transformer."""
+
+HEADS = (1, 2, 5, 8)
+"""Attention heads of a mix transformer's stages, whatever its size."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DepthOptions(NetworkOptions):
+    """What every depth network can be told.
+
+    Attributes:
+        max_depth_m: what lies farther is not learnt; networks that have a limit never say more.
+        input_scale: the network sees the picture at this share of its width and height, and its answer is brought
+            back to the picture's size. null takes what the weights were trained for, or the network's own habit where
+            they do not say.
+    """
+
+    max_depth_m: float = 80.0
+    input_scale: float | None = None
+
+    def __post_init__(self) -> None:
+        if not self.max_depth_m > 0:
+            raise FieldError("max_depth_m", f"must be above 0 m, got {self.max_depth_m:g}")
+        if self.input_scale is not None and not 0 < self.input_scale <= LARGEST_SCALE:
+            raise FieldError("input_scale", f"must be above 0 and at most {LARGEST_SCALE:g}, got {self.input_scale:g}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GlpnOptions(DepthOptions):
+    """GLPDepth, by default with the encoder of the published weights, MiT-b4.
+
+    Attributes:
+        blocks: transformer blocks of each of the four stages.
+        widths: channels of each stage, divisible by 1, 2, 5 and 8 (its attention heads).
+        decoder_width: channels of the decoder.
+    """
+
+    blocks: tuple[int, int, int, int] = (3, 8, 27, 3)
+    widths: tuple[int, int, int, int] = (64, 128, 320, 512)
+    decoder_width: int = 64
+
+    def __post_init__(self) -> None:
+        DepthOptions.__post_init__(self)
+        if min(self.blocks) < 1:
+            raise FieldError("blocks", f"every stage needs at least 1 block, got {self.blocks}")
+        if any(width < 1 or width % heads for width, heads in zip(self.widths, HEADS, strict=True)):
+            raise FieldError("widths", f"must be divisible by {HEADS}, got {self.widths}")
+        if self.decoder_width < 2 or self.decoder_width % 2:
+            raise FieldError("decoder_width", f"must be even and above 0, got {self.decoder_width}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GlpnB0Options(GlpnOptions):
+    """GLPDepth with the smallest encoder, MiT-b0."""
+
+    blocks: tuple[int, int, int, int] = (2, 2, 2, 2)
+    widths: tuple[int, int, int, int] = (32, 64, 160, 256)
+    decoder_width: int = 32
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AdaBinsOptions(DepthOptions):
+    """AdaBins, by default as published.
+
+    Attributes:
+        encoder: which of timm's EfficientNets, `tf_efficientnet_b0` to `tf_efficientnet_b8`.
+        features: channels of the decoder's widest layer, divisible by 16; what follows has a half, a quarter and so on.
+        bins: into which the range of depths is divided, anew for each picture.
+        queries: how many of the transformer's tokens look for things in the feature map.
+        min_depth_m: where the bins begin.
+    """
+
+    encoder: str = "tf_efficientnet_b5"
+    features: int = 2048
+    bins: int = 256
+    queries: int = 128
+    min_depth_m: float = 1e-3
+
+    def __post_init__(self) -> None:
+        DepthOptions.__post_init__(self)
+        if not re.fullmatch("tf_efficientnet_b[0-8]", self.encoder):
+            raise FieldError("encoder", f"must be tf_efficientnet_b0 to tf_efficientnet_b8, got {self.encoder!r}")
+        if self.features < 16 or self.features % 16:
+            raise FieldError("features", f"must be divisible by 16 and above 0, got {self.features}")
+        if self.bins < 2:
+            raise FieldError("bins", f"must be at least 2, got {self.bins}")
+        if not 1 <= self.queries <= 400:
+            raise FieldError("queries", f"must be 1 to 400, got {self.queries}")
+        if not 0 < self.min_depth_m < self.max_depth_m:
+            raise FieldError("min_depth_m", f"must be above 0 and below max_depth_m, got {self.min_depth_m:g}")

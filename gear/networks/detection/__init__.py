@@ -1,0 +1,1 @@
+"""2D detection networks and their losses."""

@@ -1,0 +1,190 @@
+"""Faster R-CNN (Ren et al., 2015) with a feature pyramid, on torchvision's graph."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from gear.formats.coco import Detection
+from gear.networks.detection.network import (
+    ANCHORS,
+    MOSTLY,
+    PICTURE,
+    VIEW,
+    Detector,
+    Targets,
+    picture_size,
+    share_inside,
+    size_of,
+)
+from gear.networks.runtime import autocast, seeded
+
+OBJECTNESS, RPN_DELTAS, ANCHORS_PX = "objectness", "rpn_bbox_regression", "anchors_px"
+PROPOSALS, LOGITS, DELTAS = "proposals_px", "class_logits", "box_regression"
+
+MAPS = ("0", "1", "2", "3", "pool")
+"""Feature maps at 1/4 to 1/64 of what the graph sees, as torchvision names them."""
+
+SURE_BACKGROUND = 20.0
+"""The background's logit where there is no proposal."""
+
+
+class FasterRcnnDetector(Detector):
+    """Faster R-CNN behind the `Model` protocol.
+
+    Outputs: `objectness` (B, N) and `rpn_bbox_regression` (B, N, 4) of the anchors `anchors_px` (B, N, 4);
+    `class_logits` (B, R, 91) and `box_regression` (B, R, 364) of the proposals `proposals_px` (B, R, 4). R is fixed;
+    where a picture has fewer proposals the last ones are empty boxes of background. Boxes are in the picture's edge
+    pixels. Losses: `loss_classifier`, `loss_box_reg`, `loss_objectness`, `loss_rpn_box_reg`.
+    """
+
+    generator = "rpn.anchor_generator"
+
+    def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        """What the proposals' head and the boxes' heads say.
+
+        Pictures go through one by one: convolutions of a batch round otherwise than those of one picture, and the
+        least difference may change which proposals are kept, and so everything after them.
+        """
+        each = [self._run_one(picture[None]) for picture in pictures[VIEW]]
+        return {name: torch.cat([outputs[name] for outputs in each]) for name in each[0]}
+
+    def _run_one(self, picture: Tensor) -> dict[str, Tensor]:
+        trunk = self.run_for_losses({VIEW: picture})
+        graph: Any = self.graph
+        (proposals,) = self._proposals(trunk)
+        logits, deltas = self._box_heads(trunk, [proposals])
+        missing = graph.rpn.post_nms_top_n() - len(proposals)
+        nothing = logits.new_zeros(1, logits.shape[1])  # there may be no proposal at all
+        nothing[:, 0] = SURE_BACKGROUND
+        shrinkage = self.shrinkage(size_of(picture))
+        return {
+            OBJECTNESS: trunk[OBJECTNESS],
+            RPN_DELTAS: trunk[RPN_DELTAS],
+            ANCHORS_PX: trunk[ANCHORS] / shrinkage,
+            PROPOSALS: torch.cat([proposals / shrinkage, torch.zeros(missing, 4, device=self.device)])[None],
+            LOGITS: torch.cat([logits, nothing.expand(missing, -1)])[None],
+            DELTAS: functional.pad(deltas, (0, 0, 0, missing))[None],
+        }
+
+    def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        """Feature maps, what the proposals' head says of them, anchors in the graph's pixels, the picture's size."""
+        from torchvision.models.detection.rpn import concat_box_prediction_layers
+
+        graph: Any = self.graph
+        picture = pictures[VIEW]
+        maps = graph.backbone(self.seen(picture))
+        objectness, deltas = concat_box_prediction_layers(*graph.rpn.head(list(maps.values())))
+        anchors = self.anchors(size_of(picture), [size_of(each) for each in maps.values()])
+        size = torch.tensor(size_of(picture), device=self.device)
+        return dict(maps) | {
+            OBJECTNESS: objectness.reshape(len(picture), -1).float(),
+            RPN_DELTAS: deltas.reshape(len(picture), -1, 4).float(),
+            ANCHORS: anchors.expand(len(picture), -1, -1),
+            PICTURE: size.expand(len(picture), -1),
+        }
+
+    def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
+        """torchvision's; background that lies mostly in ignored objects is never sampled.
+
+        Which anchors and proposals take part is drawn: from `options.seed`, the same ones every time, unless the
+        network is in training mode, where torch's own generator draws.
+        """
+        wanted = [self.targets(sample, picture_size(outputs)) for sample in targets]
+        graph: Any = self.graph
+        with _as_in_training(graph.rpn):
+            proposals = self._proposals(outputs)
+        with contextlib.nullcontext() if self.training else seeded(self.options.seed):
+            proposal_losses = self._proposal_losses(outputs, wanted)
+            return self._box_losses(outputs, proposals, wanted) | proposal_losses
+
+    def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[Detection, ...]]:
+        """Detections of each picture, surest first."""
+        heads: Any = self.graph.get_submodule("roi_heads")
+        answers = []
+        for proposals, logits, deltas in zip(outputs[PROPOSALS], outputs[LOGITS], outputs[DELTAS], strict=True):
+            real = (proposals[:, 2:] > proposals[:, :2]).all(dim=1)
+            boxes, scores, labels = heads.postprocess_detections(
+                logits[real], deltas[real], [proposals[real]], [(size_px[0], size_px[1])]
+            )
+            answers.append(self.detections({"boxes": boxes[0], "scores": scores[0], "labels": labels[0]}))
+        return answers
+
+    def _proposals(self, outputs: Mapping[str, Tensor]) -> list[Tensor]:
+        """(R, 4) boxes of each picture in the graph's pixels, surest first; no gradient passes them."""
+        rpn: Any = self.graph.get_submodule("rpn")
+        anchors = outputs[ANCHORS]
+        boxes = rpn.box_coder.decode(outputs[RPN_DELTAS].detach(), list(anchors)).view(anchors.shape)
+        each = rpn.anchor_generator.num_anchors_per_location()
+        counts = [
+            outputs[name].shape[-2] * outputs[name].shape[-1] * count for name, count in zip(MAPS, each, strict=True)
+        ]
+        sizes = [self.sizing.inner_px(picture_size(outputs))] * len(anchors)
+        proposals: list[Tensor] = rpn.filter_proposals(boxes, outputs[OBJECTNESS], sizes, counts)[0]
+        return proposals
+
+    def _box_heads(self, outputs: Mapping[str, Tensor], proposals: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
+        """Class logits and box deltas of all proposals of all pictures, one after another, in float32."""
+        heads: Any = self.graph.get_submodule("roi_heads")
+        sizes = [self.sizing.inner_px(picture_size(outputs))] * len(proposals)
+        maps = {name: outputs[name] for name in MAPS}
+        with autocast(self.device, self.options.precision):
+            pooled = heads.box_roi_pool(maps, list(proposals), sizes)
+            logits, deltas = heads.box_predictor(heads.box_head(pooled))
+        return logits.float(), deltas.float()
+
+    def _proposal_losses(self, outputs: Mapping[str, Tensor], wanted: Sequence[Targets]) -> dict[str, Tensor]:
+        rpn: Any = self.graph.get_submodule("rpn")
+        anchors = list(outputs[ANCHORS])
+        labels, boxes = rpn.assign_targets_to_anchors(anchors, [target.as_torchvision() for target in wanted])
+        labels = _without_ignored(labels, anchors, wanted)
+        deltas = rpn.box_coder.encode(boxes, anchors)
+        objectness, box_reg = rpn.compute_loss(outputs[OBJECTNESS], outputs[RPN_DELTAS].reshape(-1, 4), labels, deltas)
+        return {"loss_objectness": objectness, "loss_rpn_box_reg": box_reg}
+
+    def _box_losses(
+        self, outputs: Mapping[str, Tensor], proposals: list[Tensor], wanted: Sequence[Targets]
+    ) -> dict[str, Tensor]:
+        from torchvision.models.detection.roi_heads import fastrcnn_loss
+
+        heads: Any = self.graph.get_submodule("roi_heads")
+        boxes = [target.boxes for target in wanted]
+        proposals = heads.add_gt_proposals(proposals, boxes)
+        matched, labels = heads.assign_targets_to_proposals(proposals, boxes, [target.labels for target in wanted])
+        chosen = heads.subsample(_without_ignored(labels, proposals, wanted))
+        # A picture without objects matches its background to one empty box, which no loss looks at.
+        some = [each if len(each) else each.new_zeros(1, 4) for each in boxes]
+        truth = [each[match[keep]] for each, match, keep in zip(some, matched, chosen, strict=True)]
+        kept = [each[keep] for each, keep in zip(proposals, chosen, strict=True)]
+        labels = [each[keep] for each, keep in zip(labels, chosen, strict=True)]
+        logits, deltas = self._box_heads(outputs, kept)
+        classifier, box_reg = fastrcnn_loss(logits, deltas, labels, heads.box_coder.encode(truth, kept))
+        return {"loss_classifier": classifier, "loss_box_reg": box_reg}
+
+
+def _without_ignored(labels: Sequence[Tensor], boxes: Sequence[Tensor], wanted: Sequence[Targets]) -> list[Tensor]:
+    """Labels in which background that lies mostly in ignored objects is -1: never sampled.
+
+    A picture in which nothing would be left keeps its background.
+    """
+    answers = []
+    for label, box, target in zip(labels, boxes, wanted, strict=True):
+        is_masked = (label == 0) & (share_inside(box, target.ignored) >= MOSTLY)
+        masked = label.masked_fill(is_masked, -1)
+        answers.append(masked if bool((masked >= 0).any()) else label)
+    return answers
+
+
+@contextlib.contextmanager
+def _as_in_training(rpn: Any) -> Iterator[None]:
+    """Inside, torchvision's proposal network keeps as many proposals as in training; its layers are left alone."""
+    was, rpn.training = rpn.training, True
+    try:
+        yield
+    finally:
+        rpn.training = was

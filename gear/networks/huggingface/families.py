@@ -1,0 +1,139 @@
+"""Image processors of transformers that gear repeats in torch: what a file leaves out is as their classes have it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from gear.networks.network import IMAGENET_MEAN, IMAGENET_STD
+from gear.values.errors import GearError
+
+HALF = (0.5, 0.5, 0.5)
+
+STEPS = ("do_resize", "do_rescale", "do_normalize", "do_pad", "do_center_crop")
+
+FOR_LABELS_OR_OTHER_FILES = ("do_reduce_labels", "do_convert_annotations", "do_convert_rgb")
+"""Steps that leave gear's pictures as they are: those are RGB, and its labels are its own."""
+
+EVERYWHERE: Mapping[str, Any] = MappingProxyType(
+    {"do_resize": True, "do_rescale": True, "rescale_factor": 1 / 255, "do_normalize": True, "do_pad": False,
+     "do_center_crop": False, "image_mean": IMAGENET_MEAN, "image_std": IMAGENET_STD, "resample": 2}
+)  # fmt: skip
+
+
+NEEDED_PX: Mapping[str, int] = MappingProxyType(
+    {"glpn": 32, "rt_detr": 32, "rt_detr_v2": 32, "d_fine": 32, "deimv2": 32}
+)
+"""By `model_type`: what sides must be multiples of, or a network's maps of several scales do not fit one another."""
+
+IN_PATCHES = ("beit", "data2vec-vision", "depth_anything", "dpt", "yolos", "zoedepth")
+"""By `model_type`: networks that look at whole patches only. What is left of a picture on the right and below they do
+not see, and what they say is of the rest alone."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Family:
+    """One class of image processors.
+
+    Attributes:
+        defaults: of the keys of its file, where they are not `EVERYWHERE`'s.
+        networks: `model_type` of the networks whose folders need not name it.
+        is_square: whether a `size` of one number is the height and the width, rather than the shorter edge.
+    """
+
+    defaults: Mapping[str, Any] = field(default_factory=dict)
+    networks: tuple[str, ...] = ()
+    is_square: bool = True
+
+    def facts(self, said: Mapping[str, Any]) -> dict[str, Any]:
+        """The keys of a file and what it leaves out; null is left out."""
+        return {**EVERYWHERE, **self.defaults, **{key: value for key, value in said.items() if value is not None}}
+
+    def steps(self) -> frozenset[str]:
+        """Keys `do_…` that this class, or nothing that gear does, looks at."""
+        return frozenset((*STEPS, *FOR_LABELS_OR_OTHER_FILES, *(key for key in self.defaults if key.startswith("do_"))))
+
+
+def _detr(*networks: str) -> Family:
+    edges = {"shortest_edge": 800, "longest_edge": 1333}
+    return Family(defaults={"size": edges, "do_pad": True}, networks=networks, is_square=False)
+
+
+FAMILIES: Mapping[str, Family] = MappingProxyType(
+    {
+        "Segformer": Family(defaults={"size": {"height": 512, "width": 512}}, networks=("segformer", "upernet")),
+        "Beit": Family(
+            defaults={
+                "size": {"height": 224, "width": 224}, "resample": 3, "image_mean": HALF, "image_std": HALF,
+            },
+            networks=("beit", "data2vec-vision"),
+        ),
+        "MobileViT": Family(
+            defaults={
+                "size": {"shortest_edge": 224}, "resample": 3, "do_center_crop": True, "do_normalize": False,
+                "do_flip_channel_order": True,
+            },
+            networks=("mobilevit", "mobilevitv2"),
+            is_square=False,
+        ),
+        "MobileNetV2": Family(
+            defaults={
+                "size": {"shortest_edge": 256}, "do_center_crop": True, "image_mean": HALF, "image_std": HALF,
+            },
+            networks=("mobilenet_v2",),
+            is_square=False,
+        ),
+        "GLPN": Family(defaults={"size_divisor": 32, "do_normalize": False}, networks=("glpn",)),
+        "DPT": Family(
+            defaults={
+                "size": {"height": 384, "width": 384}, "resample": 3, "image_mean": HALF, "image_std": HALF,
+                "ensure_multiple_of": 1, "keep_aspect_ratio": False,
+            },
+            networks=("dpt", "depth_anything"),
+        ),
+        "ZoeDepth": Family(
+            defaults={
+                "size": {"height": 384, "width": 512}, "image_mean": HALF, "image_std": HALF, "do_pad": True,
+                "ensure_multiple_of": 1 / 32, "keep_aspect_ratio": True,
+            },
+            networks=("zoedepth",),
+        ),
+        "Detr": _detr("detr", "table-transformer"),
+        "ConditionalDetr": _detr("conditional_detr"),
+        "DeformableDetr": _detr("deformable_detr", "lw_detr"),
+        "Yolos": _detr("yolos"),
+        "RTDetr": Family(
+            defaults={"size": {"height": 640, "width": 640}, "do_normalize": False},
+            networks=("rt_detr", "rt_detr_v2", "d_fine", "deimv2"),
+            is_square=False,
+        ),
+    }
+)  # fmt: skip
+
+
+def family_of(said: Mapping[str, Any], model_type: str, path: Path) -> str:
+    """The name in `FAMILIES` of the image processor of a folder.
+
+    Args:
+        said: its file.
+        model_type: of the network beside it, for files that name no class.
+        path: of the file.
+
+    Raises:
+        GearError: gear does not know the class, or nothing says which it is.
+    """
+    named = said.get("image_processor_type") or said.get("feature_extractor_type")
+    if named is not None:
+        name = str(named)
+        for ending in ("Fast", "Pil", "ImageProcessor", "FeatureExtractor"):
+            name = name.removesuffix(ending)
+    else:
+        name = next((each for each, family in FAMILIES.items() if model_type in family.networks), "")
+    if name not in FAMILIES:
+        problem = f"image_processor_type {named!r} is not one that gear repeats" if named else "no image_processor_type"
+        known = ", ".join(f"{each}ImageProcessor" for each in FAMILIES)
+        raise GearError(f"{path}: {problem}; write one of {known}, or an adapter (docs/write-a-model.md)")
+    return name

@@ -1,0 +1,210 @@
+"""Networks of transformers out of a folder: without the net, without pickles, without the folder's own code."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import nn
+
+from gear.networks.depth.packages import need_transformers
+from gear.networks.huggingface.options import FOLDER, FolderOptions
+from gear.networks.huggingface.processor_file import read_mapping
+from gear.networks.options import NONE
+from gear.networks.runtime import seeded
+from gear.networks.weights import OPTIONAL, load_into
+from gear.values.errors import GearError
+
+ADAPTER = "write an adapter (docs/write-a-model.md)"
+
+SHOWN = 240
+"""Characters of what transformers says."""
+
+OF_TIMM = {"in_chans": "num_channels", "out_indices": "out_indices", "output_stride": "output_stride"}
+"""What transformers before 5 says of a backbone of timm's in `backbone_kwargs`, and what it says since."""
+
+DILATED_STRIDE_PX = 16
+"""Of the last map of such a backbone that is dilated, where nothing else is said."""
+
+
+def open_folder(options: FolderOptions, auto: str) -> nn.Module:
+    """The graph of a folder, in float32.
+
+    Args:
+        options: of the network.
+        auto: name of the class of transformers that opens this kind of network.
+
+    Raises:
+        GearError: there is no network of this kind in the folder, or it is damaged.
+    """
+    folder = Path(options.folder)
+    if not options.folder or not (folder / "config.json").is_file():
+        raise GearError(f"folder {options.folder!r} has no config.json; set folder to what save_pretrained wrote")
+    read_mapping(folder / "config.json")
+    if options.weights == FOLDER:
+        _need_safetensors(folder)
+    need_transformers()
+    try:
+        with _quietly(), _offline():
+            graph, found = _opened(options, auto)
+    except Exception as error:  # transformers lets out whatever a broken file happens to raise
+        raise _refused(folder, auto, error) from error
+    _check(graph, found, folder)
+    if options.weights not in (FOLDER, NONE):
+        load_into(graph, options.weights)
+    return graph
+
+
+def start_from(folder_network: Any, auto: str) -> None:
+    """Puts the folder's own weights into a network of that folder, whatever it was built with: `--init folder`.
+
+    Args:
+        folder_network: a `gear.networks.huggingface.network.FolderNetwork`.
+        auto: as for `open_folder`.
+
+    Raises:
+        GearError: the folder has none that fit.
+    """
+    graph = open_folder(dataclasses.replace(folder_network.options, weights=FOLDER), auto)
+    folder_network.module().load_state_dict(graph.state_dict())
+
+
+def _opened(options: FolderOptions, auto: str) -> tuple[nn.Module, Mapping[str, Any]]:
+    """The graph, and what transformers found in the folder's weights."""
+    import transformers
+
+    kind: Any = getattr(transformers, auto)
+    # Left open, transformers asks, and runs the folder's code at a "y".
+    common: dict[str, Any] = {"local_files_only": True, "trust_remote_code": False}
+    said = read_mapping(Path(options.folder) / "config.json")
+    described = _with_backbone(said)
+    config = (
+        transformers.AutoConfig.from_pretrained(options.folder, **common)
+        if described == said
+        else transformers.AutoConfig.for_model(**described)
+    )
+    if options.weights == FOLDER:
+        # In the precision of the file, as transformers would have it, the network does not take gear's pictures.
+        loaded: tuple[nn.Module, Mapping[str, Any]] = kind.from_pretrained(
+            options.folder,
+            config=config,
+            use_safetensors=True,
+            dtype=torch.float32,
+            output_loading_info=True,
+            ignore_mismatched_sizes=True,  # `_check` says which they are, transformers refers to its own table
+            **common,
+        )
+        return loaded
+    with seeded(options.seed):
+        return kind.from_config(config, dtype=torch.float32, trust_remote_code=False), {}
+
+
+def _with_backbone(said: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A config.json whose backbone of timm's is described in it rather than named beside its options.
+
+    transformers before 5 wrote DETRs so; today it asks the net whether the name is a repository's.
+    """
+    name, options = said.get("backbone"), said.get("backbone_kwargs", {})
+    if said.get("use_timm_backbone") is not True or said.get("backbone_config") is not None or not name:
+        return said
+    if options is None:
+        return {key: value for key, value in said.items() if key != "backbone_kwargs"}
+    if not isinstance(options, dict) or "out_indices" not in options or options.keys() - OF_TIMM:
+        return said
+    kept = {key: value for key, value in said.items() if "backbone" not in key}
+    stride = {"output_stride": DILATED_STRIDE_PX} if said.get("dilation") else {}
+    of_timm = {OF_TIMM[key]: value for key, value in options.items()}
+    return {**kept, "backbone_config": {"model_type": "timm_backbone", "backbone": name, **stride, **of_timm}}
+
+
+def _need_safetensors(folder: Path) -> None:
+    """Refuses pickles: opening one runs what its author wants.
+
+    Raises:
+        GearError: there are no safetensors, or the list of files names others.
+    """
+    wanted = "open the network where you trust it and save it again with save_pretrained"
+    if not any(folder.glob("*.safetensors")):
+        raise GearError(f"{folder}: there is no model.safetensors, and gear reads no pickles; {wanted}")
+    index = folder / "model.safetensors.index.json"
+    if not (folder / "model.safetensors").is_file() and index.is_file():
+        files = read_mapping(index).get("weight_map")
+        if not isinstance(files, dict) or not all(str(name).endswith(".safetensors") for name in files.values()):
+            raise GearError(f"{index}: weight_map must name files of safetensors only; {wanted}")
+
+
+def _refused(folder: Path, auto: str, error: Exception) -> GearError:
+    if "trust_remote_code" in str(error):
+        return GearError(
+            f"{folder}: its network is code of the folder's own (auto_map in config.json), which gear never runs; "
+            f"save a network that transformers itself has, or {ADAPTER}"
+        )
+    if type(error).__name__ == "OfflineModeIsEnabled":
+        return GearError(
+            f"{folder}: config.json leaves something to the net, such as a backbone that it only names, and gear "
+            "fetches nothing; open it with transformers where there is a net and save it again with save_pretrained"
+        )
+    wanted = auto.removeprefix("AutoModelFor")
+    return GearError(
+        f"{folder}: no network for {wanted}; see to config.json and model.safetensors there: {in_one_line(error)}"
+    )
+
+
+def in_one_line(error: Exception) -> str:
+    """Its kind and the beginning of what it says."""
+    said = " ".join(str(error).split())
+    return f"{type(error).__name__}: {said if len(said) <= SHOWN else said[:SHOWN] + '...'}"
+
+
+def _check(graph: nn.Module, found: Mapping[str, Any], folder: Path) -> None:
+    """Refuses weights that transformers made up, because the folder lacks them, and weights that are no numbers.
+
+    Raises:
+        GearError: there are such: a classifier, say, has no head for depth.
+    """
+    name = type(graph).__name__
+    lost = sorted(key for key in found.get("missing_keys", ()) if not key.endswith(OPTIONAL))
+    if lost:
+        raise GearError(f"{folder}: {len(lost)} weights of {name} are not there, such as {lost[0]}; see to config.json")
+    other = sorted(found.get("mismatched_keys", ()))
+    if other:
+        key, given, wanted = other[0]
+        raise GearError(
+            f"{folder}: {len(other)} weights do not fit config.json, such as {key}: {tuple(given)}, not {tuple(wanted)}"
+        )
+    for key, weights in graph.state_dict().items():
+        if not bool(weights.isfinite().all()):
+            raise GearError(f"{folder}: {key} holds NaN or infinity; fetch the folder or train the network again")
+
+
+@contextlib.contextmanager
+def _offline() -> Iterator[None]:
+    """Inside, nothing of Hugging Face's asks the net: `local_files_only` does not hold for backbones."""
+    from huggingface_hub import constants
+
+    was = constants.HF_HUB_OFFLINE
+    constants.HF_HUB_OFFLINE = True
+    try:
+        yield
+    finally:
+        constants.HF_HUB_OFFLINE = was
+
+
+@contextlib.contextmanager
+def _quietly() -> Iterator[None]:
+    """Inside, transformers draws no progress bars and prints no tables: errors say what matters of them."""
+    from transformers.utils import logging as settings
+
+    had_bars, verbosity = settings.is_progress_bar_enabled(), settings.get_verbosity()
+    settings.disable_progress_bar()
+    settings.set_verbosity_error()
+    try:
+        yield
+    finally:
+        settings.set_verbosity(verbosity)
+        if had_bars:
+            settings.enable_progress_bar()

@@ -1,0 +1,260 @@
+"""Networks of Hugging Face's `transformers` from a local folder, behind the `Model` protocol."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from gear.formats.cityscapes import LABELS
+from gear.formats.coco import CATEGORY_NAMES, Detection
+from gear.networks.huggingface.folder import in_one_line
+from gear.networks.huggingface.labels import match
+from gear.networks.huggingface.options import DepthFolderOptions, DetectorFolderOptions, FolderOptions
+from gear.networks.huggingface.processor_file import read_processor
+from gear.networks.huggingface.set_loss import IGNORED, set_loss
+from gear.networks.network import Network
+from gear.networks.runtime import autocast
+from gear.networks.segmentation.label_maps import best_class
+from gear.networks.segmentation.losses import train_ids
+from gear.networks.segmentation.network import CLASSES, LABEL_ID_OF_TRAIN_ID
+from gear.values.errors import GearError
+from gear.values.frames import FloatImage
+
+VIEW = "left"
+LOGITS, DEPTH, BOXES, PICTURE = "logits", "depth_m", "pred_boxes", "picture"
+
+UNKNOWN_LOGIT = -50.0
+"""Of classes that the network does not have."""
+
+NEAREST_M = 1e-3
+
+METRIC_TYPES = ("glpn", "zoedepth")
+"""Families whose every network says metres; others say so in `depth_estimation_type`."""
+
+logger = logging.getLogger(__name__)
+
+
+class FolderNetwork(Network):
+    """A network of a folder.
+
+    Attributes:
+        unmatched: names of its classes that the task does not have.
+    """
+
+    options: FolderOptions
+    unmatched: tuple[str, ...] = ()
+
+    def __init__(self, graph: nn.Module, options: FolderOptions) -> None:
+        super().__init__(graph, options, views=(VIEW,))
+        resizes = options.input_size == "processor"
+        self.processor = read_processor(Path(options.folder), resizes=resizes, config=graph.config)
+
+    def seen(self, pictures: Mapping[str, Tensor]) -> Tensor:
+        """(B, 3, h, w) as the network wants it."""
+        return self.processor.apply(pictures[VIEW])
+
+    def said(self, seen: Tensor, **labels: Any) -> Any:
+        """What the graph makes of pictures as it wants them.
+
+        Raises:
+            GearError: it does not run on them, as with a config.json whose sizes can be built but do not fit.
+        """
+        try:
+            return self.graph(pixel_values=seen, **labels)
+        except torch.OutOfMemoryError:
+            raise
+        except (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeError, ValueError) as error:
+            raise GearError(
+                f"{self.options.folder}: the network does not run on {seen.shape[3]} x {seen.shape[2]} pixels; see to "
+                f"config.json and preprocessor_config.json there: {in_one_line(error)}"
+            ) from error
+
+    def restored(self, maps: Tensor, pictures: Mapping[str, Tensor], mode: str) -> Tensor:
+        """(B, C, H, W) at the size of the pictures, without the margins that the network saw."""
+        size = (int(pictures[VIEW].shape[2]), int(pictures[VIEW].shape[3]))
+        return self.processor.restore(maps, size, mode)
+
+    def matched(self, known: Mapping[str, int], whose: str) -> dict[int, int]:
+        """Our numbers of the network's classes, by name; what matches nothing goes to `unmatched` and the log.
+
+        Raises:
+            GearError: nothing matches, or the network's classes have no names.
+        """
+        config: Any = self.graph.config
+        theirs: dict[int, str] = config.id2label
+        if not all(isinstance(name, str) and 0 <= index < len(theirs) for index, name in theirs.items()):
+            raise GearError(
+                f"{self.options.folder}/config.json: id2label must be names by number, from 0, got {theirs!r:.80}"
+            )
+        found, self.unmatched = match(theirs, known)
+        if not found:
+            names = ", ".join(self.unmatched[:10])
+            raise GearError(f"{self.options.folder}: none of its classes is one of {whose} ({names})")
+        if self.unmatched:
+            logger.info("%s: %s has no %s", self.options.folder, whose, ", ".join(self.unmatched))
+        return found
+
+
+class FolderSegmenter(FolderNetwork):
+    """`logits` (B, 19, H, W) over Cityscapes train ids.
+
+    Several classes of the network that are one of Cityscapes' add up (as probabilities); what it does not know has a
+    logit of -50 and takes no part in the loss.
+    """
+
+    def __init__(self, graph: nn.Module, options: FolderOptions) -> None:
+        super().__init__(graph, options)
+        train_id_of = {label.name: label.train_id for label in LABELS if label.is_evaluated}
+        found = self.matched(train_id_of, "Cityscapes")
+        self._indexes = [[i for i, number in found.items() if number == train_id] for train_id in range(CLASSES)]
+
+    def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        """At the picture's size."""
+        theirs = self.their_logits(self.seen(pictures)).float()
+        nothing = torch.full_like(theirs[:, 0], UNKNOWN_LOGIT)
+        ours = [theirs[:, indexes].logsumexp(1) if indexes else nothing for indexes in self._indexes]
+        return {LOGITS: self.restored(torch.stack(ours, dim=1), pictures, "bilinear")}
+
+    def their_logits(self, seen: Tensor) -> Tensor:
+        """(B, classes, h, w) over the network's own classes, for pictures as it wants them."""
+        logits: Tensor = self.said(seen).logits
+        return logits
+
+    def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
+        """Cross-entropy over the pixels whose class the network knows."""
+        ids = train_ids(targets, self.device)
+        known = torch.tensor([train_id for train_id, indexes in enumerate(self._indexes) if indexes])
+        is_known = torch.isin(ids, known.to(self.device))
+        each = functional.cross_entropy(outputs[LOGITS], ids.where(is_known, 0), reduction="none")
+        return {"cross_entropy": (each * is_known).sum() / is_known.sum().clamp_min(1)}
+
+    def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
+        """(H, W) uint8 label ids."""
+        labels = np.array(LABEL_ID_OF_TRAIN_ID, dtype=np.uint8)
+        return [labels[best_class(logits)] for logits in outputs[LOGITS]]
+
+
+class FolderDepth(FolderNetwork):
+    """`depth_m` (B, H, W), metres."""
+
+    options: DepthFolderOptions
+
+    def __init__(self, graph: nn.Module, options: DepthFolderOptions) -> None:
+        super().__init__(graph, options)
+        config: Any = graph.config
+        metric = config.model_type in METRIC_TYPES or getattr(config, "depth_estimation_type", "") == "metric"
+        most_m = getattr(config, "max_depth", None)
+        if metric and most_m is not None and not 0 < most_m < math.inf:
+            raise GearError(f"{options.folder}/config.json: max_depth must be a number of metres above 0, got {most_m}")
+        if metric == bool(options.inverse_scale):
+            raise GearError(
+                f"{options.folder}: says metres, so leave inverse_scale at 0"
+                if metric
+                else f"{options.folder}: says relative depth; set inverse_scale (and inverse_shift) so that "
+                "1 / (inverse_scale * what it says + inverse_shift) are metres"
+            )
+
+    def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        """At the picture's size."""
+        said = self.said(self.seen(pictures)).predicted_depth.float()
+        said = self.restored(said[:, None], pictures, "bicubic")[:, 0]  # as transformers does
+        if self.options.inverse_scale:
+            inverse = self.options.inverse_scale * said + self.options.inverse_shift
+            said = 1 / inverse.clamp(min=1e-3)
+        return {DEPTH: said.clamp(min=NEAREST_M)}
+
+    def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
+        """Mean absolute difference of logarithms where depth is known."""
+        truth = torch.from_numpy(np.stack([sample.depth_m for sample in targets])).to(self.device)
+        is_known = torch.isfinite(truth)
+        error = (outputs[DEPTH].log() - truth.where(is_known, 1.0).log()).abs()
+        return {"log_l1": (error * is_known).sum() / is_known.sum().clamp_min(1)}
+
+    def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[FloatImage]:
+        """(H, W) float32 metres."""
+        return [depth_m.cpu().numpy() for depth_m in outputs[DEPTH]]
+
+
+class FolderDetector(FolderNetwork):
+    """A DETR, RT-DETR, YOLOS or the like: `logits` (B, N, classes) and `pred_boxes` (B, N, 4), middle and size as
+    shares of the picture's."""
+
+    options: DetectorFolderOptions
+
+    def __init__(self, graph: nn.Module, options: DetectorFolderOptions) -> None:
+        super().__init__(graph, options)
+        network: Any = graph
+        network.loss_function = partial(set_loss, network.loss_function, self.device.type)
+        self._categories = self.matched({name: number for number, name in CATEGORY_NAMES.items()}, "COCO")
+
+    def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        """One row a query."""
+        said = self.said(self.seen(pictures))
+        return {LOGITS: said.logits, BOXES: said.pred_boxes}
+
+    def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        """What the network's own loss starts from: the picture as it sees it, and the picture's size."""
+        size = torch.tensor(pictures[VIEW].shape[2:], device=self.device)
+        return {"seen": self.seen(pictures), PICTURE: size.expand(len(pictures[VIEW]), -1)}
+
+    def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
+        """The network's own set loss, in float32, against the objects of classes that it has; others are ignored."""
+        height, width = outputs[PICTURE][0].tolist()
+        labels = [self._labels(sample, torch.tensor([width, height] * 2)) for sample in targets]
+        with autocast(self.device, self.options.precision):
+            return {"set_loss": self.said(outputs["seen"], labels=labels).loss}
+
+    def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[Detection, ...]]:
+        """Sure enough boxes of classes that COCO has, surest first."""
+        scale = torch.tensor([size_px[1], size_px[0]] * 2, device=self.device)
+        answers = []
+        for logits, boxes in zip(outputs[LOGITS], outputs[BOXES], strict=True):
+            scores = self._scores(logits)
+            edges = torch.cat([boxes[:, :2] - boxes[:, 2:] / 2, boxes[:, :2] + boxes[:, 2:] / 2], dim=1) * scale
+            edges = edges.clamp(min=0).minimum(scale)
+            surest, places = scores.flatten().topk(len(scores))  # as many as there are queries, whatever their class
+            found = [
+                Detection(category_id=self._categories[index], box_px=(box[0], box[1], box[2], box[3]), score=score)
+                for score, index, box in zip(
+                    surest.tolist(),
+                    (places % scores.shape[1]).tolist(),
+                    edges[places // scores.shape[1]].tolist(),
+                    strict=True,
+                )
+                if index in self._categories and score >= self.options.least_score and score > 0
+            ]
+            answers.append(tuple(found))
+        return answers
+
+    def _scores(self, logits: Tensor) -> Tensor:
+        """(N, classes): each class's own probability, or, where the last of the logits means nothing there, the
+        likeliest class's alone."""
+        config: Any = self.graph.config
+        if logits.shape[-1] == config.num_labels:
+            return logits.sigmoid()
+        probabilities = logits.softmax(-1)[:, :-1]
+        return probabilities * (probabilities == probabilities.amax(1, keepdim=True))
+
+    def _labels(self, sample: Any, scale: Tensor) -> dict[str, Tensor]:
+        index_of = {category: index for index, category in reversed(self._categories.items())}
+        wanted = [thing for thing in sample.objects if not thing.is_ignored and thing.category_id in index_of]
+        others = [thing for thing in sample.objects if thing.is_ignored or thing.category_id not in index_of]
+        classes = torch.tensor([index_of[thing.category_id] for thing in wanted], dtype=torch.int64)
+        return {
+            "class_labels": classes.to(self.device),
+            "boxes": self._boxes(wanted, scale),
+            IGNORED: self._boxes(others, scale),
+        }
+
+    def _boxes(self, things: Sequence[Any], scale: Tensor) -> Tensor:
+        edges = torch.tensor([thing.box_px for thing in things], dtype=torch.float32).reshape(-1, 4) / scale
+        return torch.cat([(edges[:, :2] + edges[:, 2:]) / 2, edges[:, 2:] - edges[:, :2]], dim=1).to(self.device)

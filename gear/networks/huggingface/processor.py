@@ -1,0 +1,130 @@
+"""What an image processor of Hugging Face's does to a picture, in torch, so that gradients pass it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from torch import Tensor
+from torch.nn import functional
+
+from gear.networks.network import IMAGENET_MEAN, IMAGENET_STD, Normalise
+
+Size = tuple[int, int]
+"""Height and width."""
+
+Channels = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Processor:
+    """Resizing, normalisation and margins.
+
+    Attributes:
+        mean, std: of each channel of a picture in 0..1.
+        size: as the file has it: `height` and `width`, or `shortest_edge` and perhaps `longest_edge`; empty for none.
+        mode: of interpolation.
+        multiple_px: sides are multiples of this, which may be a fraction.
+        keeps_ratio: whether `height` and `width` are a frame that the picture is fitted to by the lesser change.
+        rounds_down: whether sides are cut down to the multiple rather than rounded.
+        pads_to_px: what is left to a multiple of this is filled with zeros on all sides, after all else; 0 for nothing.
+        has_margin: whether the picture is mirrored beyond its edges, before all else.
+        aligns_corners: of interpolation, which has no anti-aliasing then.
+        is_bgr: whether the network takes blue first.
+    """
+
+    mean: Channels = IMAGENET_MEAN
+    std: Channels = IMAGENET_STD
+    size: dict[str, int] | None = None
+    mode: str = "bilinear"
+    multiple_px: float = 1
+    keeps_ratio: bool = False
+    rounds_down: bool = False
+    pads_to_px: int = 0
+    has_margin: bool = False
+    aligns_corners: bool = False
+    is_bgr: bool = False
+
+    def target(self, picture_px: Size) -> Size:
+        """Height and width that a picture, with its mirrored margin, is resized to."""
+        height, width = picture_px
+        size = self.size or {}
+        if "shortest_edge" in size:
+            height, width = _with_edges(picture_px, size["shortest_edge"], size.get("longest_edge"))
+            return self._multiple(height), self._multiple(width)
+        scales = (size["height"] / height, size["width"] / width) if size else (1.0, 1.0)
+        if self.keeps_ratio:
+            scales = (min(scales, key=lambda each: abs(1 - each)),) * 2
+        return self._multiple(scales[0] * height), self._multiple(scales[1] * width)
+
+    def apply(self, pictures: Tensor) -> Tensor:
+        """(B, 3, h, w) as the network wants them, from (B, 3, H, W) in 0..1."""
+        rows, columns = self._margin(_size(pictures))
+        if rows or columns:
+            pictures = functional.pad(pictures, (columns, columns, rows, rows), mode="reflect")
+        seen: Tensor = Normalise(self.mean, self.std).to(pictures.device)(self._resized(pictures))
+        if self.is_bgr:
+            seen = seen.flip(1)
+        top, bottom, left, right = self._filled(_size(seen))
+        return functional.pad(seen, (left, right, top, bottom))
+
+    def restore(self, maps: Tensor, picture_px: Size, mode: str) -> Tensor:
+        """(B, C, H, W) over the picture, from (B, C, h, w) over what the network saw: the margins are cut off."""
+        rows, columns = self._margin(picture_px)
+        wide = (picture_px[0] + 2 * rows, picture_px[1] + 2 * columns)
+        height, width = self.target(wide)
+        top, bottom, left, right = self._filled((height, width))
+        if top + bottom + left + right:
+            maps = _interpolated(maps, (top + height + bottom, left + width + right), mode)
+            maps = maps[:, :, top : top + height, left : left + width]
+        maps = _interpolated(maps, wide, mode)
+        return maps[:, :, rows : rows + picture_px[0], columns : columns + picture_px[1]]
+
+    def _resized(self, pictures: Tensor) -> Tensor:
+        target = self.target(_size(pictures))
+        if target == _size(pictures):
+            return pictures
+        if self.mode == "nearest-exact":
+            return functional.interpolate(pictures, target, mode=self.mode)
+        if self.aligns_corners:
+            return functional.interpolate(pictures, target, mode=self.mode, align_corners=True)
+        # Theirs are whole levels, which cannot overshoot as a bicubic does.
+        return functional.interpolate(pictures, target, mode=self.mode, antialias=True).clamp(0, 1)
+
+    def _multiple(self, side_px: float) -> int:
+        steps = side_px / self.multiple_px
+        return max(1, int(max(1, int(steps) if self.rounds_down else round(steps)) * self.multiple_px))
+
+    def _margin(self, picture_px: Size) -> Size:
+        """Rows above and below, columns left and right."""
+        rows, columns = (int(math.sqrt(side / 2) * 3) if self.has_margin else 0 for side in picture_px)
+        return rows, columns
+
+    def _filled(self, seen_px: Size) -> tuple[int, int, int, int]:
+        """Rows above and below, columns left and right."""
+        rows, columns = (-side % self.pads_to_px if self.pads_to_px else 0 for side in seen_px)
+        return rows // 2, rows - rows // 2, columns // 2, columns - columns // 2
+
+
+def _size(pictures: Tensor) -> Size:
+    return int(pictures.shape[2]), int(pictures.shape[3])
+
+
+def _interpolated(maps: Tensor, size_px: Size, mode: str) -> Tensor:
+    if _size(maps) == size_px:
+        return maps
+    return functional.interpolate(maps, size=size_px, mode=mode, align_corners=False)
+
+
+def _with_edges(picture_px: Size, edge_px: int, most_px: int | None) -> Size:
+    """The picture's shorter edge brought to `edge_px`, or as near as the longer one stays within `most_px`."""
+    short, long = min(picture_px), max(picture_px)
+    exact: float = edge_px
+    if most_px and long / short * edge_px > most_px:
+        exact = most_px * short / long
+    rounded = round(exact)
+    if rounded == short:
+        return picture_px
+    # Theirs rounds the shorter side only: the longer one follows from what it was before.
+    height, width = (rounded if side == short else int(exact * side / short) for side in picture_px)
+    return height, width

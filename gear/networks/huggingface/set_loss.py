@@ -1,0 +1,101 @@
+"""Set losses of transformers' detectors: in float32, and without background that lies in ignored objects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from inspect import signature
+from typing import Any
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from gear.networks.detection.network import MOSTLY, share_inside
+
+PAIRS = (
+    ("logits", "pred_boxes"),
+    ("outputs_class", "outputs_coord"),
+    ("enc_topk_logits", "enc_topk_bboxes"),
+    ("enc_outputs_class", "enc_outputs_coord"),
+)
+"""What the losses are given of queries, by name: of the last layer, of all layers, of the encoder."""
+
+BATCH_FIRST = "enc_topk_logits"
+"""Losses that are given this have all layers' queries as (B, layers, …), others as (layers, B, …)."""
+
+DENOISING, NOTHING_NOISED = "denoising_meta_values", {"dn_num_split": (0,)}
+NOISED = ("logits", "outputs_class")
+"""In training, begin with queries that are noised boxes of the objects; those always take part."""
+
+IGNORED = "ignored"
+"""Beside the labels' `boxes`: those of what is neither to be found nor background."""
+
+NEAR = 0.4
+"""A query whose box overlaps (IoU) that of an object to be found by more is about that one, as RetinaNet's anchors."""
+
+SURE, FAR = 50.0, 10.0
+"""Logit of the background, and middle of the box in sides of the picture, of queries that take no part."""
+
+
+def set_loss(loss: Callable[..., Any], device_type: str, *said: Any, **more: Any) -> Any:
+    """A loss of transformers' on what its network says, whatever precision that was worked out in.
+
+    Queries that lie mostly in ignored objects, and near none that is to be found, are shown to it as sure background
+    far away: nothing is matched with them, and nothing is learnt of them. Where too few others would be left for the
+    objects of a picture, all of its queries take part. Queries that are matched in groups are counted so.
+    """
+    call = signature(loss).bind(*said, **more)
+    given = call.arguments
+    given.update({name: _float(value) for name, value in given.items()})
+    with torch.autocast(device_type, enabled=False):
+        for classes, boxes in PAIRS:
+            if isinstance(given.get(classes), Tensor):
+                config, batch = given["config"], 1 if classes == "outputs_class" and BATCH_FIRST not in given else 0
+                noised = (given.get(DENOISING) or NOTHING_NOISED)["dn_num_split"][0] if classes in NOISED else 0
+                group = getattr(config, "num_queries", given[boxes].shape[-2])
+                hidden = _hidden(given[boxes].detach(), given["labels"], batch, noised, group)
+                given[classes], given[boxes] = _without(hidden, given[classes], given[boxes], config.num_labels)
+        return loss(*call.args, **call.kwargs)
+
+
+def is_hidden(boxes: Tensor, labels: Mapping[str, Tensor]) -> Tensor:
+    """(…, N): which queries of a picture take no part in its loss.
+
+    Args:
+        boxes: (…, N, 4) of queries, middle and size as shares of the picture's.
+        labels: `boxes` and `ignored`, likewise.
+    """
+    from transformers.loss.loss_for_object_detection import box_iou
+
+    flat, wanted = _edges(boxes.reshape(-1, 4)), _edges(labels["boxes"])
+    hidden = share_inside(flat, _edges(labels[IGNORED])) >= MOSTLY
+    if len(wanted):
+        hidden &= box_iou(flat, wanted)[0].amax(dim=1) <= NEAR
+    hidden = hidden.reshape(boxes.shape[:-1])
+    return hidden & ((~hidden).sum(dim=-1, keepdim=True) >= len(wanted))
+
+
+def _hidden(boxes: Tensor, labels: Sequence[Mapping[str, Tensor]], batch: int, noised: int, group: int) -> Tensor:
+    """(…, N) for (…, N, 4), of which the dimension `batch` are the pictures."""
+    count = boxes.shape[-2] - noised
+    group = group if count % group == 0 else count
+    grouped = boxes[..., noised:, :].reshape(*boxes.shape[:-2], count // group, group, 4)
+    each = [is_hidden(one, label) for one, label in zip(grouped.unbind(batch), labels, strict=True)]
+    return functional.pad(torch.stack(each, dim=batch).flatten(-2), (noised, 0), value=False)
+
+
+def _without(hidden: Tensor, logits: Tensor, boxes: Tensor, classes: int) -> tuple[Tensor, Tensor]:
+    """Queries of which the hidden ones are sure background far away."""
+    background, away = torch.full_like(logits, -SURE), torch.zeros_like(boxes)
+    if logits.shape[-1] > classes:
+        background[..., -1] = SURE
+    away[..., :2] = FAR
+    return torch.where(hidden[..., None], background, logits), torch.where(hidden[..., None], away, boxes)
+
+
+def _edges(boxes: Tensor) -> Tensor:
+    return torch.cat([boxes[:, :2] - boxes[:, 2:] / 2, boxes[:, :2] + boxes[:, 2:] / 2], dim=1)
+
+
+def _float(value: Any) -> Any:
+    return value.float() if isinstance(value, Tensor) and value.is_floating_point() else value

@@ -1,0 +1,51 @@
+"""The size at which networks look at pictures: what the user says, or what the weights were trained for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Protocol
+
+from gear.networks.options import LARGEST_SCALE
+from gear.networks.shipped import resolve, trained_option
+from gear.values.errors import GearError
+
+OPTION = "input_scale"
+
+
+class Scaled(Protocol):
+    """Options of a network that has such a size."""
+
+    @property
+    def weights(self) -> str:
+        """See `gear.networks.options.NetworkOptions`."""
+        ...
+
+    @property
+    def input_scale(self) -> float | None:
+        """Share of the picture's width and height; None for what the weights say."""
+        ...
+
+
+def input_scale_of(options: Scaled, name: str, habit: float = 1.0) -> float:
+    """Share of the picture's width and height that network `name` looks at, above 0 and at most `LARGEST_SCALE`.
+
+    Args:
+        options: of the network.
+        name: of the model plugin, for the shipped weights.
+        habit: where neither the options nor the weights say.
+
+    Raises:
+        GearError: there are no such weights, or what they say is no such share.
+    """
+    if options.input_scale is not None:
+        return options.input_scale
+    said = trained_option(options.weights, name, OPTION)
+    if said is None:
+        return habit
+    if isinstance(said, bool) or not isinstance(said, (int, float)) or not 0 < said <= LARGEST_SCALE:
+        path: Path | None = resolve(options.weights, name)
+        raise GearError(
+            f"{path}: says input_scale {said!r}, which is no number above 0 and at most {LARGEST_SCALE:g}; "
+            f"say --set {OPTION}=… yourself, or take another file"
+        )
+    return float(said)

@@ -1,0 +1,170 @@
+"""The base of gear's networks: a torch graph behind the `Model` protocol."""
+
+from __future__ import annotations
+
+import copy
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+import torch
+from torch import Tensor, nn
+
+from gear.networks.fused_inference import InStep, quick_copy
+from gear.networks.options import NetworkOptions
+from gear.networks.runtime import autocast, device_of, prepare
+from gear.values.frames import UInt8Image
+
+Run = Callable[[Mapping[str, Tensor]], Mapping[str, Tensor]]
+
+IMAGENET_MEAN = (0.485, 0.456, 0.406)
+IMAGENET_STD = (0.229, 0.224, 0.225)
+
+
+class Network(nn.Module, ABC):
+    """A graph with its normalisation, losses and answers.
+
+    Attributes:
+        graph: the network itself, under official key names.
+        options: as given.
+        device: where it runs.
+        has_quick_copy: whether predictions on a CPU come from a copy of the graph that
+            `gear.networks.fused_inference` makes. Only for graphs in which nothing but its normalisation takes what a
+            convolution gives.
+    """
+
+    has_quick_copy: ClassVar[bool] = False
+
+    def __init__(self, graph: nn.Module, options: NetworkOptions, *, views: Sequence[str] = ("left",)) -> None:
+        super().__init__()
+        prepare()
+        self.graph = graph
+        self.options = options
+        self.device = device_of(options.device)
+        self._views = tuple(views)
+        self._quick: InStep[Network] = InStep()
+        self.to(self.device)
+        self.eval()
+
+    def module(self) -> nn.Module:
+        """The graph."""
+        return self.graph
+
+    def forward(self, views: Mapping[str, Tensor], targets: Sequence[Any] | None = None) -> Mapping[str, Tensor]:
+        """Outputs of a batch of (B, 3, H, W) pictures in 0..1, or its losses where the batch's samples are given.
+
+        Inputs may lie on any device; what comes out lies on the network's, in float32.
+        """
+        if targets is None:
+            return self._outputs(self.run, views)
+        return self.losses(self._outputs(self.run_for_losses, views), targets)
+
+    def _outputs(self, run: Run, views: Mapping[str, Tensor]) -> dict[str, Tensor]:
+        pictures = {name: views[name].to(self.device) for name in self._views}
+        with autocast(self.device, self.options.precision):
+            raw = run(pictures)
+        return {name: tensor.float() for name, tensor in raw.items()}
+
+    def taps(self) -> Mapping[str, nn.Module]:
+        """Named feature maps; none unless a network says so."""
+        return {}
+
+    def predict(self, views: Mapping[str, UInt8Image]) -> Any:
+        """The task's prediction for one sample."""
+        return self.predict_many([views])[0]
+
+    def predict_many(self, samples: Sequence[Mapping[str, UInt8Image]]) -> list[Any]:
+        """The task's predictions; pictures of one size go through the graph together."""
+        sizes = [sample[self._views[0]].shape[:2] for sample in samples]
+        answers: list[Any] = [None] * len(samples)
+        for size in dict.fromkeys(sizes):
+            chosen = [index for index, other in enumerate(sizes) if other == size]
+            with torch.inference_mode():
+                batch = as_batch([samples[index] for index in chosen], self._views, self.device)
+                quick = self.for_predictions(batch)
+                outputs = quick._outputs(quick.run_for_answers, batch)
+                for index, answer in zip(chosen, self.answers(outputs, size), strict=True):
+                    answers[index] = answer
+        return answers
+
+    def for_predictions(self, batch: Mapping[str, Tensor]) -> Network:
+        """What says the same to rounding, sooner: on a CPU this network with a quick copy of its graph.
+
+        Args:
+            batch: as for `forward`; a new copy sees the first of it.
+        """
+        if not self.has_quick_copy or self.device.type != "cpu":
+            return self
+        first = {name: pictures[:1] for name, pictures in batch.items()}
+        return (
+            self._quick.of(self.graph, lambda: self._with(quick_copy(self.graph, lambda g: self._with(g)(first))))
+            or self
+        )
+
+    def _with(self, graph: nn.Module) -> Network:
+        """This network on another graph; they share everything else."""
+        other = copy.copy(self)
+        other._modules = self._modules | {"graph": graph}
+        return other
+
+    @abstractmethod
+    def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        """Named outputs of a batch of pictures in 0..1 on the network's device."""
+
+    def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        """What `losses` is given: the outputs, unless a network has heads that only training looks at."""
+        return self.run(pictures)
+
+    def run_for_answers(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        """What `answers` is given for predictions: the outputs, unless a network answers sooner from something else."""
+        return self.run(pictures)
+
+    @abstractmethod
+    def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
+        """Named numbers without dimensions, to be minimised in training."""
+
+    @abstractmethod
+    def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
+        """The task's predictions from the outputs of a batch of pictures of (height, width), or from what
+        `run_for_answers` gives."""
+
+
+class Normalise(nn.Module):
+    """(x - mean) / std by channel; its numbers are not part of the saved state."""
+
+    mean: Tensor
+    std: Tensor
+
+    def __init__(self, mean: Sequence[float] = IMAGENET_MEAN, std: Sequence[float] = IMAGENET_STD) -> None:
+        super().__init__()
+        self.register_buffer("mean", torch.tensor(mean).view(1, -1, 1, 1), persistent=False)
+        self.register_buffer("std", torch.tensor(std).view(1, -1, 1, 1), persistent=False)
+
+    def forward(self, pictures: Tensor) -> Tensor:
+        """(B, 3, H, W) of 0..1, normalised."""
+        return (pictures - self.mean) / self.std
+
+
+def as_batch(
+    samples: Sequence[Mapping[str, UInt8Image]], views: Sequence[str], device: torch.device | None = None
+) -> dict[str, Tensor]:
+    """Pictures of one size as `Model.forward` takes them: (B, 3, H, W) float32 in 0..1 by camera name.
+
+    They go to the device, if there is one, as bytes, and become numbers there.
+    """
+    stacked = {name: _channels_first([sample[name] for sample in samples]) for name in views}
+    return {name: torch.from_numpy(one).to(device).float().div_(255) for name, one in stacked.items()}
+
+
+def _channels_first(pictures: Sequence[UInt8Image]) -> npt.NDArray[np.uint8]:
+    """(B, 3, H, W) in memory too: torch's CPU backward pass of small strided convolutions fails on channels last."""
+    height, width, channels = size = pictures[0].shape
+    stacked = np.empty((len(pictures), channels, height, width), np.uint8)
+    for planes, picture in zip(stacked, pictures, strict=True):
+        if picture.shape != size or picture.dtype != np.uint8:  # OpenCV would put its planes elsewhere
+            raise ValueError(f"a batch has uint8 pictures of one size: {size} and {picture.dtype} {picture.shape}")
+        cv2.split(picture, list(planes))
+    return stacked

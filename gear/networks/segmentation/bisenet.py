@@ -1,0 +1,164 @@
+"""BiSeNet with Xception39 (Yu et al., arXiv 1808.00897), under the key names of TorchSeg's published weights."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from gear.networks.segmentation.xception39 import ConvBnRelu, Xception39
+
+PLANES = 128
+
+
+def upsample(features: Tensor, size: torch.Size) -> Tensor:
+    """Bilinear with aligned corners, as everywhere in this network."""
+    return functional.interpolate(features, size=size, mode="bilinear", align_corners=True)
+
+
+class SpatialPath(nn.Module):
+    """Four convolutions to 128 channels at 1/8."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.conv_7x7 = ConvBnRelu(3, 64, 7, 2)
+        self.conv_3x3_1 = ConvBnRelu(64, 64, 3, 2)
+        self.conv_3x3_2 = ConvBnRelu(64, 64, 3, 2)
+        self.conv_1x1 = ConvBnRelu(64, PLANES, 1)
+
+    def forward(self, pictures: Tensor) -> Tensor:
+        """(B, 3, H, W) to (B, 128, H / 8, W / 8)."""
+        features: Tensor = self.conv_1x1(self.conv_3x3_2(self.conv_3x3_1(self.conv_7x7(pictures))))
+        return features
+
+
+class AttentionRefinement(nn.Module):
+    """A 3x3 convolution whose channels are weighed by what they hold on average."""
+
+    def __init__(self, inputs: int) -> None:
+        super().__init__()
+        self.conv_3x3 = ConvBnRelu(inputs, PLANES, 3)
+        self.channel_attention = nn.Sequential(
+            nn.AdaptiveAvgPool2d(1), ConvBnRelu(PLANES, PLANES, 1, rectify=False), nn.Sigmoid()
+        )
+
+    def forward(self, features: Tensor) -> Tensor:
+        """(B, inputs, H, W) to (B, 128, H, W)."""
+        mixed: Tensor = self.conv_3x3(features)
+        weights: Tensor = self.channel_attention(mixed)
+        return mixed * weights
+
+
+class FeatureFusion(nn.Module):
+    """Joins both paths and lets each channel add a share of itself."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        planes = PLANES * 2
+        self.conv_1x1 = ConvBnRelu(planes, planes, 1)
+        self.channel_attention = nn.Sequential(
+            nn.AdaptiveAvgPool2d(1),
+            ConvBnRelu(planes, planes, 1, norm=False),
+            ConvBnRelu(planes, planes, 1, norm=False, rectify=False),
+            nn.Sigmoid(),
+        )
+
+    def forward(self, spatial: Tensor, context: Tensor) -> Tensor:
+        """Two of (B, 128, H, W) to (B, 256, H, W)."""
+        fused: Tensor = self.conv_1x1(torch.cat([spatial, context], dim=1))
+        weights: Tensor = self.channel_attention(fused)
+        return fused + fused * weights
+
+
+class Head(nn.Module):
+    """From features to one map a class."""
+
+    def __init__(self, inputs: int, planes: int, classes: int) -> None:
+        super().__init__()
+        self.conv_3x3 = ConvBnRelu(inputs, planes, 3)
+        self.conv_1x1 = nn.Conv2d(planes, classes, 1)
+
+    def forward(self, features: Tensor) -> Tensor:
+        """(B, inputs, H, W) to (B, classes, H, W)."""
+        maps: Tensor = self.conv_1x1(self.conv_3x3(features))
+        return maps
+
+
+class BiSeNetX39(nn.Module):
+    """A spatial path at 1/8 and a context path down to 1/32, fused at 1/8.
+
+    The original interpolates inside and gives logarithms of probabilities; here the caller interpolates, and what comes
+    out are logits, whose `log_softmax` those are.
+
+    Attributes:
+        align_corners: of the interpolation that brings its maps to the picture's size.
+    """
+
+    align_corners = True
+
+    def __init__(self, classes: int, *, auxiliary: bool = True) -> None:
+        """Makes the graph with random weights (He initialisation, by fan-in).
+
+        Args:
+            classes: of the pictures.
+            auxiliary: whether it has the two heads that only training looks at.
+        """
+        super().__init__()
+        self.context_path = Xception39()
+        self.spatial_path = SpatialPath()
+        self.global_context = nn.Sequential(nn.AdaptiveAvgPool2d(1), ConvBnRelu(256, PLANES, 1))
+        self.arms = nn.ModuleList([AttentionRefinement(256), AttentionRefinement(128)])
+        self.refines = nn.ModuleList([ConvBnRelu(PLANES, PLANES, 3), ConvBnRelu(PLANES, PLANES, 3)])
+        self.ffm = FeatureFusion()
+        heads: dict[str, nn.Module] = {"2": Head(PLANES * 2, 64, classes)}
+        if auxiliary:
+            heads = {"0": Head(PLANES, PLANES, classes), "1": Head(PLANES, PLANES, classes)} | heads
+        self.heads = nn.ModuleDict(heads)
+        for module in self.modules():
+            if isinstance(module, nn.Conv2d):
+                nn.init.kaiming_normal_(module.weight, mode="fan_in", nonlinearity="relu")
+
+    def forward(self, pictures: Tensor, *, auxiliary: bool = False) -> list[Tensor]:
+        """Logits at 1/8 of the picture's size.
+
+        Args:
+            pictures: (B, 3, H, W), normalised.
+            auxiliary: whether to give the other heads' maps too, where there are any.
+
+        Returns:
+            (B, classes, h, w) each: the main head's at 1/8, then those at 1/16 and 1/8 that only training looks at.
+        """
+        spatial = self.spatial_path(pictures)
+        eighth, sixteenth, thirty_second = self.context_path(pictures)
+        context = upsample(self.global_context(thirty_second), thirty_second.shape[2:])
+        refined = []
+        for features, finer, arm, refine in zip(
+            (thirty_second, sixteenth), (sixteenth, eighth), self.arms, self.refines, strict=True
+        ):
+            context = refine(upsample(arm(features) + context, finer.shape[2:]))
+            refined.append(context)
+        maps = [self.heads["2"](self.ffm(spatial, context))]
+        if auxiliary and "0" in self.heads:
+            maps += [self.heads[str(index)](features) for index, features in enumerate(refined)]
+        return maps
+
+    def taps(self) -> dict[str, nn.Module]:
+        """Feature maps by the names of Z-Mask's paper (Rossolini et al., AAAI 2023).
+
+        `spatial_7x7` at 1/2 and `spatial_1x1` at 1/8 of the spatial path; `ct2`, `ct1` and `ct0` at 1/8, 1/16 and 1/32
+        of the context path.
+        """
+        return {
+            "spatial_7x7": self.spatial_path.conv_7x7,
+            "spatial_1x1": self.spatial_path.conv_1x1,
+            "ct2": self.context_path.layer1,
+            "ct1": self.context_path.layer2,
+            "ct0": self.context_path.layer3,
+        }
+
+
+def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    """The network's own keys from a checkpoint's: the criteria go, the rest is as it is."""
+    return {key: value for key, value in state.items() if not key.startswith(("criterion.", "ohem_criterion."))}

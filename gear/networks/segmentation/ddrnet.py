@@ -1,0 +1,102 @@
+"""DDRNet-23-slim (Hong et al., arXiv 2101.06085), under the key names of its authors' published weights."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from torch import Tensor, nn
+from torch.nn import functional
+
+from gear.networks.segmentation.ddrnet_parts import Bottleneck, Dappm, Head, conv1x1, conv3x3, stage, upsample
+
+PLANES = 32
+BRANCH_PLANES = 128
+HEAD_PLANES = 64
+
+WRAPPER = "model."
+"""The authors save the wrapper that they train with; its criterion has weights of its own."""
+
+
+class DDRNet23Slim(nn.Module):
+    """Two branches, at 1/8 and down to 1/64 of the picture, that exchange features twice.
+
+    Attributes:
+        align_corners: of the interpolation that brings its maps to the picture's size.
+    """
+
+    align_corners = False
+
+    def __init__(self, channels: int, *, auxiliary: bool = True) -> None:
+        """Makes the graph with random weights (He initialisation, by fan-out).
+
+        Args:
+            channels: of its output: classes, or 1 for a depth map.
+            auxiliary: whether it has the second head, which only training looks at.
+        """
+        super().__init__()
+        high = PLANES * 2
+        self.conv1 = nn.Sequential(
+            conv3x3(3, PLANES, 2, bias=True), nn.BatchNorm2d(PLANES), nn.ReLU(inplace=True),
+            conv3x3(PLANES, PLANES, 2, bias=True), nn.BatchNorm2d(PLANES), nn.ReLU(inplace=True),
+        )  # fmt: skip
+        self.layer1 = stage(PLANES, PLANES)
+        self.layer2 = stage(PLANES, PLANES * 2, 2)
+        self.layer3 = stage(PLANES * 2, PLANES * 4, 2)
+        self.layer4 = stage(PLANES * 4, PLANES * 8, 2)
+        self.compression3 = nn.Sequential(conv1x1(PLANES * 4, high), nn.BatchNorm2d(high))
+        self.compression4 = nn.Sequential(conv1x1(PLANES * 8, high), nn.BatchNorm2d(high))
+        self.down3 = nn.Sequential(conv3x3(high, PLANES * 4, 2), nn.BatchNorm2d(PLANES * 4))
+        self.down4 = nn.Sequential(
+            conv3x3(high, PLANES * 4, 2), nn.BatchNorm2d(PLANES * 4), nn.ReLU(inplace=True),
+            conv3x3(PLANES * 4, PLANES * 8, 2), nn.BatchNorm2d(PLANES * 8),
+        )  # fmt: skip
+        self.layer3_ = stage(PLANES * 2, high)
+        self.layer4_ = stage(high, high)
+        self.layer5_ = nn.Sequential(Bottleneck(high, high))
+        self.layer5 = nn.Sequential(Bottleneck(PLANES * 8, PLANES * 8, 2))
+        self.spp = Dappm(PLANES * 16, BRANCH_PLANES, PLANES * 4)
+        self.seghead_extra = Head(high, HEAD_PLANES, channels) if auxiliary else None
+        self.final_layer = Head(PLANES * 4, HEAD_PLANES, channels)
+        for module in self.modules():
+            if isinstance(module, nn.Conv2d):
+                nn.init.kaiming_normal_(module.weight, mode="fan_out", nonlinearity="relu")
+
+    def forward(self, pictures: Tensor, *, auxiliary: bool = False) -> list[Tensor]:
+        """Maps at 1/8 of the picture's size.
+
+        Args:
+            pictures: (B, 3, H, W), normalised; sides that are multiples of 8 keep both branches aligned.
+            auxiliary: whether to give the second head's map too, where there is one.
+
+        Returns:
+            (B, channels, H / 8, W / 8) each: the main head's, then the second one's.
+        """
+        relu = functional.relu
+        eighth = self.layer2(relu(self.layer1(self.conv1(pictures))))
+        low = self.layer3(relu(eighth))
+        high = self.layer3_(relu(eighth))
+        low, high = low + self.down3(relu(high)), high + upsample(self.compression3(relu(low)), high)
+        extra = high
+        low = self.layer4(relu(low))
+        high = self.layer4_(relu(high))
+        low, high = low + self.down4(relu(high)), high + upsample(self.compression4(relu(low)), high)
+        high = self.layer5_(relu(high))
+        context = self.spp(self.layer5(relu(low)))
+        maps = [self.final_layer(upsample(context, high) + high)]
+        if auxiliary and self.seghead_extra is not None:
+            maps.append(self.seghead_extra(extra))
+        return maps
+
+    def taps(self) -> dict[str, nn.Module]:
+        """The residual stages and bottlenecks by the names of Z-Mask's paper (Rossolini et al., AAAI 2023).
+
+        `rb1` at 1/4 and `rb2` at 1/8, before the branches part; `rbb1` at 1/8 and `rbb2` at 1/64, where they end. None
+        is rectified.
+        """
+        return {"rb1": self.layer1, "rb2": self.layer2, "rbb1": self.layer5_, "rbb2": self.layer5}
+
+
+def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    """The network's own keys from a checkpoint's: the training wrapper's prefix and its criterion go."""
+    kept = {key: value for key, value in state.items() if not key.startswith("loss.")}
+    return {key.removeprefix(WRAPPER): value for key, value in kept.items()}

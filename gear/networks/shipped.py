@@ -1,0 +1,175 @@
+"""Where weights lie and what their files say of themselves. No torch here, so that listing them costs nothing."""
+
+from __future__ import annotations
+
+import functools
+import importlib.metadata
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from safetensors import SafetensorError, safe_open
+
+from gear.dataset.sidecar import parse_json
+from gear.networks.options import NONE, SHIPPED
+from gear.values.errors import GearError
+from gear.values.serial import Json
+
+GROUP = "gear.weights"
+"""Entry points of this group name a module whose `FOLDER` holds `models/` and `patches/`."""
+
+CHECKOUT = Path(__file__).resolve().parents[2] / "weights" / "gear_weights"
+
+JSON_KEYS = ("metrics", "intervals", "options", "data", "look", "averaged")
+"""Metadata whose texts are JSON."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WeightsFile:
+    """A safetensors file, without its numbers.
+
+    Attributes:
+        path: of the file.
+        size_mb: of the file, in 10^6 bytes.
+        shapes: by key.
+        metadata: as written, all texts. gear writes, as far as it knows: `model`, `task`, `gear` (version), `source`
+            and `source_sha256` (of a published file), `licence`, `command`, `seed`, `look_hash` (of the training),
+            `measured_look_hash` (of the figures, where it is another), and as JSON `data` (what it was trained on),
+            `metrics` (figures by name), `intervals` (their bounds of 95 %), `options` (of the model, such as
+            `input_scale`), `look` (`gear.measuring.appearance_hash.Look`) and `averaged`
+            (hashes of the two states whose mean it is).
+    """
+
+    path: Path
+    size_mb: float
+    shapes: Mapping[str, tuple[int, ...]]
+    metadata: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def numbers(self) -> int:
+        """How many it holds, statistics included."""
+        return sum(math.prod(shape) for shape in self.shapes.values())
+
+    def facts(self) -> dict[str, Json]:
+        """The metadata with its JSON texts read; a text that is none stays as it is."""
+        return {key: _read(text) if key in JSON_KEYS else text for key, text in self.metadata.items()}
+
+    def option(self, name: str) -> Json:
+        """What the file says of one of the model's options; None where it says nothing."""
+        options = self.facts().get("options")
+        return options.get(name) if isinstance(options, dict) else None
+
+
+def inspect(path: str | Path) -> WeightsFile:
+    """Reads a file's header.
+
+    Raises:
+        GearError: there is no such file, or it is no safetensors.
+    """
+    file = Path(path)
+    check_file(file)
+    try:
+        with safe_open(str(file), framework="numpy") as opened:
+            shapes = {key: tuple(opened.get_slice(key).get_shape()) for key in opened.keys()}  # noqa: SIM118
+            metadata = dict(opened.metadata() or {})
+    except (SafetensorError, OSError) as error:
+        raise not_safetensors(file, error) from error
+    return WeightsFile(path=file, size_mb=file.stat().st_size / 1e6, shapes=shapes, metadata=metadata)
+
+
+def check_file(path: Path) -> None:
+    """Whether there is such a file.
+
+    Raises:
+        GearError: there is not.
+    """
+    if path.is_dir():
+        raise GearError(f"{path}: is a folder; name the file in it")
+    if not path.is_file():
+        raise GearError(f"{path}: there is no such weights file")
+
+
+def not_safetensors(path: str | Path, error: Exception) -> GearError:
+    """What to say of a file that cannot be read."""
+    reason = str(error).splitlines()[0]
+    return GearError(f"{path}: not a safetensors file ({reason}); gear weights convert makes one of a published file")
+
+
+def resolve(weights: str, name: str) -> Path | None:
+    """The file that the option `weights` of network `name` means; None for random weights.
+
+    Raises:
+        GearError: none is shipped.
+    """
+    if weights == NONE:
+        return None
+    if weights != SHIPPED:
+        return Path(weights)
+    path = shipped(name)
+    if path is None:
+        others = shipped_networks()
+        remedy = f"those installed are of {', '.join(others)};" if others else "install mujoco-gear-weights, or"
+        raise GearError(
+            f"{name} has no weights here: {remedy} say weights=FILE.safetensors "
+            "(gear weights convert makes one of a published file, gear train another), or weights=none for random ones"
+        )
+    return path
+
+
+def trained_option(weights: str, name: str, option: str) -> Json:
+    """What the weights that `weights` means say of one of network `name`'s options; None where they say nothing.
+
+    Raises:
+        GearError: there are no such weights.
+    """
+    path = resolve(weights, name)
+    return None if path is None else inspect(path).option(option)
+
+
+def shipped(name: str) -> Path | None:
+    """The reference weights of a network, where an installed package has them."""
+    for folder in shipped_folders():
+        path = folder / "models" / f"{name}.safetensors"
+        if path.is_file():
+            return path
+    return None
+
+
+def shipped_networks() -> list[str]:
+    """Names of the networks that installed packages have reference weights of."""
+    return sorted({path.stem for folder in shipped_folders() for path in (folder / "models").glob("*.safetensors")})
+
+
+@functools.cache
+def shipped_folders() -> tuple[Path, ...]:
+    """Folders of the installed weights packages, in the order of their names; in a checkout, last, the one beside gear.
+
+    Raises:
+        GearError: a package of that kind cannot be imported, or has no folder.
+    """
+    folders = []
+    for entry in sorted(importlib.metadata.entry_points(group=GROUP), key=lambda entry: (entry.name, entry.value)):
+        try:
+            folders.append(Path(entry.load().FOLDER))
+        except (ImportError, AttributeError, TypeError) as error:
+            package = entry.dist.name if entry.dist else entry.value
+            raise GearError(f"the weights package {package} is broken ({error}); install it again") from error
+    return tuple(dict.fromkeys([*folders, *([CHECKOUT] if CHECKOUT.is_dir() else [])]))
+
+
+def _read(text: str) -> Json:
+    try:
+        return parse_json(text)
+    except (ValueError, RecursionError):
+        return text
+
+
+def shipped_patches() -> dict[str, Path]:
+    """Pre-computed patch folders by name, of the installed weights packages."""
+    return {
+        path.name: path
+        for folder in reversed(shipped_folders())
+        for path in sorted((folder / "patches").glob("*"))
+        if (path / "patch_0.png").is_file()
+    }

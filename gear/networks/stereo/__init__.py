@@ -1,0 +1,1 @@
+"""Stereo 3D detection networks and their losses."""

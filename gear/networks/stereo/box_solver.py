@@ -1,0 +1,213 @@
+"""Where a car stands, from its boxes in both pictures and one of its corners: Stereo R-CNN, section 4.
+
+Seven measurements (sides, top and bottom of the left box, sides of the right one, the column of the corner that is seen
+between the sides) determine the position and the direction of a box whose size is known. Which corner of the box makes
+which side depends on how it is seen; the authors look that up among eight ways of seeing a car, here the corners are
+projected, solved with, and projected again until none changes.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from gear.formats.kitti_object import Calibration
+from gear.groundtruth.boxes import Box3d
+from gear.values.geometry import Array, wrap_angle_rad
+from gear.values.ground_truth import BoxPx
+
+BORDER_PX = (20.0, 10.0)
+"""A side of the box this near to the picture's edge, in x and in y, may be the picture's and not the car's."""
+
+LEAST_BOX_PX, LEAST_SEEN_PX = 10.0, 3.0
+CORNER_WEIGHT = 2.0
+MOST_DEPTH_M = 100.0
+NEAREST_M = 0.5
+ROUNDS = 5
+
+SIGNS = np.array([(-1, -1), (-1, 1), (1, 1), (1, -1)]) / 2
+"""Corners on the ground in widths to the right and lengths to the front, in the order of the keypoint's four types."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measured:
+    """What a network says of one car; index pixels of the pictures.
+
+    Attributes:
+        left_px: box in the left picture.
+        right_sides_px: left and right side of the box in the right picture.
+        corner: which corner on the ground is seen between the sides, 0..3: left behind, left in front, right in front,
+            right behind, as its driver has it.
+        corner_px: column of that corner.
+        borders_px: columns between which nothing covers the car.
+        width_m, height_m, length_m: its size.
+        alpha_rad: observation angle.
+    """
+
+    left_px: BoxPx
+    right_sides_px: tuple[float, float]
+    corner: int
+    corner_px: float
+    borders_px: tuple[float, float]
+    width_m: float
+    height_m: float
+    length_m: float
+    alpha_rad: float
+
+    @property
+    def alpha_of_corner_rad(self) -> float:
+        """The observation angle that the corner's place between the sides asks for, roughly."""
+        share = (self.corner_px - self.left_px[0]) / max(self.left_px[2] - self.left_px[0], 1e-6)
+        turned = math.asin(min(max(share, -1.0), 1.0))
+        return wrap_angle_rad((-math.pi / 2, math.pi, math.pi / 2, 0.0)[self.corner] - turned)
+
+
+def solve_box(measured: Measured, calibration: Calibration, depth_m: float | None = None) -> Box3d | None:
+    """The box that the measurements fit best.
+
+    Args:
+        measured: of one car.
+        calibration: of the pair.
+        depth_m: of the middle of the box, where it is known better; then the right picture is not asked.
+
+    Returns:
+        None where the boxes are too small, the car is hardly seen, or nothing sensible fits.
+    """
+    left, top, right, bottom = measured.left_px
+    seen_px = measured.borders_px[1] - measured.borders_px[0]
+    if seen_px < LEAST_SEEN_PX or min(right - left, bottom - top) < LEAST_BOX_PX:
+        return None
+    problem = _Problem.of(measured, calibration, depth_m)
+    starts = [problem.start(angle) for angle in (measured.alpha_of_corner_rad, measured.alpha_rad)]
+    solved = [_descend(problem, start) for start in starts if start is not None]
+    if not solved:
+        return None
+    _, state = min(solved, key=lambda found: found[0])
+    x, y, z, rotation_y = problem.whole(state)
+    if not (NEAREST_M < z < MOST_DEPTH_M and all(math.isfinite(value) for value in (x, y, rotation_y))):
+        return None
+    return Box3d(
+        height_m=measured.height_m,
+        width_m=measured.width_m,
+        length_m=measured.length_m,
+        bottom_m=(x, y, z),
+        rotation_y_rad=wrap_angle_rad(rotation_y),
+    )
+
+
+def _descend(problem: _Problem, state: Array) -> tuple[float, Array]:
+    """The error that is left, and the unknowns."""
+    cost, corners = math.inf, tuple[int, ...]()
+    for _ in range(ROUNDS):
+        chosen = problem.silhouette(state)
+        if chosen == corners:
+            break
+        corners = chosen
+        found = least_squares(problem.errors, state, args=(corners,), method="trf", x_scale=problem.scale())
+        cost, state = float(found.cost), found.x
+    return cost, state
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Problem:
+    """Least squares over x, y, z and rotation_y, without z where it is known; in units of the focal length."""
+
+    measured: Measured
+    baseline_m: float
+    depth_m: float | None
+    sides: Array
+    rows: Array
+    right_sides: Array
+    corner: float
+    alpha_rad: float
+    weights: Array
+
+    @staticmethod
+    def of(measured: Measured, calibration: Calibration, depth_m: float | None) -> _Problem:
+        lens = calibration.intrinsics
+        left, top, right, bottom = measured.left_px
+        x_edge, y_edge = BORDER_PX
+        in_x = np.array([left >= x_edge, right <= lens.width_px - 1 - x_edge])
+        in_y = np.array([top >= y_edge, bottom <= lens.height_px - 1 - y_edge])
+        right_in_x = np.array(
+            [measured.right_sides_px[0] >= x_edge, measured.right_sides_px[1] <= lens.width_px - 1 - x_edge]
+        )
+        is_whole = bool(in_x.all())
+        weights = [*in_x, *in_y, *(right_in_x & (depth_m is None)), CORNER_WEIGHT * is_whole, float(not is_whole)]
+        focal = lens.focal_px
+        return _Problem(
+            measured=measured,
+            baseline_m=calibration.baseline_m,
+            depth_m=depth_m,
+            sides=(np.array([left, right]) - lens.cx_px) / focal,
+            rows=(np.array([top, bottom]) - lens.cy_px) / focal,
+            right_sides=(np.array(measured.right_sides_px) - lens.cx_px) / focal,
+            corner=(measured.corner_px - lens.cx_px) / focal,
+            # A car that the picture cuts shows no share to be trusted.
+            alpha_rad=measured.alpha_of_corner_rad if is_whole else measured.alpha_rad,
+            weights=np.array(weights, dtype=np.float64),
+        )
+
+    def start(self, alpha_rad: float) -> Array | None:
+        """From the disparity of the boxes' middles and an observation angle."""
+        z = self.depth_m
+        if z is None:
+            disparity = float(self.sides.mean() - self.right_sides.mean())
+            if disparity <= 0:
+                return None
+            z = min(self.baseline_m / disparity, MOST_DEPTH_M)
+        x = z * float(self.sides.mean())
+        y = z * float(self.rows.mean()) + self.measured.height_m / 2
+        rotation_y = alpha_rad + math.atan2(x, z)
+        return np.array([x, y, rotation_y] if self.depth_m is not None else [x, y, z, rotation_y])
+
+    def whole(self, state: Array) -> tuple[float, float, float, float]:
+        """x, y, z, rotation_y."""
+        x, y, *others = (float(value) for value in state)
+        return (x, y, self.depth_m if self.depth_m is not None else others[0], others[-1])
+
+    def scale(self) -> Array:
+        """A step of each unknown that changes the picture about equally."""
+        return np.array([1.0, 1.0, 0.3] if self.depth_m is not None else [1.0, 1.0, 10.0, 0.3])
+
+    def corners(self, state: Array) -> tuple[Array, float]:
+        """(4, 2) x and z of the corners on the ground, and y of the ground."""
+        x, y, z, rotation_y = self.whole(state)
+        c, s = math.cos(rotation_y), math.sin(rotation_y)
+        across, along = self.measured.width_m * SIGNS[:, :1], self.measured.length_m * SIGNS[:, 1:]
+        places = np.array([x, z]) + across * (-s, -c) + along * (c, -s)
+        # A step of the solver may take the box through the camera; what is seen must stay finite there.
+        places[:, 1] = np.maximum(places[:, 1], NEAREST_M)
+        return places, y
+
+    def silhouette(self, state: Array) -> tuple[int, ...]:
+        """Which corners make the left side, the right side, the top, the bottom, and both sides on the right."""
+        places, y = self.corners(state)
+        left = places[:, 0] / places[:, 1]
+        right = (places[:, 0] - self.baseline_m) / places[:, 1]
+        roof, ground = (y - self.measured.height_m) / places[:, 1], y / places[:, 1]
+        found = (left.argmin(), left.argmax(), roof.argmin(), ground.argmax(), right.argmin(), right.argmax())
+        return tuple(int(corner) for corner in found)
+
+    def errors(self, state: Array, corners: tuple[int, ...]) -> Array:
+        """(8,) left, right, top, bottom, left and right in the right picture, corner, angle; weighted."""
+        places, y = self.corners(state)
+        x, _, z, rotation_y = self.whole(state)
+        column, right_column = places[:, 0] / places[:, 1], (places[:, 0] - self.baseline_m) / places[:, 1]
+        top = (y - self.measured.height_m) / places[corners[2], 1]
+        said = np.array(
+            [
+                column[corners[0]] - self.sides[0],
+                column[corners[1]] - self.sides[1],
+                top - self.rows[0],
+                y / places[corners[3], 1] - self.rows[1],
+                right_column[corners[4]] - self.right_sides[0],
+                right_column[corners[5]] - self.right_sides[1],
+                column[self.measured.corner] - self.corner,
+                wrap_angle_rad(rotation_y - math.atan2(x, z) - self.alpha_rad),
+            ]
+        )
+        return np.asarray(said * self.weights)

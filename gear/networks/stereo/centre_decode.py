@@ -1,0 +1,160 @@
+"""From the outputs of the network of centres to lines of KITTI's result files."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from gear.formats.kitti_object import Calibration, KittiLabel, clip_box, occlusion_level, truncation
+from gear.groundtruth.boxes import Box3d, project_box
+from gear.metrics.boxes import iou_2d
+from gear.values.geometry import Array, Intrinsics, wrap_angle_rad
+
+TRUSTED_M = 1.0
+"""A detection's score is the geometric mean of the chances that it is one, that its depth is this right, and that its
+line is, where that matters."""
+
+LONG = ("Car", "Van", "Truck", "Cyclist")
+"""Kinds whose boxes lie elsewhere when they are turned."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Peaks:
+    """Which centres become detections.
+
+    Attributes:
+        most: in a picture.
+        least_score: below which nothing is reported.
+        same_overlap: two detections that overlap by more in the picture are one, if their depths agree too.
+        same_depth: how far the depths of one object's detections may differ, relatively.
+    """
+
+    most: int = 50
+    least_score: float = 0.02
+    same_overlap: float = 0.6
+    same_depth: float = 0.15
+
+
+def decode(
+    outputs: Mapping[str, Tensor],
+    kinds: Sequence[str],
+    calibration: Calibration,
+    cell_px: tuple[float, float],
+    peaks: Peaks,
+) -> list[tuple[KittiLabel, ...]]:
+    """The detections of each picture of a batch, the surest first.
+
+    Args:
+        outputs: as `gear.networks.stereo.centre.CentreGraph` names them, lengths in pixels of the picture.
+        kinds: KITTI's types in the order of the channels of `heat`.
+        calibration: of the pair.
+        cell_px: width and height of a cell.
+        peaks: which of them are kept.
+    """
+    intrinsics = calibration.intrinsics
+    heat = outputs["heat"].sigmoid()
+    any_kind, kind = heat.max(dim=1)
+    is_peak = functional.max_pool2d(any_kind[:, None], 3, 1, 1)[:, 0] == any_kind
+    chance = any_kind * is_peak
+    count = min(peaks.most, chance[0].numel())
+    found = []
+    for batch in range(len(heat)):
+        best, cells = chance[batch].reshape(-1).topk(count)
+        cells = cells[best >= peaks.least_score]
+        rows, columns = cells // chance.shape[2], cells % chance.shape[2]
+        maps = {name: _plain(tensor[batch, :, rows, columns].T) for name, tensor in outputs.items()}
+        chosen = [kinds[index] for index in kind[batch, rows, columns].tolist()]
+        scores = _plain(chance[batch, rows, columns])
+        middles_px = np.stack([_plain(columns) + 0.5, _plain(rows) + 0.5], axis=-1) * cell_px - 0.5
+        depths_m = intrinsics.focal_px * calibration.baseline_m / maps["disparity_px"][:, 0]
+        maps["middle_m"] = intrinsics.unproject(middles_px + maps["centre_px"], depths_m)
+        maps["alpha_rad"], maps["line_chance"] = heading_rad(maps["heading_logits"])
+        labels = [
+            _label({name: values[i] for name, values in maps.items()}, chosen[i], scores[i], middles_px[i], intrinsics)
+            for i in range(len(chosen))
+        ]
+        found.append(_apart([label for label in labels if label is not None], peaks))
+    return found
+
+
+def _plain(tensor: Tensor) -> Array:
+    return np.asarray(tensor.to(torch.float64).cpu().numpy())
+
+
+def _label(
+    said: Mapping[str, Array], kind: str, chance: float, cell_middle_px: Array, intrinsics: Intrinsics
+) -> KittiLabel | None:
+    """One detection; None where its box lies outside the picture."""
+    middle_m, alpha_rad = said["middle_m"].tolist(), float(said["alpha_rad"])
+    depth_m = middle_m[2]
+    height_m, width_m, length_m = said["size_m"].tolist()
+    rotation_y_rad = wrap_angle_rad(alpha_rad + math.atan2(middle_m[0], middle_m[2]))
+    location_m = (middle_m[0], middle_m[1] + height_m / 2, depth_m)
+    (u, v), (left, top, right, bottom) = cell_middle_px.tolist(), said["sides_px"].tolist()
+    box_px = clip_box((u - left, v - top, u + right, v + bottom), intrinsics)
+    if box_px is None:
+        return None
+    box = Box3d(
+        height_m=height_m, width_m=width_m, length_m=length_m, bottom_m=location_m, rotation_y_rad=rotation_y_rad
+    )
+    projected = project_box(box.corners_m, intrinsics)
+    clipped = clip_box(projected, intrinsics) if projected else None
+    error_m = depth_m * math.exp(float(said["disparity_spread"][0]))
+    chances = (chance, 1 - math.exp(-TRUSTED_M / error_m), *((float(said["line_chance"]),) if kind in LONG else ()))
+    return KittiLabel(
+        type=kind,
+        truncated=truncation(projected, clipped) if projected and clipped else 1.0,
+        occluded=occlusion_level(1 / (1 + math.exp(-float(said["hidden"][0])))),
+        alpha_rad=alpha_rad,
+        box_px=box_px,
+        height_m=height_m,
+        width_m=width_m,
+        length_m=length_m,
+        location_m=location_m,
+        rotation_y_rad=rotation_y_rad,
+        score=math.prod(chances) ** (1 / len(chances)),
+    )
+
+
+def heading_rad(logits: Array) -> tuple[Array, Array]:
+    """The angles of distributions over directions, evenly round the circle from 0 on, and how sure their lines are.
+
+    A line is where the chances of both ends are highest together, so that not knowing front from back does not turn
+    it; between directions it is the mean of the best one and its neighbours. Then the likelier end is the front.
+
+    Args:
+        logits: (..., directions).
+
+    Returns:
+        (...) in [-pi, pi), and (...) 0..1.
+    """
+    chances = np.exp(logits - logits.max(axis=-1, keepdims=True))
+    chances /= chances.sum(axis=-1, keepdims=True)
+    half = chances.shape[-1] // 2
+    lines = chances[..., :half] + chances[..., half:]
+    best = lines.argmax(axis=-1)
+    near = best[..., None] + (-1, 0, 1)
+    sure = np.take_along_axis(lines, near % half, axis=-1)
+    place = best + (sure[..., 2] - sure[..., 0]) / sure.sum(axis=-1)
+    front, back = (np.take_along_axis(chances, (near + turn) % (2 * half), axis=-1).sum(axis=-1) for turn in (0, half))
+    angle_rad = math.pi * (place / half + (front < back))
+    return (angle_rad + math.pi) % (2 * math.pi) - math.pi, np.asarray(sure.sum(axis=-1))
+
+
+def _apart(labels: Sequence[KittiLabel], peaks: Peaks) -> tuple[KittiLabel, ...]:
+    """The surest of those that are one object."""
+    ordered = sorted(labels, key=lambda label: -(label.score or 0.0))
+    boxes_px = np.array([label.box_px for label in ordered]).reshape(-1, 4)
+    logs = np.log([label.location_m[2] for label in ordered])
+    is_same = (iou_2d(boxes_px, boxes_px) > peaks.same_overlap) & (abs(logs[:, None] - logs) < peaks.same_depth)
+    kept: list[int] = []
+    for i in range(len(ordered)):
+        if not is_same[i, kept].any():
+            kept.append(i)
+    return tuple(ordered[i] for i in kept)

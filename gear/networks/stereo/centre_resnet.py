@@ -1,0 +1,82 @@
+"""The network of centres on a ResNet-18 of its own: see `gear.networks.stereo.centre`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from gear.networks.stereo.centre import CentreGraph, StereoCentreShape, conv, conv_relu
+
+
+class Block(nn.Module):
+    """ResNet's basic block; its shortcut averages before it projects (ResNet-D, He et al., CVPR 2019)."""
+
+    def __init__(self, inputs: int, outputs: int, stride: int) -> None:
+        super().__init__()
+        self.conv1 = nn.Conv2d(inputs, outputs, 3, stride, 1, bias=False)
+        self.bn1 = nn.BatchNorm2d(outputs)
+        self.conv2 = nn.Conv2d(outputs, outputs, 3, 1, 1, bias=False)
+        self.bn2 = nn.BatchNorm2d(outputs)
+        self.skip: nn.Module = nn.Identity()
+        if stride != 1 or inputs != outputs:
+            self.skip = nn.Sequential(nn.AvgPool2d(stride), conv(inputs, outputs, 1))
+
+    def forward(self, features: Tensor) -> Tensor:
+        """(B, C, H, W) to (B, C', H / stride, W / stride)."""
+        inner = functional.relu(self.bn1(self.conv1(features)))
+        return functional.relu(self.bn2(self.conv2(inner)) + self.skip(features))
+
+
+def _stage(inputs: int, outputs: int) -> nn.Sequential:
+    return nn.Sequential(Block(inputs, outputs, 2), Block(outputs, outputs, 1))
+
+
+def _channels(shape: StereoCentreShape) -> list[int]:
+    return [shape.width * factor for factor in (2, 4, 6, 8)]
+
+
+class StereoCentre(CentreGraph):
+    """The first layers and one stage of the ResNet see both pictures, the other stages the left one and the volume."""
+
+    stem: nn.Module
+    layer1: nn.Module
+    fuse: nn.Module
+    layer2: nn.Module
+    layer3: nn.Module
+    layer4: nn.Module
+
+    def __init__(self, shape: StereoCentreShape) -> None:
+        super().__init__(shape, (shape.width, *_channels(shape)), pyramid=3 * shape.width)
+
+    def shared_layers(self) -> Mapping[str, nn.Module]:
+        """`stem` and `layer1`."""
+        width = self.shape.width
+        return {
+            "stem": nn.Sequential(conv_relu(3, width, 3, 2), conv_relu(width, width, 3)),
+            "layer1": _stage(width, _channels(self.shape)[0]),
+        }
+
+    def left_layers(self) -> Mapping[str, nn.Module]:
+        """`fuse` and `layer2` to `layer4`."""
+        one, two, three, four = _channels(self.shape)
+        return {
+            "fuse": conv_relu(one + 2 * self.shape.width, one, 1),
+            "layer2": _stage(one, two),
+            "layer3": _stage(two, three),
+            "layer4": _stage(three, four),
+        }
+
+    def shared(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
+        """The stem's and the first stage's."""
+        fine = self.stem(pictures)
+        return fine, self.layer1(fine)
+
+    def stages(self, coarse: Tensor, volume: Tensor) -> Sequence[Tensor]:
+        """What goes into the second stage, and what the others give."""
+        maps = [self.fuse(torch.cat([coarse, volume], dim=1))]
+        for layer in (self.layer2, self.layer3, self.layer4):
+            maps.append(layer(maps[-1]))
+        return maps

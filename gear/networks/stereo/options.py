@@ -1,0 +1,95 @@
+"""Options of the stereo networks, and the calibration that they stand for. No torch here."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from gear.formats.kitti_object import Calibration
+from gear.networks.options import NetworkOptions
+from gear.values.errors import FieldError
+from gear.values.geometry import Intrinsics
+
+LEFT, RIGHT = "left", "right"
+
+INPUT_SCALE = 0.5
+"""Of the network of centres, where neither the user nor the weights say."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StereoOptions(NetworkOptions):
+    """What pictures alone do not say. The defaults are those of the task stereo3d.
+
+    Attributes:
+        hfov_deg: horizontal field of view of the pictures.
+        baseline_m: left camera to right camera.
+    """
+
+    hfov_deg: float = 90.0
+    baseline_m: float = 0.54
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.hfov_deg <= 170:
+            raise FieldError("hfov_deg", f"must be 1 to 170 degrees, got {self.hfov_deg:g}")
+        if not 0.01 <= self.baseline_m <= 10:
+            raise FieldError("baseline_m", f"must be 0.01 to 10 m, got {self.baseline_m:g}")
+
+    def calibration(self, size_px: tuple[int, ...]) -> Calibration:
+        """Of pictures of (height, width)."""
+        intrinsics = Intrinsics.from_hfov(size_px[1], size_px[0], math.radians(self.hfov_deg))
+        return Calibration(intrinsics=intrinsics, baseline_m=self.baseline_m)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StereoCentreOptions(StereoOptions):
+    """Options of the network of centres.
+
+    Attributes:
+        width: channels of what is matched, and of a stem of its own; what is not a ready trunk's follows from it.
+        input_scale: size at which it looks at the pictures; 0.5 is half the width and half the height. null takes what
+            the weights were trained for, or one half where they do not say.
+        least_score: below which nothing is reported.
+    """
+
+    width: int = 32
+    input_scale: float | None = None
+    least_score: float = 0.02
+
+    def __post_init__(self) -> None:
+        StereoOptions.__post_init__(self)
+        if self.width < 1:
+            raise FieldError("width", f"must be at least 1, got {self.width}")
+        if self.input_scale is not None and not 0.05 <= self.input_scale <= 2:
+            raise FieldError("input_scale", f"must be 0.05 to 2, got {self.input_scale:g}")
+        if not 0 <= self.least_score <= 1:
+            raise FieldError("least_score", f"must be 0 to 1, got {self.least_score:g}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StereoRcnnOptions(StereoOptions):
+    """Options of Stereo R-CNN.
+
+    Attributes:
+        short_side_px: to which the pictures are enlarged.
+        considered: anchors, the best ones, that proposals are made of; twice as many in training.
+        proposals: pairs of boxes that the second stage looks at.
+        least_score: below which nothing is reported.
+        aligns: whether depth is aligned on the pictures; without, it is what the boxes and the keypoint say.
+        aligned_bias_px: added to every aligned disparity. The authors add 0.5; geometry asks for none.
+    """
+
+    short_side_px: int = 600
+    considered: int = 6000
+    proposals: int = 300
+    least_score: float = 0.05
+    aligns: bool = True
+    aligned_bias_px: float = 0.0
+
+    def __post_init__(self) -> None:
+        StereoOptions.__post_init__(self)
+        if not 32 <= self.short_side_px <= 4096:
+            raise FieldError("short_side_px", f"must be 32 to 4096, got {self.short_side_px}")
+        if not 1 <= self.proposals <= self.considered:
+            raise FieldError("proposals", f"must be 1 to the {self.considered} considered, got {self.proposals}")
+        if not 0 <= self.least_score <= 1:
+            raise FieldError("least_score", f"must be 0 to 1, got {self.least_score:g}")

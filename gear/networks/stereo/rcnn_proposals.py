@@ -1,0 +1,47 @@
+"""From the proposal network's outputs to pairs of boxes."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from gear.networks.stereo.legacy_boxes import clip, decode, left_and_right
+from gear.networks.torchvision_ops import nms
+
+SAME_OVERLAP = 0.7
+
+
+def propose(
+    chances: Tensor, codes: Tensor, anchors: Tensor, size_px: tuple[int, int], *, considered: int, most: int
+) -> tuple[Tensor, Tensor]:
+    """The best pairs of one picture: those that survive suppression among the left boxes and among the right ones.
+
+    Gradients end here, as in the authors' network.
+
+    Args:
+        chances: (A,) that an anchor holds an object.
+        codes: (A, 6) of its pair.
+        anchors: (A, 4).
+        size_px: height and width of the network's input.
+        considered: how many of the best anchors.
+        most: how many pairs.
+
+    Returns:
+        (R, 4) left and (R, 4) right boxes, R <= most, the best first.
+    """
+    with torch.no_grad():
+        order = chances.argsort(descending=True, stable=True)[:considered]
+        left, right = (clip(decode(part, anchors[order]), size_px) for part in left_and_right(codes[order]))
+        scores = chances[order]
+        in_both = torch.ones(len(order), dtype=torch.bool, device=order.device)
+        for boxes in (left, right):
+            kept = torch.zeros_like(in_both)
+            kept[legacy_nms(boxes, scores, SAME_OVERLAP)] = True
+            in_both &= kept
+        chosen = in_both.nonzero()[:most, 0]
+        return left[chosen], right[chosen]
+
+
+def legacy_nms(boxes: Tensor, scores: Tensor, most_overlap: float) -> Tensor:
+    """Suppression with sides of right - left + 1: (K,) which boxes are kept, surest first."""
+    return nms(boxes + boxes.new_tensor([0, 0, 1, 1]), scores, most_overlap)

@@ -1,0 +1,84 @@
+"""torchvision beside a torch that it was not built for.
+
+torchvision's wheels are linked with CUDA. Beside torch's CPU build their compiled operators do not load, and then
+nothing of torchvision imports, nor what imports torchvision: timm, and most of transformers. `prepare` defines the
+operators that detectors need and imports torchvision with them; where the pair fits, it does nothing. Whoever imports
+torchvision, timm or transformers calls it first.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import importlib.util
+import sys
+from typing import Any
+
+import torch
+
+from gear.networks import torchvision_ops
+from gear.values.errors import GearError
+
+NAME = "torchvision"
+
+SCHEMAS = (
+    "nms(Tensor dets, Tensor scores, float iou_threshold) -> Tensor",
+    "qnms(Tensor dets, Tensor scores, float iou_threshold) -> Tensor",
+    "roi_align(Tensor input, Tensor rois, float spatial_scale, SymInt pooled_height, SymInt pooled_width, "
+    "int sampling_ratio, bool aligned) -> Tensor",
+)
+"""As torchvision declares them; qnms, for quantised boxes, only has to exist."""
+
+_libraries: list[torch.library.Library] = []
+
+
+@functools.cache
+def prepare() -> bool:
+    """Makes torchvision importable, once a process; whether it is installed.
+
+    Deformable convolution and the position-sensitive pools stay undefined where the pair does not fit.
+
+    Raises:
+        ImportError, RuntimeError: torchvision does not import for another reason.
+    """
+    if importlib.util.find_spec(NAME) is None:
+        return False
+    try:
+        importlib.import_module(NAME)
+    except RuntimeError as error:
+        if f"{NAME}::nms" not in str(error):
+            raise
+        _define_operators()
+        _import_again()
+    return True
+
+
+def need() -> None:
+    """`prepare`, where nothing goes without torchvision.
+
+    Raises:
+        GearError: it is not installed.
+    """
+    if not prepare():
+        raise GearError(
+            "this network needs torchvision: pip install 'mujoco-gear[models]', with the versions of constraints.txt"
+        )
+
+
+def _define_operators() -> None:
+    library: Any = torch.library.Library(NAME, "DEF")  # type: ignore[no-untyped-call]
+    for schema in SCHEMAS:
+        library.define(schema)
+    library.impl("nms", torchvision_ops.nms, "CompositeExplicitAutograd")
+    library.impl("roi_align", torchvision_ops.roi_align, "CompositeImplicitAutograd")
+    _libraries.append(library)  # the operators live as long as their library
+
+
+def _import_again() -> None:
+    for name in [name for name in sys.modules if name.split(".")[0] == NAME]:
+        del sys.modules[name]
+    importlib.import_module(NAME)
+    # It asks this before every use of an operator. While it was imported the answer had to be no: it would have
+    # registered gradients for operators that are not there.
+    for module in (f"{NAME}.extension", f"{NAME}.ops.roi_align"):
+        sys.modules[module].__dict__["_has_ops"] = lambda: True

@@ -1,0 +1,180 @@
+"""Weights on disk: safetensors, strictly loaded."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save as to_bytes
+from torch import Tensor, nn
+
+from gear.dataset.files import write_alone
+from gear.networks.options import NetworkOptions
+from gear.networks.runtime import seeded
+from gear.networks.shipped import check_file, not_safetensors, resolve
+from gear.values.errors import GearError
+
+OPTIONAL = "num_batches_tracked"
+"""Files older than this counter lack it; nothing uses it."""
+
+SHORT = (torch.float16, torch.bfloat16, torch.float8_e4m3fn, torch.float8_e5m2)
+"""Numbers that are stored in fewer bits than gear's networks have."""
+
+SHOWN_KEYS = 3
+
+HEADER_AT = 8
+"""A safetensors file is the length of its header in eight bytes, the header as JSON, the tensors."""
+
+LEAST_SHARED = 0.25
+"""Of a network's numbers, for a file to be its trunk: heads are small, and a few layers alone are an accident."""
+
+GraphT = TypeVar("GraphT", bound=nn.Module)
+
+
+def build_graph(make: Callable[[], GraphT], options: NetworkOptions, name: str) -> GraphT:
+    """A network's graph with the weights that its options ask for.
+
+    Args:
+        make: builds the graph; its layers draw their first weights from `options.seed`.
+        options: of the network.
+        name: of the model plugin, for the shipped weights.
+
+    Raises:
+        GearError: the weights are not there, or are of another network.
+    """
+    path = resolve(options.weights, name)
+    with seeded(options.seed):
+        graph = make()
+    if path is not None:
+        load_into(graph, path)
+    return graph
+
+
+def load_into(network: nn.Module, path: str | Path) -> dict[str, str]:
+    """Loads a safetensors file into a network, strictly; returns the file's own metadata.
+
+    Raises:
+        GearError: there is no such file, it is no safetensors, or it is of another network.
+    """
+    state, metadata = read(path)
+    problems = mismatches(network.state_dict(), state)
+    if problems:
+        raise GearError(f"{path}: not this network's weights: {'; '.join(problems)}")
+    network.load_state_dict(state, strict=False)
+    return metadata
+
+
+def load_trunk(network: nn.Module, path: str | Path) -> tuple[int, int]:
+    """Loads what a safetensors file of another network has under the same keys in the same shapes; the rest of the
+    network stays as it is.
+
+    Returns:
+        How many of the network's numbers were loaded, and how many it has.
+
+    Raises:
+        GearError: there is no such file, it is no safetensors, or it shares less than `LEAST_SHARED` of the network.
+    """
+    given, _ = read(path)
+    wanted = network.state_dict()
+    shared = {
+        key: given[key] for key in wanted if key in given and not mismatches({key: wanted[key]}, {key: given[key]})
+    }
+    loaded, total = (sum(tensor.numel() for tensor in state.values()) for state in (shared, wanted))
+    if loaded < LEAST_SHARED * total:
+        raise GearError(
+            f"{path}: has {loaded / total:.0%} of this network's numbers under its keys and in its shapes: "
+            f"no trunk of it (that would be {LEAST_SHARED:.0%})"
+        )
+    network.load_state_dict(shared, strict=False)
+    return loaded, total
+
+
+def mismatches(wanted: Mapping[str, Tensor], given: Mapping[str, Tensor]) -> list[str]:
+    """What keeps a state from being loaded: keys that are missing or too many, other shapes or kinds of numbers, and
+    numbers that are none."""
+    missing = [key for key in wanted if key not in given and not key.endswith(OPTIONAL)]
+    surplus = [key for key in given if key not in wanted]
+    shared = [key for key in wanted if key in given]
+    shapes = [
+        f"{key} is {tuple(given[key].shape)}, not {tuple(wanted[key].shape)}"
+        for key in shared
+        if given[key].shape != wanted[key].shape
+    ]
+    kinds = [
+        key
+        for key in shared
+        if given[key].is_floating_point() != wanted[key].is_floating_point() and not key.endswith(OPTIONAL)
+    ]
+    broken = [key for key in shared if not _finite(given[key])]
+    found = {
+        "missing": missing,
+        "not known": surplus,
+        "of another shape": shapes,
+        "of integers where fractions belong, or the other way round": kinds,
+        "with numbers that are not finite": broken,
+    }
+    return [f"{len(keys)} {what} ({_few(keys)})" for what, keys in found.items() if keys]
+
+
+def read(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
+    """The tensors of a safetensors file, in float32 where they were stored shorter, and its metadata.
+
+    Raises:
+        GearError: there is no such file, or it is no safetensors.
+    """
+    check_file(Path(path))
+    try:
+        with safe_open(str(path), framework="pt") as opened:
+            metadata = dict(opened.metadata() or {})
+            state = {key: opened.get_tensor(key) for key in opened.keys()}  # noqa: SIM118
+    except (SafetensorError, OSError) as error:
+        raise not_safetensors(path, error) from error
+    return {key: value.float() if value.dtype in SHORT else value for key, value in state.items()}, metadata
+
+
+def write(path: str | Path, state: Mapping[str, Tensor], metadata: Mapping[str, str], *, halves: bool = False) -> None:
+    """Writes tensors whole or not at all; see `serialised`."""
+    write_alone(Path(path), serialised(state, metadata, halves=halves))
+
+
+def serialised(state: Mapping[str, Tensor], metadata: Mapping[str, str], *, halves: bool = False) -> bytes:
+    """A safetensors file; the same tensors and texts give the same bytes.
+
+    Args:
+        state: by key.
+        metadata: any texts; `gear.networks.shipped.WeightsFile` says which ones gear looks at.
+        halves: whether weights of two dimensions and more are stored in float16; statistics and biases never are, nor
+            are weights beyond its range.
+    """
+    tensors = {key: value.detach().cpu().clone().contiguous() for key, value in state.items()}
+    if halves:
+        tensors = {key: value.half() if _may_halve(value) else value for key, value in tensors.items()}
+    return _in_order(to_bytes(tensors, dict(metadata)))
+
+
+def _in_order(data: bytes) -> bytes:
+    """The same safetensors with its metadata sorted: the library writes them in another order every time."""
+    length = int.from_bytes(data[:HEADER_AT], "little")
+    header = json.loads(data[HEADER_AT : HEADER_AT + length])
+    header["__metadata__"] = dict(sorted(header.get("__metadata__", {}).items()))
+    text = json.dumps(header, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % HEADER_AT)  # tensors begin at multiples of eight
+    return len(text).to_bytes(HEADER_AT, "little") + text + data[HEADER_AT + length :]
+
+
+def _finite(tensor: Tensor) -> bool:
+    """Shapes without numbers, as lists of published keys have them, have none that are broken."""
+    return tensor.is_meta or bool(torch.isfinite(tensor).all())
+
+
+def _may_halve(tensor: Tensor) -> bool:
+    is_matrix = tensor.dtype == torch.float32 and tensor.dim() > 1
+    return is_matrix and bool((tensor.abs() <= torch.finfo(torch.float16).max).all())
+
+
+def _few(keys: list[Any]) -> str:
+    return ", ".join(keys[:SHOWN_KEYS]) + (", …" if len(keys) > SHOWN_KEYS else "")

@@ -1,1 +1,0 @@
-"""Networks in torch: graphs, weights, and what runs them. Never imported by what collects."""

@@ -1,0 +1,31 @@
+"""Looks of a patch: expectation over appearance, with CARLA-GeAR's transforms in their order."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from gear.plugins.attacks.optimisation.settings import Appearance
+
+
+def vary(appearance: Appearance, patch: Tensor, rng: np.random.Generator) -> Tensor:
+    """One look of a (3, h, w) patch in 0..1, differentiable: noise, brightness, contrast, blur."""
+    brightness, contrast, seed = rng.normal(), rng.normal(), int(rng.integers(2**63))
+    side = int(rng.integers(3, max(appearance.blur_px, 3) + 1))
+    seen = patch
+    if appearance.noise:
+        generator = torch.Generator(device="cpu").manual_seed(seed)
+        noise = torch.randn(patch.shape, generator=generator, dtype=patch.dtype).to(patch.device)
+        seen = (seen + appearance.noise * noise).clamp(0, 1)
+    seen = ((seen + appearance.brightness * brightness) * (1 + appearance.contrast * contrast)).clamp(0, 1)
+    return _box_blurred(seen, side) if appearance.blur_px >= 3 else seen
+
+
+def _box_blurred(patch: Tensor, side: int) -> Tensor:
+    before, after = (side - 1) // 2, side // 2
+    padded = functional.pad(patch[None], (before, after, before, after), mode="replicate")
+    # A convolution of each channel is some three times as fast as pooling with a stride of one.
+    box = patch.new_full((len(patch), 1, side, side), 1 / side**2)
+    return functional.conv2d(padded, box, groups=len(patch))[0]

@@ -1,0 +1,141 @@
+"""Models put together: several attacked at once, or one behind a defense that the attack knows of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from gear.contracts.defenses import Defense
+from gear.contracts.models import Model
+from gear.plugins.attacks.optimisation.frozen_model import networks_of
+from gear.values.frames import UInt8Image
+
+CleansBatches = Callable[[Mapping[str, Tensor]], Mapping[str, Tensor]]
+"""(B, 3, H, W) pictures in 0..1 by camera name to the same."""
+
+
+class Group(nn.Module):
+    """Several models as one: outputs, losses and taps are the members', under `<member>/<name>`.
+
+    Attributes:
+        members: by name.
+        device: where the first of them runs.
+    """
+
+    def __init__(self, members: Mapping[str, Model]) -> None:
+        super().__init__()
+        self.members = dict(members)
+        self.device = device_name(next(iter(members.values())))
+        self.networks = _networks(*members.values())
+
+    def predict(self, views: Mapping[str, UInt8Image]) -> dict[str, Any]:
+        """Every member's prediction by its name."""
+        return {name: member.predict(views) for name, member in self.members.items()}
+
+    def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
+        """Every member's outputs or losses."""
+        return {
+            f"{name}/{key}": value
+            for name, member in self.members.items()
+            for key, value in member.forward(views, targets).items()
+        }
+
+    def taps(self) -> Mapping[str, nn.Module]:
+        """Every member's."""
+        return {f"{name}/{key}": tap for name, member in self.members.items() for key, tap in member.taps().items()}
+
+
+class Defended(nn.Module):
+    """A model that sees what a defense lets through, for attacks that know of the defense.
+
+    Args:
+        model: as the defense wraps it.
+        defense: what cleans its pictures.
+        bare: the model that was wrapped, if the wrapping is another: its networks are attacked too.
+        clean: what cleans batches; by default the defense's `forward`.
+
+    Attributes:
+        device: where the model runs, whatever is around it.
+    """
+
+    def __init__(
+        self, model: Model, defense: Defense, bare: Model | None = None, clean: CleansBatches | None = None
+    ) -> None:
+        super().__init__()
+        self.model, self.defense = model, defense
+        self._clean_batch = defense.forward if clean is None else clean
+        self.device = device_name(model if bare is None else bare)
+        inside = [model] if bare is None or bare is model else [bare, model]
+        self.networks = _networks(*(one for one in inside if one is not model or not isinstance(one, nn.Module)))
+
+    def predict(self, views: Mapping[str, UInt8Image]) -> Any:
+        """The guarded model's own, without the defense: attacks optimise `forward`."""
+        return self.model.predict(views)
+
+    def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
+        """The model's, of the cleaned pictures; gradients pass the defense as it declares."""
+        return self.model.forward(self._clean_batch(views), targets)
+
+    def taps(self) -> Mapping[str, nn.Module]:
+        """The model's."""
+        return self.model.taps()
+
+
+class Cleaned(Defended):
+    """A model that sees what a defense without gradients lets through, for attacks that need none.
+
+    Pictures go through the defense as bytes, one sample at a time, and no gradient comes back.
+
+    Args:
+        model, defense, bare: as of `Defended`.
+        clean: what the defense makes of a sample's pictures.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        defense: Defense,
+        bare: Model,
+        clean: Callable[[Mapping[str, UInt8Image]], Mapping[str, UInt8Image]],
+    ) -> None:
+        super().__init__(model, defense, bare)
+        self._clean = clean
+
+    def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
+        """The model's, of the cleaned pictures."""
+        with torch.no_grad():
+            given = {name: _as_bytes(batch) for name, batch in views.items()}
+            count = len(next(iter(given.values())))
+            cleaned = [self._clean({name: batch[i] for name, batch in given.items()}) for i in range(count)]
+            seen = {}
+            for name, batch in views.items():
+                pictures = torch.from_numpy(np.stack([one[name] for one in cleaned])).permute(0, 3, 1, 2)
+                seen[name] = pictures.to(batch.device, batch.dtype) / 255
+            return self.model.forward(seen, targets)
+
+
+def _as_bytes(batch: Tensor) -> UInt8Image:
+    """(B, 3, H, W) 0..1 to (B, H, W, 3)."""
+    levels = (batch.clamp(0, 1) * 255).round().to(torch.uint8)
+    return levels.permute(0, 2, 3, 1).contiguous().cpu().numpy()
+
+
+def _networks(*models: Model) -> nn.ModuleList:
+    """What models that are no modules themselves hold counts too, where weights are frozen and hashed."""
+    return nn.ModuleList([network for model in models for _, network in networks_of(model)])
+
+
+def device_name(model: Model) -> str:
+    """Where a model says that it runs; the CPU where it does not say."""
+    return str(getattr(model, "device", "cpu"))
+
+
+def members_of(model: Model) -> Mapping[str, Model]:
+    """What is attacked, by a prefix for its figures: the members of a group, or the model itself under no name."""
+    if isinstance(model, Group):
+        return {f"{name}/": member for name, member in model.members.items()}
+    return {"": model}

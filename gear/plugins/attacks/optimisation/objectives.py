@@ -1,0 +1,381 @@
+"""What an attack maximises: the terms of each task, from a model's outputs or losses.
+
+Every term is a number that grows with the harm. In segmentation and depth, pixels on the patch never count: an attack
+is judged by what it does elsewhere. The losses of detectors and stereo networks are of the whole picture, as they are
+trained; there is no labelled object on a board.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal, Protocol
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from gear.contracts.models import Model
+from gear.formats import rle
+from gear.formats.cityscapes import IGNORED_TRAIN_ID, LABELS
+from gear.networks.network import as_batch
+from gear.plugins.attacks.optimisation.clean_outputs import CleanAnswers
+from gear.plugins.attacks.optimisation.frozen_model import frozen
+from gear.plugins.attacks.optimisation.model_group import members_of
+from gear.values.errors import GearError
+
+TRAIN_IDS = torch.tensor([label.train_id for label in LABELS if label.id >= 0])
+TRAIN_CLASSES = 19
+
+Kind = Literal["semseg", "depth", "losses"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Term:
+    """One thing to make large.
+
+    Attributes:
+        value: differentiable, without dimensions.
+        weight: of its gradient, after that has been brought to unit length.
+    """
+
+    value: Tensor
+    weight: float = 1.0
+
+
+class Objective(Protocol):
+    """Terms of a batch.
+
+    An objective whose weighted terms do not add up to a number that grows with the harm has a method `harm` of the same
+    arguments beside it, which gives that number (see `counted`). One whose `harm` asks for the answer to a sample's
+    clean picture, once a sample, says so by a true attribute `asks_for_clean`: attacks that are counted in queries pay
+    for it.
+    """
+
+    def terms(
+        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
+    ) -> Mapping[str, Term]:
+        """Terms by name for pictures (B, 3, H, W) with the patch in them; none where nothing is left to be harmed.
+
+        Args:
+            model: what is attacked.
+            views: pictures by camera name.
+            samples: the batch's samples, whose own pictures are without the patch.
+            indexes: their numbers in the data set, to remember things by.
+        """
+        ...
+
+
+def default_objective(sample: Any) -> Objective:
+    """Untargeted harm to the sample's task."""
+    kind = kind_of(sample)
+    if kind == "semseg":
+        return SemsegObjective()
+    return DepthObjective() if kind == "depth" else LossObjective(signs={})
+
+
+def kind_of(sample: Any) -> Kind:
+    """Which terms suit a sample, by its ground truth: labels, depth, or the model's own losses."""
+    if hasattr(sample, "label_ids"):
+        return "semseg"
+    return "depth" if hasattr(sample, "depth_m") else "losses"
+
+
+def outside(samples: Sequence[Any], view: str, device: torch.device) -> Tensor:
+    """(B, H, W) bool: where no patch surface is seen."""
+    masks = []
+    for sample in samples:
+        height, width = sample.images[view].shape[:2]
+        free = np.ones((height, width), dtype=np.bool_)
+        for surface in sample.surfaces:
+            if surface.camera == view and surface.visible_px:
+                free &= ~_mask(surface.mask_rle, height, width)
+        masks.append(free)
+    return torch.from_numpy(np.stack(masks)).to(device)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SemsegObjective:
+    """Cross-entropy of pixels that are right (Y) and of those that are wrong already (N) (Rossolini et al., 2022).
+
+    Attributes:
+        gamma: share of Y's gradient, the rest is N's; `dynamic` is the share of pixels that are right.
+        attacked, target: label ids: pixels of `attacked` (of any class where None) are pushed to `target`; untargeted
+            where `target` is None.
+    """
+
+    gamma: float | Literal["dynamic"] = "dynamic"
+    attacked: int | None = None
+    target: int | None = None
+    _right: CleanAnswers = field(default_factory=CleanAnswers, init=False, repr=False, compare=False)
+
+    @property
+    def asks_for_clean(self) -> bool:
+        """Whether `harm` looks at the answer to the picture without the patch, too; once a sample."""
+        return self.target is None and self.gamma != "dynamic"
+
+    def terms(
+        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
+    ) -> Mapping[str, Term]:
+        """`correct` and `wrong`, or `target`."""
+        logits, labels, counts = self._answers(model, views, samples)
+        if self.target is not None:
+            return self._targeted(logits, labels, counts)
+        loss = functional.cross_entropy(logits, labels, ignore_index=IGNORED_TRAIN_ID, reduction="none")
+        right = counts & _is_right(logits.detach(), labels)
+        wrong = counts & ~right
+        if self.gamma == "dynamic":
+            gamma = float(right.sum() / counts.sum().clamp_min(1))
+        else:
+            gamma = self.gamma
+        return _split(loss, {"correct": (right, gamma), "wrong": (wrong, 1 - gamma)})
+
+    def harm(self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]) -> Tensor:
+        """With a fixed `gamma` as the terms, but of the pixels that are right and wrong without the patch.
+
+        Those that the patch makes wrong change sides, and what is right still is what is harmed least: of it alone, the
+        figure would fall as the attack succeeds, to 0 where nothing is right any more.
+        """
+        if not self.asks_for_clean:
+            terms = weighted(self, model, views, samples, indexes)
+            return torch.stack(terms).sum() if terms else torch.zeros(())
+        assert self.gamma != "dynamic"
+        logits, labels, counts = self._answers(model, views, samples)
+
+        def rightly_said(sample: Any) -> Tensor:
+            clean = _logits(model, as_batch([sample.images], list(views)))
+            return _is_right(clean, train_labels([sample], clean.shape[1]).to(clean.device))[0]
+
+        right = counts & self._right.of(model, samples, indexes, rightly_said).to(logits.device)
+        loss = functional.cross_entropy(logits, labels, ignore_index=IGNORED_TRAIN_ID, reduction="none")
+        return self.gamma * _mean(loss, right) + (1 - self.gamma) * _mean(loss, counts & ~right)
+
+    def _answers(
+        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any]
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """Logits, the labels that they should show, and which pixels count."""
+        logits = _logits(model, views)
+        labels = train_labels(samples, logits.shape[1]).to(logits.device)
+        return logits, labels, outside(samples, next(iter(views)), logits.device) & (labels != IGNORED_TRAIN_ID)
+
+    def _targeted(self, logits: Tensor, labels: Tensor, counts: Tensor) -> Mapping[str, Term]:
+        assert self.target is not None
+        classes = logits.shape[1]
+        wanted = class_of(self.target, classes)
+        if self.attacked is not None:
+            counts = counts & (labels == class_of(self.attacked, classes))
+        loss = functional.cross_entropy(logits, torch.full_like(labels, wanted), reduction="none")
+        return {"target": Term(value=-_mean(loss, counts))}
+
+
+class DepthObjective:
+    """Smooth L1 against the network's own answer to the picture without the patch, split where the error is small.
+
+    Args:
+        gamma: share of the pixels whose error is still below `split_m`; the rest is the others'.
+        split_m: metres.
+        direction: `any` error, or only `farther` or `nearer` than the clean answer: log-depth is pushed that way.
+    """
+
+    asks_for_clean = True
+
+    def __init__(
+        self, *, gamma: float = 0.8, split_m: float = 0.5, direction: Literal["any", "farther", "nearer"] = "any"
+    ) -> None:
+        self._gamma, self._split_m, self._direction = gamma, split_m, direction
+        self._clean = CleanAnswers()
+
+    def terms(
+        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
+    ) -> Mapping[str, Term]:
+        """`small` and `large`, or the direction's name."""
+        depth_m, clean, free = self._answers(model, views, samples, indexes)
+        if self._direction != "any":
+            return {self._direction: Term(value=self._pushed(depth_m, clean, free))}
+        error = functional.smooth_l1_loss(depth_m, clean, reduction="none")
+        small = free & ((depth_m.detach() - clean).abs_() <= self._split_m)
+        return _split(error, {"small": (small, self._gamma), "large": (free & ~small, 1 - self._gamma)})
+
+    def harm(self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]) -> Tensor:
+        """The mean error, whatever it is split into.
+
+        The sum of both means, weighted, would fall where an error grows past `split_m`, and one pixel that is far off
+        would count for more than all of them that are a little off.
+        """
+        depth_m, clean, free = self._answers(model, views, samples, indexes)
+        if self._direction != "any":
+            return self._pushed(depth_m, clean, free)
+        return _mean(functional.smooth_l1_loss(depth_m, clean, reduction="none"), free)
+
+    def _answers(
+        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """(B, H, W) metres with the patch and without it, and where no patch is seen."""
+
+        def said(sample: Any) -> Tensor:
+            return _said(model, as_batch([sample.images], list(views)), "depth_m")[0]
+
+        clean = self._clean.of(model, samples, indexes, said)
+        depth_m = _said(model, views, "depth_m")
+        return depth_m, clean.to(depth_m.device, depth_m.dtype), outside(samples, next(iter(views)), depth_m.device)
+
+    def _pushed(self, depth_m: Tensor, clean: Tensor, free: Tensor) -> Tensor:
+        sign = 1.0 if self._direction == "farther" else -1.0
+        change = depth_m.clamp_min(1e-3).log() - clean.clamp_min(1e-3).log()
+        return sign * _mean(change, free)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LossObjective:
+    """The model's own training losses against the ground truth, each its own term: detectors and stereo networks.
+
+    Attributes:
+        signs: by loss name: 1 to make it large, -1 small, 0 to leave it out; names that are not there count as 1.
+    """
+
+    signs: Mapping[str, float]
+
+    def terms(
+        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
+    ) -> Mapping[str, Term]:
+        """One a loss."""
+        losses = model.forward(views, samples)
+        signs = {name: self.signs.get(name, 1.0) for name in losses}
+        return {name: Term(value=loss, weight=signs[name]) for name, loss in losses.items() if signs[name]}
+
+
+def counted(
+    objective: Objective,
+    model: Model,
+    views: Mapping[str, Tensor],
+    samples: Sequence[Any],
+    indexes: Sequence[int],
+) -> list[Tensor]:
+    """Numbers that add up to the harm by which patches are compared, of all members of a group.
+
+    They are the objective's own `harm` where it has one, its weighted terms otherwise.
+    """
+    harm = getattr(objective, "harm", None)
+    if harm is not None:
+        return [harm(member, views, samples, indexes) for member in members_of(model).values()]
+    return weighted(objective, model, views, samples, indexes)
+
+
+def weighted(
+    objective: Objective,
+    model: Model,
+    views: Mapping[str, Tensor],
+    samples: Sequence[Any],
+    indexes: Sequence[int],
+) -> list[Tensor]:
+    """The terms of all members of a group, times their weights: what attacks climb that add everything up."""
+    return [
+        term.weight * term.value
+        for member in members_of(model).values()
+        for term in objective.terms(member, views, samples, indexes).values()
+    ]
+
+
+def not_finite(what: str, indexes: Sequence[int]) -> GearError:
+    """What is said of a number along which nothing can be optimised, with the samples that it came of."""
+    which = f"sample{'s' * (len(indexes) > 1)} {', '.join(map(str, indexes))}"
+    return GearError(
+        f"{what} is NaN or infinite, as is what the model says of {which} with the patch; see to its weights"
+    )
+
+
+def loss_names(model: Model, sample: Any) -> list[str]:
+    """What a model calls its losses, of a group all members', in the order that they come in."""
+    views = as_batch([sample.images], list(sample.images))
+    with torch.no_grad(), frozen(model):
+        found = [name for member in members_of(model).values() for name in member.forward(views, [sample])]
+    return list(dict.fromkeys(found))
+
+
+def train_labels(samples: Sequence[Any], classes: int) -> Tensor:
+    """(B, H, W) int64 targets for logits over 19 train ids or over label ids; 255 is ignored in both.
+
+    Raises:
+        ValueError: fewer classes than Cityscapes has train ids.
+    """
+    labels = torch.from_numpy(np.stack([sample.label_ids for sample in samples])).long()
+    trained = TRAIN_IDS[labels]
+    if classes == TRAIN_CLASSES:
+        return trained
+    if classes < TRAIN_CLASSES:
+        raise ValueError(f"logits over {classes} classes; Cityscapes has {TRAIN_CLASSES} train ids")
+    return torch.where(trained == IGNORED_TRAIN_ID, IGNORED_TRAIN_ID, labels)
+
+
+def class_of(label_id: int, classes: int) -> int:
+    """The channel of a label id."""
+    return int(TRAIN_IDS[label_id]) if classes == TRAIN_CLASSES else label_id
+
+
+def _is_right(logits: Tensor, labels: Tensor) -> Tensor:
+    """(B, H, W) bool: where the surest class is the label; anything where that is ignored."""
+    # The largest value is found much faster than where it is.
+    given = logits.gather(1, labels.clamp(max=logits.shape[1] - 1)[:, None])[:, 0]
+    return given == logits.amax(1)
+
+
+def _said(model: Model, views: Mapping[str, Tensor], name: str) -> Tensor:
+    """The output that every network of the task has, at the picture's size.
+
+    Raises:
+        GearError: this one has not, or at another size.
+    """
+    outputs = model.forward(views)
+    if name not in outputs:
+        given = ", ".join(outputs) or "nothing"
+        raise GearError(
+            f"an attack works on the output {name!r}, and the network gives {given} (docs/write-a-model.md)"
+        )
+    said, size = outputs[name], next(iter(views.values())).shape[-2:]
+    if said.shape[-2:] != size:
+        there, wanted = (" x ".join(map(str, shape)) for shape in (said.shape[-2:], size))
+        raise GearError(
+            f"an attack works on {name!r} at the picture's size, {wanted}, and the network gives {there} "
+            "(docs/write-a-model.md)"
+        )
+    return said
+
+
+def _logits(model: Model, views: Mapping[str, Tensor]) -> Tensor:
+    """(B, C, H, W) of a network that knows Cityscapes' classes.
+
+    Raises:
+        GearError: it knows others.
+    """
+    logits = _said(model, views, "logits")
+    known = TRAIN_CLASSES, len(TRAIN_IDS)
+    if logits.shape[1] not in known:
+        raise GearError(
+            f"an attack works on logits over Cityscapes' {known[0]} train ids or {known[1]} label ids, and the network "
+            f"gives {logits.shape[1]} classes (docs/write-a-model.md)"
+        )
+    return logits
+
+
+@functools.lru_cache(maxsize=64)
+def _mask(counts: str, height: int, width: int) -> npt.NDArray[np.bool_]:
+    mask = rle.decode(counts, height, width)
+    mask.setflags(write=False)
+    return mask
+
+
+def _split(values: Tensor, parts: Mapping[str, tuple[Tensor, float]]) -> Mapping[str, Term]:
+    """A term for the mean over each part, which is where it lies and its weight; none for what is empty or weightless.
+
+    Counting is several times as fast as asking whether there is any.
+    """
+    return {n: Term(value=_mean(values, where), weight=w) for n, (where, w) in parts.items() if w and where.sum()}
+
+
+def _mean(values: Tensor, where: Tensor) -> Tensor:
+    """Over the chosen; 0 with a gradient of 0 where nothing is chosen."""
+    # As a number: a product with bools converts them in every direction that it goes.
+    return (values * where.to(values.dtype)).sum() / where.sum().clamp_min(1)

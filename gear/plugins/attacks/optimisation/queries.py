@@ -1,0 +1,87 @@
+"""Attacks without gradients see numbers: the objective of patches on some samples, counted by forward passes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import torch
+
+from gear.contracts.attacks import Budget, Compositor, Patch, State
+from gear.contracts.models import Model
+from gear.plugins.attacks.optimisation.checkpoint_state import check_saved
+from gear.plugins.attacks.optimisation.model_group import members_of
+from gear.plugins.attacks.optimisation.objectives import Objective, counted, not_finite
+from gear.values.errors import GearError
+
+Textures = npt.NDArray[np.float32]
+"""(S, 3, h, w) in 0..1."""
+
+
+class Oracle:
+    """Answers how much harm textures do; a question about a batch costs one query a model.
+
+    Objectives that compare with the answer to the clean picture (`asks_for_clean`) cost one more for every sample not
+    seen before.
+
+    Attributes:
+        left: queries that may still be asked.
+    """
+
+    def __init__(
+        self, model: Model, dataset: Sequence[Any], compositor: Compositor, objective: Objective, budget: Budget
+    ) -> None:
+        self._model, self._dataset, self._compositor, self._objective = model, dataset, compositor, objective
+        if budget.queries is None:
+            raise GearError("an attack without gradients is counted in forward passes: say how many with --queries N")
+        self.left = budget.queries
+        self._seen: set[int] = set()
+
+    def state(self) -> State:
+        """What was spent and on what, to go on from."""
+        return {"left": np.array(self.left), "paid": np.array(sorted(self._seen), np.int64)}
+
+    def restore(self, state: State) -> None:
+        """Goes on where `state` was taken.
+
+        Raises:
+            GearError: it is none.
+        """
+        check_saved(state, {"left": np.array(0), "paid": np.zeros(np.size(state.get("paid", ())), np.int64)})
+        self.left, self._seen = int(state["left"]), {int(index) for index in state["paid"]}
+
+    def cost(self, indexes: Sequence[int]) -> int:
+        """Queries of one question about these samples."""
+        asks = getattr(self._objective, "asks_for_clean", False)
+        clean = len(set(indexes) - self._seen) if asks else 0
+        return len(members_of(self._model)) * (1 + clean)
+
+    def harm(self, textures: Textures, indexes: Sequence[int]) -> float:
+        """The objective as one number. Only forward passes, without gradients.
+
+        Raises:
+            RuntimeError: there are no queries left.
+            GearError: the objective is not finite.
+        """
+        cost = self.cost(indexes)
+        if self.left < cost:
+            raise RuntimeError("no queries left")
+        self.left -= cost
+        self._seen.update(indexes)
+        patches = [torch.from_numpy(np.ascontiguousarray(texture)) for texture in textures]
+        samples = [self._dataset[index] for index in indexes]
+        with torch.no_grad():
+            views = {view: self._compositor.compose(patches, indexes, view) for view in samples[0].images}
+            harm = sum(map(float, counted(self._objective, self._model, views, samples, indexes)))
+        if not math.isfinite(harm):
+            raise not_finite("the objective", indexes)
+        return harm
+
+
+def as_patches(textures: Textures) -> tuple[Patch, ...]:
+    """One patch a texture."""
+    rgb = np.ascontiguousarray(textures.transpose(0, 2, 3, 1), np.float32)
+    return tuple(Patch(name=f"patch_{n}", rgb=one) for n, one in enumerate(rgb))

@@ -1,0 +1,96 @@
+"""A network's feature maps while it looks at one sample."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from gear.contracts.models import Model
+from gear.networks.network import as_batch
+from gear.values.errors import GearError
+from gear.values.frames import UInt8Image
+
+PAPERS_DEEPEST = "ct1"
+"""BiSeNet's layer for detection in Z-Mask's supplement, although `ct0` is deeper."""
+
+
+def feature_maps(model: Model, views: Mapping[str, UInt8Image], names: Iterable[str]) -> dict[str, Tensor]:
+    """What the named taps give for one sample: (C, h, w) float32 on the CPU by name, without gradients.
+
+    Args:
+        model: with such taps.
+        views: (H, W, 3) uint8 pictures by camera name.
+        names: of taps.
+
+    Raises:
+        GearError: the model has no such tap, or its output is no map.
+    """
+    with torch.no_grad():
+        return {name: maps[0] for name, maps in tapped(model, as_batch([views], tuple(views)), names).items()}
+
+
+def tapped(model: Model, batch: Mapping[str, Tensor], names: Iterable[str]) -> dict[str, Tensor]:
+    """What the named taps give for a batch, with gradients where torch is keeping track.
+
+    Args:
+        model: with such taps.
+        batch: (B, 3, H, W) pictures in 0..1 by camera name.
+        names: of taps.
+
+    Returns:
+        (B, C, h, w) float32 on the CPU by name. Of a tap that sees both pictures of pairs at once, which have the left
+        ones first, it is the left ones'.
+
+    Raises:
+        GearError: the model has no such tap, or its output is no map.
+    """
+    taps, wanted = model.taps(), tuple(dict.fromkeys(names))
+    count = len(next(iter(batch.values())))
+    seen: dict[str, Tensor] = {}
+    lacking = [name for name in wanted if name not in taps]
+    if lacking:
+        has = ", ".join(taps) or "none"
+        raise GearError(f"the model has no feature maps {', '.join(lacking)}; it has {has}")
+
+    def keep(name: str) -> Callable[[nn.Module, Any, Any], None]:
+        def hook(_: nn.Module, __: Any, output: Any) -> None:
+            # A copy: what comes after the tap may rectify it in place. A tap that runs more than once is taken first.
+            if isinstance(output, Tensor):
+                seen.setdefault(name, output[:count].to("cpu", torch.float32, copy=True))
+
+        return hook
+
+    handles = [taps[name].register_forward_hook(keep(name)) for name in wanted]
+    try:
+        model.forward(batch)
+    finally:
+        for handle in handles:
+            handle.remove()
+    for name in wanted:
+        if name not in seen or seen[name].ndim != 4:
+            raise GearError(f"the model's tap {name!r} gives no feature map of (B, C, H, W)")
+    return {name: seen[name] for name in wanted}
+
+
+def deepest(model: Model, views: Mapping[str, UInt8Image]) -> str:
+    """The tap whose map has the fewest cells, the later one of equals; BiSeNet's `ct1`.
+
+    Raises:
+        GearError: the model has no taps.
+    """
+    names = tuple(model.taps())
+    if not names:
+        raise GearError("the model has no feature maps to look at")
+    if PAPERS_DEEPEST in names:
+        return PAPERS_DEEPEST
+    maps = feature_maps(model, views, names)
+    return min(reversed(names), key=lambda name: maps[name].shape[1] * maps[name].shape[2])
+
+
+def spread(items: Sequence[Any], most: int) -> Iterator[Any]:
+    """At most so many of them, evenly spaced from the first on; read one at a time."""
+    count = min(most, len(items))
+    return (items[index * len(items) // count] for index in range(count))

@@ -1,0 +1,97 @@
+"""Detectors that score how unusual one feature map is: HyperNeuron and FPDA are two of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from torch import Tensor
+
+from gear.contracts.defenses import DefenseResult
+from gear.contracts.models import Model
+from gear.plugins.defenses.activations.feature_maps import deepest, feature_maps
+from gear.plugins.defenses.activations.z_scores import Usual, alarm_level, sureness, usual
+from gear.values.errors import GearError
+from gear.values.frames import UInt8Image
+
+Views = Mapping[str, UInt8Image]
+
+HELD_BACK = 4
+"""One in so many clean pictures says how high clean scores are; the others, what is usual. Pictures that have taught
+what is usual look more usual than new ones."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Learnt:
+    """What a detector knows after calibration.
+
+    Attributes:
+        layer: the tap that it looks at.
+        usual: its numbers in clean pictures.
+        level: raw score at which it raises the alarm.
+    """
+
+    layer: str
+    usual: Usual
+    level: float
+
+
+class Detector:
+    """A `Defense` that leaves pictures as they are and says how sure it is of an attack.
+
+    Args:
+        layer: the tap to look at; "" takes the deepest.
+        compress: from a (C, h, w) feature map to the numbers that are compared.
+        aggregate: from their Z-scores to one number, 0 or more.
+        false_alarms: share of clean pictures that score above 0.5.
+    """
+
+    def __init__(
+        self,
+        layer: str,
+        compress: Callable[[Tensor], Tensor],
+        aggregate: Callable[[Tensor], Tensor],
+        false_alarms: float,
+    ) -> None:
+        self._layer, self._compress, self._aggregate = layer, compress, aggregate
+        self._false_alarms = false_alarms
+
+    def fit(
+        self, clean: Sequence[Views], patched: Sequence[Views], model: Model | None, rng: np.random.Generator
+    ) -> Learnt:
+        """Learns from clean pictures alone.
+
+        Raises:
+            GearError: there are fewer than four, they differ in size, or the model has no such feature map.
+        """
+        assert model is not None
+        if len(clean) < HELD_BACK:
+            raise GearError(
+                f"calibration needs at least {HELD_BACK} clean pictures, and better a hundred; there are {len(clean)}"
+            )
+        layer = self._layer or deepest(model, clean[0])
+        held_back = range(HELD_BACK - 1, len(clean), HELD_BACK)
+        learnt = usual(self._numbers(model, clean[i], layer) for i in range(len(clean)) if i not in held_back)
+        scores = [self._raw(learnt, self._numbers(model, clean[i], layer)) for i in held_back]
+        return Learnt(layer=layer, usual=learnt, level=alarm_level(scores, self._false_alarms))
+
+    def apply(self, views: Views, model: Model | None, state: Learnt, rng: np.random.Generator) -> DefenseResult:
+        """The pictures as they came, and the score."""
+        assert model is not None
+        raw = self._raw(state.usual, self._numbers(model, views, state.layer))
+        return DefenseResult(views=dict(views), score=sureness(raw, state.level))
+
+    def forward(self, views: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        """The pictures as they came."""
+        return dict(views)
+
+    def wrap(self, model: Model) -> Model:
+        """The model as it is."""
+        return model
+
+    def _numbers(self, model: Model, views: Views, layer: str) -> Tensor:
+        return self._compress(feature_maps(model, views, [layer])[layer])
+
+    def _raw(self, learnt: Usual, numbers: Tensor) -> float:
+        return float(self._aggregate(learnt.z_scores(numbers)))

@@ -1,0 +1,223 @@
+"""Z-Mask (Rossolini et al., AAAI 2023): what over-activates shallow and deep layers alike is a patch, and is covered.
+
+After the authors' code and supplement; what they leave open is an option of the plugin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from gear.contracts.defenses import DefenseResult
+from gear.contracts.models import Model
+from gear.plugins.defenses.activations.feature_maps import feature_maps, spread, tapped
+from gear.plugins.defenses.activations.mask_block import Example, MaskBlock, learn
+from gear.plugins.defenses.activations.over_activation import (
+    Cells,
+    ChannelStatistics,
+    channel_statistics,
+    mean_of,
+    pooled_sizes,
+    refined,
+)
+from gear.plugins.defenses.activations.twin_masks import patch_area
+from gear.plugins.defenses.activations.z_scores import alarm_level, sureness
+from gear.plugins.defenses.activations.zmask_layers import Layers, Look, Views, layers_of, looks
+from gear.plugins.defenses.activations.zmask_options import ZMaskConfig
+from gear.values.errors import GearError
+from gear.values.frames import UInt8Image
+
+COVERED_FROM = 0.5
+"""Of the mask, and of the score where `only_if_sure` asks for it."""
+
+MOSTLY = 0.5
+"""Share of a cell that the patch must take to be there."""
+
+FILL = np.array([124, 116, 104], np.uint8)
+"""ImageNet's mean: what is covered is 0 to a network that normalises by it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Learnt:
+    """What calibration gives.
+
+    Attributes:
+        layers: that are looked at.
+        statistics: of their channels.
+        block: makes masks of heat maps.
+        level: raw score that the share `false_alarms` of clean pictures exceeds.
+    """
+
+    layers: Layers
+    statistics: Mapping[str, ChannelStatistics]
+    block: MaskBlock
+    level: float
+
+
+class ZMask:
+    """The defense. Its statistics, and the mask that is learnt from them, are of the reference camera."""
+
+    def __init__(self, settings: ZMaskConfig) -> None:
+        self._settings = settings
+
+    def fit(
+        self, clean: Sequence[Views], patched: Sequence[Views], model: Model | None, rng: np.random.Generator
+    ) -> Learnt:
+        """Statistics from clean pictures, the fusion block from their twins with patches.
+
+        Raises:
+            GearError: there are no pictures, they are no twins, or no patch is seen in them.
+        """
+        assert model is not None
+        if not len(clean) or not len(patched):
+            raise GearError(
+                "Z-Mask learns from patches, too: give --calibration-patched DIR, the twin of --calibration with "
+                "patches (gear collect with the same seed and settings, and --patch random)"
+            )
+        if len(patched) != len(clean):
+            raise GearError(
+                f"the calibration data are no twins: {len(clean)} clean samples, and {len(patched)} with patches"
+            )
+        layers = layers_of(model, self._settings.shallow, self._settings.deep)
+        statistics = self._statistics(clean, model, layers)
+        examples = list(self._examples(clean, patched, model, layers, statistics))
+        if not examples:
+            raise GearError("no patch is seen in the patched calibration data: Z-Mask has nothing to learn from")
+        block = learn(examples, self._settings.steps, rng)
+        scores = [
+            max(block.score(*self._seen(model, look, layers, statistics)) for look in looks(sample))
+            for sample in spread(clean, self._settings.learning_pictures)
+        ]
+        level = alarm_level(scores, self._settings.false_alarms)
+        return Learnt(layers=layers, statistics=statistics, block=block, level=level)
+
+    def apply(self, views: Views, model: Model | None, state: Learnt, rng: np.random.Generator) -> DefenseResult:
+        """Covers what over-activates the network; the score is that of the camera that shows most of it."""
+        assert model is not None
+        masks = {name: np.zeros(picture.shape[:2], np.float32) for name, picture in views.items()}
+        score = 0.0
+        for look in looks(views):
+            shallow, deep = self._seen(model, look, state.layers, state.statistics)
+            score = max(score, sureness(state.block.score(shallow, deep), state.level))
+            size = masks[look.camera].shape[::-1]
+            masks[look.camera] = cv2.resize(
+                state.block.mask(shallow, deep).numpy(), size, interpolation=cv2.INTER_NEAREST_EXACT
+            )
+        is_sure = score > COVERED_FROM or not self._settings.only_if_sure
+        cleaned = {name: _covered(picture, masks[name], is_sure) for name, picture in views.items()}
+        return DefenseResult(views=cleaned, mask=masks, score=score)
+
+    def forward(self, views: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        """Needs the model and what was learnt of it, which it is not given here.
+
+        Raises:
+            ValueError: always.
+        """
+        raise ValueError("Z-Mask looks into the model: it has `forward_taught`")
+
+    def forward_taught(self, views: Mapping[str, Tensor], model: Model, state: Learnt) -> Mapping[str, Tensor]:
+        """Covers as `apply` does; how far a patch is covered has the gradient of the mask before it is rounded."""
+        masks = {name: torch.zeros_like(pictures[:, :1]) for name, pictures in views.items()}
+        scores = [0.0] * len(next(iter(views.values())))
+        for look in looks(views):
+            maps = tapped(model, look.views, state.layers.all())
+            size = look.views[look.camera].shape[2:]
+            grid = self._grid(*size)
+            said = []
+            for number in range(len(scores)):
+                own = {name: features[number] for name, features in maps.items()}
+                heats = self._heats(own, grid, state.layers, state.statistics)
+                heats = _flipped(heats) if look.is_mirrored else heats
+                raw = state.block.score(*(heat.detach() for heat in heats))
+                scores[number] = max(scores[number], sureness(raw, state.level))
+                said.append(state.block.mask(*heats))
+            soft = functional.interpolate(torch.stack(said)[:, None], size=size, mode="nearest-exact")
+            masks[look.camera] = ((soft > COVERED_FROM).float() + soft - soft.detach()).to(masks[look.camera])
+        sure = [score > COVERED_FROM or not self._settings.only_if_sure for score in scores]
+        fill = torch.from_numpy(FILL / np.float32(255))[:, None, None]
+        cleaned = {}
+        for name, pictures in views.items():
+            mask = masks[name] * pictures.new_tensor(sure)[:, None, None, None]
+            cleaned[name] = pictures * (1 - mask) + fill.to(pictures) * mask
+        return cleaned
+
+    def wrap(self, model: Model) -> Model:
+        """The model as it is."""
+        return model
+
+    def _statistics(self, clean: Sequence[Views], model: Model, layers: Layers) -> dict[str, ChannelStatistics]:
+        each: dict[str, list[ChannelStatistics]] = {name: [] for name in layers.all()}
+        for sample in spread(clean, self._settings.statistics_pictures):
+            look = looks(sample)[0]
+            grid = self._grid(*look.views[look.camera].shape[:2])
+            for name, features in feature_maps(model, look.views, layers.all()).items():
+                each[name].append(channel_statistics(features, grid))
+        return {name: mean_of(many) for name, many in each.items()}
+
+    def _examples(
+        self,
+        clean: Sequence[Views],
+        patched: Sequence[Views],
+        model: Model,
+        layers: Layers,
+        statistics: Mapping[str, ChannelStatistics],
+    ) -> Iterator[Example]:
+        """Heat maps of pictures in which a patch is seen, with where."""
+        for number in spread(range(len(patched)), self._settings.learning_pictures):
+            without, look = looks(clean[number])[0], looks(patched[number])[0]
+            area = patch_area(without.views[look.camera], look.views[look.camera], number)
+            if area.any():
+                shallow, deep = self._seen(model, look, layers, statistics)
+                share = cv2.resize(area.astype(np.float32), shallow.shape[::-1], interpolation=cv2.INTER_AREA)
+                truth = torch.from_numpy((share >= MOSTLY).astype(np.float32))
+                yield Example(shallow=shallow, deep=deep, truth=truth)
+
+    def _grid(self, height: int, width: int) -> Cells:
+        """Of a picture of that size: its cells are as square as those of 150 x 300 are in one of 2048 x 1024."""
+        return self._settings.rows, max(1, round(self._settings.rows * width / height))
+
+    def _seen(
+        self, model: Model, look: Look[UInt8Image], layers: Layers, statistics: Mapping[str, ChannelStatistics]
+    ) -> tuple[Tensor, Tensor]:
+        """The heat maps of what a model sees, the right way round."""
+        grid = self._grid(*look.views[look.camera].shape[:2])
+        heats = self._heats(feature_maps(model, look.views, layers.all()), grid, layers, statistics)
+        return _flipped(heats) if look.is_mirrored else heats
+
+    def _heats(
+        self,
+        maps: Mapping[str, Tensor],
+        grid: Cells,
+        layers: Layers,
+        statistics: Mapping[str, ChannelStatistics],
+    ) -> tuple[Tensor, Tensor]:
+        """The shallow and the deep heat map of one camera's features: cell by cell the largest of the layers'."""
+        shallow, deep = self._settings.shallow_kernels, self._settings.deep_kernels
+        heats: dict[str, list[Tensor]] = {"shallow": [], "deep": []}
+        for name, features in maps.items():
+            z = statistics[name].z_scores(features)
+            pooled = {rows: pooled_sizes(z, grid, (rows, 2 * rows)) for rows in {*shallow, *deep}}
+            if name in layers.shallow:
+                heats["shallow"].append(refined([pooled[rows] for rows in shallow]))
+            if name in layers.deep:
+                heats["deep"].append(refined([pooled[rows] for rows in deep]))
+        first, second = (torch.stack(maps).amax(dim=0) for maps in heats.values())
+        return first, second
+
+
+def _flipped(heats: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
+    return heats[0].flip(1), heats[1].flip(1)
+
+
+def _covered(picture: UInt8Image, mask: npt.NDArray[np.float32], is_covered: bool) -> UInt8Image:
+    covered = picture.copy()
+    if is_covered:
+        covered[mask > COVERED_FROM] = FILL
+    return covered

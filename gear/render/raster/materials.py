@@ -1,0 +1,82 @@
+"""How geoms look: colours, surfaces and textures of a model, as the shaders want them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from gear.camera.response import decode_srgb
+from gear.contracts.rendering import has_own_colour
+from gear.render.display_colours import has_linear_colours
+from gear.values.geometry import Array
+
+ROLES = {"HAS_BASE": "RGB", "HAS_NORMAL": "NORMAL", "HAS_ORM": "ORM", "HAS_EMISSIVE": "EMISSIVE"}
+"""MuJoCo's texture roles by what a shader calls them, in the order of its samplers."""
+
+DIELECTRIC = 0.04
+"""What surfaces that are no metal mirror of light from straight ahead."""
+
+_DEFAULT_SHININESS = 0.5
+_MOST_SHININESS = 128
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Looks:
+    """By geom.
+
+    Attributes:
+        albedo: (ngeom, 3) float32, linear.
+        surface: (ngeom, 4) float32: perceptual roughness, metallic, emission, reflectance.
+        textures: (ngeom, 4) int, ids in the order of `ROLES`, -1 where there is none.
+        is_clear: (ngeom,) what is so transparent that nothing of it is seen.
+    """
+
+    albedo: npt.NDArray[np.float32]
+    surface: npt.NDArray[np.float32]
+    textures: npt.NDArray[np.int32]
+    is_clear: npt.NDArray[np.bool_]
+
+
+def looks_of(model: mujoco.MjModel) -> Looks:
+    """Looks of a model's geoms before a stage paints them.
+
+    Materials without roughness have Phong's shininess instead, whose highlight is as wide as that of a roughness of
+    (2 / (2 + 128 shininess)) ^ 1/4. What is half transparent is drawn as if it were solid.
+    """
+    material = model.geom_matid
+    bare = material < 0
+    own = has_own_colour(model)
+    rgba: Array = model.geom_rgba.astype(np.float64)
+    rgba[~own] = model.mat_rgba[material[~own]]
+    albedo = rgba[:, :3] if has_linear_colours(model) else decode_srgb(rgba[:, :3])
+    surface = np.zeros((model.ngeom, 4), np.float32)
+    surface[:] = (_roughness_of(_DEFAULT_SHININESS), 0.0, 0.0, DIELECTRIC)
+    textures = np.full((model.ngeom, len(ROLES)), -1, np.int32)
+    if not bare.all():
+        surface[~bare] = _surfaces(model)[material[~bare]]
+        roles = [int(getattr(mujoco.mjtTextureRole, f"mjTEXROLE_{role}")) for role in ROLES.values()]
+        textures[~bare] = model.mat_texid[np.ix_(material[~bare], roles)]
+    return Looks(
+        albedo=albedo.astype(np.float32), surface=surface, textures=textures, is_clear=np.asarray(rgba[:, 3] == 0)
+    )
+
+
+def _surfaces(model: mujoco.MjModel) -> npt.NDArray[np.float32]:
+    """(nmat, 4) as `Looks.surface`."""
+    rough, metallic = model.mat_roughness, model.mat_metallic
+    return np.stack(
+        [
+            np.where(rough < 0, _roughness_of(model.mat_shininess), rough),
+            np.maximum(metallic, 0.0),
+            model.mat_emission,
+            np.full(model.nmat, DIELECTRIC),
+        ],
+        axis=1,
+    ).astype(np.float32)
+
+
+def _roughness_of(shininess: npt.ArrayLike) -> Array:
+    return np.asarray((2 / (2 + _MOST_SHININESS * np.asarray(shininess, np.float64))) ** 0.25)

@@ -1,0 +1,28 @@
+"""What attacks promise to return, and what is said where they do not."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from gear.contracts.attacks import Patch
+from gear.measuring.guarded_model import accusation
+from gear.plugins.catalogue import Found
+from gear.verbs.attack.monitor import is_picture
+
+
+def check_patches(patches: Any, surfaces: int, found: Found) -> None:
+    """Whether what an attack returns is a patch for each surface.
+
+    Raises:
+        PluginError: it is not; says whose attack it is.
+    """
+    names = [f"patch_{n}" for n in range(surfaces)]
+    if not isinstance(patches, tuple) or not all(isinstance(patch, Patch) for patch in patches):
+        raise accusation(found, "optimise", "must return a tuple of Patch")
+    if [patch.name for patch in patches] != names:
+        raise accusation(found, "optimise", f"must return {', '.join(names)}")
+    for patch in patches:
+        if not is_picture(patch.rgb):
+            raise accusation(found, "optimise", f"{patch.name} must be (H, W, 3) float32 without NaN")
+        if patch.rgb.min() < 0 or patch.rgb.max() > 1:
+            raise accusation(found, "optimise", f"{patch.name} leaves 0..1")

@@ -1,0 +1,57 @@
+"""How much of a patch surface the picture's border and other things hide."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gear.values.ground_truth import SurfaceTruth
+from gear.values.scene import CameraRecord
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Hidden:
+    """Shares of a surface's silhouette; None where a corner lies behind the camera or the surface looks away.
+
+    Attributes:
+        truncated_fraction: outside the picture.
+        occluded_fraction: of what lies inside the picture, what something else covers; None too if nothing does.
+    """
+
+    truncated_fraction: float | None
+    occluded_fraction: float | None
+
+
+def hidden(truth: SurfaceTruth, camera: CameraRecord) -> Hidden:
+    """Measures both from the outline in index pixels and the count of visible pixels."""
+    if truth.corners_px is None or truth.incidence_deg >= 90:
+        return Hidden(None, None)
+    outline = [(x, y) for x, y in truth.corners_px]
+    whole = area_px2(outline)
+    if whole <= 0:
+        return Hidden(None, None)
+    inside = area_px2(clipped(outline, camera.width_px - 0.5, camera.height_px - 0.5))
+    occluded = max(0.0, 1.0 - truth.visible_px / inside) if inside >= 1.0 else None
+    return Hidden(max(0.0, 1.0 - inside / whole), occluded)
+
+
+def clipped(polygon: list[Point], right: float, bottom: float) -> list[Point]:
+    """The part of a convex polygon inside [-0.5, right] x [-0.5, bottom]: the picture, in index pixels."""
+    for axis, bound, sign in ((0, -0.5, 1.0), (0, right, -1.0), (1, -0.5, 1.0), (1, bottom, -1.0)):
+        kept: list[Point] = []
+        for a, b in zip(polygon, polygon[1:] + polygon[:1], strict=True):
+            in_a, in_b = sign * (a[axis] - bound), sign * (b[axis] - bound)
+            if in_a >= 0:
+                kept.append(a)
+            if (in_a >= 0) != (in_b >= 0):
+                t = in_a / (in_a - in_b)
+                kept.append((a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])))
+        polygon = kept
+    return polygon
+
+
+def area_px2(polygon: list[Point]) -> float:
+    """Area of a polygon without self-intersections; 0 for fewer than three corners."""
+    pairs = zip(polygon, polygon[1:] + polygon[:1], strict=True)
+    return abs(sum(a[0] * b[1] - a[1] * b[0] for a, b in pairs)) / 2

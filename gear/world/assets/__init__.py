@@ -1,0 +1,1 @@
+"""MJCF assets: finding them by name, their facts, their geoms' classes and triangles."""

@@ -1,0 +1,177 @@
+"""What there is: actors with their triangles, boxes and colours; countable things of the town."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from gear.values.errors import TownError
+from gear.values.frames import STATIC_OBJECT_BASE, SceneObject, Shape
+from gear.values.geometry import RigidTransform
+from gear.values.labels import LABELS, Label
+from gear.world.assets.geom_classes import NEVER_SEEN, GeomClasses
+from gear.world.assets.geom_triangles import body_shape
+from gear.world.assets.library import ActorFacts
+from gear.world.compilation.compose import Slot
+from gear.world.compilation.model_compilation import Stance
+
+MASS_KG = {"person": 75.0, "bicycle": 95.0, "motorcycle": 300.0}
+VEHICLE_MASS_KG = 1500.0
+"""Only their inertia's shape matters for how things come to rest."""
+
+ACTOR_SIDE_M = (0.1, 100.0)
+"""Least and most of an actor's longest side: what is beyond was drawn in other units."""
+
+COUNTABLE = frozenset(label.code for label in LABELS if label.coco_id is not None and not label.is_instance)
+"""Labels of the town's things that are counted one by one, each in a body of its own."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ActorType:
+    """One asset that may take part.
+
+    Attributes:
+        facts: what its file says.
+        shape: visible triangles in the actor frame.
+        half_length_m, half_width_m: half of its footprint, symmetric about the origin, so that it holds the asset.
+    """
+
+    facts: ActorFacts
+    shape: Shape
+    half_length_m: float
+    half_width_m: float
+
+    @property
+    def label(self) -> Label:
+        """What it mainly is."""
+        return self.facts.label
+
+    @property
+    def front_m(self) -> float:
+        """How far it reaches ahead of its origin."""
+        return float(self.shape.box_centre_m[0] + self.shape.box_size_m[0] / 2)
+
+    @property
+    def rear_m(self) -> float:
+        """How far it reaches behind its origin."""
+        return float(self.shape.box_size_m[0] / 2 - self.shape.box_centre_m[0])
+
+    @property
+    def stance(self) -> Stance:
+        """How it stands: its feet are a fifth inside its footprint, where wheels are."""
+        return Stance(
+            half_length_m=0.8 * self.half_length_m,
+            half_width_m=0.8 * self.half_width_m,
+            height_m=float(self.shape.box_centre_m[2] + self.shape.box_size_m[2] / 2),
+            mass_kg=MASS_KG.get(self.facts.kind, VEHICLE_MASS_KG),
+        )
+
+
+def body_tree(model: mujoco.MjModel, body_id: int) -> list[int]:
+    """Ids of a body and of all below it, which follow it: MuJoCo numbers bodies depth first."""
+    outside = np.flatnonzero(model.body_parentid[body_id + 1 :] < body_id)
+    return list(range(body_id, body_id + 1 + int(outside[0]) if len(outside) else model.nbody))
+
+
+def visible_geoms(model: mujoco.MjModel, body_id: int, label_code: npt.NDArray[np.uint8]) -> list[int]:
+    """Ids of the visible geoms of a body and of all below it."""
+    owners = np.isin(model.geom_bodyid, body_tree(model, body_id))
+    return [int(geom) for geom in np.flatnonzero(owners & (label_code != NEVER_SEEN))]
+
+
+def actor_types(
+    model: mujoco.MjModel, data: mujoco.MjData, classes: GeomClasses, slots: Sequence[Slot]
+) -> dict[str, ActorType]:
+    """Every asset of the pool by name, measured on its first instance.
+
+    Raises:
+        TownError: an asset has nothing visible, something without bounds, a size that no road user has, or does not
+            stand at its origin.
+    """
+    types: dict[str, ActorType] = {}
+    for slot in slots:
+        facts = slot.actor
+        if facts.name in types:
+            continue
+        body_id = model.body(slot.body).id
+        geoms = visible_geoms(model, body_id, classes.label_code)
+        if not geoms:
+            raise TownError(facts.path, "has no visible geom")
+        shape = _shape(model, data, body_id, geoms, classes, facts.path)
+        longest_m = float(shape.box_size_m.max())
+        if not ACTOR_SIDE_M[0] <= longest_m <= ACTOR_SIDE_M[1]:
+            raise TownError(facts.path, f"its longest side is {longest_m:.3g} m; MJCF is in metres, and so is gear")
+        extent_m = np.abs(shape.box_centre_m) + shape.box_size_m / 2
+        bottom_m = float(shape.box_centre_m[2] - shape.box_size_m[2] / 2)
+        if abs(bottom_m) > 0.1:
+            raise TownError(facts.path, f"its lowest point must be at z = 0, the ground, but is at {bottom_m:.2f} m")
+        types[facts.name] = ActorType(
+            facts=facts, shape=shape, half_length_m=float(extent_m[0]), half_width_m=float(extent_m[1])
+        )
+    return types
+
+
+def _shape(
+    model: mujoco.MjModel, data: mujoco.MjData, body_id: int, geoms: Sequence[int], classes: GeomClasses, path: Path
+) -> Shape:
+    try:
+        return body_shape(model, data, body_id, geoms, classes.label_code)
+    except ValueError as error:
+        raise TownError(path, f"{error}; make it of meshes, boxes, cylinders, capsules or ellipsoids") from error
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class StaticObjects:
+    """Countable things of the town.
+
+    Attributes:
+        objects: by object id.
+        object_id: (ngeom,) int32, the thing that each geom belongs to, else -1.
+    """
+
+    objects: Mapping[int, SceneObject]
+    object_id: npt.NDArray[np.int32]
+
+
+def static_objects(
+    model: mujoco.MjModel, data: mujoco.MjData, classes: GeomClasses, slots: Sequence[Slot], path: Path
+) -> StaticObjects:
+    """Traffic lights, benches and the like: one object a body that holds geoms of such a label.
+
+    Raises:
+        TownError: such a geom is not in a body of its own, or has no bounds.
+    """
+    actor_bodies = {body for slot in slots for body in body_tree(model, model.body(slot.body).id)}
+    object_id = np.full(model.ngeom, -1, np.int32)
+    by_body: dict[tuple[int, int], list[int]] = {}
+    for geom_id in np.flatnonzero(np.isin(classes.label_code, list(COUNTABLE))):
+        body_id = int(model.geom_bodyid[geom_id])
+        if body_id in actor_bodies:
+            continue
+        if body_id == 0:
+            label = LABELS[classes.label_code[geom_id]].name
+            raise TownError(path, f"geom {model.geom(geom_id).name!r} is a {label} and needs a body of its own")
+        by_body.setdefault((body_id, int(classes.label_code[geom_id])), []).append(int(geom_id))
+    objects: dict[int, SceneObject] = {}
+    for number, ((body_id, label_code), geoms) in enumerate(sorted(by_body.items())):
+        name = model.body(body_id).name
+        thing = SceneObject(
+            id=STATIC_OBJECT_BASE + number,
+            asset=name,
+            label_code=label_code,
+            kitti_type=None,
+            is_ego=False,
+            world_from_object=RigidTransform.from_parts(
+                "world", "object", data.xmat[body_id].reshape(3, 3), data.xpos[body_id]
+            ),
+            shape=_shape(model, data, body_id, geoms, classes, path),
+        )
+        objects[thing.id] = thing
+        object_id[geoms] = thing.id
+    object_id.setflags(write=False)
+    return StaticObjects(objects=objects, object_id=object_id)

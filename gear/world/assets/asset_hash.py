@@ -1,0 +1,80 @@
+"""Which files a town's pictures can show, and one hash over all of them."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from pathlib import Path
+
+from gear.values.errors import TownError
+from gear.values.resources import data_dir
+from gear.world.assets.library import AssetLibrary, read_xml
+
+ASSET_SUFFIXES = (".xml", ".obj", ".msh", ".stl", ".png")
+
+
+def asset_files(library: AssetLibrary) -> dict[str, Path]:
+    """Every MJCF file, mesh and texture that goes with a town, by a name that does not say where it lies."""
+    own = data_dir("mjcf")
+    roots = [library.town, library.town.with_suffix("")]
+    roots += [library.folder("vehicle"), library.folder("pedestrian"), library.folder("surface")]
+    if any(root.is_relative_to(own) for root in roots):
+        roots.append(own / "textures")
+    files: dict[str, Path] = {}
+    for root in roots:
+        for path in root.rglob("*") if root.is_dir() else [root]:
+            if (path.suffix.lower() in ASSET_SUFFIXES or path == library.town) and path.is_file():
+                files[f"{root.name}/{path.relative_to(root).as_posix()}"] = path
+    # gear's own refer to nothing else, and there are many: asking where each really lies takes longer than the rest.
+    others = [
+        path
+        for path in files.values()
+        if (path.suffix.lower() == ".xml" or path == library.town) and not path.is_relative_to(own)
+    ]
+    known = {path.resolve() for path in files.values()} if others else set()
+    for path in others:
+        for name, referred in _referred(path):
+            if referred.resolve() not in known:
+                files.setdefault(f"referred/{path.name}/{name}", referred)
+    return files
+
+
+def _referred(path: Path) -> Iterator[tuple[str, Path]]:
+    """What an MJCF file and what is included in it name, as far as it is there: by how it is written, and where."""
+    elements: list[tuple[Path, ET.Element]] = []
+    files, folders = [path], dict[str, str]()
+    for file in files:  # grows: what is included is looked at in turn
+        try:
+            root = read_xml(file)
+        except TownError:
+            continue  # whoever reads it says so
+        for compiler in root.iter("compiler"):
+            folders.update({key: value for key, value in compiler.items() if key.endswith("dir")})
+        elements += [(file, element) for element in root.iter()]
+        names = [name for include in root.iter("include") if (name := include.get("file"))]
+        included = [Path(os.path.normpath(base / name)) for base in _bases(path, file) for name in names]
+        files += [one for one in included if one not in files]
+    usual = folders.get("assetdir", "")
+    for file, element in elements:
+        folder = folders.get("texturedir" if element.tag == "texture" else "meshdir", usual)
+        for key, name in element.items():
+            for base in _bases(path, file) if key.startswith("file") else ():
+                target = base / ("" if element.tag == "include" else folder) / name
+                if target.is_file():
+                    yield name if base == path.parent else f"{file.name}/{name}", target
+
+
+def _bases(path: Path, file: Path) -> list[Path]:
+    """Where what `file` names may lie, a part of the MJCF at `path`: MuJoCo looks beside both."""
+    return list(dict.fromkeys((path.parent, file.parent)))
+
+
+def assets_digest(library: AssetLibrary) -> str:
+    """sha256 over every MJCF file, mesh and texture that a town's pictures can show."""
+    files = asset_files(library)
+    digest = hashlib.sha256()
+    for name in sorted(files):
+        digest.update(f"{name}\0{hashlib.sha256(files[name].read_bytes()).hexdigest()}\n".encode())
+    return digest.hexdigest()

@@ -1,0 +1,34 @@
+"""A MJCF file as MuJoCo itself reads it."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import mujoco
+
+from gear.world.assets.library import read_xml
+
+
+def read_spec(path: Path) -> mujoco.MjSpec:
+    """Reads a file that may have any name: MuJoCo alone takes none for MJCF whose name does not end in `.xml`.
+
+    Raises:
+        ValueError: MuJoCo refuses it.
+        TownError: it is no XML, or cannot be read.
+    """
+    if path.suffix == ".xml":
+        spec = mujoco.MjSpec.from_file(str(path))
+    else:
+        root = read_xml(path)
+        for include in root.iter("include"):
+            include.set("file", str(path.parent.absolute() / include.get("file", "")))
+        spec = mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
+        spec.modelfiledir = str(path.parent.absolute())
+    bear_flat_bodies(spec)
+    return spec
+
+
+def bear_flat_bodies(spec: mujoco.MjSpec) -> None:
+    """Lets a flat sign be a body of its own: it is at the edge of what inertia can be, and rounding decides."""
+    spec.compiler.balanceinertia = True

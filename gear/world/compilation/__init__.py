@@ -1,0 +1,1 @@
+"""From MJCF files to compiled MuJoCo models, and the cache that keeps them."""

@@ -1,0 +1,87 @@
+"""Materials of a compiled model: what colour geoms have, and what a renderer would die of."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from gear.contracts.rendering import has_own_colour
+from gear.values.errors import TownError
+from gear.values.geometry import Array
+from gear.world.assets.geom_classes import FIRST_HIDDEN_GROUP
+
+TEXTURE_KINDS = {
+    mujoco.mjtTexture.mjTEXTURE_2D: "2D",
+    mujoco.mjtTexture.mjTEXTURE_CUBE: "cube",
+    mujoco.mjtTexture.mjTEXTURE_SKYBOX: "skybox",
+}
+"""As messages name them."""
+
+LARGEST_SIDE_PX = 16384
+"""Of a texture, for Vulkan and OpenGL as Mesa has them."""
+
+
+def effective_rgba(model: mujoco.MjModel) -> Array:
+    """(ngeom, 4) what geoms are coloured with."""
+    rgba: Array = model.geom_rgba.astype(np.float64)
+    plain = ~has_own_colour(model)
+    rgba[plain] = model.mat_rgba[model.geom_matid[plain]]
+    return rgba
+
+
+def seen_materials(model: mujoco.MjModel) -> dict[int, int]:
+    """A visible geom, the first, for each material that one wears."""
+    worn: dict[int, int] = {}
+    for geom in np.flatnonzero((model.geom_group < FIRST_HIDDEN_GROUP) & (model.geom_matid >= 0)).tolist():
+        worn.setdefault(int(model.geom_matid[geom]), geom)
+    return worn
+
+
+def textures_of(model: mujoco.MjModel, material: int) -> list[tuple[int, int]]:
+    """(role, texture id) of the textures of a material."""
+    return [(role, int(texture)) for role, texture in enumerate(model.mat_texid[material]) if texture >= 0]
+
+
+def refuse_deadly(model: mujoco.MjModel, path: Path) -> None:
+    """Filament ends the process, without a word, over some textures.
+
+    Args:
+        model: compiled.
+        path: the town's file, for the error.
+
+    Raises:
+        TownError: a visible geom wears such a texture.
+    """
+    for material, geom in seen_materials(model).items():
+        for _, texture in textures_of(model, material):
+            deadly = _deadly(model, material, texture)
+            if deadly:
+                wearing, wearer = _own(model.mat(material).name), _own(model.geom(geom).name)
+                raise TownError(path, f"material {wearing!r} of geom {wearer!r} has {deadly}")
+
+
+def _deadly(model: mujoco.MjModel, material: int, texture: int) -> str:
+    """What a material has of a texture that Filament cannot draw, and what to do; empty if it can."""
+    name = _own(model.tex(texture).name)
+    width, height = int(model.tex_width[texture]), int(model.tex_height[texture])
+    if width > LARGEST_SIDE_PX or height > LARGEST_SIDE_PX:
+        return (
+            f"a texture, {name!r}, of {width} x {height} pixels, and renderers take {LARGEST_SIDE_PX} a side at most; "
+            "make it smaller"
+        )
+    is_physical = model.mat_metallic[material] >= 0 or model.mat_roughness[material] >= 0
+    if is_physical and model.tex_type[texture] != mujoco.mjtTexture.mjTEXTURE_2D:
+        return f"metallic or roughness and a cube texture, {name!r}, which Filament cannot draw; give it a 2D texture"
+    if model.tex_nchannel[texture] == 1 and model.tex_colorspace[texture] == mujoco.mjtColorSpace.mjCOLORSPACE_SRGB:
+        return (
+            f'a texture of one channel, {name!r}, that is marked colorspace="sRGB", which Filament cannot draw; '
+            "give it three channels"
+        )
+    return ""
+
+
+def _own(name: str) -> str:
+    """As its own file names it."""
+    return name.rpartition("/")[2]

@@ -1,0 +1,230 @@
+"""The two compiled models of a composition: what is seen, and what is felt."""
+
+from __future__ import annotations
+
+import contextlib
+import copy
+import xml.etree.ElementTree as ET
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+
+from gear.values.errors import TownError
+from gear.world.assets.geom_classes import GeomClasses, classify, own_class
+from gear.world.assets.mjspec import bear_flat_bodies
+from gear.world.compilation.compose import Composition
+from gear.world.compilation.materials import refuse_deadly
+from gear.world.compilation.mujoco_errors import refused
+
+COLLISION_CLASS = "collision"
+GROUND_PREFIX = "ground"
+
+GROUND_GROUP, OBSTACLE_GROUP, ACTOR_GROUP, FOOT_GROUP = 0, 1, 2, 3
+"""Geom groups of the placement model, so that rays can choose what to hit."""
+
+_BODIES, _FEET = "1", "2"
+"""Contact bits: bodies touch bodies and obstacles, feet touch ground."""
+
+FOOT_RADIUS_M = 0.05
+_CORNERS = ((1, 1), (1, -1), (-1, 1), (-1, -1))
+
+_OPAQUE = "1 1 1 1"
+"""Rays pass through what has no colour."""
+
+_ASSET_REFERENCES = ("material", "mesh", "hfield")
+_PLACEMENT_SECTIONS = ("compiler", "size", "default", "worldbody", "custom")
+"""A town's own options are left out: where it turns contacts or gravity off, nothing would be felt."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stance:
+    """How an actor stands: what the placement model must know of it.
+
+    Attributes:
+        half_length_m, half_width_m: where its feet are.
+        height_m: of the whole.
+        mass_kg: of the whole.
+    """
+
+    half_length_m: float
+    half_width_m: float
+    height_m: float
+    mass_kg: float
+
+
+def render_model(composition: Composition) -> tuple[mujoco.MjModel, GeomClasses]:
+    """Compiles what is seen: no collision geoms, actors are mocap bodies.
+
+    Raises:
+        TownError: MuJoCo refuses it, a visible geom has no label, or a material would end Filament.
+    """
+    tree = copy.deepcopy(composition.tree)
+    for parent, geom in _geoms(tree, _collides):
+        parent.remove(geom)
+    with _refusing(composition):
+        spec = _read(composition, tree, composition.assets)
+        model = spec.compile()
+    refuse_deadly(model, composition.town)
+    return model, classify(spec, composition.town)
+
+
+def placement_spec(composition: Composition) -> mujoco.MjSpec:
+    """What is felt: collision geoms, every actor of the pool free to move and on four feet. How they stand is missing,
+    which only shows in what is seen; until that is compiled, this is read beside.
+
+    Raises:
+        TownError: MuJoCo refuses it, a collision geom is no primitive, or an actor has none.
+    """
+    tree = copy.deepcopy(composition.tree)
+    for section in list(tree):
+        if section.tag not in _PLACEMENT_SECTIONS:
+            tree.remove(section)
+    for default in tree.iter("default"):
+        for geom in default.findall("geom"):
+            for reference in _ASSET_REFERENCES:
+                geom.attrib.pop(reference, None)
+    for parent, geom in _geoms(tree, lambda felt: not felt):
+        parent.remove(geom)
+    worldbody = tree.find("worldbody")
+    assert worldbody is not None  # dm_control always writes one
+    for light in list(worldbody.findall("light")):
+        worldbody.remove(light)
+    paths = _files_of_bodies(composition)
+    actors = {slot.body for slot in composition.slots}
+    for element in worldbody:
+        for geom in element.iter("geom"):
+            if "mesh" in geom.attrib or "hfield" in geom.attrib:
+                path = paths.get(element.get("name", ""), composition.town)
+                raise TownError(path, f"collision geom {geom.get('name')!r} must be a primitive")
+            geom.attrib.pop("material", None)
+        if element.get("name") in actors and element.tag == "body":
+            if next(element.iter("geom"), None) is None:
+                raise TownError(
+                    paths[element.get("name", "")], "has no geom of class collision, so everything could stand in it"
+                )
+            _free(element)
+        else:
+            for geom in element.iter("geom"):
+                _fix(geom)
+    with _refusing(composition):
+        return _read(composition, tree, {})
+
+
+def placement_model(composition: Composition, spec: mujoco.MjSpec, stances: Mapping[str, Stance]) -> mujoco.MjModel:
+    """Compiles what is felt.
+
+    Args:
+        composition: the world.
+        spec: of it, as `placement_spec` gives it.
+        stances: by name of the slot's body.
+
+    Raises:
+        TownError: MuJoCo refuses it.
+    """
+    for name, stance in stances.items():
+        _stand(spec, name, stance)
+    with _refusing(composition):
+        return spec.compile()
+
+
+def _files_of_bodies(composition: Composition) -> dict[str, Path]:
+    """Which file a body comes from, by its name, of those that gear puts into the town."""
+    files = {file.stem: file for file in composition.files[1:]}
+    boards = {face.owner: files[face.asset] for face in composition.faces}
+    return boards | {slot.body: slot.actor.path for slot in composition.slots}
+
+
+def _collides(felt: bool) -> bool:
+    return felt
+
+
+def _geoms(tree: ET.Element, wanted: Callable[[bool], bool]) -> list[tuple[ET.Element, ET.Element]]:
+    """(parent, geom) for the geoms of the world that are wanted, by whether they are collision geoms."""
+    found: list[tuple[ET.Element, ET.Element]] = []
+
+    def walk(parent: ET.Element, inherited: str) -> None:
+        inherited = parent.get("childclass", inherited)
+        for child in parent:
+            if child.tag == "geom":
+                name = own_class(child.get("class", inherited))
+                if wanted(name.partition(".")[0] == COLLISION_CLASS):
+                    found.append((parent, child))
+            elif child.tag in ("body", "frame"):
+                walk(child, inherited)
+
+    for worldbody in tree.iter("worldbody"):
+        walk(worldbody, "")
+    return found
+
+
+def _fix(geom: ET.Element) -> None:
+    """A collision geom of the town."""
+    is_ground = geom.get("name", "").rpartition("/")[2].startswith(GROUND_PREFIX)
+    geom.set("group", str(GROUND_GROUP if is_ground else OBSTACLE_GROUP))
+    geom.set("contype", "0" if is_ground else _BODIES)
+    geom.set("conaffinity", _FEET if is_ground else _BODIES)
+    geom.set("rgba", _OPAQUE)
+
+
+def _free(body: ET.Element) -> None:
+    """Makes an actor of the pool free to move, with all that `_stand` gives a size and a place."""
+    body.attrib.pop("mocap")
+    name = body.get("name", "")
+    for geom in body.iter("geom"):
+        geom.attrib.update(group=str(ACTOR_GROUP), contype=_BODIES, conaffinity=_BODIES, mass="0", rgba=_OPAQUE)
+    body.insert(0, ET.Element("freejoint", name=name))
+    ET.SubElement(body, "inertial", pos="0 0 0", mass="1", diaginertia="1 1 1")
+    for number in range(len(_CORNERS)):
+        ET.SubElement(
+            body,
+            "geom",
+            name=f"{name}_foot_{number}",
+            type="sphere",
+            size=f"{FOOT_RADIUS_M}",
+            mass="0",
+            group=str(FOOT_GROUP),
+            contype=_FEET,
+            conaffinity="0",
+            friction="1.5 0.01 0.001",
+        )
+
+
+def _stand(spec: mujoco.MjSpec, name: str, stance: Stance) -> None:
+    """Stands an actor of the pool on its feet.
+
+    Numbers are rounded so that they do not hang on the last digits of what is seen, and everything stands as before
+    where those change.
+    """
+    body = spec.body(name)
+    x, y, z = 2 * stance.half_length_m, 2 * stance.half_width_m, stance.height_m
+    body.mass, body.ipos = _rounded(stance.mass_kg, 6), [0, 0, _rounded(0.4 * z, 6)]
+    body.inertia = [_rounded(stance.mass_kg / 12 * (a * a + b * b), 9) for a, b in ((y, z), (x, z), (x, y))]
+    # Its last geoms: to find them by name, MuJoCo would look at every geom before them.
+    for foot, (sx, sy) in zip(body.geoms[-len(_CORNERS) :], _CORNERS, strict=True):
+        place = sx * stance.half_length_m, sy * stance.half_width_m, FOOT_RADIUS_M
+        foot.pos = [_rounded(along, 9) for along in place]
+
+
+def _rounded(number: float, digits: int) -> float:
+    return float(f"{number:.{digits}g}")
+
+
+def _read(composition: Composition, tree: ET.Element, assets: Mapping[str, bytes]) -> mujoco.MjSpec:
+    spec = mujoco.MjSpec.from_string(ET.tostring(tree, encoding="unicode"), assets=dict(assets))
+    if composition.folder is not None:
+        spec.meshdir = spec.texturedir = str(composition.folder)
+    # Either would make away with bodies and geoms that are looked for by name.
+    spec.compiler.discardvisual = spec.compiler.fusestatic = False
+    bear_flat_bodies(spec)
+    return spec
+
+
+@contextlib.contextmanager
+def _refusing(composition: Composition) -> Iterator[None]:
+    """What MuJoCo has against a world, with the file that it is in."""
+    try:
+        yield
+    except ValueError as error:
+        raise refused(error, composition.files) from error

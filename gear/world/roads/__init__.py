@@ -1,0 +1,1 @@
+"""Lanes, junctions and routes of a town, on the ground plan."""

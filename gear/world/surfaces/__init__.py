@@ -1,0 +1,1 @@
+"""Patch surfaces: the faces that show patches, their textures and what carries them."""

@@ -1,0 +1,140 @@
+"""Faces that take patches: where they are in the compiled model, how large, and what they show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from gear.values.errors import TownError
+from gear.values.frames import UInt8Image
+from gear.values.geometry import RigidTransform
+from gear.values.scene import Pose, SurfaceRecord
+from gear.world.assets.geom_triangles import geom_triangles
+from gear.world.compilation.instances import FaceName
+from gear.world.surfaces.face_texture import SurfaceAlbedo, face_from_patch, srgb_from_linear, uniform_face
+from gear.world.surfaces.upright import what_is_wrong
+
+FLATNESS_M = 0.01
+FACE_SIDE_M = (0.1, 100.0)
+"""Least and most of a face's sides: smaller shows no patch, larger was meant in other units."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Face:
+    """One face in the render model.
+
+    Attributes:
+        name: `surface_0`, ….
+        asset: MJCF that it comes from.
+        is_carried: whether an actor bears it.
+        geom_id: in the render model.
+        parent_from_surface: its frame in the world, or in its actor.
+        width_m, height_m: its size.
+        neutral: (H, W, 3) what it shows without a patch.
+    """
+
+    name: str
+    asset: str
+    is_carried: bool
+    geom_id: int
+    parent_from_surface: RigidTransform
+    width_m: float
+    height_m: float
+    neutral: UInt8Image
+
+    def record(self, carrier_id: int | None) -> SurfaceRecord:
+        """As data, on the actor of that id if it is carried."""
+        return SurfaceRecord(
+            name=self.name,
+            asset=self.asset,
+            actor_id=carrier_id if self.is_carried else None,
+            parent_from_surface=Pose.from_transform(self.parent_from_surface),
+            width_m=round(self.width_m, 6),
+            height_m=round(self.height_m, 6),
+        )
+
+    def show(self, albedo: SurfaceAlbedo) -> UInt8Image:
+        """The texture for what it is to show."""
+        if not isinstance(albedo, str):
+            return face_from_patch(albedo)
+        if albedo == "none":
+            return self.neutral
+        return uniform_face(255 if albedo == "white" else 0)
+
+
+def find_faces(model: mujoco.MjModel, data: mujoco.MjData, names: Sequence[FaceName], path: Path) -> tuple[Face, ...]:
+    """Measures the faces of a compiled model; actors stand at their own origins in `data`.
+
+    Raises:
+        TownError: a face is not flat in its `surface` frame, has no size of a board's, or would not show a patch
+            upright and whole there.
+    """
+    return tuple(_face(model, data, number, name, path) for number, name in enumerate(names))
+
+
+def _face(model: mujoco.MjModel, data: mujoco.MjData, number: int, name: FaceName, path: Path) -> Face:
+    surface = f"surface_{number}"
+    geom_id, site_id = model.geom(name.geom).id, model.site(name.site).id
+    world_from_surface = RigidTransform.from_parts(
+        "world", surface, data.site_xmat[site_id].reshape(3, 3), data.site_xpos[site_id]
+    )
+    try:
+        points, _ = geom_triangles(model, geom_id)
+    except ValueError as error:
+        raise TownError(path, f"{name.asset}: {error}; make it a mesh or a box") from error
+    world_m = points @ data.geom_xmat[geom_id].reshape(3, 3).T + data.geom_xpos[geom_id]
+    local_m = world_from_surface.inverse().apply(world_m)
+    low, high = local_m.min(axis=0), local_m.max(axis=0)
+    if np.abs(low + high).max() > 2 * FLATNESS_M or high[2] - low[2] > FLATNESS_M:
+        raise TownError(
+            path,
+            f"{name.asset}: the face must be flat (no thicker than {FLATNESS_M * 100:g} cm), with the site `surface` in"
+            " its middle, z into the board",
+        )
+    width_m, height_m = float(high[0] - low[0]), float(high[1] - low[1])
+    if not all(FACE_SIDE_M[0] <= side_m <= FACE_SIDE_M[1] for side_m in (width_m, height_m)):
+        least_m, most_m = FACE_SIDE_M
+        problem = f"is {width_m:.3g} m x {height_m:.3g} m, and its sides must be {least_m:g} to {most_m:g} m"
+        raise TownError(path, f"{name.asset}: the face {problem}")
+    world_from_geom = RigidTransform.from_parts(
+        "world", "geom", data.geom_xmat[geom_id].reshape(3, 3), data.geom_xpos[geom_id]
+    )
+    if wrong := what_is_wrong(model, geom_id, world_from_surface.inverse() @ world_from_geom):
+        raise TownError(path, f"{name.asset}: the face {wrong}")
+    body = model.body(name.owner).id
+    world_from_owner = RigidTransform.from_parts("world", "actor", data.xmat[body].reshape(3, 3), data.xpos[body])
+    owner_from_surface = world_from_owner.inverse() @ world_from_surface
+    if not name.is_carried and owner_from_surface.rotation[0, 2] > -0.999:
+        raise TownError(path, f"{name.asset}: the face of a board must look along its +x axis")
+    return Face(
+        name=surface,
+        asset=name.asset,
+        is_carried=name.is_carried,
+        geom_id=geom_id,
+        parent_from_surface=owner_from_surface if name.is_carried else world_from_surface,
+        width_m=width_m,
+        height_m=height_m,
+        neutral=_neutral(model, name.neutral_material),
+    )
+
+
+def _neutral(model: mujoco.MjModel, material: str) -> UInt8Image:
+    """What the asset's own material looks like, as a face."""
+    material_id = model.material(material).id
+    roles = (mujoco.mjtTextureRole.mjTEXROLE_RGB, mujoco.mjtTextureRole.mjTEXROLE_RGBA)
+    textures = [int(model.mat_texid[material_id, role]) for role in roles]
+    texture = max(textures)
+    if texture < 0:
+        # A material's colour is linear albedo, and a face's bytes are sRGB.
+        byte = np.floor(srgb_from_linear(model.mat_rgba[material_id, :3]) * 255 + 0.5).astype(np.uint8)
+        return face_from_patch(byte[None, None, :])
+    height, width, channels = (
+        int(model.tex_height[texture]), int(model.tex_width[texture]), int(model.tex_nchannel[texture])
+    )  # fmt: skip
+    start = int(model.tex_adr[texture])
+    pixels = np.array(model.tex_data[start : start + height * width * channels]).reshape(height, width, channels)
+    return face_from_patch(np.ascontiguousarray(np.broadcast_to(pixels[..., :3], (height, width, 3))))

@@ -1,0 +1,95 @@
+"""Whether the reference camera has the faces in view."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from gear.values.geometry import Array, RigidTransform
+from gear.values.rig import CameraMount, Rig
+from gear.values.scene import CameraRecord
+from gear.world.placement import PlacementSpace
+from gear.world.surfaces.patch_faces import Face
+
+PICTURE_MARGIN = 0.06
+"""The middle of a face keeps this share of the picture's size from its border."""
+
+GRID = (5, 3)
+STAND_OFF_M = 0.2
+"""Lines of sight end this far before a face, so that its own board does not hide it."""
+
+TRUCK_MAX_INCIDENCE_DEG = 75.0
+
+Verdict = Literal["seen", "out of the picture", "too oblique", "hidden"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FaceInWorld:
+    """A face where it stands.
+
+    Attributes:
+        centre_m: its middle.
+        outward: unit normal, away from the board.
+        grid_m: (15, 3) points spread over it, just before it.
+    """
+
+    centre_m: Array
+    outward: Array
+    grid_m: Array
+
+    @staticmethod
+    def of(face: Face, world_from_surface: RigidTransform) -> FaceInWorld:
+        """From its size and its frame."""
+        u, v = np.meshgrid((np.arange(GRID[0]) + 0.5) / GRID[0] - 0.5, (np.arange(GRID[1]) + 0.5) / GRID[1] - 0.5)
+        local_m = np.stack([u * face.width_m, v * face.height_m, np.full(u.shape, -STAND_OFF_M)], axis=-1)
+        return FaceInWorld(
+            world_from_surface.translation_m,
+            -world_from_surface.rotation[:, 2],
+            world_from_surface.apply(local_m.reshape(-1, 3)),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ViewLimits:
+    """What the reference camera must see of each face.
+
+    Attributes:
+        max_incidence_deg: how obliquely it may see it.
+        min_free: share that nothing of the town may hide.
+    """
+
+    max_incidence_deg: float = TRUCK_MAX_INCIDENCE_DEG
+    min_free: float = 0.4
+
+    def judge(
+        self, space: PlacementSpace, faces: Sequence[FaceInWorld], mount: CameraMount, camera: CameraRecord
+    ) -> Verdict:
+        """The first thing that is wrong with any of the faces, or `seen`."""
+        world_from_camera = camera.world_from_camera_transform
+        eye_m = world_from_camera.translation_m
+        camera_from_world = world_from_camera.inverse()
+        for face in faces:
+            centre_m = camera_from_world.apply(face.centre_m)
+            if centre_m[2] <= 0.5:
+                return "out of the picture"
+            u, v = mount.intrinsics.project(centre_m)
+            margin_u, margin_v = PICTURE_MARGIN * mount.width_px, PICTURE_MARGIN * mount.height_px
+            if not (margin_u <= u <= mount.width_px - margin_u and margin_v <= v <= mount.height_px - margin_v):
+                return "out of the picture"
+            to_eye = eye_m - face.centre_m
+            cosine = float(to_eye @ face.outward) / float(np.linalg.norm(to_eye))
+            if cosine < math.cos(math.radians(self.max_incidence_deg)):
+                return "too oblique"
+        for face in faces:
+            if float(np.mean(space.sees(eye_m, face.grid_m))) < self.min_free:
+                return "hidden"
+        return "seen"
+
+
+def reference_camera(rig: Rig, world_from_ego: RigidTransform) -> tuple[CameraMount, CameraRecord]:
+    """The rig's first camera, on the car."""
+    return rig.cameras[0], rig.place(world_from_ego)[0]

@@ -1,0 +1,1 @@
+"""Road users: drawing them, placing them, and moving them through time."""

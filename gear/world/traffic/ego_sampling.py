@@ -1,0 +1,249 @@
+"""The ego car, and the truck ahead of it where the scene has one: where they stand is what a sample is drawn around."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.values.errors import PlacementError
+from gear.values.geometry import RigidTransform
+from gear.values.rig import Rig
+from gear.values.rng import derive_rng
+from gear.values.scene import Pose
+from gear.world.assets.actor_types import ActorType
+from gear.world.compilation.actor_pool import EGO_ASSET
+from gear.world.compilation.compose import Slot
+from gear.world.placement import PlacementSpace
+from gear.world.roads.regions import Region
+from gear.world.roads.routes import back_up, vehicle_pose
+from gear.world.scene_spec import SceneSpec
+from gear.world.surfaces.patch_faces import Face
+from gear.world.surfaces.view_limits import FaceInWorld, Verdict, ViewLimits, reference_camera
+from gear.world.traffic.crowd import Cast, is_upright
+from gear.world.traffic.footprints import Footprint
+from gear.world.traffic.spawn import Draft, FreeSlots, Spawner
+
+LEAD_TRIES = 60
+LONGEST_WAY_M = 40.0
+USUAL_MPS = 5.0
+"""A driving ego car starts at most so far before its limits, and no further than it comes at this speed."""
+
+CORRIDOR_M = 1.3
+"""Half the width of the strip between the ego car and its truck that others keep out of."""
+
+
+@dataclass(eq=False, kw_only=True)
+class Leads:
+    """Draws ego cars and carriers for one scene.
+
+    Attributes:
+        scene_name, scene: whose limits hold.
+        rig: the cameras on the ego car.
+        types, slots: the pool.
+        faces: what takes patches.
+        spawner: where vehicles may be.
+        space: what feels overlaps and hidden faces.
+    """
+
+    scene_name: str
+    scene: SceneSpec
+    rig: Rig
+    types: Mapping[str, ActorType]
+    slots: Sequence[Slot]
+    faces: Sequence[Face]
+    spawner: Spawner
+    space: PlacementSpace
+
+    def draw(self, seed: int, sequence: int, duration_s: float = 0.0) -> Cast:
+        """A cast with its leads alone.
+
+        Args:
+            seed, sequence: what the draws derive from.
+            duration_s: how long they will drive. The ego car then starts where its limits begin or before, has the
+                boards in view from there already, and drives to where they end.
+
+        Raises:
+            PlacementError: no place keeps the limits; says which is too tight.
+        """
+        problems: Counter[str] = Counter()
+        for attempt in range(LEAD_TRIES):
+            cast = self.fresh_cast()
+            # Failures bring the start nearer to the limits, so that the last tries begin where the board is in view.
+            before_s = duration_s * 0.5 ** (attempt // 6)
+            problem = self._place(cast, derive_rng(seed, self.scene_name, "ego", sequence, attempt), before_s)
+            if problem is None:
+                return cast
+            problems[problem] += 1
+        told = ", ".join(f"{count} {what}" for what, count in problems.most_common())
+        raise PlacementError(
+            self.scene_name, f"no place for the ego car in {LEAD_TRIES} tries ({told}); {self._advice}"
+        )
+
+    def fresh_cast(self) -> Cast:
+        """Nobody yet."""
+        return Cast(drafts={}, poses={}, keep_out=[], free=FreeSlots.of(self.slots))
+
+    def enter(self, cast: Cast, drafts: Sequence[Draft]) -> str | None:
+        """Stands leads up in a cast; what is wrong with their places, if anything is."""
+        for draft in drafts:
+            standing = self.space.stand(draft.kind, draft.x_m, draft.y_m, draft.near_z_m, draft.yaw_rad)
+            if standing is None:
+                return "without ground below"
+            pose = standing.world_from_actor
+            if not standing.is_even:
+                pose = self.space.settle({draft.body: pose})[draft.body]
+            if not is_upright(pose):
+                return "tipping over"
+            cast.drafts[draft.body] = draft
+            cast.poses[draft.body] = pose
+        cast.leads = frozenset(cast.drafts)
+        if self.space.overlaps(cast.poses):
+            return "overlapping the town or a board"
+        return None
+
+    def judge(self, cast: Cast) -> Verdict:
+        """Whether the ego car of a cast sees every face."""
+        ego = next(iter(cast.drafts))
+        mount, camera = reference_camera(self.rig, Pose.from_transform(cast.poses[ego]).transform("world", "ego"))
+        return self.limits.judge(self.space, self.faces_in_world(cast), mount, camera)
+
+    def faces_in_world(self, cast: Cast) -> list[FaceInWorld]:
+        """Every face, on its board or on the carrier of a cast."""
+        placed = []
+        for face in self.faces:
+            frame = face.parent_from_surface
+            if face.is_carried:
+                carrier = next(body for body, draft in cast.drafts.items() if draft.role == "carrier")
+                frame = cast.poses[carrier] @ frame
+            placed.append(FaceInWorld.of(face, frame))
+        return placed
+
+    @property
+    def ego_type(self) -> ActorType:
+        """What the ego car is."""
+        return self.types[EGO_ASSET]
+
+    @cached_property
+    def limits(self) -> ViewLimits:
+        """What the reference camera must see."""
+        if self.scene.ego is None:
+            return ViewLimits()
+        return ViewLimits(max_incidence_deg=self.scene.ego.max_incidence_deg, min_free=self.scene.ego.min_free)
+
+    @property
+    def _advice(self) -> str:
+        if self.scene.truck is not None:
+            return "widen truck.gap_m"
+        return "widen ego.ahead_m or ego.lateral_m" if self.scene.boards else "the town's lanes are blocked"
+
+    def _place(self, cast: Cast, rng: np.random.Generator, before_s: float) -> str | None:
+        if self.scene.truck is not None:
+            drafts = self._draw_behind_truck(cast, rng)
+        else:
+            drafts = self._draw_alone(cast, rng, before_s)
+        if isinstance(drafts, str):
+            return drafts
+        problem = self.enter(cast, drafts)
+        if problem is not None or not self.faces:
+            return problem
+        verdict = self.judge(cast)
+        return None if verdict == "seen" else f"with a face {verdict}"
+
+    def _draw_alone(self, cast: Cast, rng: np.random.Generator, before_s: float) -> list[Draft] | str:
+        lane, s_m = self.spawner.lane_table.draw(self.places, rng)
+        lanes: tuple[str, ...] = (lane,)
+        if self.scene.boards and before_s > 0:
+            first_m, last_m = self._run(lane, s_m)
+            s_m = first_m + float(rng.uniform(0.0, 0.15)) * (last_m - first_m)
+            before_m = float(rng.uniform(0.4, 0.8)) * min(LONGEST_WAY_M, before_s * USUAL_MPS)
+            cast.way_m = before_m + last_m - s_m
+            way = back_up(self.spawner.lanes, lane, s_m, before_m, rng)
+            if way is None:
+                return "before the start of the road"
+            lanes, s_m = way
+        ego = self.ego_on(cast, lanes[0], s_m, rng)
+        cast.ways[ego.body] = lanes
+        return [ego]
+
+    def _run(self, lane: str, s_m: float) -> tuple[float, float]:
+        """From where to where along a lane, around a place on it, the ego car may be without a gap."""
+        table = self.spawner.lane_table
+        pieces = np.array([piece for piece in self.places if table.names[piece] == lane])
+        here = int(pieces[np.argmin(np.abs(table.s_m[pieces] - s_m))])
+        inside = set(pieces.tolist())
+        first = last = here
+        while first - 1 in inside:
+            first -= 1
+        while last + 1 in inside:
+            last += 1
+        return float(table.s_m[first]), float(table.s_m[last])
+
+    def ego_on(self, cast: Cast, lane: str, s_m: float, rng: np.random.Generator) -> Draft:
+        """The ego car on a lane."""
+        return self.spawner.on_lane(self.ego_type, cast.free.take(EGO_ASSET), "ego", lane, s_m, rng)
+
+    def _draw_behind_truck(self, cast: Cast, rng: np.random.Generator) -> list[Draft] | str:
+        assert self.scene.truck is not None
+        slot = next(slot for slot in self.slots if slot.bears_surface)
+        kind = self.types[slot.actor.name]
+        lane, s_m = self.spawner.lane_table.draw(self.places, rng)
+        truck = self.spawner.on_lane(kind, slot.body, "carrier", lane, s_m, rng)
+        gap_m = float(rng.uniform(*self.scene.truck.gap_m))
+        way = back_up(self.spawner.lanes, lane, s_m, kind.rear_m + gap_m + self.ego_type.front_m, rng)
+        if way is None:
+            return "before the start of the road"
+        lanes, ego_s_m = way
+        ego = self.ego_on(cast, lanes[0], ego_s_m, rng)
+        cast.keep_out.append(_between(ego, truck))
+        cast.ways[ego.body] = lanes
+        return [ego, truck]
+
+    @cached_property
+    def places(self) -> npt.NDArray[np.intp]:
+        """Pieces of lanes where the ego car (or the truck) may be, found once.
+
+        Raises:
+            PlacementError: there are none; says what is wrong with those that the limits hold.
+        """
+        table = self.spawner.lane_table
+        ego = self.scene.ego
+        if ego is None:
+            return np.flatnonzero([not self.spawner.lanes.lanes[name].is_junction for name in table.names])
+        board = self.scene.boards[0]
+        inside = table.inside(Region(board=board, ahead_m=ego.ahead_m, lateral_m=ego.lateral_m))
+        if not len(inside):
+            raise PlacementError(self.scene_name, f"no lane lies within ego.ahead_m and ego.lateral_m; {self._advice}")
+        verdicts = [self._judge_piece(int(piece)) for piece in inside]
+        seen = inside[[verdict == "seen" for verdict in verdicts]]
+        if not len(seen):
+            told = ", ".join(f"{count} have a face {what}" for what, count in Counter(verdicts).most_common())
+            raise PlacementError(
+                self.scene_name, f"of {len(inside)} m of lanes within the ego car's limits {told}; {self._advice}"
+            )
+        return seen
+
+    def _judge_piece(self, piece: int) -> Verdict:
+        table = self.spawner.lane_table
+        line = self.spawner.lanes.lanes[table.names[piece]].line
+        point, yaw_rad = vehicle_pose(line, float(table.s_m[piece]), self.ego_type.half_length_m)
+        mount, camera = reference_camera(self.rig, RigidTransform.from_yaw("world", "ego", point, yaw_rad))
+        faces = [FaceInWorld.of(face, face.parent_from_surface) for face in self.faces]
+        return self.limits.judge(self.space, faces, mount, camera)
+
+
+def _between(ego: Draft, truck: Draft) -> Footprint:
+    """The strip from the ego car to its truck."""
+    dx, dy = truck.x_m - ego.x_m, truck.y_m - ego.y_m
+    return Footprint(
+        (ego.x_m + truck.x_m) / 2,
+        (ego.y_m + truck.y_m) / 2,
+        (ego.near_z_m + truck.near_z_m) / 2,
+        float(np.arctan2(dy, dx)),
+        float(np.hypot(dx, dy)) / 2,
+        CORRIDOR_M,
+    )

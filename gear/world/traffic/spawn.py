@@ -1,0 +1,240 @@
+"""Drawing road users: which asset, where, how fast. Drafts lie on the ground plan; placement stands them up."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.values.scene import Role, Vec3
+from gear.world.assets.actor_types import ActorType
+from gear.world.compilation.compose import Slot
+from gear.world.roads.lanes import LaneGraph, ParkingBay
+from gear.world.roads.regions import LineTable, Region
+from gear.world.roads.routes import vehicle_pose
+from gear.world.traffic.footprints import Footprint
+
+JUNCTION_WEIGHT = 0.4
+CROSSING_WEIGHT = 2.5
+STANDING_SHARE = 0.2
+"""Share of the vehicles on lanes that stand still, as in a queue."""
+
+MOTORWAY_MPS = 20.0
+"""Nobody cycles where traffic is this fast."""
+
+SIDE_CLEARANCE_M = 0.35
+"""People keep this far from the edge of a sidewalk."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WalkPlace:
+    """Where a person is on a sidewalk or crosswalk.
+
+    Attributes:
+        walk: its name.
+        s_m, lateral_m: along its line, and to its left.
+        direction: 1 along the line, -1 against it.
+    """
+
+    walk: str
+    s_m: float
+    lateral_m: float
+    direction: int
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Draft:
+    """A road user as drawn.
+
+    Attributes:
+        role: as in its record.
+        kind: what it is.
+        body: its body in the placement model.
+        x_m, y_m, near_z_m, yaw_rad: place and heading; the ground is near that height.
+        speed_mps: along the heading.
+        paint_rgb: colour of its paint.
+        lane, s_m, lateral_m: where on which lane it drives; "" for what does not.
+        walk: where it walks; None for vehicles.
+    """
+
+    role: Role
+    kind: ActorType
+    body: str
+    x_m: float
+    y_m: float
+    near_z_m: float
+    yaw_rad: float
+    speed_mps: float = 0.0
+    paint_rgb: Vec3 | None = None
+    lane: str = ""
+    s_m: float = 0.0
+    lateral_m: float = 0.0
+    walk: WalkPlace | None = None
+
+    @property
+    def footprint(self) -> Footprint:
+        """What it covers of the ground."""
+        kind = self.kind
+        return Footprint(self.x_m, self.y_m, self.near_z_m, self.yaw_rad, kind.half_length_m, kind.half_width_m)
+
+
+@dataclass(slots=True, eq=False)
+class FreeSlots:
+    """What is left of the pool while a sample is drawn.
+
+    Attributes:
+        bodies: free bodies by asset.
+    """
+
+    bodies: dict[str, list[str]] = field(default_factory=dict)
+
+    @staticmethod
+    def of(slots: Sequence[Slot]) -> FreeSlots:
+        """The whole pool, but for what bears a surface."""
+        free = FreeSlots()
+        for slot in slots:
+            if not slot.bears_surface:
+                free.bodies.setdefault(slot.actor.name, []).append(slot.body)
+        return free
+
+    def take(self, asset: str) -> str:
+        """A free body of an asset."""
+        return self.bodies[asset].pop(0)
+
+    def give_back(self, asset: str, body: str) -> None:
+        """A body is free again."""
+        self.bodies[asset].append(body)
+
+    def draw(self, types: Mapping[str, ActorType], rng: np.random.Generator, *, people: bool) -> ActorType | None:
+        """A kind that still has a free body, by how common it is; None where all are taken."""
+        kinds = [
+            kind
+            for name, kind in types.items()
+            if self.bodies.get(name) and (kind.facts.kind == "person") == people and kind.facts.weight > 0
+        ]
+        if not kinds:
+            return None
+        shares = np.cumsum([kind.facts.weight for kind in kinds])
+        return kinds[min(int(np.searchsorted(shares, rng.random() * shares[-1])), len(kinds) - 1)]
+
+
+def draw_paint(kind: ActorType, rng: np.random.Generator) -> Vec3 | None:
+    """A colour of its palette."""
+    palette = kind.facts.palette
+    total = sum(weight for _, weight in palette)
+    if total <= 0:
+        return None
+    shares = np.cumsum([weight for _, weight in palette])
+    return palette[min(int(np.searchsorted(shares, rng.random() * total)), len(palette) - 1)][0]
+
+
+class Spawner:
+    """Draws places on the lanes, walks and bays of one town."""
+
+    def __init__(self, lanes: LaneGraph) -> None:
+        """Cuts the town's lines into pieces."""
+        self.lanes = lanes
+        self.lane_table = LineTable.of(
+            (lane.name, lane.line, JUNCTION_WEIGHT if lane.is_junction else 1.0) for lane in lanes.lanes.values()
+        )
+        self.walk_table = LineTable.of(
+            (walk.name, walk.line, CROSSING_WEIGHT if walk.is_crossing else 1.0) for walk in lanes.walks.values()
+        )
+        self._bays_m = np.array([bay.position_m for bay in lanes.bays]).reshape(-1, 3)
+
+    def bays_inside(self, region: Region) -> list[ParkingBay]:
+        """Bays whose middle lies inside a region."""
+        return (
+            [self.lanes.bays[i] for i in np.flatnonzero(region.holds(self._bays_m[:, :2]))] if len(self._bays_m) else []
+        )
+
+    def belongs(self, kind: ActorType, lane: str) -> bool:
+        """Whether such a vehicle is met on a lane: bicycles keep off motorways."""
+        return kind.facts.kind != "bicycle" or self.lanes.lanes[lane].speed_mps < MOTORWAY_MPS
+
+    def on_lane(
+        self,
+        kind: ActorType,
+        body: str,
+        role: Role,
+        lane: str,
+        s_m: float,
+        rng: np.random.Generator,
+    ) -> Draft:
+        """A vehicle on a lane, a little off its middle and its heading; two-wheelers keep to the right."""
+        road = self.lanes.lanes[lane]
+        room_m = max(0.0, road.width_m / 2 - kind.half_width_m - 0.2)
+        lateral_m = float(np.clip(rng.normal(0.0, 0.12), -room_m, room_m))
+        if kind.facts.kind in ("bicycle", "motorcycle"):
+            lateral_m = -room_m * float(rng.uniform(0.3, 0.8))
+        point, yaw_rad = vehicle_pose(road.line, s_m, kind.half_length_m, lateral_m)
+        stands = rng.random() < STANDING_SHARE and not road.is_junction
+        most_mps = min(road.speed_mps, 6.0) if kind.facts.kind == "bicycle" else road.speed_mps
+        speed_mps = most_mps * float(rng.uniform(0.35, 1.0))
+        return Draft(
+            role=role,
+            kind=kind,
+            body=body,
+            x_m=float(point[0]),
+            y_m=float(point[1]),
+            near_z_m=float(point[2]),
+            yaw_rad=yaw_rad + float(np.clip(rng.normal(0.0, 0.01), -0.03, 0.03)),
+            speed_mps=0.0 if stands and role == "npc" else speed_mps,
+            paint_rgb=draw_paint(kind, rng),
+            lane=lane,
+            s_m=s_m,
+            lateral_m=lateral_m,
+        )
+
+    def in_bay(self, kind: ActorType, body: str, bay: ParkingBay, rng: np.random.Generator) -> Draft | None:
+        """A parked vehicle, or None where it does not fit."""
+        spare_m = bay.length_m / 2 - kind.half_length_m, bay.width_m / 2 - kind.half_width_m
+        if min(spare_m) < 0:
+            return None
+        ahead_m, left_m = (float(rng.uniform(-1, 1)) * min(0.25, spare) for spare in spare_m)
+        c, s = math.cos(bay.yaw_rad), math.sin(bay.yaw_rad)
+        turned = math.pi if rng.random() < 0.15 else 0.0
+        return Draft(
+            role="parked",
+            kind=kind,
+            body=body,
+            x_m=bay.position_m[0] + c * ahead_m - s * left_m,
+            y_m=bay.position_m[1] + s * ahead_m + c * left_m,
+            near_z_m=bay.position_m[2],
+            yaw_rad=bay.yaw_rad + turned + float(np.clip(rng.normal(0.0, 0.015), -0.03, 0.03)),
+            paint_rgb=draw_paint(kind, rng),
+        )
+
+    def on_walk(
+        self, kind: ActorType, body: str, pieces: npt.NDArray[np.intp], rng: np.random.Generator
+    ) -> Draft | None:
+        """A person on a sidewalk or crossing: walkers keep to their right half, those who stand look anywhere.
+
+        Nobody stands about on a crossing: None where that was drawn.
+        """
+        name, s_m = self.walk_table.draw(pieces, rng)
+        walk = self.lanes.walks[name]
+        if walk.is_crossing and kind.facts.gait != "walk":
+            return None
+        direction = 1 if rng.random() < 0.5 else -1
+        room_m = max(0.0, walk.width_m / 2 - SIDE_CLEARANCE_M)
+        walks = kind.facts.gait == "walk"
+        lateral_m = -direction * room_m * float(rng.uniform(0.1, 1.0)) if walks else room_m * float(rng.uniform(-1, 1))
+        point, heading_rad = walk.line.at(s_m, lateral_m)
+        if direction < 0:
+            heading_rad += math.pi
+        return Draft(
+            role="pedestrian",
+            kind=kind,
+            body=body,
+            x_m=float(point[0]),
+            y_m=float(point[1]),
+            near_z_m=float(point[2]),
+            yaw_rad=heading_rad if walks else float(rng.uniform(-math.pi, math.pi)),
+            speed_mps=float(rng.uniform(0.8, 1.7)) if walks else 0.0,
+            paint_rgb=draw_paint(kind, rng),
+            walk=WalkPlace(walk=name, s_m=s_m, lateral_m=lateral_m, direction=direction),
+        )

@@ -1,0 +1,1 @@
+"""Weather: presets, sun and sky, air, wet ground, and lamps at night."""

@@ -1,0 +1,159 @@
+"""A weather as the camera needs it: CARLA's fog, what clear air scatters, rain and water on the ground."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from gear.camera.air import Air, Fog
+from gear.camera.ground_shade import GroundShade
+from gear.camera.night import Night
+from gear.camera.pipeline import Darkroom
+from gear.camera.rain import Rain
+from gear.camera.response import encode_srgb, response_for
+from gear.camera.water import Water
+from gear.values.frames import Shape
+from gear.values.optics import CameraEffects
+from gear.values.scene import Weather
+from gear.world.weather.light import (
+    Floats,
+    Lighting,
+    even_light,
+    horizon_light,
+    lamplit_houses,
+    lighting_of,
+    mirrored_light,
+)
+from gear.world.weather.presets import wetness
+
+DENSEST_FOG_PER_M = 0.05
+"""Extinction of CARLA's 100 percent: what is 60 m away can no longer be told."""
+
+RAIN_PER_M = 0.0035
+"""Extinction of the hardest rain."""
+
+RAIN_FROM_M, RAIN_FALLOFF = 0.75, 0.1
+"""Where its veil begins and how it thins, in the terms of CARLA's fog: as its presets have the fog in rain."""
+
+AEROSOL_PER_M = 1.6e-4
+"""Extinction of a town's clear air by dust and vapour: 24 km of sight, as on a good day."""
+
+MOLECULES_PER_M = (7.6e-6, 1.16e-5, 2.3e-5)
+"""Rayleigh's extinction at 610, 550 and 465 nm, at sea level."""
+
+FALLOFF_PER_M = 0.0693
+"""A falloff of 1 halves the fog every ten metres, as the engine below CARLA does."""
+
+
+FULL_PUDDLES = 0.32
+"""Share of open ground under water at 100 percent of deposits."""
+
+DROP_LIGHT = 1.25
+"""A drop shows a wide piece of the sky, brighter than the horizon."""
+
+SHADE_SKY_FACE_PX = 8
+"""A small sky says as much about its light as a large one."""
+
+_MIRROR_ROWS, _MIRROR_COLUMNS = 128, 512
+
+
+def darkroom_of(
+    weather: Weather,
+    renderer_name: str,
+    town: str,
+    effects: CameraEffects | None = None,
+    night: Night | None = None,
+    shapes: Mapping[str, Shape] | None = None,
+) -> Darkroom:
+    """What develops a renderer's frames of a weather in a town.
+
+    Args:
+        weather: light and air.
+        renderer_name: who renders.
+        town: its puddles lie where they always lie.
+        effects: of the camera; none unless given.
+        night: the town's lamps; none by day.
+        shapes: of the assets that may take part, which shade the ground about them; without them nothing does.
+    """
+    left = night.sky_level if night else 1.0
+    mirrored = left * mirrored_light(weather, _MIRROR_ROWS, _MIRROR_COLUMNS)
+    if night is not None:
+        mirrored += night.lit * lamplit_houses(_MIRROR_ROWS)
+    return Darkroom(
+        response=response_for(renderer_name, weather),
+        shade=None if shapes is None else shade_of(weather, renderer_name, shapes),
+        night=night,
+        air=air_of(weather, renderer_name, left),
+        water=Water(
+            town=town,
+            share=FULL_PUDDLES * weather.precipitation_deposits / 100,
+            ripples=min(1.0, 1.5 * weather.precipitation / 100),
+            film=wetness(weather),
+            mirrored=_shown(mirrored, renderer_name).astype(np.float32),
+        ),
+        rain=Rain.of(
+            weather.precipitation,
+            weather.wind_intensity,
+            np.minimum(_shown(left * DROP_LIGHT * horizon_light(weather).mean(axis=0), renderer_name), 1.0),
+        ),
+        effects=effects or CameraEffects(),
+    )
+
+
+def shade_of(weather: Weather, renderer_name: str, shapes: Mapping[str, Shape]) -> GroundShade:
+    """What assets keep from the ground of a weather's light."""
+    light = lighting_of(weather, sky_face_px=SHADE_SKY_FACE_PX)
+    return GroundShade(shapes=shapes, even_share=even_share(weather, light), is_display=renderer_name == "classic")
+
+
+def even_share(weather: Weather, light: Lighting) -> float:
+    """How much of the light on open level ground is not the sun's, 0..1."""
+    even = even_light(weather)[0].mean()
+    sun = light.sun.mean() * max(light.towards_sun[2], 0) / math.pi
+    return float(even / (even + sun))
+
+
+def _shown(light: Floats, renderer_name: str) -> Floats:
+    """Light in units of a renderer's frames: classic's hold display values."""
+    return encode_srgb(light) if renderer_name == "classic" else light
+
+
+def air_of(weather: Weather, renderer_name: str, left: float = 1.0) -> Air:
+    """The air of a weather, in the units of a renderer's frames; `left` is the share of its own light at night."""
+    aerosol = AEROSOL_PER_M * weather.mie_scattering_scale / 0.03
+    molecules = np.array(MOLECULES_PER_M) * weather.rayleigh_scattering_scale / 0.0331
+    return Air(
+        fogs=fogs_of(weather),
+        clear_per_m=weather.scattering_intensity * (aerosol + molecules),
+        ring=_shown(left * horizon_light(weather), renderer_name),
+    )
+
+
+def fogs_of(weather: Weather) -> tuple[Fog, ...]:
+    """The fog and the veil of rain, in the order of what they take of light; none that is not there.
+
+    CARLA's percent run from clear air to a thick fog. Where the fog begins and how it thins are its own: the veil hangs
+    as a usual fog does, and both are one where the fog is a usual one.
+    """
+    fog = DENSEST_FOG_PER_M * (weather.fog_density / 100) ** 1.5
+    rain = RAIN_PER_M * math.pow(weather.precipitation / 100, 1.5)
+    usual = Fog(
+        per_m=float(weather.scattering_intensity * rain), from_m=RAIN_FROM_M, thinning_per_m=_thinning(RAIN_FALLOFF)
+    )
+    own = Fog(
+        per_m=float(weather.scattering_intensity * fog),
+        from_m=weather.fog_distance_m,
+        thinning_per_m=_thinning(weather.fog_falloff),
+    )
+    # As one they cost every frame half.
+    if (own.from_m, own.thinning_per_m) == (usual.from_m, usual.thinning_per_m):
+        both = dataclasses.replace(own, per_m=float(weather.scattering_intensity * (fog + rain)))
+        return tuple(one for one in (both,) if one.per_m > 0)
+    return tuple(one for one in (own, usual) if one.per_m > 0)
+
+
+def _thinning(falloff: float) -> float:
+    return FALLOFF_PER_M * falloff

@@ -1,0 +1,86 @@
+"""A town at night, for the camera: its lamps and windows, and how much of the even light is left."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from gear.camera.beams import Headlamps
+from gear.camera.lamp_shadows import Casters, LampShadows
+from gear.camera.night import Night
+from gear.values.errors import TownError
+from gear.values.labels import LABEL_BY_NAME
+from gear.values.rng import derive_rng
+from gear.values.scene import Weather
+from gear.world.weather.lamps import find_lamps, find_windows
+from gear.world.weather.light import even_light
+from gear.world.weather.presets import wetness
+from gear.world.weather.shadow_casters import find_casters
+from gear.world.world import World
+
+LEVEL, SKY_LEVEL = 0.03, 0.14
+"""Of even light, on the ground and in the sky, when the sun's is gone."""
+
+HEADLAMP_KINDS = ("car", "van", "bus", "truck", "motorcycle")
+GAUGE_SHARE = 0.72
+"""Of a vehicle's width that lies between its headlamps."""
+
+
+def night_of(world: World, weather: Weather, renderer_name: str) -> Night | None:
+    """What the night adds to a world's frames; nothing while the sun is up.
+
+    Args:
+        world: compiled; its meshes must still be there.
+        weather: light and air.
+        renderer_name: who renders.
+
+    Raises:
+        TownError: the glass of a lamp has no surface that could shine.
+    """
+    if not weather.night:
+        return None
+    model = world.model
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    material = materials_of(model)
+    level = LEVEL**weather.night
+    try:
+        lamps = find_lamps(model, data)
+    except ValueError as error:
+        problem = f"{error}; make the glass of lamps of meshes, boxes, cylinders, capsules or ellipsoids"
+        raise TownError(world.library.town, problem) from error
+    return Night(
+        level=level,
+        sky_level=SKY_LEVEL**weather.night,
+        lit=1 - level,
+        even=even_light(weather),
+        lamps=lamps,
+        windows=find_windows(model, data, derive_rng(0, "windows", world.town_name)),
+        vehicles={
+            name: Headlamps(
+                front_m=kind.front_m,
+                half_gauge_m=0.0 if kind.facts.kind == "motorcycle" else GAUGE_SHARE * kind.half_width_m,
+            )
+            for name, kind in world.types.items()
+            if kind.facts.kind in HEADLAMP_KINDS
+        },
+        wetness=wetness(weather),
+        is_signal=np.array([index >= 0 and model.mat_emission[index] > 0 for index in model.geom_matid]),
+        is_lens=np.array([name == "lights" for name in material]),
+        is_pane=panes_of_buses(material, world.classes.label_code),
+        is_display=renderer_name == "classic",
+        shadows=LampShadows(
+            casters=Casters.of(find_casters(model, data, world.classes.label_code)), shapes=world.shapes
+        ),
+    )
+
+
+def materials_of(model: mujoco.MjModel) -> list[str]:
+    """The name of each geom's material in the file that it came with; empty where it has none."""
+    return [model.mat(index).name.rsplit("/", 1)[-1] if index >= 0 else "" for index in model.geom_matid]
+
+
+def panes_of_buses(material: list[str], label_code: npt.NDArray[np.uint8]) -> npt.NDArray[np.bool_]:
+    """(ngeom,) what of a world is the glass of a bus, by each geom's material and label."""
+    return np.asarray((np.array(material) == "glass") & (label_code == LABEL_BY_NAME["bus"].code))

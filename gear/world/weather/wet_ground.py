@@ -1,0 +1,81 @@
+"""Wet ground: what lies open to the rain, darker and smoother.
+
+Water fills the pores, so that less light comes back from inside, and the surface mirrors more sharply.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from gear.contracts.rendering import has_own_colour
+from gear.values.labels import LABEL_BY_NAME
+from gear.world.compilation.instances import class_name
+from gear.world.compilation.quiet_mjcf import mjcf
+
+WET_LABELS = frozenset({"road", "road_marking", "sidewalk", "parking", "ground"})
+"""What lies open to the rain and holds its water."""
+
+Worn = tuple[str, str | None]
+"""A default class, and a material that a geom has besides."""
+
+_DARKENING = 0.45
+_SMOOTHING = 0.7
+
+
+def wet_materials(root: mjcf.RootElement, amount: float, worn: Sequence[Worn] = ()) -> None:
+    """Wets the materials of open ground.
+
+    Args:
+        root: of a world.
+        amount: 0 is dry, 1 as wet as can be.
+        worn: default class and own material of geoms of the world that are not in the tree.
+    """
+    for material in _open_materials(root, worn):
+        rgba = np.array(material.rgba if material.rgba is not None else (1.0, 1.0, 1.0, 1.0))
+        rgba[:3] *= 1 - _DARKENING * amount
+        material.rgba = rgba
+        if material.roughness is not None and material.roughness >= 0:
+            material.roughness = float(material.roughness * (1 - _SMOOTHING * amount))
+
+
+def wet_own_colours(model: mujoco.MjModel, label_code: npt.NDArray[np.uint8], amount: float) -> None:
+    """Darkens open ground that its geom colours, not its material.
+
+    Args:
+        model: compiled; its geoms' colours are changed.
+        label_code: (ngeom,) what each geom is.
+        amount: 0 is dry, 1 as wet as can be.
+    """
+    is_open = np.isin(label_code, [LABEL_BY_NAME[name].code for name in WET_LABELS])
+    model.geom_rgba[is_open & has_own_colour(model), :3] *= np.float32(1 - _DARKENING * amount)
+
+
+def _open_materials(root: mjcf.RootElement, worn: Sequence[Worn]) -> list[Any]:
+    """Materials of geoms whose label is in `WET_LABELS`, each once."""
+    pairs: list[tuple[Any, Any]] = [
+        (root.find("default", name), None if own is None else root.find("material", own))
+        for name, own in worn
+        if _is_open(name)
+    ]
+    pairs += [(geom.dclass, geom.material) for geom in root.find_all("geom") if _is_open(class_name(geom.dclass))]
+    found = (own if own is not None else _inherited_material(default) for default, own in pairs)
+    return list({material.full_identifier: material for material in found if material is not None}.values())
+
+
+def _is_open(class_name: str) -> bool:
+    return class_name.rsplit("/", 1)[-1].partition(".")[0] in WET_LABELS
+
+
+def _inherited_material(default: Any) -> Any:
+    """The material that a default class, or one that it stands in, gives its geoms."""
+    # Of a class that went around dm_control only the name is here, and such a one gives no material.
+    while default is not None and not isinstance(default, str) and default.tag == "default":
+        if default.geom is not None and default.geom.material is not None:
+            return default.geom.material
+        default = default.parent
+    return None

@@ -1,0 +1,60 @@
+"""Means, deviations, levels and scores."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gear.plugins.defenses.activations.z_scores import FLOOR, alarm_level, sureness, usual
+from gear.values.errors import GearError
+
+
+@given(st.integers(0, 10_000), st.integers(2, 9), st.floats(-1e4, 1e4))
+@settings(max_examples=40, deadline=None)
+def test_one_pass_gives_what_numpy_gives_from_all(seed: int, count: int, offset: float) -> None:
+    values = torch.randn(count, 2, 3, generator=torch.Generator().manual_seed(seed)) + offset
+    learnt = usual(values)
+    assert np.allclose(learnt.mean, values.double().numpy().mean(axis=0))
+    assert np.allclose(learnt.deviation, values.double().numpy().std(axis=0, ddof=1), atol=1e-9)
+
+
+def test_scores_count_deviations() -> None:
+    learnt = usual([torch.tensor([0.0, 10.0]), torch.tensor([2.0, 14.0])])
+    floor = FLOOR * float(learnt.deviation.mean())
+    z = learnt.z_scores(torch.tensor([3.0, 10.0]))
+    assert z.tolist() == pytest.approx([2 / (2**0.5 + floor), -2 / (8**0.5 + floor)])
+
+
+def test_a_number_that_never_changed_does_not_outweigh_all_others() -> None:
+    learnt = usual([torch.tensor([0.0, 10.0]), torch.tensor([0.0, 14.0])])
+    assert float(learnt.z_scores(torch.tensor([0.01, 12.0])).abs().max()) < 1
+
+
+def test_maps_of_another_size_are_refused_with_both() -> None:
+    learnt = usual([torch.zeros(2, 3), torch.ones(2, 3)])
+    with pytest.raises(GearError, match=r"2 x 4 numbers, and had 2 x 3 in calibration"):
+        learnt.z_scores(torch.zeros(2, 4))
+    with pytest.raises(GearError, match="one size"):
+        usual([torch.zeros(2), torch.zeros(3)])
+    with pytest.raises(GearError, match="at least two pictures"):
+        usual([torch.zeros(2)])
+
+
+def test_one_clean_picture_in_twenty_raises_the_alarm() -> None:
+    scores = np.linspace(1, 2, 101).tolist()
+    level = alarm_level(scores, 0.05)
+    assert level == pytest.approx(1.95)
+    assert np.mean([sureness(score, level) > 0.5 for score in scores]) == pytest.approx(0.05, abs=0.01)
+
+
+@given(st.floats(0, 1e6), st.floats(0, 1e6), st.floats(0, 1e3))
+def test_scores_keep_the_order_and_stay_in_0_to_1(one: float, other: float, level: float) -> None:
+    low, high = sorted((one, other))
+    assert 0 <= sureness(low, level) <= sureness(high, level) <= 1
+
+
+def test_what_is_no_number_is_an_alarm() -> None:
+    assert sureness(float("nan"), 1.0) == sureness(float("inf"), 1.0) == 1.0
