@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from gear.contracts.specs import KINDS, Kind
 
 if TYPE_CHECKING:
-    from gear.plugins.catalogue import Catalogue, Found
+    from gear.plugins.catalogue import Catalogue, PluginEntry
 
 EXAMPLE = """examples:
   gear plugins
@@ -94,7 +94,7 @@ def show(found: Catalogue, kinds: tuple[Kind, ...], args: argparse.Namespace) ->
     return 0
 
 
-def the_one(found: Catalogue, kinds: tuple[Kind, ...], name: str | None) -> Found:
+def the_one(found: Catalogue, kinds: tuple[Kind, ...], name: str | None) -> PluginEntry:
     """The plugin that answers to a name, whatever its kind.
 
     Raises:

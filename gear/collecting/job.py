@@ -22,7 +22,7 @@ from gear.contracts.rendering import RendererInfo
 from gear.contracts.tasks import SplitInfo
 from gear.dataset.plan import Plan
 from gear.plugins.build import blamed, build
-from gear.plugins.catalogue import Found
+from gear.plugins.catalogue import PluginEntry
 from gear.render.probing import renderer_info
 from gear.values.errors import ConfigError
 from gear.values.scene import Weather
@@ -131,7 +131,7 @@ def _scene_content(scene: SceneSpec) -> Json:
     return content
 
 
-def _check_lens(config: CollectionConfig, task: Found) -> None:
+def _check_lens(config: CollectionConfig, task: PluginEntry) -> None:
     lens = config.camera.lens
     if not lens.bends:
         return

@@ -13,7 +13,7 @@ from gear.config.load import load_simulation, split_of
 from gear.config.nodes import Place, parse_file
 from gear.config.reader import read_node, told_at
 from gear.plugins.build import find
-from gear.plugins.catalogue import Found
+from gear.plugins.catalogue import PluginEntry
 from gear.values.errors import ConfigError, FieldError, UnknownNameError
 from gear.values.resources import data_dir
 from gear.values.scene import Weather
@@ -43,7 +43,7 @@ class Named:
     """
 
     config: CollectionConfig
-    task: Found
+    task: PluginEntry
     options: Any
     library: AssetLibrary
     scene: SceneSpec

@@ -16,7 +16,7 @@ from gear.contracts.tasks import Encoded, Sample, Task
 from gear.dataset.output_checks import check_encoded
 from gear.formats.probes import AuxiliaryFiles, probe_files
 from gear.plugins.build import blamed, build, find
-from gear.plugins.catalogue import Found
+from gear.plugins.catalogue import PluginEntry
 from gear.render.registry import open_renderer
 from gear.values.frames import Frame, GeomTable, SceneObject
 from gear.values.scene import SceneRecord
@@ -54,7 +54,7 @@ class Session:
     """Everything that makes samples of one job."""
 
     job: Job
-    plugin: Found
+    plugin: PluginEntry
     task: Task[Any, Any]
     world: World
     planner: ScenePlanner

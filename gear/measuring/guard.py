@@ -13,7 +13,7 @@ import numpy.typing as npt
 from gear.contracts.defenses import Defense, DefenseResult
 from gear.contracts.models import Model
 from gear.plugins.build import blamed
-from gear.plugins.catalogue import Found
+from gear.plugins.catalogue import PluginEntry
 from gear.values.errors import PluginError
 from gear.values.frames import UInt8Image
 
@@ -25,7 +25,7 @@ class Guard:
 
     def __init__(
         self,
-        found: Found,
+        found: PluginEntry,
         defense: Defense,
         model: Model | None = None,
         learn: Callable[[], Any] = lambda: None,

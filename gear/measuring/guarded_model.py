@@ -25,7 +25,7 @@ from gear.measuring.guard import Guard
 from gear.measuring.parallel_batches import lanes_of
 from gear.measuring.plugin_selection import Chosen
 from gear.plugins.build import blamed, build
-from gear.plugins.catalogue import Found
+from gear.plugins.catalogue import PluginEntry
 from gear.plugins.manager import DISTRIBUTION
 from gear.values.errors import PluginError
 from gear.values.rng import derive_rng
@@ -170,7 +170,7 @@ class Player:
         return answers
 
 
-def accusation(found: Found, stage: str, problem: str) -> PluginError:
+def accusation(found: PluginEntry, stage: str, problem: str) -> PluginError:
     """An error that says whose plugin it is."""
     return PluginError(f"{found.spec.name} ({found.owner.package} {found.owner.version})", stage, problem)
 

@@ -14,7 +14,7 @@ from gear.contracts.evaluation import Maskable, Reports
 from gear.contracts.specs import DefenseSpec, ModelSpec
 from gear.dataset.reading import Dataset
 from gear.plugins.build import NO_OPTIONS, find
-from gear.plugins.catalogue import Found
+from gear.plugins.catalogue import PluginEntry
 from gear.values.errors import GearError, UnknownNameError
 from gear.values.serial import Json
 
@@ -29,7 +29,7 @@ CAMERA = ("hfov_deg", "baseline_m")
 class Chosen:
     """A plugin with the options that it will be built with."""
 
-    found: Found
+    found: PluginEntry
     options: Node
 
     def facts(self) -> Json:

@@ -20,7 +20,7 @@ from gear.measuring.metric_json import known_json
 from gear.measuring.patch_area import MASK_FIGURES, mask_figures, patch_masks, widened
 from gear.measuring.plugin_selection import OUTSIDE_PATCH
 from gear.measuring.statistics import AnyEvaluator
-from gear.plugins.catalogue import Found, one_line
+from gear.plugins.catalogue import PluginEntry, one_line
 from gear.plugins.manager import DISTRIBUTION
 from gear.values.errors import DatasetError, FieldError, GearError
 from gear.values.serial import Json, from_json
@@ -90,7 +90,9 @@ class Unwritten:
 class Scorer:
     """Measures and keeps the samples of one dataset; its methods may run in several threads."""
 
-    def __init__(self, dataset: Dataset[Any], root: Path, folder: str, reports: tuple[str, ...], model: Found) -> None:
+    def __init__(
+        self, dataset: Dataset[Any], root: Path, folder: str, reports: tuple[str, ...], model: PluginEntry
+    ) -> None:
         """Args:
         dataset: whose samples they are.
         root: of the evaluation.

@@ -13,14 +13,14 @@ from gear.config.nodes import Mapping, Node, Place
 from gear.config.reader import read_node
 from gear.contracts.specs import Kind, TaskSpec
 from gear.contracts.tasks import Task
-from gear.plugins.catalogue import Found, one_line
+from gear.plugins.catalogue import PluginEntry, one_line
 from gear.plugins.manager import DISTRIBUTION, catalogue
 from gear.values.errors import GearError, PluginError
 
 NO_OPTIONS = Mapping({}, Place("defaults"))
 
 
-def find(kind: Kind, name: str) -> Found:
+def find(kind: Kind, name: str) -> PluginEntry:
     """The plugin that answers to a name."""
     return catalogue().get(kind, name)
 
@@ -33,7 +33,7 @@ def name_of_task(written: JsonMapping[str, Any]) -> str:
     return full if any(found.full_name == full for found in catalogue().of_kind("task")) else written["name"]
 
 
-def build(found: Found, options: Node = NO_OPTIONS) -> Any:
+def build(found: PluginEntry, options: Node = NO_OPTIONS) -> Any:
     """Makes a plugin's product from its options.
 
     Raises:
@@ -46,7 +46,7 @@ def build(found: Found, options: Node = NO_OPTIONS) -> Any:
 
 
 @contextlib.contextmanager
-def blamed(found: Found, stage: str) -> Iterator[None]:
+def blamed(found: PluginEntry, stage: str) -> Iterator[None]:
     """Around a plugin's code: what it prints goes to stderr, and what a third party's raises says whose it is.
 
     Raises:
@@ -67,7 +67,7 @@ def blamed(found: Found, stage: str) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def traced(founds: Iterable[Found], stage: str) -> Iterator[None]:
+def traced(founds: Iterable[PluginEntry], stage: str) -> Iterator[None]:
     """Around another's code that calls plugins, such as an attack's that asks a network: what passes through a third
     party's package on its way says whose it is.
 

@@ -26,8 +26,8 @@ class Owner:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Found:
-    """One spec and whose it is."""
+class PluginEntry:
+    """A plugin in the catalogue: one spec and the distribution that brings it."""
 
     kind: Kind
     spec: AnySpec
@@ -62,10 +62,10 @@ class Broken:
 class Catalogue:
     """All plugins of this environment."""
 
-    found: tuple[Found, ...]
+    found: tuple[PluginEntry, ...]
     broken: tuple[Broken, ...] = field(default=())
 
-    def of_kind(self, kind: Kind) -> tuple[Found, ...]:
+    def of_kind(self, kind: Kind) -> tuple[PluginEntry, ...]:
         """Sorted by name, then package."""
         return tuple(sorted((f for f in self.found if f.kind == kind), key=lambda f: (f.spec.name, f.owner.package)))
 
@@ -75,7 +75,7 @@ class Catalogue:
         short = [f.spec.name for f in found]
         return tuple(f.spec.name if short.count(f.spec.name) == 1 else f.full_name for f in found)
 
-    def get(self, kind: Kind, name: str) -> Found:
+    def get(self, kind: Kind, name: str) -> PluginEntry:
         """By short name if unique, else by `package/name`.
 
         Raises:

@@ -10,7 +10,7 @@ from typing import Any
 
 from gear.config.dump import to_plain
 from gear.contracts.specs import AnySpec, ModelSpec, Spec
-from gear.plugins.catalogue import Found
+from gear.plugins.catalogue import PluginEntry
 
 COMMON = {field.name for field in dataclasses.fields(Spec)}
 ELSEWHERE = {"recipe", "published", "convert", "parameters", "starts"}
@@ -23,7 +23,7 @@ UNITS = {
 """By the last word of an option's name."""
 
 
-def summary(found: Found) -> dict[str, Any]:
+def summary(found: PluginEntry) -> dict[str, Any]:
     """Kind, name, package, version, summary and capabilities; JSON."""
     capabilities = {
         field.name: sorted(value) if isinstance(value := getattr(found.spec, field.name), frozenset) else value

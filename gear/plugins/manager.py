@@ -19,7 +19,7 @@ from gear.contracts import hookspecs
 from gear.contracts.models import PublishedWeights, Recipe
 from gear.contracts.specs import PROTOCOL_VERSION, SPEC_TYPES, AnySpec, Kind, ModelSpec
 from gear.plugins.builtins import BUILTINS
-from gear.plugins.catalogue import Broken, Catalogue, Found, Owner, as_iterable, one_line
+from gear.plugins.catalogue import Broken, Catalogue, Owner, PluginEntry, as_iterable, one_line
 
 GROUP = "gear"
 HOOK_OF: dict[Kind, str] = {
@@ -115,9 +115,9 @@ def _register(
     return None
 
 
-def _call_hooks(manager: pluggy.PluginManager, owners: dict[str, Owner]) -> tuple[list[Found], list[Broken]]:
+def _call_hooks(manager: pluggy.PluginManager, owners: dict[str, Owner]) -> tuple[list[PluginEntry], list[Broken]]:
     """Calls each implementation on its own, so that one that raises aborts nobody else's, and its owner is known."""
-    found: list[Found] = []
+    found: list[PluginEntry] = []
     broken: list[Broken] = []
     for kind, hook in HOOK_OF.items():
         for implementation in getattr(manager.hook, hook).get_hookimpls():
@@ -132,7 +132,7 @@ def _call_hooks(manager: pluggy.PluginManager, owners: dict[str, Owner]) -> tupl
             for spec in specs:
                 problem = spec_problem(kind, spec)
                 if problem is None:
-                    found.append(Found(kind=kind, spec=spec, owner=owner))
+                    found.append(PluginEntry(kind=kind, spec=spec, owner=owner))
                 else:
                     broken.append(Broken(owner=owner, stage="spec", problem=problem))
     return found, broken

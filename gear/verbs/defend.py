@@ -16,7 +16,7 @@ from gear.dataset.sidecar import dump_json, load_json
 from gear.dataset.store import refuse_dataset
 from gear.measuring.guard import Guard
 from gear.plugins.build import NO_OPTIONS, build, find
-from gear.plugins.catalogue import Found
+from gear.plugins.catalogue import PluginEntry
 from gear.plugins.datasets import open_dataset
 from gear.values.errors import DatasetError, GearError
 from gear.values.rng import check_seed, derive_rng
@@ -120,7 +120,7 @@ def defend(
     return DefendReport(root=root, split=name, samples=len(opened), made=len(missing), outdated=outdated)
 
 
-def suitable(found: Found, task: str) -> DefenseSpec[Any]:
+def suitable(found: PluginEntry, task: str) -> DefenseSpec[Any]:
     """The defense's spec, if it can do this job, which has pictures alone.
 
     Raises:

@@ -8,7 +8,7 @@ from typing import Any
 
 from gear.contracts.specs import ModelSpec
 from gear.networks.shipped import WeightsFile, inspect, shipped
-from gear.plugins.catalogue import Found
+from gear.plugins.catalogue import PluginEntry
 from gear.plugins.manager import catalogue
 from gear.values.serial import Json, to_json
 
@@ -50,7 +50,7 @@ class ModelFacts:
         shipped: its reference weights, if an installed package has them.
     """
 
-    found: Found
+    found: PluginEntry
     missing: tuple[str, ...]
     shipped: ShippedWeights | None
 

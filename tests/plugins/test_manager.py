@@ -14,7 +14,7 @@ from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import PublishedWeights, Recipe
 from gear.contracts.specs import PROTOCOL_VERSION, DefenseSpec, ModelSpec
 from gear.plugins.build import build
-from gear.plugins.catalogue import Catalogue, Found
+from gear.plugins.catalogue import Catalogue, PluginEntry
 from gear.plugins.manager import discover, spec_problem
 from gear.values.errors import DuplicateNameError, PluginError, UnknownNameError
 
@@ -43,7 +43,7 @@ def spec(name: str, **changes: Any) -> DefenseSpec[Config]:
     return DefenseSpec(name=name, **facts)
 
 
-def strangers(found: Catalogue) -> list[Found]:
+def strangers(found: Catalogue) -> list[PluginEntry]:
     return [f for f in found.of_kind("defense") if f.owner.package != "mujoco-gear"]
 
 

@@ -19,7 +19,7 @@ from gear.dataset.store import plan_of, splits_of
 from gear.measuring.calibration import Calibration, Progress, opened_calibration
 from gear.measuring.plugin_selection import Chosen
 from gear.plugins.build import NO_OPTIONS, find
-from gear.plugins.catalogue import Found
+from gear.plugins.catalogue import PluginEntry
 from gear.plugins.datasets import root_and_split, roots_of
 from gear.readers import open_all
 from gear.values.errors import DatasetError, GearError
@@ -62,7 +62,7 @@ class Job:
     models: Sequence[Chosen]
     defense: Chosen | None
     calibration: Calibration
-    found: Found
+    found: PluginEntry
     spec: AttackSpec[Any]
     options: Node
     config: Any

@@ -15,7 +15,7 @@ from gear.measuring.guard import Guard
 from gear.measuring.plugin_selection import Chosen, check_defense, check_model, chosen_defense, chosen_model
 from gear.plugins.attacks.optimisation.model_group import Cleaned, Defended, Group
 from gear.plugins.build import blamed, build
-from gear.plugins.catalogue import Found
+from gear.plugins.catalogue import PluginEntry
 from gear.values.errors import GearError
 from gear.values.rng import derive_rng
 
@@ -70,7 +70,7 @@ def choose_defense(
 
 
 def check_attack(
-    found: Found, models: Sequence[Chosen], task: str, surfaces: int, queries: int | None
+    found: PluginEntry, models: Sequence[Chosen], task: str, surfaces: int, queries: int | None
 ) -> AttackSpec[Any]:
     """Whether the attack can do it.
 

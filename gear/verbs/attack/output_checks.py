@@ -6,11 +6,11 @@ from typing import Any
 
 from gear.contracts.attacks import Patch
 from gear.measuring.guarded_model import accusation
-from gear.plugins.catalogue import Found
+from gear.plugins.catalogue import PluginEntry
 from gear.verbs.attack.monitor import is_picture
 
 
-def check_patches(patches: Any, surfaces: int, found: Found) -> None:
+def check_patches(patches: Any, surfaces: int, found: PluginEntry) -> None:
     """Whether what an attack returns is a patch for each surface.
 
     Raises:

@@ -24,7 +24,7 @@ from gear.measuring.shown_size import size_note
 from gear.plugins.attacks.optimisation.model_group import device_name
 from gear.plugins.attacks.optimisation.objectives import Objective, default_objective
 from gear.plugins.build import blamed, build, traced
-from gear.plugins.catalogue import Found
+from gear.plugins.catalogue import PluginEntry
 from gear.values.errors import GearError, PluginError
 from gear.values.rng import derive_rng
 from gear.values.serial import Json
@@ -170,7 +170,7 @@ def _note_doubts(job: Job, noted: Callable[[str], None] | None) -> None:
                 noted(note)
 
 
-def _asked(job: Job) -> list[Found]:
+def _asked(job: Job) -> list[PluginEntry]:
     """Whose code the attack asks."""
     return [one.found for one in (*job.models, job.defense) if one is not None]
 

@@ -11,7 +11,7 @@ from gear.config.reader import read_node
 from gear.contracts.specs import AttackSpec, DefenseSpec, Kind, ModelSpec, TaskSpec
 from gear.measuring.plugin_selection import Chosen, check_defense, chosen_defense, chosen_model
 from gear.plugins.build import NO_OPTIONS, find
-from gear.plugins.catalogue import Found
+from gear.plugins.catalogue import PluginEntry
 from gear.values.errors import GearError
 from gear.verbs.attack.models import check_attack
 from gear.verbs.bench.config import BenchConfig, Contestant, settings_of
@@ -74,7 +74,7 @@ class Contest:
         return (None, *self.defenses)
 
 
-def find_attack(config: BenchConfig, node: Node) -> Found:
+def find_attack(config: BenchConfig, node: Node) -> PluginEntry:
     """The plugin that makes the patches.
 
     Raises:
@@ -92,7 +92,7 @@ def find_attack(config: BenchConfig, node: Node) -> Found:
 
 
 def contests(
-    config: BenchConfig, node: Node, *, attack: Found, surfaces: int, device: str | None = None
+    config: BenchConfig, node: Node, *, attack: PluginEntry, surfaces: int, device: str | None = None
 ) -> Iterator[Contest]:
     """What meets what, in every task.
 
@@ -137,7 +137,7 @@ def _entrants(
     return tuple(found)
 
 
-def _check(one: Contest, attack: Found, config: BenchConfig, node: Node, surfaces: int) -> None:
+def _check(one: Contest, attack: PluginEntry, config: BenchConfig, node: Node, surfaces: int) -> None:
     at = ("tasks", one.name)
     for model in one.models:
         spec = model.chosen.found.spec

@@ -18,7 +18,7 @@ from gear.contracts.tasks import Task
 from gear.dataset.files import sha256
 from gear.networks.runtime import autocast, device_of, seeded
 from gear.plugins.build import blamed
-from gear.plugins.catalogue import Found
+from gear.plugins.catalogue import PluginEntry
 from gear.readers import Batch
 from gear.values.errors import GearError
 from gear.values.rng import derive_rng
@@ -67,7 +67,7 @@ class Parts:
 
     spec: TaskSpec[Any]
     task: Task[Any, Any]
-    found: Found
+    found: PluginEntry
     model: Any
     twin: Any
     views: Sequence[str]

@@ -21,7 +21,7 @@ from gear.dataset.files import explained, read_bytes, sha256, write_whole
 from gear.measuring.appearance_hash import Look
 from gear.networks.options import CIRCUMSTANCES
 from gear.networks.weights import serialised
-from gear.plugins.catalogue import Found
+from gear.plugins.catalogue import PluginEntry
 from gear.readers import Samples
 from gear.values.errors import DatasetError
 from gear.values.serial import to_json
@@ -50,7 +50,7 @@ class Origin:
         picture_share: width of the training pictures, as a share of the task's own.
     """
 
-    model: Found
+    model: PluginEntry
     task: str
     config: TrainConfig
     training: Samples

@@ -20,7 +20,7 @@ from gear.measuring.appearance_hash import PLANNED, look_of
 from gear.measuring.plugin_selection import Chosen, check_camera
 from gear.networks.runtime import device_of, prepare
 from gear.plugins.build import blamed, find
-from gear.plugins.catalogue import Found
+from gear.plugins.catalogue import PluginEntry
 from gear.readers import Kept, Samples, all_of, open_all
 from gear.values.errors import GearError
 from gear.values.serial import Json
@@ -195,7 +195,7 @@ def train(
     )
 
 
-def trainable(found: Found, task: str) -> Any:
+def trainable(found: PluginEntry, task: str) -> Any:
     """The recipe of a network for a task.
 
     Raises:
@@ -211,7 +211,12 @@ def trainable(found: Found, task: str) -> Any:
 
 
 def _parts(
-    found: Found, spec: TaskSpec[Any], origin: Origin, root: Path, noted: Callable[[str], None] | None, begun: Json
+    found: PluginEntry,
+    spec: TaskSpec[Any],
+    origin: Origin,
+    root: Path,
+    noted: Callable[[str], None] | None,
+    begun: Json,
 ) -> Parts:
     config = origin.config
     model = build_network(found, config, precision=config.precision)

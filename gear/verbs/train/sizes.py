@@ -10,7 +10,7 @@ from gear.config.nodes import Mapping
 from gear.contracts.specs import ModelSpec
 from gear.networks.input_scale import OPTION
 from gear.networks.runtime import device_of
-from gear.plugins.catalogue import Found
+from gear.plugins.catalogue import PluginEntry
 from gear.readers import Samples
 from gear.values.errors import GearError
 from gear.verbs.train.config import CROPS_PX, TrainConfig
@@ -24,7 +24,7 @@ LEAST_PIXELS = 1 << 16
 NEARLY_WHOLE = 0.9
 
 
-def picture_scale(found: Found, config: TrainConfig, samples: Samples) -> float:
+def picture_scale(found: PluginEntry, config: TrainConfig, samples: Samples) -> float:
     """Share of their size at which pictures are shown.
 
     What the config says; else 1 without a time budget, on a GPU, where crops are smaller than pictures anyway, and
@@ -63,7 +63,7 @@ def without_empty_margins(config: TrainConfig, samples: Samples) -> TrainConfig:
     return replace(config, crop_px=(min(config.crop_px[0], height_px), min(config.crop_px[1], width_px)))
 
 
-def _says_its_scale(found: Found, config: TrainConfig) -> bool:
+def _says_its_scale(found: PluginEntry, config: TrainConfig) -> bool:
     spec = found.spec
     assert isinstance(spec, ModelSpec)
     is_given = isinstance(config.options, Mapping) and OPTION in config.options.entries

@@ -15,7 +15,7 @@ from gear.networks.runtime import device_of, is_quick_in_half, seeded
 from gear.networks.shipped import resolve, shipped, shipped_networks, trained_option
 from gear.networks.weights import load_into, load_trunk
 from gear.plugins.build import blamed, build
-from gear.plugins.catalogue import Found
+from gear.plugins.catalogue import PluginEntry
 from gear.readers import Samples
 from gear.values.errors import GearError, UnknownNameError
 from gear.values.serial import Json
@@ -31,7 +31,7 @@ FLAGS = {"weights": "--init", "seed": "--seed", "device": "--device", "precision
 """Options of a network that the training gives it, and what says them."""
 
 
-def check_options(found: Found, config: TrainConfig) -> None:
+def check_options(found: PluginEntry, config: TrainConfig) -> None:
     """Whether the network's options are left to the training where the training sets them: weights that were slipped in
     here would be noted as random ones, and a precision would hold for validation, too.
 
@@ -45,7 +45,7 @@ def check_options(found: Found, config: TrainConfig) -> None:
             raise GearError(f"options.{name} is set by the training; say it with {flag}")
 
 
-def sizes_note(found: Found, config: TrainConfig, samples: Samples) -> str:
+def sizes_note(found: PluginEntry, config: TrainConfig, samples: Samples) -> str:
     """What to know where pictures have several sizes and the network would have noted one; nothing elsewhere."""
     widths_px = _widths_px(samples)
     if len(widths_px) == 1 or not _notes_share(found, config):
@@ -67,13 +67,13 @@ def _widths_px(samples: Samples) -> set[int]:
     return {dataset.sidecar(0).record.cameras[0].width_px for dataset in samples.datasets}
 
 
-def _notes_share(found: Found, config: TrainConfig) -> bool:
+def _notes_share(found: PluginEntry, config: TrainConfig) -> bool:
     """Whether the network's weights say at which share of the task's own pictures they are used, and nobody said it."""
     is_given = isinstance(config.options, Mapping) and SCALE in config.options.entries
     return getattr(found.spec.config(), SCALE, 1.0) is None and not is_given
 
 
-def with_scale(found: Found, config: TrainConfig, share: float, begun: Json = None) -> TrainConfig:
+def with_scale(found: PluginEntry, config: TrainConfig, share: float, begun: Json = None) -> TrainConfig:
     """Lets a network that would run at a share of its pictures' size see small pictures as they are, and those of the
     task's own size at the share that the weights were trained for with which it begins.
 
@@ -95,7 +95,7 @@ def with_scale(found: Found, config: TrainConfig, share: float, begun: Json = No
     return dataclasses.replace(config, options=options)
 
 
-def goes_on_alone(found: Found, init: str, begun: Json) -> bool:
+def goes_on_alone(found: PluginEntry, init: str, begun: Json) -> bool:
     """Whether a training that was begun with weights must do without them: they are gone, and its checkpoint has all
     that the next step depends on.
 
@@ -119,7 +119,7 @@ def _given_scale(begun: Json) -> Json:
     return options.get(SCALE) if isinstance(options, dict) else None
 
 
-def _scale_of_start(found: Found, init: str) -> Json:
+def _scale_of_start(found: PluginEntry, init: str) -> Json:
     """What whole weights that a training begins with say of the share that they were trained for; None for nothing.
 
     Raises:
@@ -132,7 +132,7 @@ def _scale_of_start(found: Found, init: str) -> Json:
     return trained_option(init, spec.name, SCALE)
 
 
-def precision_of(found: Found, config: TrainConfig) -> Literal["float32", "bfloat16"]:
+def precision_of(found: PluginEntry, config: TrainConfig) -> Literal["float32", "bfloat16"]:
     """Of the training steps: what was asked for; half of it where time counts and the device is quicker so.
 
     Without a time budget the same command gives the same weights, so there it does not depend on the device.
@@ -145,7 +145,7 @@ def precision_of(found: Found, config: TrainConfig) -> Literal["float32", "bfloa
     return "bfloat16" if config.time_budget_s and knows and is_quick_in_half(device_of(config.device)) else "float32"
 
 
-def build_network(found: Found, config: TrainConfig, *, precision: str) -> Any:
+def build_network(found: PluginEntry, config: TrainConfig, *, precision: str) -> Any:
     """The network with random weights from the seed, on the device.
 
     Options that a network does not have are not given to it: one that knows no `precision` runs at torch's.
@@ -174,7 +174,7 @@ def go_on_from(model: Any, init: str) -> None:
         freeze_trunks(model.module())
 
 
-def begin_with(found: Found, model: Any, init: str) -> str:
+def begin_with(found: PluginEntry, model: Any, init: str) -> str:
     """Puts first weights into a network: `shipped`, a file's, those that the network knows by name, or `trunk:` and a
     file or the name of another network with reference weights, for what the two have in common.
 

@@ -13,7 +13,7 @@ from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Task
 from gear.dataset.output_checks import check_figures
 from gear.plugins.build import blamed
-from gear.plugins.catalogue import Found
+from gear.plugins.catalogue import PluginEntry
 from gear.readers import TorchDataset, as_pictures
 from gear.values.errors import GearError
 
@@ -21,7 +21,7 @@ LOSS = "loss"
 
 
 def validate(
-    model: Any, found: Found, task: Task[Any, Any], samples: Sequence[Any], views: Sequence[str]
+    model: Any, found: PluginEntry, task: Task[Any, Any], samples: Sequence[Any], views: Sequence[str]
 ) -> dict[str, float]:
     """Figures over the samples, with the model in eval mode.
 

@@ -20,7 +20,7 @@ from gear.networks.options import CIRCUMSTANCES, NONE
 from gear.networks.shipped import inspect
 from gear.networks.weights import mismatches, write
 from gear.plugins.build import NO_OPTIONS, blamed, build, find
-from gear.plugins.catalogue import Found
+from gear.plugins.catalogue import PluginEntry
 from gear.plugins.manager import DISTRIBUTION
 from gear.values.errors import GearError
 from gear.values.serial import Json
@@ -124,7 +124,7 @@ def check_target(target: Path, *origins: Path) -> None:
         raise GearError(f"{target}: is the file to read; write another one")
 
 
-def _graph(found: Found, settings: Iterable[str]) -> Any:
+def _graph(found: PluginEntry, settings: Iterable[str]) -> Any:
     """The network's module, with random weights.
 
     Raises:

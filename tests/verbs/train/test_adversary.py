@@ -16,7 +16,7 @@ import gear
 from gear.contracts.attacks import Budget, Patch
 from gear.contracts.specs import AttackSpec
 from gear.plugins import build as building
-from gear.plugins.catalogue import Catalogue, Found, Owner
+from gear.plugins.catalogue import Catalogue, Owner, PluginEntry
 from gear.readers import all_of, open_all
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import GearError, PluginError
@@ -56,7 +56,7 @@ class Painter:
 def painter(install: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     spec = AttackSpec(name="painter", summary="Paints.", config=Config, build=Painter, tasks=("semseg",))
     found = building.catalogue()
-    more = Found(kind="attack", spec=spec, owner=Owner(plugin="p", package="painter", version="1"))
+    more = PluginEntry(kind="attack", spec=spec, owner=Owner(plugin="p", package="painter", version="1"))
     monkeypatch.setattr(building, "catalogue", lambda: Catalogue((*found.found, more)))
 
 
