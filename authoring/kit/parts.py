@@ -21,7 +21,7 @@ class Part:
 
     Attributes:
         material: a name in `authoring.materials.MATERIALS`.
-        label: a semantic label of docs/mjcf-conventions.md (`building`, `pole`, ...).
+        label: a semantic label of docs/reference/mjcf.md (`building`, `pole`, ...).
         mesh: triangles with one normal and one UV a vertex, in metres.
     """
 

@@ -27,12 +27,14 @@ from gear.values.frames import UInt8Image
 
 
 class ModelContract:
-    """Attributes:
-    spec: the model.
-    options: of its config, such that no weights are needed.
-    task_options: of the tasks' configs: the pictures' size.
-    tolerance: how far the outputs of one picture may lie from those of the same picture in a batch, relative to the
-        largest output.
+    """The promises of a model, as tests. A plugin's test file subclasses it and sets `spec`.
+
+    Attributes:
+        spec: the model's spec.
+        options: options of the model's config with which it needs no weights file.
+        task_options: options of the tasks' configs, such as the size of the pictures.
+        tolerance: largest allowed difference between the outputs for a picture alone and in a batch, relative to the
+            largest output.
     """
 
     spec: ClassVar[ModelSpec[Any]]

@@ -4,7 +4,7 @@
         town = "my/towns/port.xml"
         scenes = "my/scenes/port.yml"
 
-The town's own file is held against `docs/mjcf-conventions.md`: labels, what is seen and felt, materials, lanes, walks,
+The town's own file is held against `docs/reference/mjcf.md`: labels, what is seen and felt, materials, lanes, walks,
 bays, bounds and depth. Then gear composes the town, plans samples of every scene with the boards in view, and rendered
 ids and depth must be those of rays. Boards, vehicles and people are read as far as the first scene is composed of them,
 which tells what gear cannot use, and their materials are looked at; how well collision geoms fit, how many triangles

@@ -134,7 +134,7 @@ class TownError(GearError):
         self.path, self.problem = str(path), problem
 
     def __str__(self) -> str:
-        return f"{self.path}: {self.problem} (see docs/mjcf-conventions.md)"
+        return f"{self.path}: {self.problem} (see docs/reference/mjcf.md)"
 
 
 class PlacementError(GearError):

@@ -1,6 +1,6 @@
 """What a thing is.
 
-Gear's labels and their names in Cityscapes, COCO and KITTI. `docs/mjcf-conventions.md` is this table in words.
+Gear's labels and their names in Cityscapes, COCO and KITTI. `docs/reference/mjcf.md` is this table in words.
 """
 
 from __future__ import annotations

@@ -116,6 +116,6 @@ def test_on_a_street_that_nobody_has_seen_before(path: Path, tmp_path: Path) -> 
 
 
 def test_depth_has_a_trunk_for_segmentation() -> None:
-    """What docs/train.md says: all but the heads of ddrnet23_slim can begin with what depth has taught."""
+    """What docs/how-to/train.md says: all but the heads of ddrnet23_slim can begin with what depth has taught."""
     loaded, total = load_trunk(DDRNet23Slim(19), CHECKOUT / "models" / "ddrnet23_slim_depth.safetensors")
     assert 0.95 * total < loaded < total

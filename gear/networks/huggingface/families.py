@@ -135,5 +135,5 @@ def family_of(said: Mapping[str, Any], model_type: str, path: Path) -> str:
     if name not in FAMILIES:
         problem = f"image_processor_type {named!r} is not one that gear repeats" if named else "no image_processor_type"
         known = ", ".join(f"{each}ImageProcessor" for each in FAMILIES)
-        raise GearError(f"{path}: {problem}; write one of {known}, or an adapter (docs/write-a-model.md)")
+        raise GearError(f"{path}: {problem}; write one of {known}, or an adapter (docs/how-to/write-a-model.md)")
     return name

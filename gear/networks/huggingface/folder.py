@@ -19,7 +19,7 @@ from gear.networks.runtime import seeded
 from gear.networks.weights import OPTIONAL, load_into
 from gear.values.errors import GearError
 
-ADAPTER = "write an adapter (docs/write-a-model.md)"
+ADAPTER = "write an adapter (docs/how-to/write-a-model.md)"
 
 SHOWN = 240
 """Characters of what transformers says."""

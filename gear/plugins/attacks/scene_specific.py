@@ -71,7 +71,7 @@ class SceneSpecificConfig(Settings):
 
 
 LEARNING_RATES = {"depth": 0.25}
-"""Of tasks that want another one than the usual; measured, docs/attack.md."""
+"""Of tasks that want another one than the usual; measured, docs/how-to/make-patches.md."""
 
 SIGNS = {"+": 1.0, "-": -1.0, "0": 0.0}
 

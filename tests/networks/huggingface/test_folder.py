@@ -186,7 +186,7 @@ def test_a_folders_own_code_is_never_run(
     (folder / "config.json").write_text(json.dumps({"model_type": model_type, "auto_map": classes}))
     assert refused(folder, weights=weights) == (
         f"{folder}: its network is code of the folder's own (auto_map in config.json), which gear never runs; save a "
-        "network that transformers itself has, or write an adapter (docs/write-a-model.md)"
+        "network that transformers itself has, or write an adapter (docs/how-to/write-a-model.md)"
     )
     assert not marker.exists()
 

@@ -77,8 +77,8 @@ def test_configs_that_come_with_gear_fit_together(name: str, tmp_path: Path, mon
 
 def test_the_config_of_the_documentation_fits_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.undo()
-    page = (Path(__file__).parents[3] / "docs/bench.md").read_text()
-    (tmp_path / "page.yml").write_text(page.split("```yaml\n")[1].split("```")[0])
+    page = (Path(__file__).parents[3] / "docs/how-to/run-a-bench.md").read_text()
+    (tmp_path / "page.yml").write_text(page.split("```yaml bench\n")[1].split("```")[0])
     plan = prepared(tmp_path / "page.yml", out=tmp_path / "out")
     assert [model.label for model in plan.contests[0].models] == ["ddrnet23_slim", "mine"]
     assert len(plan.scenes) == 3 + 7 and len(plan.weathers) == 2

@@ -332,14 +332,14 @@ def _said(model: Model, views: Mapping[str, Tensor], name: str) -> Tensor:
     if name not in outputs:
         given = ", ".join(outputs) or "nothing"
         raise GearError(
-            f"an attack works on the output {name!r}, and the network gives {given} (docs/write-a-model.md)"
+            f"an attack works on the output {name!r}, and the network gives {given} (docs/how-to/write-a-model.md)"
         )
     said, size = outputs[name], next(iter(views.values())).shape[-2:]
     if said.shape[-2:] != size:
         there, wanted = (" x ".join(map(str, shape)) for shape in (said.shape[-2:], size))
         raise GearError(
             f"an attack works on {name!r} at the picture's size, {wanted}, and the network gives {there} "
-            "(docs/write-a-model.md)"
+            "(docs/how-to/write-a-model.md)"
         )
     return said
 
@@ -355,7 +355,7 @@ def _logits(model: Model, views: Mapping[str, Tensor]) -> Tensor:
     if logits.shape[1] not in known:
         raise GearError(
             f"an attack works on logits over Cityscapes' {known[0]} train ids or {known[1]} label ids, and the network "
-            f"gives {logits.shape[1]} classes (docs/write-a-model.md)"
+            f"gives {logits.shape[1]} classes (docs/how-to/write-a-model.md)"
         )
     return logits
 

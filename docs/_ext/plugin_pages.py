@@ -1,17 +1,14 @@
-"""Writes docs/reference.md from the code: `python docs/make_reference.py`. A test fails when the page is stale."""
+"""The reference page of hooks, specs, protocols and the built-in plugins, made from the code."""
 
 from __future__ import annotations
 
 import dataclasses
 import inspect
-from pathlib import Path
 from typing import Any
 
 from gear.contracts import attacks, defenses, hookspecs, models, specs, tasks
 from gear.plugins.describe import meanings_of, options
 from gear.plugins.manager import discover
-
-PAGE = Path(__file__).parent / "reference.md"
 
 SPECS = (specs.Spec, specs.TaskSpec, specs.ModelSpec, specs.AttackSpec, specs.DefenseSpec)
 PROTOCOLS = (
@@ -25,9 +22,9 @@ VALUES = (
 def page() -> str:
     """The whole page."""
     parts = [
-        "# Reference: hooks, specs, protocols",
-        "Written by `docs/make_reference.py` from the code; do not edit it by hand.",
-        f"Protocol version: {specs.PROTOCOL_VERSION}. Entry-point group: `gear`.",
+        "# Plugins: hooks, specs, protocols, options",
+        f"Protocol version: {specs.PROTOCOL_VERSION}. Entry-point group: `gear`. `gear plugins show NAME` prints the "
+        "same facts about one plugin.",
         "## Hooks",
         *(hook(name) for name in sorted(vars(hookspecs)) if name.startswith("gear_")),
         "## Specs and their capabilities",
@@ -36,7 +33,7 @@ def page() -> str:
         *(protocol(kind) for kind in PROTOCOLS),
         "## Values",
         *(table(kind) for kind in VALUES),
-        "## What gear brings",
+        "## Built-in plugins",
         *builtins(),
     ]
     return "\n\n".join(parts) + "\n"
@@ -97,7 +94,3 @@ def signature(function: Any) -> str:
 def first_line(thing: Any) -> str:
     """The first line of a docstring."""
     return (inspect.getdoc(thing) or "").splitlines()[0]
-
-
-if __name__ == "__main__":
-    PAGE.write_text(page(), encoding="utf-8")
