@@ -5,8 +5,8 @@
 
 The first prints every task with every renderer and quality, with one process and with two.
 
-The bare loop places a scene, renders colour, depth and ids, and has the camera develop them into a picture: air, water
-and response are part of what is seen, and a renderer's linear frame is nothing that anybody would look at. The whole
+The bare loop places a scene, renders colour, depth and ids, and lets the camera pipeline turn them into a picture: air,
+water and response are part of what is seen, and a renderer's linear frame is nothing that anybody would look at. The whole
 loop also plans the scenes, measures, encodes and writes. Both are measured in alternation in one run; compiling and the
 first sample are left out.
 
@@ -69,13 +69,13 @@ class Figures:
 
 
 def bare_loop(session: Session, indices: range) -> tuple[Spent, Spent]:
-    """For placing, rendering and developing, records known before; and for developing alone."""
+    """Times of placing, rendering and the camera pipeline, with records planned earlier; and of the pipeline alone."""
     records = [session.record(i) for i in indices]
     camera, begun = Spent(), Spent.now()
     for record in records:
         shot = session.shoot(record)
         rendered = Spent.now()
-        session.develop(shot)
+        session.to_frame(shot)
         camera += Spent.now() - rendered
     return Spent.now() - begun, camera
 

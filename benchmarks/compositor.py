@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from gear.camera.pipeline import Darkroom
+from gear.camera.pipeline import CameraPipeline
 from gear.collecting.job import Job, resolve
 from gear.collecting.lookup import scene_library
 from gear.collecting.pipeline import collect_samples
@@ -32,7 +32,7 @@ from gear.render import RENDERERS, open_renderer
 from gear.verbs.collect.run import manifest_facts
 from gear.verbs.gap.figures import picture_gap, visible_mask
 from gear.world.planner import ScenePlanner
-from gear.world.weather.air import darkroom_of
+from gear.world.weather.air import camera_pipeline
 from gear.world.world import World
 
 
@@ -114,14 +114,14 @@ def collect_both(world: World, clean: Job, twin: Job) -> None:
     """As `gear.collect` does, with one world and one renderer for both."""
     plugin = find("task", clean.config.task)
     task: Any = build(plugin, clean.config.options)
-    darkroom: Darkroom = darkroom_of(
+    pipeline: CameraPipeline = camera_pipeline(
         clean.weather, clean.config.renderer, world.town_name, clean.config.camera, shapes=world.shapes
     )
     renderer = open_renderer(clean.config.renderer, world.model, quality=clean.config.quality)
     try:
         planner = ScenePlanner(world, task.rig(), clean.split, split_name=clean.config.split)
         session = Session(
-            job=clean, plugin=plugin, task=task, world=world, planner=planner, renderer=renderer, darkroom=darkroom
+            job=clean, plugin=plugin, task=task, world=world, planner=planner, renderer=renderer, pipeline=pipeline
         )
         for one in (clean, twin):
             store = Store(one.root, one.plan)

@@ -88,7 +88,7 @@ class Air:
     clear_per_m: Array
     ring: Array
 
-    def veil(self, linear_rgb: UInt16Image, depth_m: FloatImage, camera: CameraRecord) -> UInt16Image:
+    def apply(self, linear_rgb: UInt16Image, depth_m: FloatImage, camera: CameraRecord) -> UInt16Image:
         """The frame seen through the air.
 
         Args:

@@ -155,7 +155,7 @@ class GroundShade:
     is_display: bool
     _known: dict[str, HiddenSky] = field(default_factory=dict, init=False, repr=False)
 
-    def lay(
+    def apply(
         self, linear_rgb: UInt16Image, depth_m: FloatImage, is_ground: Mask, camera: CameraRecord, record: SceneRecord
     ) -> UInt16Image:
         """The frame with shaded ground.

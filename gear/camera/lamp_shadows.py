@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.camera.beams import Lamps
-from gear.camera.shadow_map import Floats, Layout, Outlook, ShadowMap, first_met, lengths, stop_behind
+from gear.camera.shadow_map import Floats, LampFrame, Layout, ShadowMap, first_met, lengths, stop_behind
 from gear.camera.surface_points import longest_edges, points_on
 from gear.values.frames import FloatImage, Shape
 from gear.values.scene import ActorRecord, SceneRecord
@@ -93,7 +93,7 @@ class User:
     middle_m: Floats
     radius_m: float
 
-    def is_before(self, outlook: Outlook, reach_m: float) -> bool:
+    def is_before(self, outlook: LampFrame, reach_m: float) -> bool:
         """Whether some of it may be in a lamp's map, near enough to matter."""
         away = self.middle_m - outlook.place_m
         away_m = float(np.linalg.norm(away))
@@ -140,7 +140,7 @@ class LampShadows:
         radius_m = float(lengths((points_m - middle_m).T).max())
         return User(points_m=points_m, spacing_m=spacing_m, middle_m=middle_m, radius_m=radius_m)
 
-    def standing(self, kind: str, index: int, outlook: Outlook, reach_m: float) -> Floats:
+    def standing(self, kind: str, index: int, outlook: LampFrame, reach_m: float) -> Floats:
         """(cells, cells) how far the light of a lamp that stands comes among what stands."""
         if (kind, index) not in self._fixed:
             self._fixed[kind, index] = first_met(self.casters.near(outlook.place_m, reach_m), outlook)
@@ -166,7 +166,7 @@ class SceneShadows:
         """Of one lamp of a kind; before those that do not stand only road users throw shadows."""
         if (kind, index) not in self._maps:
             place_m, axis = lamps.position_m[index], lamps.axis[index]
-            outlook = Outlook.of(place_m, axis, STANDING if stands else DRIVING)
+            outlook = LampFrame.of(place_m, axis, STANDING if stands else DRIVING)
             if stands:
                 comes_m = self.town.standing(kind, index, outlook, lamps.reach_m).copy()
             else:
@@ -195,7 +195,7 @@ class LampShadow:
     lamps: Lamps
     stands: bool
 
-    def lay(
+    def attenuate(
         self,
         light: FloatImage,
         towards: tuple[FloatImage, FloatImage, FloatImage],

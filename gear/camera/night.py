@@ -58,7 +58,7 @@ class NightLight:
     glow: HalfImage
     streaks: HalfImage | None
 
-    def lay(self, linear_rgb: UInt16Image) -> UInt16Image:
+    def apply(self, linear_rgb: UInt16Image) -> UInt16Image:
         """(H, W, 3) uint16 frame at night, a new array. Steps between levels are hidden in a fixed grain."""
         result = np.empty_like(linear_rgb)
         for rows in _bands(len(linear_rgb)):
@@ -66,7 +66,7 @@ class NightLight:
             result[rows] = _rounded(light.astype(np.float32, copy=False), rows)
         return result
 
-    def mirror(self, linear_rgb: UInt16Image) -> UInt16Image:
+    def apply_reflections(self, linear_rgb: UInt16Image) -> UInt16Image:
         """The frame with lamps mirrored in wet ground."""
         if self.streaks is None:
             return linear_rgb

@@ -11,7 +11,7 @@ from gear.camera.ground_shade import GroundShade
 from gear.camera.night import Night, NightLight
 from gear.camera.optics import lens_map, motion_blurred, noisy, through_lens, vignetted
 from gear.camera.rain import Rain
-from gear.camera.reflection import Below, Reflection, beyond_mirror, camera_below
+from gear.camera.reflection import MirrorView, Reflection, beyond_mirror, mirror_camera
 from gear.camera.response import Response
 from gear.camera.water import Water
 from gear.contracts.rendering import RawView
@@ -23,8 +23,10 @@ from gear.values.scene import CameraRecord, SceneRecord
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Darkroom:
-    """Develops the frames of one renderer in one weather. All but noise and the last step is linear in every albedo.
+class CameraPipeline:
+    """Turns the linear frames of one renderer into pictures of one weather.
+
+    All steps but noise and the response curve are linear in every albedo.
 
     Attributes:
         response: exposure and tone curve.
@@ -44,7 +46,7 @@ class Darkroom:
     rain: Rain
     effects: CameraEffects
 
-    def recorded(self, record: SceneRecord) -> SceneRecord:
+    def with_lens(self, record: SceneRecord) -> SceneRecord:
         """The record with the lens in it."""
         lens = self.effects.lens
         if not lens.bends:
@@ -61,24 +63,24 @@ class Darkroom:
         """What a view gets of lamps, for `view`; None by day."""
         return self.night.light(truth, camera, record, geoms) if self.night is not None else None
 
-    def camera_below(self, camera: CameraRecord, record: SceneRecord) -> CameraRecord | None:
+    def mirror_camera(self, camera: CameraRecord, record: SceneRecord) -> CameraRecord | None:
         """Who has to look as well, since the ground mirrors what is seen from there; None where nothing is wet.
 
         At night lamps are mirrored by `NightLight`, and nothing else is bright enough.
         """
         if self.night is not None or (self.water.share <= 0 and self.water.film <= 0):
             return None
-        return camera_below(camera, record.ego.world_from_actor.position_m[2])
+        return mirror_camera(camera, record.ego.world_from_actor.position_m[2])
 
-    def reflection(self, below: Below | None, record: SceneRecord) -> Reflection | None:
-        """What wet ground mirrors, from what `camera_below` saw without ground and with neutral surfaces."""
+    def reflection(self, below: MirrorView | None, record: SceneRecord) -> Reflection | None:
+        """What wet ground mirrors, from what `mirror_camera` saw without ground and with neutral surfaces."""
         if below is None:
             return None
         raw, camera = below
         assert raw.linear_rgb is not None
         height_m = record.ego.world_from_actor.position_m[2]
         # The air on this side of the mirror is laid over the whole frame, later.
-        veiled = replace(raw, linear_rgb=self.air.veil(raw.linear_rgb, *beyond_mirror(raw.depth_m, camera, height_m)))
+        veiled = replace(raw, linear_rgb=self.air.apply(raw.linear_rgb, *beyond_mirror(raw.depth_m, camera, height_m)))
         return Reflection.of(veiled, camera, height_m)
 
     def view(
@@ -139,19 +141,19 @@ class Darkroom:
         linear_rgb = raw.linear_rgb
         lamps = given or self.night_light(raw, camera, record, geoms)
         if lamps is not None:
-            linear_rgb = lamps.lay(linear_rgb)
+            linear_rgb = lamps.apply(linear_rgb)
         if self.shade is not None:
             is_ground = np.append(np.isin(geoms.label_code, GROUND_CODES), False)
-            linear_rgb = self.shade.lay(linear_rgb, raw.depth_m, is_ground[raw.geom_id], camera, record)
+            linear_rgb = self.shade.apply(linear_rgb, raw.depth_m, is_ground[raw.geom_id], camera, record)
         if self.water.share > 0 or reflection is not None:
             # The last entry is what id -1, nothing, finds.
             holds_water = np.append(np.isin(geoms.label_code, OPEN_GROUND_CODES), False)
-            linear_rgb = self.water.lay(linear_rgb, raw.depth_m, holds_water[raw.geom_id], camera, reflection)
+            linear_rgb = self.water.apply(linear_rgb, raw.depth_m, holds_water[raw.geom_id], camera, reflection)
         if lamps is not None:
-            linear_rgb = lamps.mirror(linear_rgb)
+            linear_rgb = lamps.apply_reflections(linear_rgb)
             del lamps  # much memory
-        linear_rgb = self.air.veil(linear_rgb, raw.depth_m, camera)
+        linear_rgb = self.air.apply(linear_rgb, raw.depth_m, camera)
         if self.rain.intensity > 0:
             rng = derive_rng(record.seed, "rain", record.index, camera.name)
-            linear_rgb = self.rain.fall(linear_rgb, raw.depth_m, camera, record.ego.velocity_world_mps, rng)
+            linear_rgb = self.rain.apply(linear_rgb, raw.depth_m, camera, record.ego.velocity_world_mps, rng)
         return linear_rgb

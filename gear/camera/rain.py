@@ -54,7 +54,7 @@ class Rain:
         wind = (_WIND_MPS * wind_intensity / 100, 0.25 * _WIND_MPS * wind_intensity / 100, 0.0)
         return Rain(intensity=precipitation / 100, wind_world_mps=wind, light=light)
 
-    def fall(
+    def apply(
         self,
         linear_rgb: UInt16Image,
         depth_m: FloatImage,

@@ -19,8 +19,8 @@ from gear.values.scene import CameraRecord, Pose
 
 _Floats = npt.NDArray[np.float32]
 
-Below = tuple[RawView, CameraRecord]
-"""What a camera from `camera_below` saw."""
+MirrorView = tuple[RawView, CameraRecord]
+"""What a camera from `mirror_camera` saw."""
 
 SHARE_PX = 0.5
 """Of the picture's pixels to a radian: water that rain stirs and rough ground show less than a mirror."""
@@ -62,7 +62,7 @@ class Reflection:
 
         Args:
             view: of `camera`.
-            camera: from `camera_below`.
+            camera: from `mirror_camera`.
             height_m: of the mirror.
         """
         assert view.linear_rgb is not None
@@ -85,7 +85,7 @@ class Reflection:
         return sampled(picture, column, row, is_periodic=False)
 
 
-def camera_below(camera: CameraRecord, height_m: float) -> CameraRecord | None:
+def mirror_camera(camera: CameraRecord, height_m: float) -> CameraRecord | None:
     """Who sees what a level mirror shows to a camera; None where the camera looks at no ground.
 
     Args:
@@ -117,7 +117,7 @@ def camera_below(camera: CameraRecord, height_m: float) -> CameraRecord | None:
 
 
 def beyond_mirror(depth_m: FloatImage, camera: CameraRecord, height_m: float) -> tuple[FloatImage, CameraRecord]:
-    """The way from a mirror to what a camera from `camera_below` sees in it, as depth from a camera at its height."""
+    """The way from a mirror to what a camera from `mirror_camera` sees in it, as depth from a camera at its height."""
     x, y, z = camera.world_from_camera.position_m
     leg_m = np.float32(height_m - z) / np.maximum(_climb(camera), np.float32(1e-6))
     pose = replace(camera.world_from_camera, position_m=(x, y, height_m))

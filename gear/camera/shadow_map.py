@@ -61,7 +61,7 @@ class Layout:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Outlook:
+class LampFrame:
     """Where a lamp is, and how directions from it lie in its map.
 
     Attributes:
@@ -75,13 +75,13 @@ class Outlook:
     layout: Layout
 
     @staticmethod
-    def of(place_m: Array, axis: Array, layout: Layout) -> Outlook:
+    def of(place_m: Array, axis: Array, layout: Layout) -> LampFrame:
         """Of a lamp that shines along an axis."""
         along = axis / np.linalg.norm(axis)
         across = np.cross(along, (0.0, 0.0, 1.0) if abs(along[2]) < _LEVEL else (0.0, 1.0, 0.0))
         across /= np.linalg.norm(across)
         frame = np.stack([across, np.cross(across, along), along])
-        return Outlook(place_m=place_m.astype(np.float32), frame=frame.astype(np.float32), layout=layout)
+        return LampFrame(place_m=place_m.astype(np.float32), frame=frame.astype(np.float32), layout=layout)
 
     def places(self, unit: Floats) -> tuple[Floats, Floats]:
         """Columns and rows of (3, N) directions, whole numbers in the middle of cells; outside for what is behind."""
@@ -114,7 +114,7 @@ class ShadowMap:
             nothing does, as in the border. It may not change any more.
     """
 
-    outlook: Outlook
+    outlook: LampFrame
     comes_m: Floats
     _least_m: Floats = field(init=False, repr=False)
     _most_m: Floats = field(init=False, repr=False)
@@ -164,7 +164,7 @@ def _weights(share: Floats) -> tuple[Floats, Floats, Floats]:
     return half - half * share, half, half * share
 
 
-def first_met(corners_m: Floats, outlook: Outlook) -> Floats:
+def first_met(corners_m: Floats, outlook: LampFrame) -> Floats:
     """(cells, cells) float32, how far a lamp's light comes among (N, 3, 3) triangles that are seen from outside.
 
     Triangles of which the lamp sees the back belong to bodies whose front is nearer.
@@ -222,7 +222,7 @@ def _quartered(corners: Floats) -> Floats:
     return np.concatenate([np.stack(three, axis=1) for three in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
 
 
-def stop_behind(comes_m: Floats, points_m: Floats, spacing_m: float, outlook: Outlook) -> None:
+def stop_behind(comes_m: Floats, points_m: Floats, spacing_m: float, outlook: LampFrame) -> None:
     """Ends light in a map where a body ends that is given by (N, 3) points so far apart, in place.
 
     What it would throw on itself is left to slants, and its shadow begins at its soles.

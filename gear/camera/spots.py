@@ -97,5 +97,5 @@ class Spots:
         light = lamps.beam(along, across, z) * facing * np.square(ends * inverse)
         light *= np.float32(lamps.intensity[index])
         if shadow is not None:
-            shadow.lay(light, (x, y, z), square * inverse, facing, normal[2])
+            shadow.attenuate(light, (x, y, z), square * inverse, facing, normal[2])
         total += light

@@ -67,7 +67,7 @@ class Water:
     film: float = 0.0
     mirrored: npt.NDArray[np.float32]
 
-    def lay(
+    def apply(
         self,
         linear_rgb: UInt16Image,
         depth_m: FloatImage,

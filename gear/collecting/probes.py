@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gear.camera.pipeline import Darkroom
+from gear.camera.pipeline import CameraPipeline
 from gear.camera.reflection import Reflection
 from gear.camera.response import face_light
 from gear.contracts.rendering import RawView, Renderer
@@ -79,15 +79,23 @@ def _is_clipped(black: RawView, white: RawView) -> bool:
     return bool(((white.linear_rgb >= LINEAR_FULL_SCALE) & (white.linear_rgb != black.linear_rgb)).any())
 
 
-def develop_probes(
-    darkroom: Darkroom,
+def compute_probes(
+    pipeline: CameraPipeline,
     shot: ProbeShot,
     record: SceneRecord,
     geoms: GeomTable,
     reflections: Sequence[Reflection | None],
 ) -> list[Probe]:
-    """Crops of developed frames; `reflections` are what wet ground mirrors in the sample itself, by camera."""
-    quiet = replace(darkroom, effects=replace(darkroom.effects, shot_noise=0.0, read_noise=0.0))
+    """Probes of all surfaces and cameras.
+
+    Args:
+        pipeline: the camera pipeline of the sample; its noise is left out.
+        shot: the probe renders.
+        record: the scene.
+        geoms: what each geom is.
+        reflections: what wet ground mirrors in the sample itself, one per camera.
+    """
+    quiet = replace(pipeline, effects=replace(pipeline.effects, shot_noise=0.0, read_noise=0.0))
     probes = []
     for number, camera in enumerate(record.cameras if shot.white else ()):
         mirrored = reflections[number]
@@ -98,7 +106,7 @@ def develop_probes(
             if surface in shot.grey:
                 grey = quiet.view(shot.grey[surface][number], camera, record, geoms, lamps, mirrored).linear_rgb
                 white = _unclipped(black, white, grey, shot.grey_weight)
-            probe = crop_probe(surface, camera.name, black, white, darkroom.response)
+            probe = crop_probe(surface, camera.name, black, white, pipeline.response)
             if probe is not None:
                 probes.append(probe)
     return probes

@@ -7,10 +7,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from gear.camera.pipeline import Darkroom
-from gear.camera.reflection import Below, Reflection
+from gear.camera.pipeline import CameraPipeline
+from gear.camera.reflection import MirrorView, Reflection
 from gear.collecting.job import Job
-from gear.collecting.probes import ProbeShot, develop_probes, shoot_probes
+from gear.collecting.probes import ProbeShot, compute_probes, shoot_probes
 from gear.contracts.rendering import RawView, Renderer
 from gear.contracts.tasks import Encoded, Sample, Task
 from gear.dataset.output_checks import check_encoded
@@ -23,8 +23,8 @@ from gear.values.scene import SceneRecord
 from gear.world.compilation.memory import forget_shown, map_large_buffers, release_memory
 from gear.world.compilation.world_cache import ready_world
 from gear.world.planner import ScenePlanner
-from gear.world.weather.air import darkroom_of
-from gear.world.weather.mirror_view import look_from_below
+from gear.world.weather.air import camera_pipeline
+from gear.world.weather.mirror_view import render_mirror_view
 from gear.world.weather.night import night_of
 from gear.world.world import World
 
@@ -43,7 +43,7 @@ class Shot:
 
     record: SceneRecord
     raw: tuple[RawView, ...]
-    below: tuple[Below | None, ...]
+    below: tuple[MirrorView | None, ...]
     geoms: GeomTable
     objects: Mapping[int, SceneObject]
     probes: ProbeShot | None = None
@@ -59,46 +59,46 @@ class Session:
     world: World
     planner: ScenePlanner
     renderer: Renderer
-    darkroom: Darkroom
+    pipeline: CameraPipeline
 
     def record(self, index: int) -> SceneRecord:
         """The scene of one sample: a pure function of the job and the index."""
-        return self.darkroom.recorded(self.planner.plan(index))
+        return self.pipeline.with_lens(self.planner.plan(index))
 
     def shoot(self, record: SceneRecord) -> Shot:
         """Places the scene with the run's patch in it and renders it."""
         names = tuple(surface.name for surface in record.surfaces)
         placed = self.world.place(record, self.job.patch.by_surface(names))
         raw = self.renderer.render(placed.stage, record.cameras)
-        below = look_from_below(self.world, self.renderer, placed, record, self.darkroom)
+        below = render_mirror_view(self.world, self.renderer, placed, record, self.pipeline)
         is_probed = self.job.config.probes
         probes = shoot_probes(self.world, self.renderer, placed, record, raw) if is_probed else None
         return Shot(record=record, raw=raw, below=below, geoms=placed.geoms, objects=placed.objects, probes=probes)
 
-    def develop(self, shot: Shot) -> Frame:
+    def to_frame(self, shot: Shot) -> Frame:
         """Turns what the renderer saw into pictures; needs neither world nor renderer, so it can run beside them."""
-        return self._developed(shot, self._reflections(shot))
+        return self._frame(shot, self._reflections(shot))
 
     def _reflections(self, shot: Shot) -> list[Reflection | None]:
-        return [self.darkroom.reflection(below, shot.record) for below in shot.below]
+        return [self.pipeline.reflection(below, shot.record) for below in shot.below]
 
-    def _developed(self, shot: Shot, reflections: Sequence[Reflection | None]) -> Frame:
+    def _frame(self, shot: Shot, reflections: Sequence[Reflection | None]) -> Frame:
         views = {
-            camera.name: self.darkroom.view(view, camera, shot.record, shot.geoms, reflection=reflection)
+            camera.name: self.pipeline.view(view, camera, shot.record, shot.geoms, reflection=reflection)
             for camera, view, reflection in zip(shot.record.cameras, shot.raw, reflections, strict=True)
         }
         return Frame(views=views, geoms=shot.geoms, objects=shot.objects)
 
     def finish(self, shot: Shot) -> tuple[Sample, Encoded, AuxiliaryFiles]:
-        """Develops and measures a shot and turns it into files, beside the next one's rendering."""
+        """Turns a shot into pictures, ground truth and files. It can run while the next sample is rendered."""
         reflections = self._reflections(shot)
-        frame = self._developed(shot, reflections)
+        frame = self._frame(shot, reflections)
         with blamed(self.plugin, f"sample {shot.record.index}"):
             sample = self.task.ground_truth(frame, shot.record)
             encoded = check_encoded(self.task.encode(sample, self.job.plan.info), "encode")
         if shot.probes is None:
             return sample, encoded, {}
-        probes = develop_probes(self.darkroom, shot.probes, shot.record, shot.geoms, reflections)
+        probes = compute_probes(self.pipeline, shot.probes, shot.record, shot.geoms, reflections)
         return sample, encoded, probe_files(probes, self.job.plan.info.split, shot.record.index)
 
 
@@ -117,7 +117,7 @@ def open_session(job: Job) -> Iterator[Session]:
     release_memory()
     try:
         planner = ScenePlanner(world, rig, job.split, split_name=job.config.split)
-        darkroom = darkroom_of(
+        pipeline = camera_pipeline(
             job.weather, job.config.renderer, world.town_name, job.config.camera, night, world.shapes
         )
         yield Session(
@@ -127,7 +127,7 @@ def open_session(job: Job) -> Iterator[Session]:
             world=world,
             planner=planner,
             renderer=renderer,
-            darkroom=darkroom,
+            pipeline=pipeline,
         )
     finally:
         renderer.close()

@@ -123,11 +123,11 @@ def test_the_veil_is_linear_and_blind_to_the_picture() -> None:
     thick = air(ring=np.linspace(0.2, 0.9, 24).reshape(8, 3))
     black, white = np.zeros((HEIGHT, WIDTH, 3), np.uint16), np.full((HEIGHT, WIDTH, 3), LINEAR_FULL_SCALE, np.uint16)
     patch = rng.integers(0, LINEAR_FULL_SCALE + 1, black.shape).astype(np.uint16)
-    b, w, p = (thick.veil(picture, depth, camera()).astype(float) for picture in (black, white, patch))
+    b, w, p = (thick.apply(picture, depth, camera()).astype(float) for picture in (black, white, patch))
     assert np.abs(p - (b + patch / LINEAR_FULL_SCALE * (w - b))).max() <= 1.5
     changed = patch.copy()
     changed[10:20, 30:40] = 0
-    differs = (thick.veil(changed, depth, camera()) != thick.veil(patch, depth, camera())).any(axis=-1)
+    differs = (thick.apply(changed, depth, camera()) != thick.apply(patch, depth, camera())).any(axis=-1)
     assert differs[10:20, 30:40].mean() > 0.8
     differs[10:20, 30:40] = False
     assert not differs.any()
@@ -139,17 +139,17 @@ def test_thick_fog_shows_the_light_of_its_direction() -> None:
     thick = air(fog_per_m=5.0, ring=ring)
     frame = np.full((HEIGHT, WIDTH, 3), 300, np.uint16)
     middle = (HEIGHT // 2, WIDTH // 2)
-    north, east = (thick.veil(frame, wall(50.0), camera(yaw_deg=yaw))[middle] for yaw in (90, 0))
+    north, east = (thick.apply(frame, wall(50.0), camera(yaw_deg=yaw))[middle] for yaw in (90, 0))
     np.testing.assert_allclose(north, np.array([1.0, 0.5, 0.0]) * LINEAR_FULL_SCALE, atol=2)
     assert (east == 0).all()
-    left = thick.veil(frame, wall(50.0), camera(yaw_deg=45))[HEIGHT // 2]
+    left = thick.apply(frame, wall(50.0), camera(yaw_deg=45))[HEIGHT // 2]
     assert left[:20].mean() > left[-20:].mean() + 50, "north lies to the left of north-east"
 
 
 def test_the_light_of_the_air_turns_with_the_azimuth_of_every_pixel() -> None:
     azimuth_rad = np.arange(72) * 2 * np.pi / 72
     ring = np.stack([0.5 + 0.4 * np.cos(azimuth_rad), 0.5 + 0.4 * np.sin(azimuth_rad), azimuth_rad * 0], axis=1)
-    seen = air(fog_per_m=5.0, ring=ring).veil(
+    seen = air(fog_per_m=5.0, ring=ring).apply(
         np.zeros((HEIGHT, WIDTH, 3), np.uint16), wall(50.0), camera(yaw_deg=30.0)
     )  # fmt: skip
     x = (np.arange(WIDTH) - (WIDTH - 1) / 2) / FOCAL_PX
@@ -162,7 +162,7 @@ def test_the_light_of_the_air_turns_with_the_azimuth_of_every_pixel() -> None:
 
 def test_clear_air_without_fog_changes_nothing() -> None:
     frame = np.random.default_rng(1).integers(0, 1021, (HEIGHT, WIDTH, 3)).astype(np.uint16)
-    assert np.array_equal(air(fog_per_m=0.0).veil(frame, wall(80.0), camera()), frame)
+    assert np.array_equal(air(fog_per_m=0.0).apply(frame, wall(80.0), camera()), frame)
 
 
 def test_two_fogs_take_their_shares_one_after_the_other() -> None:

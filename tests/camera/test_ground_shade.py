@@ -172,7 +172,7 @@ def test_only_ground_is_shaded_and_half_of_its_outline() -> None:
 def test_what_no_camera_sees_costs_nothing(x_m: float) -> None:
     depth_m = plane_depth_m()
     frame = np.full((*depth_m.shape, 3), 500, np.uint16)
-    assert shade().lay(frame, depth_m, np.isfinite(depth_m), camera(), scene(x_m)) is frame
+    assert shade().apply(frame, depth_m, np.isfinite(depth_m), camera(), scene(x_m)) is frame
 
 
 def test_the_ego_car_shades_what_is_before_its_bumper() -> None:
@@ -187,7 +187,7 @@ def test_frames_stay_linear() -> None:
     rng = np.random.default_rng(0)
     one, other = (rng.integers(0, 20_000, (*depth_m.shape, 3)).astype(np.uint16) for _ in range(2))
     laid = [
-        shade().lay(f, depth_m, np.isfinite(depth_m), camera(), record).astype(int) for f in (one, other, one + other)
+        shade().apply(f, depth_m, np.isfinite(depth_m), camera(), record).astype(int) for f in (one, other, one + other)
     ]
     assert np.abs(laid[0] + laid[1] - laid[2]).max() <= 1
     left = left_of(shade(), record)

@@ -9,7 +9,7 @@ import pytest
 
 from gear.camera.beams import Lamps, globe_beam
 from gear.camera.lamp_shadows import STANDING, Casters, LampShadow, LampShadows
-from gear.camera.shadow_map import BORDER, Layout, Outlook, ShadowMap, first_met, stop_behind
+from gear.camera.shadow_map import BORDER, LampFrame, Layout, ShadowMap, first_met, stop_behind
 from gear.values.frames import Shape
 from gear.values.geometry import RigidTransform
 from gear.values.scene import ActorRecord, Pose, SceneRecord, Weather
@@ -74,7 +74,7 @@ def left(
     facing = -(np.array(normal, np.float32) @ unit)
     light = np.ones((1, len(places_m)), np.float32)
     x, y, z = (part[None] for part in unit)
-    one.lay(light, (x, y, z), away_m[None], facing[None], np.full_like(light, normal[2]))
+    one.attenuate(light, (x, y, z), away_m[None], facing[None], np.full_like(light, normal[2]))
     return light[0]
 
 
@@ -92,7 +92,7 @@ def test_light_ends_where_rays_first_meet_something(seed: int) -> None:
     boxes = [box(tuple(rng.uniform((-12, -12, 0), (12, 12, 6))), tuple(rng.uniform(0.6, 5, 3))) for _ in range(12)]
     corners = np.concatenate([one for one in boxes if np.abs(one - LAMP_M).max(axis=2).min() > 2])
     axis = DOWN + rng.uniform(-0.3, 0.3, 3)
-    outlook = Outlook.of(LAMP_M, axis, STANDING)
+    outlook = LampFrame.of(LAMP_M, axis, STANDING)
     comes_m = first_met(corners, outlook)
     row, column = (rng.integers(4, STANDING.cells - 4, 3000) for _ in range(2))
     rays = outlook.directions(column, row).astype(float)
@@ -190,7 +190,7 @@ def test_a_lamp_is_not_in_its_own_way() -> None:
 
 
 def test_nothing_is_stopped_behind_a_lamp_or_outside_of_its_map() -> None:
-    outlook = Outlook.of(LAMP_M, np.array([1.0, 0.0, 0.0]), Layout(cells=64, zoom=2.0))
+    outlook = LampFrame.of(LAMP_M, np.array([1.0, 0.0, 0.0]), Layout(cells=64, zoom=2.0))
     comes_m = outlook.layout.empty()
     comes_m[BORDER:-BORDER, BORDER:-BORDER] = 3.0
     one = ShadowMap(outlook=outlook, comes_m=comes_m)
@@ -202,7 +202,7 @@ def test_nothing_is_stopped_behind_a_lamp_or_outside_of_its_map() -> None:
 
 
 def test_sparse_points_near_a_lamp_have_no_holes_between_them() -> None:
-    outlook = Outlook.of(LAMP_M, DOWN, STANDING)
+    outlook = LampFrame.of(LAMP_M, DOWN, STANDING)
     comes_m = outlook.layout.empty()
     x, y = (grid.reshape(-1) for grid in np.meshgrid(*[np.arange(-0.6, 0.61, 0.07)] * 2))
     stop_behind(comes_m, np.stack([x, y, np.full(len(x), 5.5)], axis=1).astype(np.float32), 0.07, outlook)
@@ -244,6 +244,6 @@ def test_views_of_one_scene_share_its_maps_and_another_scene_has_its_own() -> No
 def test_layouts_say_how_far_they_reach() -> None:
     assert Layout(cells=256, zoom=1.0).half_angle_rad > math.pi / 2
     wide = Layout(cells=64, zoom=2.2)
-    outlook = Outlook.of(LAMP_M, DOWN, wide)
+    outlook = LampFrame.of(LAMP_M, DOWN, wide)
     corner = outlook.directions(np.array([0]), np.array([0]))[0]
     assert math.acos(corner @ DOWN) == pytest.approx(wide.half_angle_rad, rel=0.03)

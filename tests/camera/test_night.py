@@ -187,12 +187,12 @@ def test_frames_stay_linear_and_the_same() -> None:
     black, white = np.zeros((*SIZE, 3), np.uint16), np.full((*SIZE, 3), 90, np.uint16)
     weight = rng.random((*SIZE, 3))
     mixed = np.round(weight * white).astype(np.uint16)
-    shown = [light.lay(frame).astype(float) for frame in (black, white, mixed)]
+    shown = [light.apply(frame).astype(float) for frame in (black, white, mixed)]
     clear = shown[1] < LINEAR_FULL_SCALE
     assert clear.mean() > 0.95, "all but the lamp itself"
     assert np.abs(shown[0] + weight * (shown[1] - shown[0]) - shown[2])[clear].max() < 2.5
     assert abs(np.mean((shown[2] - mixed * light.share - light.glow)[clear])) < 0.05, "the grain is right on average"
-    np.testing.assert_array_equal(light.lay(mixed), light.lay(mixed))
+    np.testing.assert_array_equal(light.apply(mixed), light.apply(mixed))
 
 
 def test_what_stands_in_a_lamps_light_darkens_what_lies_behind_it_and_nothing_else() -> None:
@@ -260,8 +260,8 @@ def test_wet_roads_mirror_lamps_and_walls_do_not() -> None:
     assert wet.streaks is not None
     assert wet.streaks[geom_id == ROAD].max() > 5 and not wet.streaks[geom_id != ROAD].any()
     frame = np.full((*SIZE, 3), 10, np.uint16)
-    assert (wet.mirror(frame) >= frame).all() and wet.mirror(frame).max() > 14
-    assert light_of(night(place)).mirror(frame) is frame
+    assert (wet.apply_reflections(frame) >= frame).all() and wet.apply_reflections(frame).max() > 14
+    assert light_of(night(place)).apply_reflections(frame) is frame
 
 
 def test_only_those_that_drive_have_their_lamps_on() -> None:

@@ -79,7 +79,7 @@ def test_more_rain_covers_more_and_none_nothing() -> None:
     ]
     assert covers[0] < 0.5 * covers[1]
     picture = frames()[2]
-    dry = Rain.of(0, 50, np.ones(3)).fall(picture, depth, camera(), STILL, derive_rng(1, "rain", 0))
+    dry = Rain.of(0, 50, np.ones(3)).apply(picture, depth, camera(), STILL, derive_rng(1, "rain", 0))
     assert np.array_equal(dry, picture)
 
 
@@ -95,8 +95,8 @@ def test_linear_in_the_picture(effect: str) -> None:
 
     def shown(picture: np.ndarray) -> np.ndarray:
         if effect == "rain":
-            return RAIN.fall(picture, depth, camera(), STILL, derive_rng(7, "rain", 0)).astype(float)
-        return puddles(ripples=0.5).lay(picture, depth, ~np.isnan(depth), camera()).astype(float)
+            return RAIN.apply(picture, depth, camera(), STILL, derive_rng(7, "rain", 0)).astype(float)
+        return puddles(ripples=0.5).apply(picture, depth, ~np.isnan(depth), camera()).astype(float)
 
     black, white, patch = (shown(picture) for picture in frames())
     expected = black + frames()[2] / LINEAR_FULL_SCALE * (white - black)
@@ -108,10 +108,10 @@ def test_puddles_lie_on_open_ground_where_the_town_has_them() -> None:
     depth = ground_depth()
     _, white, _ = frames()
     ground = ~np.isnan(depth)
-    seen = puddles().lay(white, depth, ground, camera())
+    seen = puddles().apply(white, depth, ground, camera())
     wet = (seen != white).any(axis=-1)
     assert 0.1 < wet[ground].mean() < 0.8 and not wet[~ground].any()
-    assert np.array_equal(puddles(0.0).lay(white, depth, ground, camera()), white)
+    assert np.array_equal(puddles(0.0).apply(white, depth, ground, camera()), white)
 
 
 @pytest.mark.parametrize(("moved_m", "least_alike"), [(2.0, 0.9), (0.0, 1.0)])
@@ -120,7 +120,7 @@ def test_a_camera_that_has_moved_sees_the_same_water_elsewhere(moved_m: float, l
     x_m, y_m = (grid.reshape(-1) for grid in np.meshgrid(np.linspace(6, 9, 30), np.linspace(-2, 2, 9)))
     seen = []
     for at_m in (0.0, moved_m):
-        wet = (puddles().lay(white, depth, ~np.isnan(depth), camera(at_m)) != white).any(axis=-1)
+        wet = (puddles().apply(white, depth, ~np.isnan(depth), camera(at_m)) != white).any(axis=-1)
         row = np.rint(90 * 1.6 / (x_m - at_m) + (SIZE[0] - 1) / 2).astype(int)
         column = np.rint(-90 * y_m / (x_m - at_m) + (SIZE[1] - 1) / 2).astype(int)
         seen.append(wet[row, column])
@@ -131,7 +131,7 @@ def test_a_camera_that_has_moved_sees_the_same_water_elsewhere(moved_m: float, l
 def test_water_mirrors_more_at_a_flat_angle() -> None:
     depth = ground_depth()
     black, _, _ = frames()
-    seen = puddles(share=1.1).lay(black, depth, ~np.isnan(depth), camera())
+    seen = puddles(share=1.1).apply(black, depth, ~np.isnan(depth), camera())
     blue = seen[..., 2].mean(axis=1)
     horizon = int(np.argmax(~np.isnan(depth[:, 0])))
     assert blue[horizon] > 5 * blue[-1] > 0

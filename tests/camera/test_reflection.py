@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gear.camera.reflection import Reflection, beyond_mirror, camera_below
+from gear.camera.reflection import Reflection, beyond_mirror, mirror_camera
 from gear.camera.water import Water
 from gear.contracts.rendering import RawView
 from gear.values.frames import LINEAR_FULL_SCALE
@@ -58,7 +58,7 @@ def from_below(below: CameraRecord, light: np.ndarray, depth_m: np.ndarray) -> R
 
 def seen_from_below(looking: CameraRecord) -> Reflection:
     """The painted wall, which reaches down to below the ground, and is hidden by nothing there."""
-    below = camera_below(looking, HEIGHT_M)
+    below = mirror_camera(looking, HEIGHT_M)
     assert below is not None
     depth_m = np.full((below.height_px, below.width_px), np.nan)
     return from_below(below, painted(hits(below)), depth_m)
@@ -89,7 +89,7 @@ def test_a_mirrored_ray_shows_what_it_comes_to(look: dict[str, float]) -> None:
 
 def test_damp_ground_draws_things_out_along_the_view_and_keeps_their_light() -> None:
     looking = camera(yaw_deg=0.0)
-    below = camera_below(looking, HEIGHT_M)
+    below = mirror_camera(looking, HEIGHT_M)
     assert below is not None
     light = np.zeros((below.height_px, below.width_px, 3))
     light[below.height_px // 2, below.width_px // 2] = 1
@@ -100,8 +100,8 @@ def test_damp_ground_draws_things_out_along_the_view_and_keeps_their_light() -> 
 
 
 def test_who_sees_no_ground_sees_nothing_mirrored() -> None:
-    assert camera_below(camera(pitch_deg=60.0), HEIGHT_M) is None
-    assert camera_below(camera(), HEIGHT_M + 1.7) is None
+    assert mirror_camera(camera(pitch_deg=60.0), HEIGHT_M) is None
+    assert mirror_camera(camera(), HEIGHT_M + 1.7) is None
 
 
 def ground_depth(looking: CameraRecord, height_m: float = HEIGHT_M) -> np.ndarray:
@@ -120,7 +120,7 @@ def test_puddles_and_damp_ground_mirror_more_at_a_grazing_angle() -> None:
     is_open = ~np.isnan(depth)
     reflection = seen_from_below(looking)
     puddled, damp = (
-        wet(*water).lay(black, depth, is_open, looking, reflection).mean(axis=(1, 2)) for water in ((1.1, 0), (0, 1))
+        wet(*water).apply(black, depth, is_open, looking, reflection).mean(axis=(1, 2)) for water in ((1.1, 0), (0, 1))
     )
     far, near = slice(52, 56), slice(88, 96)
     assert puddled[far].mean() > 4 * puddled[near].mean() > 0
@@ -133,10 +133,10 @@ def test_ground_at_another_height_mirrors_the_sky_alone() -> None:
     high, reflection = ground_depth(looking, HEIGHT_M + 0.8), seen_from_below(looking)
     grey = np.full((*SIZE, 3), 300, np.uint16)
     is_open = ~np.isnan(high)
-    with_street, without = (wet(0.4, 0.0).lay(grey, high, is_open, looking, seen) for seen in (reflection, None))
+    with_street, without = (wet(0.4, 0.0).apply(grey, high, is_open, looking, seen) for seen in (reflection, None))
     assert np.array_equal(with_street, without) and not np.array_equal(without, grey)
-    damp = wet(0.0, 1.0).lay(grey, high, is_open, looking, reflection)
-    flat = wet(0.0, 1.0).lay(grey, ground_depth(looking), is_open, looking, reflection)
+    damp = wet(0.0, 1.0).apply(grey, high, is_open, looking, reflection)
+    flat = wet(0.0, 1.0).apply(grey, ground_depth(looking), is_open, looking, reflection)
     assert (damp[is_open] >= grey[is_open]).all() and (damp > grey).mean() > 0.2, "the sky is brighter"
     assert not np.array_equal(damp, flat)
 
@@ -149,7 +149,7 @@ def test_water_is_linear_in_what_lies_below_it() -> None:
 
     def laid(level: int) -> np.ndarray:
         frame = np.full((*SIZE, 3), level, np.uint16)
-        return wet(0.4, 0.7).lay(frame, depth, is_open, looking, reflection).astype(float)
+        return wet(0.4, 0.7).apply(frame, depth, is_open, looking, reflection).astype(float)
 
     assert np.abs(laid(500) - (laid(0) + laid(1000)) / 2).max() <= 1
 
@@ -167,16 +167,16 @@ def test_what_is_mirrored_lies_at_the_same_places_whatever_the_pictures_size() -
 def test_what_lies_under_the_mirror_hides_it_and_the_sky_is_mirrored_instead() -> None:
     """As on a flyover, whose deck is no ground: its underside is before whatever a mirror on top of it would show."""
     looking = camera()
-    below = camera_below(looking, HEIGHT_M)
+    below = mirror_camera(looking, HEIGHT_M)
     assert below is not None
     rise, low_m = rays(below)[..., 2], below.world_from_camera.position_m[2]
     deck_m = np.where(rise > 0.01, (HEIGHT_M - 0.3 - low_m) / np.maximum(rise, 0.01), np.nan)
     depth, grey = ground_depth(looking), np.full((*SIZE, 3), 300, np.uint16)
     is_open = depth < 30
     covered = from_below(below, painted(hits(below)), deck_m)
-    puddled = [wet(0.4, 0.0).lay(grey, depth, is_open, looking, seen) for seen in (covered, None)]
+    puddled = [wet(0.4, 0.0).apply(grey, depth, is_open, looking, seen) for seen in (covered, None)]
     assert np.array_equal(*puddled)
-    damp = wet(0.0, 1.0).lay(grey, depth, is_open, looking, covered)[60:].astype(float)
+    damp = wet(0.0, 1.0).apply(grey, depth, is_open, looking, covered)[60:].astype(float)
     assert (damp > 300)[is_open[60:]].all(), "brighter: `mirrored` is half of full scale everywhere"
 
 
@@ -190,7 +190,7 @@ def test_the_look_from_below_covers_all_that_the_ground_mirrors(
 ) -> None:
     focal_px = width_px / 2 / np.tan(np.radians(hfov_deg) / 2)
     looking = replace(camera(**look), width_px=width_px, height_px=height_px, focal_px=focal_px)
-    below = camera_below(looking, HEIGHT_M)
+    below = mirror_camera(looking, HEIGHT_M)
     assert below is not None
     towards = rays(looking)[:: height_px // 90, :: width_px // 90].reshape(-1, 3)
     towards = np.concatenate([towards, rays(looking)[[0, 0, -1, -1], [0, -1, 0, -1]]])
@@ -204,7 +204,7 @@ def test_the_look_from_below_covers_all_that_the_ground_mirrors(
 def test_sizes_do_not_hang_on_the_last_digit_of_a_pose() -> None:
     sizes = set()
     for yaw_deg in np.linspace(0, 360, 97):
-        below = camera_below(replace(camera(yaw_deg=float(yaw_deg)), width_px=1536, height_px=768, focal_px=768), 0.0)
+        below = mirror_camera(replace(camera(yaw_deg=float(yaw_deg)), width_px=1536, height_px=768, focal_px=768), 0.0)
         assert below is not None
         sizes.add((below.width_px, below.height_px))
     assert len(sizes) == 1
@@ -212,7 +212,7 @@ def test_sizes_do_not_hang_on_the_last_digit_of_a_pose() -> None:
 
 def test_air_lies_between_the_mirror_and_what_it_shows_alone() -> None:
     looking = camera(yaw_deg=0.0)
-    below = camera_below(looking, HEIGHT_M)
+    below = mirror_camera(looking, HEIGHT_M)
     assert below is not None
     towards = rays(below)
     low_m = below.world_from_camera_transform.translation_m

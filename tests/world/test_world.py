@@ -23,7 +23,7 @@ from gear.world.compilation.asset_prefetch import AssetsAhead
 from gear.world.compilation.instances import AssetParts
 from gear.world.compilation.quiet_mjcf import mjcf
 from gear.world.surfaces.face_texture import FACE_SIZE_PX
-from gear.world.weather.air import darkroom_of
+from gear.world.weather.air import camera_pipeline
 from gear.world.weather.presets import PRESETS
 from gear.world.world import World
 
@@ -356,7 +356,9 @@ def test_an_open_shutter_smears_what_the_ego_car_passes_and_not_its_bonnet() -> 
     raw = RawView(linear_rgb=light, depth_m=np.full(size, 1.5, np.float32), geom_id=ids)
     clear = Weather(name="x", scattering_intensity=0)
     sharp, smeared = (
-        darkroom_of(clear, "filament", "t", CameraEffects(shutter_s=shutter_s)).view(raw, camera, shot, placed.geoms)
+        camera_pipeline(clear, "filament", "t", CameraEffects(shutter_s=shutter_s)).view(
+            raw, camera, shot, placed.geoms
+        )
         for shutter_s in (0.0, 0.05)
     )
     changed = (sharp.linear_rgb != smeared.linear_rgb).any(axis=-1)
@@ -374,7 +376,9 @@ def test_the_ground_under_a_car_gets_less_of_the_sky_and_nothing_else_changes() 
         renderer.close()
     cloudy = PRESETS["CloudyNoon"]
     plain, shaded = (
-        darkroom_of(cloudy, "classic", "t", shapes=shapes).view(raw, camera, shot, placed.geoms).linear_rgb.astype(int)
+        camera_pipeline(cloudy, "classic", "t", shapes=shapes)
+        .view(raw, camera, shot, placed.geoms)
+        .linear_rgb.astype(int)
         for shapes in (None, world.shapes)
     )
     darker, changed = (shaded < plain).any(axis=-1), (shaded != plain).any(axis=-1)

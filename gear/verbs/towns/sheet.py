@@ -19,8 +19,8 @@ from gear.verbs.towns.canvas import Canvas
 from gear.verbs.towns.facts import Town
 from gear.world.planner import ScenePlanner
 from gear.world.scene_spec import SceneSpec
-from gear.world.weather.air import darkroom_of
-from gear.world.weather.mirror_view import look_from_below
+from gear.world.weather.air import camera_pipeline
+from gear.world.weather.mirror_view import render_mirror_view
 from gear.world.weather.night import night_of
 from gear.world.world import World
 
@@ -82,11 +82,11 @@ def thumbnail(town: Town, name: str, scene: SceneSpec, options: SheetOptions) ->
     record = ScenePlanner(world, rig, SplitConfig(seed=options.seed, samples=1), split_name="debug").plan(0)
     placed = world.place(record)
     night = night_of(world, options.weather, options.renderer)
-    darkroom = darkroom_of(options.weather, options.renderer, world.town_name, night=night, shapes=world.shapes)
+    pipeline = camera_pipeline(options.weather, options.renderer, world.town_name, night=night, shapes=world.shapes)
     renderer = open_renderer(options.renderer, world.model, quality=options.quality)
     try:
         (view,) = renderer.render(placed.stage, record.cameras)
-        (below,) = look_from_below(world, renderer, placed, record, darkroom)
+        (below,) = render_mirror_view(world, renderer, placed, record, pipeline)
     finally:
         renderer.close()
     seen = []
@@ -95,7 +95,7 @@ def thumbnail(town: Town, name: str, scene: SceneSpec, options: SheetOptions) ->
         where = f"{np.nanmean(view.depth_m[pixels]):.0f} m ahead, " if pixels.any() else ""
         seen.append(f"{face.asset} {where}{pixels.mean():.1%} of the picture")
     others = len(record.actors) - 1
-    shown = darkroom.view(view, record.cameras[0], record, placed.geoms, reflection=darkroom.reflection(below, record))
+    shown = pipeline.view(view, record.cameras[0], record, placed.geoms, reflection=pipeline.reflection(below, record))
     return shown.rgb, "; ".join([*seen, f"{others} other road users"])
 
 

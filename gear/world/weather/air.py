@@ -11,7 +11,7 @@ import numpy as np
 from gear.camera.air import Air, Fog
 from gear.camera.ground_shade import GroundShade
 from gear.camera.night import Night
-from gear.camera.pipeline import Darkroom
+from gear.camera.pipeline import CameraPipeline
 from gear.camera.rain import Rain
 from gear.camera.response import encode_srgb, response_for
 from gear.camera.water import Water
@@ -60,15 +60,15 @@ SHADE_SKY_FACE_PX = 8
 _MIRROR_ROWS, _MIRROR_COLUMNS = 128, 512
 
 
-def darkroom_of(
+def camera_pipeline(
     weather: Weather,
     renderer_name: str,
     town: str,
     effects: CameraEffects | None = None,
     night: Night | None = None,
     shapes: Mapping[str, Shape] | None = None,
-) -> Darkroom:
-    """What develops a renderer's frames of a weather in a town.
+) -> CameraPipeline:
+    """The camera pipeline for a renderer's frames of a town in one weather.
 
     Args:
         weather: light and air.
@@ -82,7 +82,7 @@ def darkroom_of(
     mirrored = left * mirrored_light(weather, _MIRROR_ROWS, _MIRROR_COLUMNS)
     if night is not None:
         mirrored += night.lit * lamplit_houses(_MIRROR_ROWS)
-    return Darkroom(
+    return CameraPipeline(
         response=response_for(renderer_name, weather),
         shade=None if shapes is None else shade_of(weather, renderer_name, shapes),
         night=night,

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from gear.camera.pipeline import Darkroom
-from gear.camera.reflection import Below
+from gear.camera.pipeline import CameraPipeline
+from gear.camera.reflection import MirrorView
 from gear.contracts.rendering import Renderer
 from gear.values.scene import SceneRecord
 from gear.world.world import PlacedStage, World
 
 
-def look_from_below(
-    world: World, renderer: Renderer, placed: PlacedStage, record: SceneRecord, darkroom: Darkroom
-) -> tuple[Below | None, ...]:
+def render_mirror_view(
+    world: World, renderer: Renderer, placed: PlacedStage, record: SceneRecord, pipeline: CameraPipeline
+) -> tuple[MirrorView | None, ...]:
     """One a camera, None where it needs none; surfaces are neutral, so that a patch changes nothing but itself.
 
     Args:
@@ -19,9 +19,9 @@ def look_from_below(
         renderer: of that world.
         placed: the sample, placed last.
         record: who looks.
-        darkroom: that develops what they see.
+        pipeline: the camera pipeline of this weather; it says which cameras need a mirror view.
     """
-    cameras = [darkroom.camera_below(camera, record) for camera in record.cameras]
+    cameras = [pipeline.mirror_camera(camera, record) for camera in record.cameras]
     looking = [camera for camera in cameras if camera is not None]
     if not looking:
         return (None,) * len(cameras)

@@ -10,8 +10,8 @@ from gear.testing.tiny_town import SMALL_RIG, build_tiny_world
 from gear.testing.town_facts import SEEN_GROUPS, Rays
 from gear.values.labels import GROUND_CODES
 from gear.values.scene import ActorRecord, Pose, SceneRecord
-from gear.world.weather.air import darkroom_of
-from gear.world.weather.mirror_view import look_from_below
+from gear.world.weather.air import camera_pipeline
+from gear.world.weather.mirror_view import render_mirror_view
 from gear.world.weather.night import night_of
 from gear.world.weather.presets import PRESETS
 from gear.world.world import World
@@ -37,11 +37,11 @@ def test_the_look_from_below_is_where_mirrored_rays_come_to(name: str) -> None:
     world = build_tiny_world()
     shot = record(world)
     placed = world.place(shot)
-    darkroom = darkroom_of(WET, name, "tiny", shapes=world.shapes)
+    pipeline = camera_pipeline(WET, name, "tiny", shapes=world.shapes)
     renderer = open_renderer(name, world.model, quality="fast")
     try:
         (above,) = renderer.render(placed.stage, shot.cameras)
-        (below,) = look_from_below(world, renderer, placed, shot, darkroom)
+        (below,) = render_mirror_view(world, renderer, placed, shot, pipeline)
         (again,) = renderer.render(placed.stage, shot.cameras)
     finally:
         renderer.close()
@@ -74,7 +74,7 @@ def test_the_look_from_below_is_where_mirrored_rays_come_to(name: str) -> None:
 def test_what_is_mirrored_does_not_know_the_patch() -> None:
     world = build_tiny_world("board")
     shot = record(world)
-    darkroom = darkroom_of(WET, "classic", "tiny", shapes=world.shapes)
+    pipeline = camera_pipeline(WET, "classic", "tiny", shapes=world.shapes)
     renderer = open_renderer("classic", world.model, quality="fast")
     (face,) = [surface.name for surface in shot.surfaces]
     looks = []
@@ -82,9 +82,9 @@ def test_what_is_mirrored_does_not_know_the_patch() -> None:
         for shown in ("white", "black"):
             placed = world.place(shot, {face: shown})
             (raw,) = renderer.render(placed.stage, shot.cameras)
-            (below,) = look_from_below(world, renderer, placed, shot, darkroom)
-            reflection = darkroom.reflection(below, shot)
-            view = darkroom.view(raw, shot.cameras[0], shot, placed.geoms, reflection=reflection)
+            (below,) = render_mirror_view(world, renderer, placed, shot, pipeline)
+            reflection = pipeline.reflection(below, shot)
+            view = pipeline.view(raw, shot.cameras[0], shot, placed.geoms, reflection=reflection)
             looks.append((raw, below, view))
     finally:
         renderer.close()
@@ -99,10 +99,10 @@ def test_what_is_mirrored_does_not_know_the_patch() -> None:
 def test_nobody_looks_from_below_where_it_is_dry_or_night() -> None:
     world = build_tiny_world("no_billboard")
     shot = record(world)
-    dry = darkroom_of(PRESETS["ClearNoon"], "classic", "tiny")
-    assert dry.camera_below(shot.cameras[0], shot) is None
-    assert darkroom_of(WET, "classic", "tiny").camera_below(shot.cameras[0], shot) is not None
+    dry = camera_pipeline(PRESETS["ClearNoon"], "classic", "tiny")
+    assert dry.mirror_camera(shot.cameras[0], shot) is None
+    assert camera_pipeline(WET, "classic", "tiny").mirror_camera(shot.cameras[0], shot) is not None
     dark = PRESETS["WetNight"]
     night = night_of(build_tiny_world("no_billboard", dark), dark, "classic")
     assert night is not None
-    assert darkroom_of(dark, "classic", "tiny", night=night).camera_below(shot.cameras[0], shot) is None
+    assert camera_pipeline(dark, "classic", "tiny", night=night).mirror_camera(shot.cameras[0], shot) is None

@@ -16,7 +16,7 @@ from gear.render import RENDERERS, open_renderer
 from gear.values.geometry import Intrinsics, RigidTransform
 from gear.values.scene import CameraRecord, Pose, Weather
 from gear.world.compilation.quiet_mjcf import mjcf
-from gear.world.weather.air import RAIN_PER_M, air_of, darkroom_of, fogs_of
+from gear.world.weather.air import RAIN_PER_M, air_of, camera_pipeline, fogs_of
 from gear.world.weather.light import (
     FACE_ORDER,
     WHITE_ALBEDO,
@@ -288,7 +288,7 @@ def test_fog_hides_what_is_far(name: str) -> None:
     finally:
         renderer.close()
     assert raw.linear_rgb is not None
-    veiled = [air_of(weather, name).veil(raw.linear_rgb, raw.depth_m, record).astype(float) for weather in weathers]
+    veiled = [air_of(weather, name).apply(raw.linear_rgb, raw.depth_m, record).astype(float) for weather in weathers]
     pillar = raw.geom_id == 1
     contrasts = [np.abs(v[pillar].mean(axis=0) - v[raw.geom_id < 0].mean(axis=0)).mean() for v in veiled]
     assert contrasts[1] < 0.7 * contrasts[0]
@@ -337,8 +337,8 @@ def test_fog_at_dusk_has_the_colour_of_the_streets_light() -> None:
 
 
 def test_a_weather_says_what_the_camera_adds() -> None:
-    dry, wet = (darkroom_of(PRESETS[name], "filament", "t") for name in ("ClearNoon", "HardRainNoon"))
+    dry, wet = (camera_pipeline(PRESETS[name], "filament", "t") for name in ("ClearNoon", "HardRainNoon"))
     assert dry.water.share == 0 == dry.rain.intensity and wet.water.share > 0.2 and wet.rain.intensity == 1
     assert wet.air.fogs[0].per_m > 5 * dry.air.fogs[0].per_m
-    still = darkroom_of(Weather(name="x", scattering_intensity=0, fog_density=50), "filament", "t").air
+    still = camera_pipeline(Weather(name="x", scattering_intensity=0, fog_density=50), "filament", "t").air
     assert still.fogs == () and not still.clear_per_m.any()
