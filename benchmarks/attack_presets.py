@@ -51,7 +51,7 @@ def main() -> None:
                 settings=settings, model_settings=args.model_set, val=folder / "val",
             )  # fmt: skip
             found = gear.gap(
-                folder / "none", patch=out / "patch", model=args.model, settings=args.model_set,
+                folder / "none", patch=out / "patch", model=args.model, model_settings=args.model_set,
                 compositors=("transport",), out=out / "gap",
             ).as_json()["effect"]  # fmt: skip
             changes[attack].append(found["rendered"][figure] - found["clean"][figure])

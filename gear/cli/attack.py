@@ -98,11 +98,11 @@ def run(args: argparse.Namespace) -> int:
             patience=args.patience,
             compositor=args.compositor,
             seed=args.seed,
-            allow_tests=args.allow_test_data,
+            allow_test_data=args.allow_test_data,
             force=args.force,
-            progress=progress,
-            learning=learning,
-            noted=lambda text: print(f"gear: note: {text}", file=sys.stderr),
+            on_progress=progress,
+            on_fit_progress=learning,
+            on_warning=lambda text: print(f"gear: note: {text}", file=sys.stderr),
         )
     if args.verify is None or not args.json:
         print(json.dumps(report.facts, indent=2) if args.json else report.summary())
@@ -112,15 +112,15 @@ def run(args: argparse.Namespace) -> int:
                 args.out,
                 args.verify,
                 models=args.model,
-                settings=args.model_set,
+                model_settings=args.model_set,
                 defense=args.defense,
                 defense_settings=args.defense_set,
                 calibration=args.calibration,
                 calibration_patched=args.calibration_patched,
                 town=args.town,
                 scenes=args.scenes,
-                progress=progress,
-                learning=learning,
+                on_progress=progress,
+                on_fit_progress=learning,
             )
         if args.json:
             verified = {name: found.as_json() for name, found in reports.items()}

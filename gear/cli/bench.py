@@ -50,8 +50,16 @@ def run(args: argparse.Namespace) -> int:
         listed = [{"verb": step.verb, "title": step.title, "arguments": step.arguments} for step in steps]
         print(json.dumps(listed, indent=1) if args.json else "\n".join(map(command, steps)))
         return 0
-    with _Bars() as watch:
-        report = bench(args.config, **given, apart=True, watch=watch)
+    with _Bars() as bars:
+        report = bench(
+            args.config,
+            **given,
+            apart=True,
+            on_step=bars.on_step,
+            on_progress=bars.on_progress,
+            on_fit_progress=bars.on_fit_progress,
+            on_warning=bars.on_warning,
+        )
     print(json.dumps(report.as_json(), indent=1, allow_nan=False) + "\n" if args.json else text(report), end="")
     return 0
 
@@ -63,7 +71,7 @@ class _Bars:
         self._bar: ProgressBar | None = None
         self._lesson: ProgressBar | None = None
 
-    def began(self, step: Step, number: int, steps: int) -> None:
+    def on_step(self, step: Step, number: int, steps: int) -> None:
         """Prints the step's title."""
         import sys
 
@@ -71,17 +79,17 @@ class _Bars:
         if sys.stderr.isatty():
             print(f"[{number}/{steps}] {step.title}", file=sys.stderr)
 
-    def progress(self, done: int, total: int) -> None:
+    def on_progress(self, done: int, total: int) -> None:
         """Moves the step's bar."""
         self._bar = self._bar or _bar("sample")
         self._bar(done, total)
 
-    def learning(self, done: int, total: int) -> None:
+    def on_fit_progress(self, done: int, total: int) -> None:
         """Moves the bar of a defense that learns."""
         self._lesson = self._lesson or _bar("picture")
         self._lesson(done, total)
 
-    def noted(self, line: str) -> None:
+    def on_warning(self, line: str) -> None:
         """Prints it."""
         import sys
 

@@ -87,8 +87,8 @@ def run(args: argparse.Namespace) -> int:
             settings=args.settings,
             workers=args.workers,
             force=args.force,
-            progress=progress,
-            noted=lambda text: print(f"gear: note: {text}", file=sys.stderr),
+            on_progress=progress,
+            on_warning=lambda text: print(f"gear: note: {text}", file=sys.stderr),
         )
     print(report.summary())
     return 0

@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
             split=args.split,
             settings=args.settings,
             seed=args.seed,
-            progress=progress,
+            on_progress=progress,
         )
     print(report.summary())
     return 0

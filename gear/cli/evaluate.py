@@ -31,9 +31,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--split", help="of the datasets, where they have several")
     parser.add_argument("--defense", metavar="NAME", help="defense plugin; gear plugins --kind defense")
-    for flag, dest, what in (("--set", "settings", "model"), ("--defense-set", "defense_settings", "defense")):
+    for flags, dest, what in (
+        (("--set", "--model-set"), "model_set", "model"),
+        (("--defense-set",), "defense_settings", "defense"),
+    ):
         parser.add_argument(
-            flag,
+            *flags,
             metavar="KEY=VALUE",
             action="append",
             default=[],
@@ -56,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--workers", type=positive, default=2, metavar="N", help="threads that read and measure (2)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the defense's draws and the bootstrap (0)")
     parser.add_argument("--resamples", type=int, default=1000, metavar="N", help="of the bootstrap; 0 for none (1000)")
-    add_device(parser, "settings")
+    add_device(parser, "model_set")
     parser.add_argument("--json", action="store_true", help="print results.json instead of the table")
 
 
@@ -79,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
         report = evaluate(
             args.data,
             model=args.model,
-            settings=args.settings,
+            model_settings=args.model_set,
             defense=args.defense,
             defense_settings=args.defense_settings,
             split=args.split,
@@ -91,8 +94,8 @@ def run(args: argparse.Namespace) -> int:
             workers=args.workers,
             seed=args.seed,
             resamples=args.resamples,
-            progress=progress,
-            learning=learning,
+            on_progress=progress,
+            on_fit_progress=learning,
         )
     for row in report.rows:
         for problem in row.damaged:

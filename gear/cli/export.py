@@ -26,6 +26,6 @@ def run(args: argparse.Namespace) -> int:
     from gear.verbs.export import export
 
     with ProgressBar("file") as progress:
-        count = export(args.dataset, layout=args.layout, out=args.out, progress=progress)
+        count = export(args.dataset, layout=args.layout, out=args.out, on_progress=progress)
     print(f"{args.out}: {count} samples in the layout {args.layout}")
     return 0

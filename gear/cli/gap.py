@@ -31,7 +31,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--split", help="its split, where it has several")
     parser.add_argument("--model", metavar="NAME", help="also what the patches do to a model, digitally and rendered")
     parser.add_argument(
-        "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings", help="an option of the model"
+        "--set",
+        "--model-set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        dest="model_set",
+        help="an option of the model",
     )
     parser.add_argument("--defense", metavar="NAME", help="a defense plugin that the model stands behind")
     parser.add_argument("--defense-set", metavar="KEY=VALUE", action="append", default=[], help="an option of it")
@@ -40,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--samples", type=positive, metavar="N", help="the first N samples only")
     parser.add_argument("--out", metavar="DIR", help="folder for gap.json and gap.txt")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the defense's draws (0)")
-    add_device(parser, "settings")
+    add_device(parser, "model_set")
     parser.add_argument("--json", action="store_true", help="print the report as JSON")
 
 
@@ -64,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
             patch=args.patch,
             split=args.split,
             model=args.model,
-            settings=args.settings,
+            model_settings=args.model_set,
             defense=args.defense,
             defense_settings=args.defense_set,
             calibration=args.calibration,
@@ -74,9 +80,9 @@ def run(args: argparse.Namespace) -> int:
             scenes=args.scenes,
             out=args.out,
             seed=args.seed,
-            progress=progress,
-            learning=learning,
-            noted=lambda text: print(f"gear: note: {text}", file=sys.stderr),
+            on_progress=progress,
+            on_fit_progress=learning,
+            on_warning=lambda text: print(f"gear: note: {text}", file=sys.stderr),
             **given,
         )
     print(dump_json(report.as_json()).decode().rstrip() if args.json else report.table())

@@ -65,7 +65,7 @@ def draw(args: argparse.Namespace) -> int:
             quality=args.quality,
             weather=args.weather,
             seed=args.seed,
-            progress=progress,
+            on_progress=progress,
         )
     print(json.dumps({"map": str(report.map), "sheet": report.sheet and str(report.sheet)}) if args.json
           else report.summary())  # fmt: skip

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from gear.cli.collect import positive
 
 if TYPE_CHECKING:
-    from gear.verbs.train.checkpoint import Progress
+    from gear.verbs.train.checkpoint import TrainingState
 
 EXAMPLE = """examples:
   gear train --task semseg --model ddrnet23_slim --data data/training/semseg --time-budget 10m --out runs/semseg
@@ -98,8 +98,8 @@ def run(args: argparse.Namespace) -> int:
             adversarial=args.adversarial,
             settings=args.settings,
             allow_test_data=args.allow_test_data,
-            watch=bar,
-            noted=lambda text: print(f"gear: note: {text}", file=sys.stderr),
+            on_step=bar,
+            on_warning=lambda text: print(f"gear: note: {text}", file=sys.stderr),
         )
     print(report.summary())
     return 0
@@ -118,7 +118,7 @@ class TrainingBar:
             bar_format="{l_bar}{bar}| {elapsed}<{remaining} {postfix}",
         )  # fmt: skip
 
-    def __call__(self, progress: Progress, share: float, figures: dict[str, float] | None) -> None:
+    def __call__(self, progress: TrainingState, share: float, figures: dict[str, float] | None) -> None:
         """After a step, or, with figures, after a validation."""
         self._bar.update(100 * share - self._bar.n)
         if progress.steps:

@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
             split=args.split,
             samples=args.samples,
             max_mb=args.max_mb,
-            progress=progress,
+            on_progress=progress,
         )
     print(report.summary())
     return 0

@@ -17,11 +17,11 @@ from gear.plugins.build import blamed
 from gear.plugins.datasets import open_dataset
 from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
+from gear.values.progress import Progress
 from gear.values.rng import derive_rng
 from gear.values.serial import Json
 
 Views = Mapping[str, UInt8Image]
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -36,7 +36,7 @@ class Calibration:
 
     clean: Dataset[Any] | None = None
     patched: Dataset[Any] | None = None
-    told: Progress | None = None
+    on_fit_progress: Progress | None = None
 
     def fit(self, defense: Chosen, product: Defense, model: Model, cameras: Sequence[str], seed: int) -> Any:
         """What the defense makes of them for a model that looks through these cameras; None where there are none.
@@ -51,8 +51,8 @@ class Calibration:
 
         def took(side: int, index: int) -> None:
             read.add((side, index))
-            if self.told is not None:
-                self.told(len(read), sum(map(len, given)))
+            if self.on_fit_progress is not None:
+                self.on_fit_progress(len(read), sum(map(len, given)))
 
         clean, *others = (CalibrationViews(one, cameras, partial(took, side)) for side, one in enumerate(given))
         patched: Sequence[Views] = others[0] if others else ()
@@ -100,7 +100,7 @@ def opened_calibration(
     defense: str | None,
     *,
     flag: str = "--set ",
-    told: Progress | None = None,
+    on_fit_progress: Progress | None = None,
 ) -> Calibration:
     """Opens what is there.
 
@@ -126,7 +126,7 @@ def opened_calibration(
         for model in models:
             if dataset is not None:
                 check_model(model, dataset, flag)
-    pair = Calibration(clean=opened[0], patched=opened[1], told=told)
+    pair = Calibration(clean=opened[0], patched=opened[1], on_fit_progress=on_fit_progress)
     if pair.shows_patch and pair.patched is not None and _label(pair.patched) == NO_PATCH:
         raise GearError(f"{clean} shows a patch, {patched} none: --calibration and --calibration-patched are swapped")
     return pair

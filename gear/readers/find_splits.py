@@ -15,7 +15,7 @@ KEPT_FOR_TESTS = "test"
 
 
 def open_all(
-    paths: Iterable[str | Path], task: str, *, names: Sequence[str], allow_tests: bool = False
+    paths: Iterable[str | Path], task: str, *, names: Sequence[str], allow_test_data: bool = False
 ) -> tuple[Dataset[Any], ...]:
     """Opens every split that the paths mean.
 
@@ -23,7 +23,7 @@ def open_all(
         paths: each is a dataset's root, a folder of roots, or a root and a split as `DIR:SPLIT`.
         task: that they must be of.
         names: splits to take where a root holds several.
-        allow_tests: whether `test` splits may be learnt from.
+        allow_test_data: whether `test` splits may be learnt from.
 
     Raises:
         DatasetError: there is none, one is of another task, or not finished.
@@ -38,7 +38,7 @@ def open_all(
         split = dataset.plan.info.split
         if dataset.plan.task["name"] != task:
             raise DatasetError(dataset.root, f"holds a {dataset.plan.task['name']} dataset, not {task}")
-        if split.split("_")[0] == KEPT_FOR_TESTS and not allow_tests:
+        if split.split("_")[0] == KEPT_FOR_TESTS and not allow_test_data:
             raise GearError(
                 f"{dataset.root}: split {split!r} is what networks are tested on, so it is not learnt from; collect a "
                 "split such as finetuning, or say --allow-test-data if nothing will be reported on it"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,12 +19,10 @@ from gear.plugins.build import NO_OPTIONS, build, find
 from gear.plugins.catalogue import PluginEntry
 from gear.plugins.datasets import open_dataset
 from gear.values.errors import DatasetError, GearError
+from gear.values.progress import Progress
 from gear.values.rng import check_seed, derive_rng
 from gear.values.serial import Json
 from gear.verbs.cleaned import FOLDER, kept_marker, marker_path, write_sample
-
-Progress = Callable[[int, int], None]
-"""Called with (samples finished, samples of the split)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,7 +60,7 @@ def defend(
     split: str | None = None,
     settings: Iterable[str] = (),
     seed: int = 0,
-    progress: Progress | None = None,
+    on_progress: Progress | None = None,
 ) -> DefendReport:
     """Writes a dataset's pictures as a defense cleans them; takes up again what was begun, and cleans again what comes
     of pictures that are others now, or was damaged.
@@ -104,15 +102,15 @@ def defend(
     missing = [i for i, marker in markers.items() if marker is None]
     outdated = sum(inside(root, marker_path(name, i)).exists() for i in missing)
     finished = len(opened) - len(missing)
-    if progress is not None:
-        progress(finished, len(opened))
+    if on_progress is not None:
+        on_progress(finished, len(opened))
     for index in missing:
         sample = opened[index]
         result = guard.apply(sample.images, derive_rng(seed, "defend", spec.name, index), index)
         markers[index] = write_sample(root, opened, index, sample, spec, result)
         finished += 1
-        if progress is not None:
-            progress(finished, len(opened))
+        if on_progress is not None:
+            on_progress(finished, len(opened))
     if "score" in spec.outputs:
         scores = [marker.score for marker in markers.values() if marker is not None]
         write_whole(root, f"{FOLDER}/{name}/scores.json", dump_json({"scores": scores}))

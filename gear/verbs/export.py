@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from gear.dataset.files import clear_scratch, explained, inside, read_bytes, write_whole
@@ -11,6 +11,7 @@ from gear.dataset.store import plan_of, splits_of
 from gear.formats.exports import SplitRecords, layouts
 from gear.plugins.datasets import open_dataset
 from gear.values.errors import DatasetError, UnknownNameError
+from gear.values.progress import Progress
 
 
 def export(
@@ -18,7 +19,7 @@ def export(
     *,
     layout: str,
     out: str | Path,
-    progress: Callable[[int, int], None] | None = None,
+    on_progress: Progress | None = None,
 ) -> int:
     """Writes all splits of a dataset as another layout's tree.
 
@@ -60,8 +61,8 @@ def export(
         for relative, data in tree:
             written.append(relative)
             write_whole(target, relative, data)
-            if progress is not None:
-                progress(len(written), 0)
+            if on_progress is not None:
+                on_progress(len(written), 0)
     except BaseException:  # Ctrl-C, too
         _take_back(target, written)
         raise

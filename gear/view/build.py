@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
@@ -20,6 +20,7 @@ from gear.dataset.reading import Dataset
 from gear.values.errors import DatasetError, GearError
 from gear.values.frames import UInt8Image
 from gear.values.machine import cores
+from gear.values.progress import Progress
 from gear.values.serial import Json
 from gear.view.channels import Channel, PreviewError, Shown, images, previews
 from gear.view.encoding import Picture, encode, largest_scale
@@ -29,9 +30,6 @@ PROBES = 6
 """Samples, spread over the split, that decide how large the pictures may be."""
 
 PICTURE_FILES = (".png", ".jpg", ".jpeg", ".webp")
-
-Progress = Callable[[int, int], None]
-"""Called with (samples finished, samples altogether)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -69,13 +67,13 @@ class Builder:
     base_url: str
     scale: float = 1.0
 
-    def entries(self, count: int, progress: Progress | None = None) -> Iterator[Entry]:
+    def entries(self, count: int, on_progress: Progress | None = None) -> Iterator[Entry]:
         """The first `count` samples, in order; a few at a time, because decoding and encoding can overlap."""
         executor = ThreadPoolExecutor(min(8, cores()))
         try:
             for done, entry in enumerate(executor.map(self.entry, range(count)), start=1):
-                if progress is not None:
-                    progress(done, count)
+                if on_progress is not None:
+                    on_progress(done, count)
                 yield entry
         finally:
             executor.shutdown(cancel_futures=True)

@@ -12,8 +12,9 @@ from urllib.parse import quote
 from gear.dataset.files import explained, refuse_folder
 from gear.dataset.reading import Dataset
 from gear.plugins.datasets import open_dataset
+from gear.values.progress import Progress
 from gear.values.serial import Json
-from gear.view.build import Builder, Progress, fitting_scale
+from gear.view.build import Builder, fitting_scale
 from gear.view.document import document
 from gear.view.rows import finite
 
@@ -58,7 +59,7 @@ def write_view(
     split: str | None = None,
     samples: int | None = None,
     max_mb: float = 48.0,
-    progress: Progress | None = None,
+    on_progress: Progress | None = None,
 ) -> ViewReport:
     """Writes one self-contained HTML page of a dataset; it opens from disk, without a server or a network.
 
@@ -77,7 +78,7 @@ def write_view(
         DatasetError: there is no finished split to show, or `out` cannot be written.
         UnknownNameError: its task's plugin is not installed.
     """
-    return write_page(open_dataset(path, split), out, samples=samples, max_mb=max_mb, progress=progress)
+    return write_page(open_dataset(path, split), out, samples=samples, max_mb=max_mb, on_progress=on_progress)
 
 
 def write_page(
@@ -86,7 +87,7 @@ def write_page(
     *,
     samples: int | None = None,
     max_mb: float = 48.0,
-    progress: Progress | None = None,
+    on_progress: Progress | None = None,
 ) -> ViewReport:
     """`write_view` of a dataset that is open already."""
     target = Path(out)
@@ -98,7 +99,7 @@ def write_page(
     builder = Builder(dataset=dataset, base_url=base_url(dataset.root, target))
     scale = fitting_scale(builder, count, max_mb * MEGABYTE / BASE64) if count else 1.0
     builder = Builder(dataset=dataset, base_url=builder.base_url, scale=scale)
-    entries = list(builder.entries(count, progress))
+    entries = list(builder.entries(count, on_progress))
     info = dataset.plan.info
     title = f"{dataset.plan.task['name']} · {info.scene} · {info.split}"
     size = _write(target, document(title, entries, about(dataset, scale)))

@@ -37,7 +37,7 @@ def test_workers_that_are_interrupted_alone_are_told_at_once(
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with pytest.raises(BackendError, match=r"a worker died \(exit code 130\).*run the same command again"):
-            collect_small("depth", tmp_path / "out", samples=500, workers=2, progress=interrupt)
+            collect_small("depth", tmp_path / "out", samples=500, workers=2, on_progress=interrupt)
     finally:
         signal.signal(signal.SIGINT, before)
 

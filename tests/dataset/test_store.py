@@ -158,7 +158,7 @@ def test_an_export_that_is_stopped_leaves_nothing_and_can_be_given_again(tmp_pat
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b", progress=stop)
+        export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b", on_progress=stop)
     assert list((tmp_path / "b").iterdir()) == []
     assert export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b") == 3
 

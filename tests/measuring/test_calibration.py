@@ -147,7 +147,7 @@ def test_doubtful_calibration_is_told_by_attacks_and_gaps(
 ) -> None:
     patched, told = tmp_path / "patched", list[str]()
     copy_small("semseg", patched, split="val", patch="random")
-    behind: dict[str, Any] = {"defense": "learner", "calibration": patched, "noted": told.append}
+    behind: dict[str, Any] = {"defense": "learner", "calibration": patched, "on_warning": told.append}
     attack(
         small(), model="tiny_segmenter", out=tmp_path / "p", attack="square", queries=4,
         settings=["height_px=12", "width_px=24"], **behind,
@@ -179,7 +179,7 @@ def test_learning_from_what_is_measured_is_noted(small: Small, learner: list[Lea
     asked: dict[str, Any] = {"model": "tiny_segmenter", "defense": "learner", "resamples": 0}
     read: list[tuple[int, int]] = []
     same = evaluate(
-        small(), calibration=small(), out=tmp_path / "same", learning=lambda *done: read.append(done), **asked
+        small(), calibration=small(), out=tmp_path / "same", on_fit_progress=lambda *done: read.append(done), **asked
     )
     assert read == [(1, 2), (2, 2)]
     assert evaluate(small(), calibration=small(), out=tmp_path / "same", **asked).facts == same.facts

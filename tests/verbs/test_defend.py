@@ -90,7 +90,7 @@ def test_it_is_taken_up_again_and_gives_the_same(stereo: Path, tmp_path: Path) -
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        defend(stereo, defense="lgs", out=tmp_path / "clean", progress=stop)
+        defend(stereo, defense="lgs", out=tmp_path / "clean", on_progress=stop)
     assert not (tmp_path / "clean/defense/debug/scores.json").exists()
     assert defend(stereo, defense="lgs", out=tmp_path / "clean").made == 1
     defend(stereo, defense="lgs", out=tmp_path / "whole")

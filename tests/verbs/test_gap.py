@@ -50,7 +50,7 @@ def test_figures_tell_inside_from_outside() -> None:
 def test_a_gap_is_reported_and_written(pair: tuple[Path, Path], tmp_path: Path) -> None:
     clean, twin = pair
     seen: list[tuple[int, int]] = []
-    report = gear.gap(clean, twin=twin, out=tmp_path / "gap", progress=lambda *done: seen.append(done))
+    report = gear.gap(clean, twin=twin, out=tmp_path / "gap", on_progress=lambda *done: seen.append(done))
     assert seen == [(0, 2), (1, 2), (2, 2)]
     assert report.median_db("transport") > 40 > report.median_db("homography") + 6
     written = json.loads((tmp_path / "gap/gap.json").read_text())
@@ -117,7 +117,7 @@ def test_what_does_not_suit_is_said_before_anything_is_rendered(pair: tuple[Path
     with pytest.raises(GearError, match="name one with --model"):
         gear.gap(clean, defense="median", **places)
     with pytest.raises(GearError, match="defense"):
-        gear.gap(clean, model="ddrnet23_slim", settings=["weights=random"], defense="no_such", **places)
+        gear.gap(clean, model="ddrnet23_slim", model_settings=["weights=random"], defense="no_such", **places)
     with pytest.raises(DatasetError, match="has 1 surfaces for patches, none has 0; give one for each"):
         gear.gap(clean, **{**places, "patch": "none"})
     with pytest.raises(DatasetError, match="samples must be at least 1"):
@@ -167,7 +167,7 @@ def test_what_cannot_be_compared_is_refused(pair: tuple[Path, Path], tmp_path: P
     with pytest.raises(GearError, match="is a semseg dataset"):
         gear.gap(clean, twin=twin, model="glpdepth")
     with pytest.raises(DatasetError, match="name it with --model"):
-        gear.gap(clean, twin=twin, settings=["weights=none"])
+        gear.gap(clean, twin=twin, model_settings=["weights=none"])
     with pytest.raises(DatasetError, match="is a dataset; write the gap into a folder of its own"):
         gear.gap(clean, twin=twin, out=clean)
     (tmp_path / "file").write_text("x")

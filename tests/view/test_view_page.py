@@ -128,7 +128,7 @@ def test_a_small_budget_makes_small_pictures_and_links_the_files(write_dataset: 
 def test_only_the_first_samples_and_progress(write_dataset: Any, tmp_path: Path) -> None:
     told: list[tuple[int, int]] = []
     root = write_dataset("depth", 5)
-    report = write_view(root, tmp_path / "page.html", samples=3, progress=lambda *seen: told.append(seen))
+    report = write_view(root, tmp_path / "page.html", samples=3, on_progress=lambda *seen: told.append(seen))
     assert report.samples == 3 and told == [(1, 3), (2, 3), (3, 3)]
     index = Blocks(tmp_path / "page.html").index
     assert [sample["index"] for sample in index["samples"]] == [0, 1, 2] and index["about"]["total"] == 5

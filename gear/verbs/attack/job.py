@@ -16,13 +16,14 @@ from gear.dataset.files import sha256
 from gear.dataset.reading import Dataset, scenes_of
 from gear.dataset.sidecar import dump_json
 from gear.dataset.store import plan_of, splits_of
-from gear.measuring.calibration import Calibration, Progress, opened_calibration
+from gear.measuring.calibration import Calibration, opened_calibration
 from gear.measuring.plugin_selection import Chosen
 from gear.plugins.build import NO_OPTIONS, find
 from gear.plugins.catalogue import PluginEntry
 from gear.plugins.datasets import root_and_split, roots_of
 from gear.readers import open_all
 from gear.values.errors import DatasetError, GearError
+from gear.values.progress import Progress
 from gear.values.rng import check_seed
 from gear.values.serial import Json
 from gear.verbs.attack.data import check_joined
@@ -114,13 +115,13 @@ def resolve(
     defense_settings: Iterable[str],
     calibration: str | Path | None,
     calibration_patched: str | Path | None,
-    learning: Progress | None,
+    on_fit_progress: Progress | None,
     val: Paths,
     every: int,
     patience: int,
     compositor: str,
     seed: int,
-    allow_tests: bool,
+    allow_test_data: bool,
 ) -> Job:
     """Opens, finds and checks what `gear.attack` was given; see there.
 
@@ -132,16 +133,18 @@ def resolve(
         raise GearError("steps, queries and every must be at least 1, patience at least 0")
     if patience and not _list(val):
         raise GearError("patience counts looks at validation samples, and there are none: name some with --val")
-    datasets = open_all(_list(data), _task_of(data), names=TRAINING, allow_tests=allow_tests)
+    datasets = open_all(_list(data), _task_of(data), names=TRAINING, allow_test_data=allow_test_data)
     task = datasets[0].plan.task["name"]
-    validation = open_all(_list(val), task, names=VALIDATION, allow_tests=allow_tests)
+    validation = open_all(_list(val), task, names=VALIDATION, allow_test_data=allow_test_data)
     check_joined([*datasets, *validation])
     models = choose_models([model] if isinstance(model, str) else list(model), model_settings, [*datasets, *validation])
     found, options = find("attack", attack), with_overrides(NO_OPTIONS, settings)
     config = read_node(found.spec.config, options, "")
     surfaces = len(datasets[0].sidecar(0).record.surfaces)
     spec = check_attack(found, models, task, surfaces, queries)
-    learnt = opened_calibration(calibration, calibration_patched, models, defense, flag=FLAG, told=learning)
+    learnt = opened_calibration(
+        calibration, calibration_patched, models, defense, flag=FLAG, on_fit_progress=on_fit_progress
+    )
     guard = choose_defense(
         defense,
         defense_settings,

@@ -19,6 +19,7 @@ from gear.contracts.attacks import Patch, State, surface_of
 from gear.dataset.files import write_whole
 from gear.plugins.catalogue import one_line
 from gear.values.errors import DatasetError, ReplaceableError
+from gear.values.progress import Progress
 from gear.values.serial import from_json
 
 CHECKPOINT = "checkpoint.safetensors"
@@ -31,7 +32,6 @@ NOTED: Any = {
 """What a checkpoint's notes say; its arrays are the attack's own."""
 
 Judge = Callable[[tuple[Patch, ...]], float]
-Told = Callable[[int, int], None]
 
 
 @dataclass(eq=False, kw_only=True)
@@ -63,7 +63,7 @@ class Recorder:
     every: int = 25
     patience: int = 0
     queries: int | None = None
-    told: Told | None = None
+    on_progress: Progress | None = None
     curves: dict[str, list[float]] = field(default_factory=dict)
     judged: list[tuple[int, float]] = field(default_factory=list)
     best: tuple[Patch, ...] | None = None
@@ -127,12 +127,12 @@ class Recorder:
 
     def tell(self, done: int, queries_left: float | None = None) -> None:
         """Says how far it is: in queries where they are counted, in steps otherwise."""
-        if self.told is None:
+        if self.on_progress is None:
             return
         if self.queries is None:
-            self.told(done, self.steps)
+            self.on_progress(done, self.steps)
         else:
-            self.told(0 if queries_left is None else self.queries - int(queries_left), self.queries)
+            self.on_progress(0 if queries_left is None else self.queries - int(queries_left), self.queries)
 
     def finish(self, done: int, last: tuple[Patch, ...]) -> None:
         """Judges the last patches where that has not been done: queries may end an attack between two looks."""

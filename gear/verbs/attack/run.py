@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from gear.plugins.attacks.optimisation.objectives import Objective, default_obje
 from gear.plugins.build import blamed, build, traced
 from gear.plugins.catalogue import PluginEntry
 from gear.values.errors import GearError, PluginError
+from gear.values.progress import Progress, Warn
 from gear.values.rng import derive_rng
 from gear.values.serial import Json
 from gear.verbs.attack.folder import begin, read_patches, tidy
@@ -36,9 +37,6 @@ from gear.verbs.attack.output_checks import check_patches
 from gear.verbs.attack.outputs import as_picture, write_curves, write_patches, write_samples
 from gear.verbs.attack.report import AttackReport
 from gear.verbs.attack.scenes import Scenes
-
-Progress = Callable[[int, int], None]
-"""Called with (steps done, steps in all)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -81,11 +79,11 @@ def attack(
     patience: int = 0,
     compositor: str = "transport",
     seed: int = 0,
-    allow_tests: bool = False,
+    allow_test_data: bool = False,
     force: bool = False,
-    progress: Progress | None = None,
-    learning: Progress | None = None,
-    noted: Callable[[str], None] | None = None,
+    on_progress: Progress | None = None,
+    on_fit_progress: Progress | None = None,
+    on_warning: Warn | None = None,
 ) -> AttackReport:
     """Makes patches for the surfaces of a scene; takes up again what was begun.
 
@@ -110,7 +108,7 @@ def attack(
         patience: looks without a better one until the attack ends; 0 for never.
         compositor: `transport`, or `homography`, which needs no probes.
         seed: of everything that is drawn.
-        allow_tests: whether `test` splits may be optimised on.
+        allow_test_data: whether `test` splits may be optimised on.
         force: start afresh where something else is.
         progress: told after every step.
         learning: told after every calibration sample that the defense reads for the first time.
@@ -132,15 +130,15 @@ def attack(
         defense_settings=defense_settings,
         calibration=calibration,
         calibration_patched=calibration_patched,
-        learning=learning,
+        on_fit_progress=on_fit_progress,
         val=val,
         every=every,
         patience=patience,
         compositor=compositor,
         seed=seed,
-        allow_tests=allow_tests,
+        allow_test_data=allow_test_data,
     )
-    _note_doubts(job, noted)
+    _note_doubts(job, on_warning)
     product, root = build(job.found, job.options), Path(out)
     network = build_model(job.models, job.defense, job.calibration, job.seed)
     plan = job.plan(weights_digest(network), product)
@@ -149,7 +147,7 @@ def attack(
         if there is not None:
             return AttackReport(out=root, patches=read_patches(root), facts=there, made=False)
         with traced(_asked(job), "forward"):
-            made = _optimised(job, product, network, root, plan, progress)
+            made = _optimised(job, product, network, root, plan, on_progress)
             facts = _facts(job, network, plan, made)
         names = ", ".join(one.found.spec.name for one in job.models)
         write_curves(root, f"{attack} on {names}", made.recorder.curves, made.recorder.judged)
@@ -159,15 +157,15 @@ def attack(
     return AttackReport(out=root, patches=made.patches, facts=facts, made=True)
 
 
-def _note_doubts(job: Job, noted: Callable[[str], None] | None) -> None:
+def _note_doubts(job: Job, on_warning: Warn | None) -> None:
     """Tells of every model that sees the pictures, which are all of one size, larger or smaller than it knows them, and
     of what may not have been meant in the data that the defense learns from.
     """
-    if noted is not None:
+    if on_warning is not None:
         sizes = (size_note(model, job.datasets[0], FLAG) for model in job.models)
         for note in (*sizes, *job.calibration.doubts()):
             if note is not None:
-                noted(note)
+                on_warning(note)
 
 
 def _asked(job: Job) -> list[PluginEntry]:
@@ -175,7 +173,7 @@ def _asked(job: Job) -> list[PluginEntry]:
     return [one.found for one in (*job.models, job.defense) if one is not None]
 
 
-def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, progress: Progress | None) -> _Made:
+def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, on_progress: Progress | None) -> _Made:
     """Has the attack make its patches, and sees to it that it keeps its promises.
 
     Raises:
@@ -196,7 +194,7 @@ def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, p
         every=job.every,
         patience=job.patience,
         queries=job.queries,
-        told=progress,
+        on_progress=on_progress,
     )
     recorder.tell(0)
     with blamed(job.found, "optimise"), traced(_asked(job), "forward"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from gear.dataset.reading import scenes_of
@@ -10,6 +10,7 @@ from gear.dataset.sidecar import load_json
 from gear.plugins.datasets import open_dataset, root_and_split
 from gear.readers import open_all
 from gear.values.errors import DatasetError, GearError
+from gear.values.progress import Progress
 from gear.verbs.attack.data import check_joined
 from gear.verbs.attack.folder import VERIFY
 from gear.verbs.attack.job import TRAINING, VALIDATION
@@ -31,7 +32,7 @@ def check_held_out(data: Sequence[str | Path], held: str | Path, val: Sequence[s
     check_clean(wanted)
     for flag, paths, names in (("--data", data, TRAINING), ("--val", val, VALIDATION)):
         try:
-            found = open_all(paths, wanted.plan.task["name"], names=names, allow_tests=True)
+            found = open_all(paths, wanted.plan.task["name"], names=names, allow_test_data=True)
         except GearError:
             continue  # the attack knows what is wrong
         for one in found:
@@ -46,7 +47,7 @@ def verify(
     data: str | Path,
     *,
     models: Sequence[str],
-    settings: Iterable[str] = (),
+    model_settings: Iterable[str] = (),
     defense: str | None = None,
     defense_settings: Iterable[str] = (),
     calibration: str | Path | None = None,
@@ -54,8 +55,8 @@ def verify(
     samples: int | None = None,
     town: str | Path | None = None,
     scenes: str | Path | None = None,
-    progress: Callable[[int, int], None] | None = None,
-    learning: Callable[[int, int], None] | None = None,
+    on_progress: Progress | None = None,
+    on_fit_progress: Progress | None = None,
 ) -> dict[str, GapReport]:
     """Renders a patch folder on a held-out dataset, and compares pictures and effect, digital and rendered.
 
@@ -69,7 +70,7 @@ def verify(
         data: root of a dataset of the scene with probes, or `DIR:SPLIT`; not one that the patches were made on, or
             by which the best of them were chosen.
         models: names of model plugins.
-        settings: `KEY=VALUE` texts for their options.
+        model_settings: `KEY=VALUE` texts for their options.
         defense: a defense plugin that they stand behind.
         defense_settings: for its options.
         calibration: dataset from which the defense learns.
@@ -93,7 +94,7 @@ def verify(
     if scenes_of(dataset) in made_on:
         raise DatasetError(root, f"is what {out} was made on; verify it on other samples")
     place = Path(out) / VERIFY / f"{Path(plan.info.scene).name}-{plan.info.split}-{plan.content_key[:6]}"
-    texts, defense_texts, reports = list(settings), list(defense_settings), {}
+    texts, defense_texts, reports = list(model_settings), list(defense_settings), {}
     for number, model in enumerate(models):
         reports[model] = gap(
             root,
@@ -101,7 +102,7 @@ def verify(
             twin=None if number == 0 else place / models[0].replace("/", "-") / "twin",
             split=split,
             model=model,
-            settings=texts,
+            model_settings=texts,
             defense=defense,
             defense_settings=defense_texts,
             calibration=calibration,
@@ -111,7 +112,7 @@ def verify(
             scenes=scenes if number == 0 else None,
             out=place / model.replace("/", "-"),
             seed=notes["seed"],
-            progress=progress,
-            learning=learning,
+            on_progress=on_progress,
+            on_fit_progress=on_fit_progress,
         )
     return reports

@@ -262,7 +262,7 @@ class Plan:
             title=f"evaluate {self.name(match.model, match.defense)} in {match.contest.name}",
             arguments={
                 "model": match.model.plugin,
-                "settings": match.model.settings,
+                "model_settings": match.model.settings,
                 **_guarded(match.defense),
                 **self._learnt(match.contest, match.model, match.defense),
                 "data": [str(root) for roots in match.pools.values() for root in roots],

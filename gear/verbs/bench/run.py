@@ -7,7 +7,7 @@ import io
 import shutil
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from gear.collecting.job import versions
 from gear.collecting.lookup import find_weather
@@ -22,6 +22,7 @@ from gear.dataset.sidecar import dump_json
 from gear.dataset.store import refuse_dataset
 from gear.measuring.plugin_selection import check_optics
 from gear.values.errors import GearError, OutdatedError, ReplaceableError
+from gear.values.progress import Progress, Warn
 from gear.verbs.attack.run import attack
 from gear.verbs.bench.chart import chart
 from gear.verbs.bench.config import BenchConfig
@@ -37,41 +38,12 @@ from gear.verbs.evaluate.run import OtherLessonsError, evaluate
 
 VERBS: dict[Verb, Callable[..., Any]] = {"collect": collect, "attack": attack, "evaluate": evaluate}
 
-TOLD: dict[Verb, tuple[str, ...]] = {
-    "collect": ("progress", "noted"),
-    "attack": ("progress", "learning", "noted"),
-    "evaluate": ("progress", "learning"),
-}
-"""What of a `Watch` each verb calls."""
+
+OnStep = Callable[[Step, int, int], None]
+"""Called with (step, its number from 1, number of steps)."""
 
 SAID = "bench.yml"
 """The config that reports are of, whole."""
-
-
-class Watch(Protocol):
-    """Who looks on."""
-
-    def began(self, step: Step, number: int, steps: int) -> None:
-        """Step `number` of so many begins; they count from 1."""
-
-    def progress(self, done: int, total: int) -> None:
-        """So many samples or steps of the attack are done."""
-
-    def learning(self, done: int, total: int) -> None:
-        """A defense has read so many calibration samples."""
-
-    def noted(self, line: str) -> None:
-        """Something that the user may not have meant."""
-
-
-class _Nobody:
-    def began(self, step: Step, number: int, steps: int) -> None: ...
-
-    def progress(self, done: int, total: int) -> None: ...
-
-    def learning(self, done: int, total: int) -> None: ...
-
-    def noted(self, line: str) -> None: ...
 
 
 def bench(
@@ -82,7 +54,10 @@ def bench(
     device: str | None = None,
     workers: int = 1,
     apart: bool = False,
-    watch: Watch | None = None,
+    on_step: OnStep | None = None,
+    on_progress: Progress | None = None,
+    on_fit_progress: Progress | None = None,
+    on_warning: Warn | None = None,
 ) -> BenchReport:
     """Compares networks and defenses over scenes and patches, the whole way; takes up again what was begun.
 
@@ -98,13 +73,16 @@ def bench(
         workers: processes of each collection; they change nothing but time.
         apart: whether a single worker is a process of its own, too. Each collection in this one keeps some 20 MB, so
             large benches should say yes; a script that does needs Python's usual `if __name__ == "__main__":`.
-        watch: told what happens.
+        on_step: called with each step, its number (from 1) and the number of steps, before it begins.
+        on_progress: called after every sample, or step of an attack, of the current step.
+        on_fit_progress: called after every calibration sample that a defense reads for the first time.
+        on_warning: called with what the user may not have meant.
 
     Raises:
         GearError: anything that the user can put right; its text is one line.
     """
     plan = prepared(config, out=out, settings=settings, device=device, workers=workers)
-    root, watching = Path(out), watch or _Nobody()
+    root, warn = Path(out), on_warning or _ignore
     with explained(root):
         root.mkdir(parents=True, exist_ok=True)
     said = to_yaml(plan.config).encode()
@@ -113,12 +91,17 @@ def bench(
     evaluations: dict[str, EvaluateReport] = {}
     steps = list(plan.steps())
     for number, step in enumerate(steps, 1):
-        watching.began(step, number, len(steps))
-        told = {name: getattr(watching, name) for name in TOLD[step.verb]}
+        if on_step is not None:
+            on_step(step, number, len(steps))
+        callbacks: dict[str, Any] = {"on_progress": on_progress}
         if step.verb == "collect":
-            told["apart"] = apart
+            callbacks["apart"] = apart
+        if step.verb != "collect":
+            callbacks["on_fit_progress"] = on_fit_progress
+        if step.verb != "evaluate":
+            callbacks["on_warning"] = warn
         try:
-            done = _done(step, told, watching.noted)
+            done = _done(step, callbacks, warn)
         except ReplaceableError as error:
             raise GearError(f"{step.title}: {error.path}: {error.problem}; use another --out, or remove it") from error
         except GearError as error:
@@ -126,7 +109,7 @@ def bench(
         if isinstance(done, EvaluateReport):
             evaluations[step.arguments["out"]] = done
             for problem in (problem for row in done.rows for problem in row.damaged):
-                watching.noted(f"{problem}; the sample was predicted again")
+                warn(f"{problem}; the sample was predicted again")
     report = _report(plan, root, evaluations)
     written = io.StringIO()
     table = csv.DictWriter(written, COLUMNS, lineterminator="\n")
@@ -144,19 +127,22 @@ def bench(
     return report
 
 
-def _done(step: Step, told: dict[str, Any], noted: Callable[[str], None]) -> Any:
+def _ignore(line: str) -> None: ...
+
+
+def _done(step: Step, callbacks: dict[str, Any], warn: Warn) -> Any:
     """Carries a step out; what the bench made from pictures or patches that are others now, it makes again."""
     verb, again = VERBS[step.verb], f"{step.title}: is made again, for what is there"
     try:
-        return verb(**step.arguments, **told)
+        return verb(**step.arguments, **callbacks)
     except OutdatedError as error:
-        noted(f"{again} {error.problem}")
-        return verb(**step.arguments, **told, force=True)
+        warn(f"{again} {error.problem}")
+        return verb(**step.arguments, **callbacks, force=True)
     except OtherLessonsError as error:
-        noted(f"{again} {error.problem.partition(';')[0]}")
+        warn(f"{again} {error.problem.partition(';')[0]}")
         with explained(Path(error.path)):
             shutil.rmtree(error.path)
-        return verb(**step.arguments, **told)
+        return verb(**step.arguments, **callbacks)
 
 
 def prepared(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,13 +16,8 @@ from gear.config.dump import to_plain
 from gear.config.load import load_collection
 from gear.dataset.store import Store
 from gear.plugins.build import blamed, build, find
+from gear.values.progress import Progress, Warn
 from gear.values.serial import Json, to_json
-
-Progress = Callable[[int, int], None]
-"""Called with (samples finished, samples of the split)."""
-
-Noted = Callable[[str], None]
-"""Called, before anything is rendered, with what the user may not have meant."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,8 +62,8 @@ def collect(
     workers: int = 1,
     apart: bool = False,
     force: bool = False,
-    progress: Progress | None = None,
-    noted: Noted | None = None,
+    on_progress: Progress | None = None,
+    on_warning: Warn | None = None,
 ) -> CollectReport:
     """Collects one dataset split; takes up again what was begun, never makes a finished sample twice.
 
@@ -108,8 +103,8 @@ def collect(
         workers=workers,
         apart=apart,
         force=force,
-        progress=progress,
-        noted=noted,
+        on_progress=on_progress,
+        on_warning=on_warning,
     )
 
 
@@ -119,33 +114,33 @@ def collect_config(
     workers: int = 1,
     apart: bool = False,
     force: bool = False,
-    progress: Progress | None = None,
-    noted: Noted | None = None,
+    on_progress: Progress | None = None,
+    on_warning: Warn | None = None,
 ) -> CollectReport:
     """As `collect`, from a config object."""
     if workers < 1:
         raise ValueError(f"workers must be at least 1, got {workers}")
     job = resolve(config)
-    if noted is not None and job.note:
-        noted(job.note)
-    return run_job(job, workers=workers, apart=apart, force=force, progress=progress)
+    if on_warning is not None and job.note:
+        on_warning(job.note)
+    return run_job(job, workers=workers, apart=apart, force=force, on_progress=on_progress)
 
 
 def run_job(
-    job: Job, *, workers: int = 1, apart: bool = False, force: bool = False, progress: Progress | None = None
+    job: Job, *, workers: int = 1, apart: bool = False, force: bool = False, on_progress: Progress | None = None
 ) -> CollectReport:
     """Collects what is missing of a resolved job and closes the split."""
     store = Store(job.root, job.plan)
     plugin = find("task", job.config.task)
     with store.begun(job.patch.files, force=force):
-        made = _collect_missing(job, store, workers, apart, progress)
+        made = _collect_missing(job, store, workers, apart, on_progress)
         task = build(plugin, job.config.options)
         with blamed(plugin, "finalise"):
             store.close(task, manifest_facts(job))
     return CollectReport(root=job.root, split=job.plan.info.split, samples=job.plan.samples, made=made)
 
 
-def _collect_missing(job: Job, store: Store, workers: int, apart: bool, progress: Progress | None) -> int:
+def _collect_missing(job: Job, store: Store, workers: int, apart: bool, on_progress: Progress | None) -> int:
     """How many samples it made."""
     missing = store.missing()
     finished = job.plan.samples - len(missing)
@@ -153,11 +148,11 @@ def _collect_missing(job: Job, store: Store, workers: int, apart: bool, progress
     def done(_: int) -> None:
         nonlocal finished
         finished += 1
-        if progress is not None:
-            progress(finished, job.plan.samples)
+        if on_progress is not None:
+            on_progress(finished, job.plan.samples)
 
-    if progress is not None:
-        progress(finished, job.plan.samples)
+    if on_progress is not None:
+        on_progress(finished, job.plan.samples)
     if missing and workers == 1 and not apart:
         with open_session(job) as session:
             collect_samples(session, store, missing, done)

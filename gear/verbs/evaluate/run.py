@@ -26,15 +26,13 @@ from gear.measuring.plugin_selection import (
 from gear.measuring.scoring import Scorer
 from gear.measuring.shown_size import size_note
 from gear.values.errors import DatasetError, GearError
+from gear.values.progress import Progress
 from gear.values.rng import check_seed
 from gear.values.serial import Json
 from gear.verbs.evaluate.compare import Measured, compared, drive_note, row_report, streets_of, together
 from gear.verbs.evaluate.pools import Pools, check_pools, pooled
 from gear.verbs.evaluate.report import EvaluateReport
 from gear.verbs.evaluate.table import table
-
-Progress = Callable[[int, int], None]
-"""Called with (samples finished, samples of all datasets)."""
 
 LEARNT = {"calibration", "calibration_samples"}
 """What of an evaluation's plan says from what its defense learnt."""
@@ -48,7 +46,7 @@ def evaluate(
     data: str | Path | Sequence[str | Path],
     *,
     model: str,
-    settings: Iterable[str] = (),
+    model_settings: Iterable[str] = (),
     defense: str | None = None,
     defense_settings: Iterable[str] = (),
     split: str | None = None,
@@ -61,8 +59,8 @@ def evaluate(
     seed: int = 0,
     resamples: int = 1000,
     pools: Pools | None = None,
-    progress: Progress | None = None,
-    learning: Progress | None = None,
+    on_progress: Progress | None = None,
+    on_fit_progress: Progress | None = None,
 ) -> EvaluateReport:
     """Runs a model, with or without a defense, over datasets of its task; takes up again what was begun.
 
@@ -74,7 +72,7 @@ def evaluate(
     Args:
         data: roots of datasets, or folders of roots, all of one task; `DIR:SPLIT` says which split of one.
         model: name of a model plugin.
-        settings: `KEY=VALUE` texts for the model's options.
+        model_settings: `KEY=VALUE` texts for the model's options.
         defense: name of a defense plugin.
         defense_settings: `KEY=VALUE` texts for its options.
         split: of the datasets; may be left out where each has only one.
@@ -100,12 +98,12 @@ def evaluate(
         raise GearError(
             f"batch and workers must be at least 1, resamples at least 0; got {batch}, {workers}, {resamples}"
         )
-    chosen = chosen_model(model, settings)
+    chosen = chosen_model(model, model_settings)
     guard = chosen_defense(defense, defense_settings)
     datasets = opened([data] if isinstance(data, (str, Path)) else data, split, chosen, reports)
     check_pools(pools or {}, [one.root for one in datasets])
     task, names = datasets[0].plan.task["name"], row_names(datasets)
-    learnt = opened_calibration(calibration, calibration_patched, [chosen], defense, told=learning)
+    learnt = opened_calibration(calibration, calibration_patched, [chosen], defense, on_fit_progress=on_fit_progress)
     if guard is not None:
         check_defense(guard, chosen, task, is_calibrated=learnt.clean is not None)
     usual = Path("evaluations", task, model.replace("/", "-") + f"+{defense}" * bool(defense))
@@ -122,7 +120,7 @@ def evaluate(
     }
     with alone_at_work(root):
         _begin(root, facts)
-        told = _counter(progress, sum(len(one) for one in datasets))
+        told = _counter(on_progress, sum(len(one) for one in datasets))
         rows = []
         for dataset, name in zip(datasets, names, strict=True):
             scorer = Scorer(dataset, root, name, tuple(reports), chosen.found)
@@ -184,18 +182,18 @@ def _end(root: Path, found: EvaluateReport) -> None:
     clear_scratch(root)
 
 
-def _counter(progress: Progress | None, total: int) -> Callable[[], None]:
+def _counter(on_progress: Progress | None, total: int) -> Callable[[], None]:
     """Tells of each sample that is finished, and of the beginning."""
     finished = 0
 
     def told() -> None:
         nonlocal finished
         finished += 1
-        if progress is not None:
-            progress(finished, total)
+        if on_progress is not None:
+            on_progress(finished, total)
 
-    if progress is not None:
-        progress(0, total)
+    if on_progress is not None:
+        on_progress(0, total)
     return told
 
 

@@ -12,12 +12,13 @@ from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Evaluator
 from gear.dataset.plan import Plan
 from gear.dataset.reading import Dataset
-from gear.measuring.calibration import Progress, opened_calibration
+from gear.measuring.calibration import opened_calibration
 from gear.measuring.guarded_model import Player
 from gear.measuring.metric_checks import said_of
 from gear.measuring.plugin_selection import check_defense, check_model, chosen_defense, chosen_model
 from gear.measuring.shown_size import size_note
 from gear.plugins.build import find, name_of_task
+from gear.values.progress import Progress
 
 CLEAN, RENDERED = "clean", "rendered"
 
@@ -64,7 +65,7 @@ class Effect:
     @staticmethod
     def of(
         model: str,
-        settings: Iterable[str],
+        model_settings: Iterable[str],
         dataset: Dataset[Any],
         compositors: tuple[str, ...],
         *,
@@ -72,7 +73,7 @@ class Effect:
         defense_settings: Iterable[str] = (),
         calibration: tuple[str | Path | None, str | Path | None] = (None, None),
         seed: int = 0,
-        learning: Progress | None = None,
+        on_fit_progress: Progress | None = None,
     ) -> Effect:
         """For a model plugin, behind a defense plugin if one is named, which learns from `calibration`; `seed` is of
         what the defense draws.
@@ -82,11 +83,11 @@ class Effect:
             GearError: it is not made for the dataset's task, or the defense does not suit it.
             ConfigError: its options cannot be read.
         """
-        chosen = chosen_model(model, settings)
+        chosen = chosen_model(model, model_settings)
         check_model(chosen, dataset)
         task = dataset.plan.task["name"]
         guard = chosen_defense(defense, defense_settings)
-        learnt = opened_calibration(*calibration, [chosen], defense, told=learning)
+        learnt = opened_calibration(*calibration, [chosen], defense, on_fit_progress=on_fit_progress)
         if guard is not None:
             check_defense(guard, chosen, task, is_calibrated=learnt.clean is not None)
         spec = find("task", name_of_task(dataset.plan.task)).spec

@@ -6,7 +6,7 @@ the untouched pictures, on the composed ones and on the rendered ones.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +22,7 @@ from gear.dataset.store import refuse_dataset
 from gear.plugins.datasets import open_dataset
 from gear.values.errors import DatasetError
 from gear.values.frames import UInt8Image
+from gear.values.progress import Progress, Warn
 from gear.values.rng import check_seed
 from gear.verbs.gap.effect import RENDERED, Effect
 from gear.verbs.gap.figures import picture_gap, visible_mask
@@ -31,8 +32,6 @@ from gear.verbs.gap.twin import check_clean, collect_twin
 if TYPE_CHECKING:
     from gear.compositor.pasting import Pasting
 
-Progress = Callable[[int, int], None]
-"""Called with (samples finished, samples)."""
 
 REPORT = "gap.json"
 TABLE = "gap.txt"
@@ -45,7 +44,7 @@ def gap(
     twin: str | Path | None = None,
     split: str | None = None,
     model: str | None = None,
-    settings: Iterable[str] = (),
+    model_settings: Iterable[str] = (),
     defense: str | None = None,
     defense_settings: Iterable[str] = (),
     calibration: str | Path | None = None,
@@ -56,9 +55,9 @@ def gap(
     scenes: str | Path | None = None,
     out: str | Path | None = None,
     seed: int = 0,
-    progress: Progress | None = None,
-    learning: Progress | None = None,
-    noted: Callable[[str], None] | None = None,
+    on_progress: Progress | None = None,
+    on_fit_progress: Progress | None = None,
+    on_warning: Warn | None = None,
 ) -> GapReport:
     """Holds digital patches against rendered ones.
 
@@ -68,7 +67,7 @@ def gap(
         twin: root of a twin that is there already; instead of `patch`.
         split: of the dataset; may be left out where there is only one.
         model: a model plugin for the task's metric; none for pictures alone.
-        settings: `KEY=VALUE` texts for the model's options.
+        model_settings: `KEY=VALUE` texts for the model's options.
         defense: a defense plugin that the model stands behind.
         defense_settings: for its options.
         calibration: dataset from which the defense learns.
@@ -98,11 +97,11 @@ def gap(
         raise DatasetError(clean.root, "--town and --scenes say what to render; with --twin nothing is rendered")
     if patch is not None and out is None:
         raise DatasetError(clean.root, "a twin has to be rendered: say where to with --out DIR")
-    settings, defense_settings = tuple(settings), tuple(defense_settings)
+    model_settings, defense_settings = tuple(model_settings), tuple(defense_settings)
     learns_from = (calibration, calibration_patched)
     if model is None and (defense is not None or defense_settings or any(learns_from)):
         raise DatasetError(clean.root, "a defense guards a model: name one with --model")
-    if model is None and settings:
+    if model is None and model_settings:
         raise DatasetError(clean.root, "options are given for a model: name it with --model")
     if out is not None:
         refuse_dataset(Path(out), "write the gap into a folder of its own")
@@ -117,19 +116,19 @@ def gap(
         if model is None
         else Effect.of(
             model,
-            settings,
+            model_settings,
             clean,
             tuple(compositors),
             defense=defense,
             defense_settings=defense_settings,
             calibration=learns_from,
             seed=seed,
-            learning=learning,
+            on_fit_progress=on_fit_progress,
         )
     )
-    if noted is not None and effect is not None:
+    if on_warning is not None and effect is not None:
         for line in effect.notes:
-            noted(line)
+            on_warning(line)
     if patch is not None:
         collect_twin(clean, patch, root, samples=samples, town=town, scenes=scenes)
         pairs = pair_twins(clean, open_dataset(root, clean.plan.info.split))
@@ -139,12 +138,12 @@ def gap(
         with explained(Path(out)):
             Path(out).mkdir(parents=True, exist_ok=True)
     found: list[SampleGap] = []
-    if progress is not None:
-        progress(0, count)
+    if on_progress is not None:
+        on_progress(0, count)
     for index in range(count):
         found += sample_gaps(pairs, engines, images, index, effect)
-        if progress is not None:
-            progress(index + 1, count)
+        if on_progress is not None:
+            on_progress(index + 1, count)
     report = GapReport(
         dataset=str(clean.root),
         twin=str(pairs.second.root),

@@ -12,9 +12,9 @@ from gear.contracts.rendering import Quality
 from gear.render.registry import open_renderer
 from gear.values.errors import PlacementError
 from gear.values.frames import UInt8Image
+from gear.values.progress import Progress
 from gear.values.rig import CameraMount, Rig
 from gear.values.scene import Weather
-from gear.verbs.collect.run import Progress
 from gear.verbs.towns.canvas import Canvas
 from gear.verbs.towns.facts import Town
 from gear.world.planner import ScenePlanner
@@ -49,7 +49,7 @@ class SheetOptions:
 
 
 def draw_sheet(
-    town: Town, options: SheetOptions, progress: Progress | None = None
+    town: Town, options: SheetOptions, on_progress: Progress | None = None
 ) -> tuple[UInt8Image, list[PlacementError]]:
     """Renders one sample of every scene and puts them side by side.
 
@@ -63,15 +63,15 @@ def draw_sheet(
     cells: list[UInt8Image] = []
     problems: list[PlacementError] = []
     for number, (name, scene) in enumerate(town.scenes.scenes.items()):
-        if progress is not None:
-            progress(number, len(town.scenes.scenes))
+        if on_progress is not None:
+            on_progress(number, len(town.scenes.scenes))
         try:
             cells.append(_cell(*thumbnail(town, name, scene, options), name))
         except PlacementError as error:
             problems.append(error)
             cells.append(_cell(_complaint(error, options), "cannot be planned", name))
-    if progress is not None:
-        progress(len(cells), len(cells))
+    if on_progress is not None:
+        on_progress(len(cells), len(cells))
     return _grid(cells), problems
 
 

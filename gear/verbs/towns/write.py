@@ -13,7 +13,7 @@ from gear.dataset.files import explained, write_alone
 from gear.render.registry import describe
 from gear.values.errors import GearError, PlacementError, UnknownNameError
 from gear.values.frames import UInt8Image
-from gear.verbs.collect.run import Progress
+from gear.values.progress import Progress
 from gear.verbs.towns.facts import Town, read_town
 from gear.verbs.towns.ground_layer import Relief
 from gear.verbs.towns.sheet import SheetOptions, draw_sheet
@@ -55,7 +55,7 @@ def write_town(
     quality: str = "fast",
     weather: str = "ClearNoon",
     seed: int = 0,
-    progress: Progress | None = None,
+    on_progress: Progress | None = None,
 ) -> TownReport:
     """Writes `<town>_map.png`, and `<town>_scenes.png` with a thumbnail of every scene.
 
@@ -76,8 +76,8 @@ def write_town(
     """
     check_pictures(renderer=renderer, quality=quality, weather=weather, seed=seed)
     found = read_town(town, scenes)
-    if progress is not None and found.scenes is not None:
-        progress(0, len(found.scenes.scenes))
+    if on_progress is not None and found.scenes is not None:
+        on_progress(0, len(found.scenes.scenes))
     folder = Path(out)
     with explained(folder):  # before minutes are spent on drawing
         folder.mkdir(parents=True, exist_ok=True)
@@ -89,7 +89,7 @@ def write_town(
         options = SheetOptions(
             renderer=renderer, quality="film" if quality == "film" else "fast", weather=PRESETS[weather], seed=seed
         )
-        picture, problems = draw_sheet(found, options, progress)
+        picture, problems = draw_sheet(found, options, on_progress)
         sheet_path = _write(folder / f"{found.name}_scenes.png", picture)
     return TownReport(town=found, map=map_path, sheet=sheet_path, problems=tuple(problems))
 

@@ -29,7 +29,7 @@ BROKEN = (SafetensorError, OSError, KeyError, ValueError, RecursionError)
 
 
 @dataclass(slots=True)
-class Progress:
+class TrainingState:
     """How far a training is.
 
     Attributes:
@@ -61,7 +61,7 @@ class Progress:
         return dataclasses.asdict(self)
 
     @staticmethod
-    def from_json(value: Json) -> Progress:
+    def from_json(value: Json) -> TrainingState:
         """The inverse.
 
         Raises:
@@ -80,13 +80,13 @@ class Progress:
         validated = [entry["step"] for entry in value["validations"]] or [-1]
         if value["best_step"] not in validated:
             raise FieldError("best_step", f"no validation was after step {value['best_step']}")
-        return Progress(**{**value, "position": Position(**value["position"])})
+        return TrainingState(**{**value, "position": Position(**value["position"])})
 
 
 def save(
     root: Path,
     plan: Json,
-    progress: Progress,
+    progress: TrainingState,
     module: nn.Module,
     mean: RunningMean,
     optimiser: torch.optim.Optimizer,
@@ -105,7 +105,7 @@ def save(
 
 def load(
     root: Path, plan: Json, module: nn.Module, mean: RunningMean, optimiser: torch.optim.Optimizer
-) -> tuple[Progress, dict[str, Tensor]] | None:
+) -> tuple[TrainingState, dict[str, Tensor]] | None:
     """Takes up a checkpoint, or does nothing where there is none.
 
     Returns:
@@ -126,7 +126,7 @@ def load(
         raise _damaged(path, error) from error
     check_plan(root, there, plan)
     try:
-        taken_up = Progress.from_json(progress)
+        taken_up = TrainingState.from_json(progress)
         module.load_state_dict(_below(tensors, "module."))
         _fill(mean.state, _below(tensors, "mean."))
         optimiser.load_state_dict({**optimiser.state_dict(), "state": _states(tensors, optimiser)})

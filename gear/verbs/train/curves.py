@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from gear.contracts.specs import TaskSpec
 from gear.dataset.files import write_whole
-from gear.verbs.train.checkpoint import Progress
+from gear.verbs.train.checkpoint import TrainingState
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,7 +19,7 @@ FILE = "curves.png"
 BLUE, RED, GREEN = "#1f5fa8", "#b3402a", "#2f7d4f"
 
 
-def write_curves(root: Path, spec: TaskSpec, progress: Progress, title: str) -> None:  # type: ignore[type-arg]
+def write_curves(root: Path, spec: TaskSpec, progress: TrainingState, title: str) -> None:  # type: ignore[type-arg]
     """Writes `curves.png`."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

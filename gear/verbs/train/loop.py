@@ -25,7 +25,7 @@ from gear.values.rng import derive_rng
 from gear.values.serial import Json
 from gear.verbs.train import checkpoint
 from gear.verbs.train.adversary import Adversary
-from gear.verbs.train.checkpoint import Progress
+from gear.verbs.train.checkpoint import TrainingState
 from gear.verbs.train.config import TrainConfig
 from gear.verbs.train.feed import Feed
 from gear.verbs.train.optimise import Buffers, RunningMean, clip_gradients, optimiser_of, rate_share
@@ -78,18 +78,18 @@ class Parts:
     plan: Json
 
 
-Watch = Callable[[Progress, float, dict[str, float] | None], None]
-"""Told of the progress, the share that is over, and the figures where a validation has just ended, the task's first."""
+OnStep = Callable[[TrainingState, float, dict[str, float] | None], None]
+"""Called with the state, the share of the training that is over (0..1), and, after a validation, its metrics."""
 
-Pack = Callable[[dict[str, torch.Tensor], Progress], bytes]
+Pack = Callable[[dict[str, torch.Tensor], TrainingState], bytes]
 """The file of the mean weights, which are the best so far."""
 
 
 class Training:
     """One training, fresh or taken up again."""
 
-    def __init__(self, parts: Parts, config: TrainConfig, *, watch: Watch | None, pack: Pack) -> None:
-        self._parts, self._config, self._watch, self._pack = parts, config, watch, pack
+    def __init__(self, parts: Parts, config: TrainConfig, *, on_step: OnStep | None, pack: Pack) -> None:
+        self._parts, self._config, self._on_step, self._pack = parts, config, on_step, pack
         self._module: nn.Module = parts.model.module()
         self._memory = torch.channels_last if config.precision == "bfloat16" else torch.contiguous_format
         for parameter in self._module.parameters():
@@ -100,7 +100,7 @@ class Training:
         self._before = Buffers(self._module)
         self._device = device_of(config.device)
         found = checkpoint.load(parts.root, parts.plan, self._module, self._mean, self._optimiser)
-        self.progress, extra = found or (Progress(), {})
+        self.progress, extra = found or (TrainingState(), {})
         if parts.adversary is not None:
             parts.adversary.restore(extra)
         self._saved_s = self.progress.elapsed_s
@@ -112,7 +112,7 @@ class Training:
             return min(1.0, self.progress.elapsed_s / self._config.time_budget_s)
         return min(1.0, self.progress.step / (self._config.epochs * self._parts.feed.batches))
 
-    def run(self) -> Progress:
+    def run(self) -> TrainingState:
         """Trains to the end.
 
         Raises:
@@ -142,8 +142,8 @@ class Training:
                 self._validate()
             elif self.progress.elapsed_s - self._saved_s > CHECKPOINT_EVERY_S:
                 self._save()
-            if self._watch is not None:
-                self._watch(self.progress, self.share, None)
+            if self._on_step is not None:
+                self._on_step(self.progress, self.share, None)
             if self._parts.adversary is not None and self.progress.position.batch == 0:
                 return
 
@@ -240,9 +240,9 @@ class Training:
             self._keep_best()
         else:
             self._save()
-        if self._watch is not None:
+        if self._on_step is not None:
             chosen = {name: figures[name] for name in (parts.spec.figure,) if name in figures}
-            self._watch(progress, self.share, chosen | figures)
+            self._on_step(progress, self.share, chosen | figures)
 
     def _keep_best(self) -> None:
         """The checkpoint goes first: of the step that it is of, it can make the weights again, and they not it."""

@@ -26,7 +26,7 @@ from gear.readers import Samples
 from gear.values.errors import DatasetError
 from gear.values.serial import to_json
 from gear.verbs.train.checkpoint import FILE as CHECKPOINT
-from gear.verbs.train.checkpoint import Progress
+from gear.verbs.train.checkpoint import TrainingState
 from gear.verbs.train.config import TrainConfig
 from gear.verbs.train.curves import FILE as CURVES
 from gear.verbs.train.starting import SCALE
@@ -109,7 +109,7 @@ def command_of(
     return shlex.join([*words, "--out", "DIR"])
 
 
-def packed(origin: Origin, state: AnyMapping[str, Tensor], progress: Progress) -> bytes:
+def packed(origin: Origin, state: AnyMapping[str, Tensor], progress: TrainingState) -> bytes:
     """The file of weights that were validated last, matrices in float16."""
     figures = figures_of(progress.validations[-1])
     return serialised(state, origin.metadata(figures), halves=True)
@@ -123,13 +123,13 @@ def write_weights(root: Path, weights: bytes) -> None:
     write_whole(root, WEIGHTS, weights)
 
 
-def is_kept(root: Path, progress: Progress) -> bool:
+def is_kept(root: Path, progress: TrainingState) -> bool:
     """Whether the file of the best weights is there, and no other; any, where an old checkpoint does not say which."""
     path = root / WEIGHTS
     return path.is_file() and progress.best_sha256 in ("", sha256(read_bytes(path)))
 
 
-def check_kept(root: Path, progress: Progress) -> None:
+def check_kept(root: Path, progress: TrainingState) -> None:
     """Whether the file of the best weights is there.
 
     Raises:
@@ -143,7 +143,7 @@ def check_kept(root: Path, progress: Progress) -> None:
         )
 
 
-def write_history(root: Path, origin: Origin, progress: Progress) -> None:
+def write_history(root: Path, origin: Origin, progress: TrainingState) -> None:
     """Writes `train.json` and `card.md`."""
     config: Any = to_plain(origin.config)
     history = {
@@ -163,7 +163,7 @@ def write_history(root: Path, origin: Origin, progress: Progress) -> None:
     write_whole(root, CARD, card(root, origin, progress).encode())
 
 
-def card(root: Path, origin: Origin, progress: Progress) -> str:
+def card(root: Path, origin: Origin, progress: TrainingState) -> str:
     """The model card, in Markdown."""
     best = next(entry for entry in progress.validations if entry["step"] == progress.best_step)
     check_kept(root, progress)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -23,6 +23,7 @@ from gear.plugins.build import blamed, find
 from gear.plugins.catalogue import PluginEntry
 from gear.readers import Kept, Samples, all_of, open_all
 from gear.values.errors import GearError
+from gear.values.progress import Warn
 from gear.values.serial import Json
 from gear.verbs.train.adversary import Adversary
 from gear.verbs.train.checkpoint import begun_config
@@ -30,7 +31,7 @@ from gear.verbs.train.config import TrainConfig, read_config
 from gear.verbs.train.curves import write_curves
 from gear.verbs.train.data import TRAINING, VALIDATION, keep_some, spread
 from gear.verbs.train.feed import Feed
-from gear.verbs.train.loop import Parts, Training, Watch
+from gear.verbs.train.loop import OnStep, Parts, Training
 from gear.verbs.train.results import WEIGHTS, Origin, command_of, figures_of, known, packed, write_history
 from gear.verbs.train.sizes import picture_scale, without_empty_margins
 from gear.verbs.train.starting import (
@@ -103,8 +104,8 @@ def train(
     adversarial: str | None = None,
     settings: Iterable[str] = (),
     allow_test_data: bool = False,
-    watch: Watch | None = None,
-    noted: Callable[[str], None] | None = None,
+    on_step: OnStep | None = None,
+    on_warning: Warn | None = None,
 ) -> TrainReport:
     """Trains a network; takes up again what was begun in `out`, and does nothing where it is finished.
 
@@ -123,7 +124,7 @@ def train(
         settings: further `KEY=VALUE` texts for any key of `TrainConfig`, such as `augmentation.flip=0`; the network's
             own options are `options.KEY`.
         allow_test_data: whether `test` splits may be learnt from.
-        watch: told after every step and every validation.
+        on_step: called after every step and every validation.
         noted: told what was chosen for the time that there is.
 
     Raises:
@@ -149,16 +150,16 @@ def train(
         for keys in PLANNED:
             dataset.content(str, *keys)
     scale = picture_scale(found, config, training)
-    if noted is not None and config.precision == "auto" and precision_of(found, config) == "bfloat16":
-        noted("steps run in bfloat16, in which this device is quicker; --precision float32 keeps them whole")
+    if on_warning is not None and config.precision == "auto" and precision_of(found, config) == "bfloat16":
+        on_warning("steps run in bfloat16, in which this device is quicker; --precision float32 keeps them whole")
     config = replace(config, picture_scale=scale, precision=precision_of(found, config))
     training, validation = replace(training, scale=scale), replace(validation, scale=scale)
-    if scale < 1 and noted is not None:
-        noted(
+    if scale < 1 and on_warning is not None:
+        on_warning(
             f"pictures are shown at {scale:g} of their size; --set picture_scale=1 shows them whole, and takes longer"
         )
-    if noted is not None and (mixed := sizes_note(found, config, training)):
-        noted(mixed)
+    if on_warning is not None and (mixed := sizes_note(found, config, training)):
+        on_warning(mixed)
     share = scale * picture_share(training, spec)
     root = Path(out)
     begun = begun_config(root)
@@ -176,10 +177,10 @@ def train(
         look=look_of(dataset.plan for dataset in training.datasets),
         picture_share=share,
     )
-    parts = _parts(found, spec, origin, root, noted, begun)
+    parts = _parts(found, spec, origin, root, on_warning, begun)
     with alone_at_work(root):
         clear_scratch(root)
-        progress = Training(parts, config, watch=watch, pack=partial(packed, origin)).run()
+        progress = Training(parts, config, on_step=on_step, pack=partial(packed, origin)).run()
         write_curves(root, spec, progress, f"{found.spec.name} on {task}")
         write_history(root, origin, progress)
         clear_scratch(root)
@@ -215,7 +216,7 @@ def _parts(
     spec: TaskSpec[Any],
     origin: Origin,
     root: Path,
-    noted: Callable[[str], None] | None,
+    on_warning: Warn | None,
     begun: Json,
 ) -> Parts:
     config = origin.config
@@ -223,8 +224,8 @@ def _parts(
     told = "" if goes_on_alone(found, config.init, begun) else begin_with(found, model, config.init)
     with blamed(found, "module"):
         go_on_from(model, config.init)
-    if told and noted is not None:
-        noted(told)
+    if told and on_warning is not None:
+        on_warning(told)
     twin = build_network(found, config, precision="float32")
     views = found.spec.views  # type: ignore[attr-defined]
     limit = config.cache_gb * GIGABYTE
@@ -280,13 +281,13 @@ def _plan(origin: Origin) -> Json:
 
 
 def _samples(
-    data: Sequence[str], val: Sequence[str], task: str, config: TrainConfig, allow_tests: bool
+    data: Sequence[str], val: Sequence[str], task: str, config: TrainConfig, allow_test_data: bool
 ) -> tuple[Samples, Samples]:
     if not data:
         raise GearError("there are no data to train on; give --data DIR")
-    training = all_of(open_all(data, task, names=TRAINING, allow_tests=allow_tests))
+    training = all_of(open_all(data, task, names=TRAINING, allow_test_data=allow_test_data))
     if val:
-        held_out = all_of(open_all(val, task, names=VALIDATION, allow_tests=allow_tests))
+        held_out = all_of(open_all(val, task, names=VALIDATION, allow_test_data=allow_test_data))
         streets = {scenes_of(one): one.root for one in training.datasets}
         for one in held_out.datasets:
             if scenes_of(one) in streets:

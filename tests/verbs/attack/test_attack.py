@@ -143,14 +143,14 @@ def test_a_killed_attack_goes_on(
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        attack(small(), model="tiny_segmenter", out=tmp_path / "cut", steps=5, settings=SMALL, progress=killed)
+        attack(small(), model="tiny_segmenter", out=tmp_path / "cut", steps=5, settings=SMALL, on_progress=killed)
     assert (tmp_path / "cut" / CHECKPOINT).exists() and not (tmp_path / "cut" / "attack.json").exists()
     with pytest.raises(DatasetError, match="unfinished attack with other settings"):
         attack(small(), model="tiny_segmenter", out=tmp_path / "cut", steps=6, settings=SMALL)
     seen: list[int] = []
     resumed = attack(
         small(), model="tiny_segmenter", out=tmp_path / "cut", steps=5, settings=SMALL,
-        progress=lambda done, total: seen.append(done),
+        on_progress=lambda done, total: seen.append(done),
     )  # fmt: skip
     assert min(done for done in seen if done) == 3, "steps that were done are not done again"
     assert not difference(resumed.patches, whole.patches, "patches")

@@ -61,7 +61,7 @@ def test_a_stopped_attack_on_other_data(
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        attack(small(), model="tiny_segmenter", out=tmp_path, steps=3, settings=SMALL, progress=stopped)
+        attack(small(), model="tiny_segmenter", out=tmp_path, steps=3, settings=SMALL, on_progress=stopped)
     other = small(seed=5)
     with pytest.raises(OutdatedError, match="unfinished attack from other samples"):
         attack(other, model="tiny_segmenter", out=tmp_path, steps=3, settings=SMALL)

@@ -80,7 +80,7 @@ def test_queries_alone_decide_how_long_it_takes(small: Small, install: Install, 
     seen: list[tuple[int, int]] = []
     report = attack(
         small(), model="tiny_segmenter", out=tmp_path / "a", attack="square", queries=401, settings=SMALL[:2],
-        progress=lambda *done: seen.append(done),
+        on_progress=lambda *done: seen.append(done),
     )  # fmt: skip
     assert 301 < report.facts["steps_done"] < 401 and report.facts["curves"]["queries_left"][-1] == 0
     assert seen[0] == (0, 401) and seen[-1] == (401, 401), "progress counts queries"
@@ -107,7 +107,7 @@ def test_a_killed_search_pays_no_query_twice(
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        attack(small("depth"), out=tmp_path / "cut", **facts, progress=killed)
+        attack(small("depth"), out=tmp_path / "cut", **facts, on_progress=killed)
     resumed = attack(small("depth"), out=tmp_path / "cut", **facts)
     assert resumed.facts["curves"] == whole.facts["curves"]
     assert not difference(resumed.patches, whole.patches, "patches")

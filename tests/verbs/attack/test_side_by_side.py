@@ -23,7 +23,9 @@ def test_the_second_is_refused_and_the_first_goes_on(
         with pytest.raises(DatasetError, match="another run is at work there just now; wait for its end"):
             attack(small(), model="tiny_segmenter", out=tmp_path / "p", steps=3, settings=SMALL, force=force)
 
-    first = attack(small(), model="tiny_segmenter", out=tmp_path / "p", steps=2, settings=SMALL, progress=begin_another)
+    first = attack(
+        small(), model="tiny_segmenter", out=tmp_path / "p", steps=2, settings=SMALL, on_progress=begin_another
+    )
     assert first.made and len(tried) == 3
     again = attack(small(), model="tiny_segmenter", out=tmp_path / "p", steps=2, settings=SMALL)
     assert not again.made and again.facts["steps_done"] == 2

@@ -3,6 +3,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -47,6 +48,11 @@ FEW = (
 
 LEARNING = (*FEW[:1], ("      blur: {plugin: gaussian}\n", ""), *FEW[2:4])
 """Changes that leave one network, one scene and a defense that must learn."""
+
+
+def callbacks(looks: Any) -> dict[str, Any]:
+    """The methods of an observer, as keywords of `gear.bench`."""
+    return {name: getattr(looks, name) for name in ("on_step", "on_progress", "on_fit_progress", "on_warning")}
 
 
 @pytest.fixture

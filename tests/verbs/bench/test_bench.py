@@ -17,7 +17,7 @@ from gear.values.errors import GearError, ReplaceableError
 from gear.verbs.bench.plan import Step
 from gear.verbs.bench.report import BenchReport
 from gear.verbs.bench.run import VERBS
-from tests.verbs.bench.conftest import FEW
+from tests.verbs.bench.conftest import FEW, callbacks
 
 pytestmark = pytest.mark.usefixtures("plugins")
 
@@ -31,22 +31,22 @@ class Looks:
         self.steps: list[str] = []
         self.lessons = self.done = 0
 
-    def began(self, step: Step, number: int, steps: int) -> None:
+    def on_step(self, step: Step, number: int, steps: int) -> None:
         self.steps.append(f"{number}/{steps} {step.verb}")
 
-    def progress(self, done: int, total: int) -> None:
+    def on_progress(self, done: int, total: int) -> None:
         self.done += 1
 
-    def learning(self, done: int, total: int) -> None:
+    def on_fit_progress(self, done: int, total: int) -> None:
         self.lessons += 1
 
-    def noted(self, line: str) -> None:
+    def on_warning(self, line: str) -> None:
         raise AssertionError(line)
 
 
 def test_the_whole_way_and_again(tmp_path: Path, written: Callable[..., Path]) -> None:
     config, out, looks = written(), tmp_path / "out", Looks()
-    report = gear.bench(config, out=out, watch=looks)
+    report = gear.bench(config, out=out, **callbacks(looks))
     assert looks.steps[0] == "1/37 collect" and looks.steps[-1] == "37/37 evaluate"
     assert looks.lessons and looks.done
     (task,) = report.tasks

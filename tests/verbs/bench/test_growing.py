@@ -12,7 +12,7 @@ import gear
 from gear.values.errors import GearError
 from gear.verbs.bench.plan import Step
 from gear.verbs.bench.run import VERBS
-from tests.verbs.bench.conftest import FEW, LEARNING
+from tests.verbs.bench.conftest import FEW, LEARNING, callbacks
 
 pytestmark = pytest.mark.usefixtures("plugins")
 
@@ -26,13 +26,13 @@ class Looks:
     def __init__(self) -> None:
         self.notes: list[str] = []
 
-    def began(self, step: Step, number: int, steps: int) -> None: ...
+    def on_step(self, step: Step, number: int, steps: int) -> None: ...
 
-    def progress(self, done: int, total: int) -> None: ...
+    def on_progress(self, done: int, total: int) -> None: ...
 
-    def learning(self, done: int, total: int) -> None: ...
+    def on_fit_progress(self, done: int, total: int) -> None: ...
 
-    def noted(self, line: str) -> None:
+    def on_warning(self, line: str) -> None:
         self.notes.append(line)
 
 
@@ -45,7 +45,7 @@ def test_more_pictures_to_attack(tmp_path: Path, written: Written, made: Made) -
     kept = {kind: times(out, kind) for kind in ("attack", "none", "random")}
     patch = (out / "patches/semseg/small/tiny-board/patch_0.png").read_bytes()
     more = (*LEARNING, ("attack: 2", "attack: 3"))
-    report = gear.bench(written(*more), out=out, watch=looks)
+    report = gear.bench(written(*more), out=out, **callbacks(looks))
     for kind, before in kept.items():
         assert before and before.items() <= times(out, kind).items(), "what is there is not collected again"
     assert len(times(out, "attack")) > len(kept["attack"])
@@ -58,7 +58,7 @@ def test_more_pictures_to_attack(tmp_path: Path, written: Written, made: Made) -
     assert [line.split()[0] for line in looks.notes] == ["attack", "collect", "attack", "collect", "evaluate"]
     assert all("is made again, for what is there" in line for line in looks.notes)
     again = Looks()
-    assert gear.bench(written(*more), out=out, watch=again).tasks[0].results[0].evaluation.rows[0].made == 0
+    assert gear.bench(written(*more), out=out, **callbacks(again)).tasks[0].results[0].evaluation.rows[0].made == 0
     assert not again.notes
 
 
@@ -69,12 +69,12 @@ class Leaves(Looks):
         super().__init__()
         self.after, self.attacks = after, False
 
-    def began(self, step: Step, number: int, steps: int) -> None:
+    def on_step(self, step: Step, number: int, steps: int) -> None:
         if self.attacks:
             raise KeyboardInterrupt
         self.attacks = step.verb == "attack"
 
-    def progress(self, done: int, total: int) -> None:
+    def on_progress(self, done: int, total: int) -> None:
         if self.attacks and done == self.after > 0:
             raise KeyboardInterrupt
 
@@ -85,11 +85,11 @@ def test_more_pictures_to_an_attack_that_was_stopped(
     monkeypatch.setattr("gear.verbs.attack.monitor.SECONDS_BETWEEN", 0.0)
     out, looks = tmp_path / "out", Leaves(0)
     with pytest.raises(KeyboardInterrupt):
-        gear.bench(written(*FEW), out=out, watch=Leaves(1))
+        gear.bench(written(*FEW), out=out, **callbacks(Leaves(1)))
     patch = out / "patches/semseg/small/tiny-board"
     assert (patch / "checkpoint.safetensors").exists()
     with pytest.raises(KeyboardInterrupt):
-        gear.bench(written(*FEW, ("attack: 2", "attack: 3")), out=out, watch=looks)
+        gear.bench(written(*FEW, ("attack: 2", "attack: 3")), out=out, **callbacks(looks))
     (line,) = looks.notes
     assert line.startswith("attack small of semseg") and "is made again, for what is there holds an unfinished" in line
     assert (patch / "attack.json").exists() and not (patch / "checkpoint.safetensors").exists()
@@ -115,7 +115,7 @@ def test_a_bench_that_is_refused_leaves_the_config_of_its_reports(
 
 def test_more_pictures_to_learn_from(written: Written, made: Made) -> None:
     out, looks = made(LEARNING), Looks()
-    report = gear.bench(written(*LEARNING, ("calibrate: 8", "calibrate: 9")), out=out, watch=looks)
+    report = gear.bench(written(*LEARNING, ("calibrate: 8", "calibrate: 9")), out=out, **callbacks(looks))
     alone, guarded = report.tasks[0].results
     assert [row.made for row in alone.evaluation.rows] == [0, 0, 0]
     assert [row.made for row in guarded.evaluation.rows] == [2, 2, 2]

@@ -93,7 +93,7 @@ def test_it_is_taken_up_again_and_predicts_nothing_twice(
         noted.append(finished)
 
     folder = tmp_path / "out"
-    evaluate(data, model="odd", out=tmp_path / "whole", reports=["reference"], resamples=20, progress=count)
+    evaluate(data, model="odd", out=tmp_path / "whole", reports=["reference"], resamples=20, on_progress=count)
     assert noted == [0, 1, 2, 3]
     evaluate(data, model="odd", out=folder, reports=["reference"], resamples=20)
     (row,) = sorted(path for path in folder.iterdir() if path.is_dir())
@@ -326,7 +326,7 @@ def test_bad_input_is_refused_before_anything_is_built(tmp_path: Path, small: Sm
         (UnknownNameError, "did you mean tiny_depth", {"model": "tiny_dept"}),
         (GearError, "'tiny_depth' does depth; .* is a semseg dataset", {"model": "tiny_depth"}),
         (GearError, "looks at right", {"model": "odd"}),
-        (ConfigError, "did you mean 'width'", {"settings": ["widht=3"]}),
+        (ConfigError, "did you mean 'width'", {"model_settings": ["widht=3"]}),
         (UnknownNameError, "did you mean reference", {"reports": ["referense"]}),
         (GearError, "'other' is for depth", {"defense": "other"}),
         (GearError, "quality=5 is a defense's option, but there is no defense", {"defense_settings": ["quality=5"]}),
@@ -358,7 +358,7 @@ def test_a_model_that_reckons_with_another_camera_is_refused(tmp_path: Path, sma
     for name, value, taken in (("baseline_m", "0.3", "0.54"), ("hfov_deg", "60", "90")):
         message = f"collected with {name} {taken}, but model 'odd' reckons with {value}; say --set {name}={taken}"
         with pytest.raises(GearError, match=message):
-            evaluate(data, model="odd", settings=[f"{name}={value}"], out=tmp_path / "x")
+            evaluate(data, model="odd", model_settings=[f"{name}={value}"], out=tmp_path / "x")
     assert not (tmp_path / "x").exists()
     assert evaluate(data, model="odd", out=tmp_path / "x", resamples=0).rows[0].samples == 2
 
@@ -385,7 +385,7 @@ def test_pictures_of_another_size_than_the_weights_are_for_are_noted(
     install(replace(model_spec(lambda _: Oracle([data]), "semseg"), config=ScaledConfig))
 
     def notes(out: str, *settings: str) -> list[str]:
-        evaluate(data, model="odd", settings=settings, out=tmp_path / out, resamples=0)
+        evaluate(data, model="odd", model_settings=settings, out=tmp_path / out, resamples=0)
         found: list[str] = json.loads((tmp_path / out / "results.json").read_text())["notes"]
         assert all(note in (tmp_path / out / "table.txt").read_text() for note in found)
         return found

@@ -22,5 +22,5 @@ def test_the_second_is_refused_and_the_first_goes_on(small: Small, install: Inst
         with pytest.raises(DatasetError, match="another run is at work there just now; wait for its end"):
             evaluate(data, model="odd", out=tmp_path)
 
-    assert evaluate(data, model="odd", out=tmp_path, progress=begin_another).rows[0].made == len(tried) - 1 == 2
+    assert evaluate(data, model="odd", out=tmp_path, on_progress=begin_another).rows[0].made == len(tried) - 1 == 2
     assert evaluate(data, model="odd", out=tmp_path).rows[0].made == 0

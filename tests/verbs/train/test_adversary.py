@@ -24,7 +24,7 @@ from gear.values.rng import derive_rng
 from gear.verbs.collect.run import collect
 from gear.verbs.train import loop
 from gear.verbs.train.adversary import Adversary
-from gear.verbs.train.checkpoint import Progress
+from gear.verbs.train.checkpoint import TrainingState
 from gear.verbs.train.config import Adversarial
 from gear.verbs.train.run import train
 
@@ -140,10 +140,10 @@ def test_training_against_patches_is_taken_up_again(
         settings = ["adversarial.share=1", "adversarial.samples=2"]
         return train(
             "semseg", "tiny_segmenter", probed, out=tmp_path / out, epochs=3, batch=2, adversarial="painter",
-            settings=settings, watch=watch,
+            settings=settings, on_step=watch,
         ).weights  # fmt: skip
 
-    def stop(progress: Progress, share: float, figures: Any) -> None:
+    def stop(progress: TrainingState, share: float, figures: Any) -> None:
         if progress.step == stop_at:
             raise StopError
 

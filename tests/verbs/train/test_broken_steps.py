@@ -16,7 +16,7 @@ from gear.contracts.models import Recipe
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_segmenter
 from gear.values.errors import GearError
 from gear.verbs.train import loop
-from gear.verbs.train.checkpoint import Progress
+from gear.verbs.train.checkpoint import TrainingState
 from gear.verbs.train.run import TrainReport, train
 
 Street = Callable[..., Path]
@@ -100,12 +100,12 @@ def test_steps_that_are_left_out_are_counted_over_a_stop(
     monkeypatch.setattr(loop, "CHECKPOINT_EVERY_S", 0.0)
     install(replace(tiny_segmenter, build=Overflowing, recipe=Recipe(batch=1, epochs=9)))
 
-    def stop(progress: Progress, share: float, figures: Any) -> None:
+    def stop(progress: TrainingState, share: float, figures: Any) -> None:
         if progress.step == 13:
             raise StopError
 
     with pytest.raises(StopError):
-        quick(street, tmp_path / "out", epochs=30, batch=1, watch=stop)
+        quick(street, tmp_path / "out", epochs=30, batch=1, on_step=stop)
     with pytest.raises(GearError, match="21 steps in a row, at step 20;"):
         quick(street, tmp_path / "out", epochs=30, batch=1)
 

@@ -118,11 +118,11 @@ def test_that_the_best_weights_are_gone_is_told_before_the_training_goes_on(
             raise StoppedError
 
     with pytest.raises(StoppedError):
-        quick(street, out, epochs=4, watch=stop)
+        quick(street, out, epochs=4, on_step=stop)
     (out / "model.safetensors").unlink()
     told.clear()
     with pytest.raises(DatasetError, match=r"model\.safetensors: is gone; put it back, or delete"):
-        quick(street, out, epochs=4, watch=stop)
+        quick(street, out, epochs=4, on_step=stop)
     assert not told
 
 

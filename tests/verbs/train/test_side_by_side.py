@@ -22,7 +22,9 @@ def test_the_second_is_refused_and_the_first_goes_on(street: Callable[..., Path]
 
     arguments: dict[str, Any] = {"epochs": 2, "batch": 2, "workers": 1}
     lone = train("semseg", "tiny_segmenter", street("semseg"), out=tmp_path / "lone", **arguments)
-    first = train("semseg", "tiny_segmenter", street("semseg"), out=tmp_path / "out", watch=begin_another, **arguments)
+    first = train(
+        "semseg", "tiny_segmenter", street("semseg"), out=tmp_path / "out", on_step=begin_another, **arguments
+    )
     assert tried and first.weights.read_bytes() == lone.weights.read_bytes()
     with pytest.raises(DatasetError, match="holds a training with other settings"):
         train("semseg", "tiny_segmenter", street("semseg"), out=tmp_path / "out", epochs=1)

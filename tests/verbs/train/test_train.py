@@ -88,7 +88,7 @@ def test_stopped_and_taken_up_again_is_as_if_never_stopped(
             raise StopError
 
     with pytest.raises(StopError):
-        quick(street, tmp_path / "parts", settings=settings, watch=stop)
+        quick(street, tmp_path / "parts", settings=settings, on_step=stop)
     parts = quick(street, tmp_path / "parts", settings=settings, workers=2)
     assert parts.weights.read_bytes() == whole.weights.read_bytes()
     assert parts.figures == whole.figures and parts.steps == whole.steps
@@ -113,7 +113,7 @@ def test_a_killed_process_is_taken_up_again(street: Street, tmp_path: Path, inst
         "stop = int(sys.argv[3])\n"
         "def watch(progress, share, figures):\n"
         "    if progress.step == stop: os.kill(os.getpid(), signal.SIGKILL)\n"
-        "train('semseg', 'tiny_segmenter', sys.argv[1], out=sys.argv[2], epochs=3, batch=2, watch=watch)\n"
+        "train('semseg', 'tiny_segmenter', sys.argv[1], out=sys.argv[2], epochs=3, batch=2, on_step=watch)\n"
     )
 
     def run(out: str, stop: int) -> int:
@@ -147,7 +147,7 @@ def test_what_is_half_written_lies_where_the_next_run_tidies_up(
 def test_finished_work_is_not_done_again(street: Street, tmp_path: Path, install: Any) -> None:
     first = quick(street, tmp_path / "out")
     steps: list[int] = []
-    again = quick(street, tmp_path / "out", watch=lambda progress, *_: steps.append(progress.step))
+    again = quick(street, tmp_path / "out", on_step=lambda progress, *_: steps.append(progress.step))
     assert not steps and again == first
     with pytest.raises(DatasetError, match=r"other settings \(config.batch differ\)"):
         quick(street, tmp_path / "out", batch=3)
@@ -309,7 +309,7 @@ def test_it_begins_with_the_trunk_of_another_network(street: Street, tmp_path: P
     write(other, {**state, "head.weight": torch.zeros(1, 2, 3, 3), "more": torch.zeros(3)}, {})
     said: list[str] = []
     begun = quick(
-        street, tmp_path / "begun", epochs=1, lr=1e-9, settings=["ema=0"], init=f"trunk:{other}", noted=said.append
+        street, tmp_path / "begun", epochs=1, lr=1e-9, settings=["ema=0"], init=f"trunk:{other}", on_warning=said.append
     )
     after, _ = read(begun.weights)
     assert torch.allclose(after["stem.weight"], state["stem.weight"], atol=1e-3)
@@ -391,7 +391,7 @@ def test_what_was_begun_goes_on_when_the_file_that_it_began_with_is_gone(
         raise StopError
 
     with pytest.raises(StopError):
-        quick(street, tmp_path / "parts", init=f"{before}{first}", watch=stop)
+        quick(street, tmp_path / "parts", init=f"{before}{first}", on_step=stop)
     first.unlink()
     parts = quick(street, tmp_path / "parts", init=f"{before}{first}")
     assert parts.weights.read_bytes() == whole.weights.read_bytes()
