@@ -1,4 +1,7 @@
-"""The four hooks. They take nothing, change nothing and return specs; built-ins come in by the same ones."""
+"""The five hooks that a plugin implements. They take no arguments, have no effects and return specs.
+
+gear's own tasks, models, attacks and defenses are registered through the same hooks.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ from typing import Any
 
 import pluggy
 
-from gear.contracts.specs import AttackSpec, DefenseSpec, ModelSpec, TaskSpec
+from gear.contracts.specs import AttackSpec, DefenseSpec, MetricSpec, ModelSpec, TaskSpec
 
 PROJECT = "gear"
 hookspec = pluggy.HookspecMarker(PROJECT)
@@ -16,23 +19,29 @@ hookimpl = pluggy.HookimplMarker(PROJECT)
 
 @hookspec
 def gear_tasks() -> Iterable[TaskSpec[Any]]:
-    """Tasks: dataset formats with their ground truth."""
+    """Tasks: each is a dataset format with its ground truth, its files and its metric."""
     return ()
 
 
 @hookspec
 def gear_models() -> Iterable[ModelSpec[Any]]:
-    """Models: networks."""
+    """Models: networks that do one or several tasks."""
     return ()
 
 
 @hookspec
 def gear_attacks() -> Iterable[AttackSpec[Any]]:
-    """Attacks: what makes patches."""
+    """Attacks: algorithms that optimise patches against a model."""
     return ()
 
 
 @hookspec
 def gear_defenses() -> Iterable[DefenseSpec[Any]]:
-    """Defenses: what guards a model."""
+    """Defenses: algorithms that clean pictures or detect patches in front of a model."""
+    return ()
+
+
+@hookspec
+def gear_metrics() -> Iterable[MetricSpec[Any]]:
+    """Metrics: further ones of tasks that exist, built in or of another package."""
     return ()

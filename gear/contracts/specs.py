@@ -9,7 +9,7 @@ from typing import Any, Generic, Literal, TypeVar
 from gear.contracts.attacks import Attack
 from gear.contracts.defenses import Defense
 from gear.contracts.models import Model, PublishedWeights, Recipe
-from gear.contracts.tasks import Task
+from gear.contracts.tasks import Evaluator, Task
 
 ConfigT = TypeVar("ConfigT")
 ProductT = TypeVar("ProductT", covariant=True)
@@ -138,12 +138,32 @@ class DefenseSpec(Spec[ConfigT, Defense]):
     needs_model: bool = False
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MetricSpec(Spec[ConfigT, Evaluator[Any, Any]]):
+    """A further metric of tasks that exist, for `gear evaluate --report NAME`.
+
+    `build` returns a fresh, empty evaluator at every call. Its `update` is given the task's samples and predictions.
+
+    Attributes:
+        tasks: names of the tasks whose samples and predictions it understands; at least one.
+        main_metric: the one of the evaluator's metrics that tells better from worse.
+        unit: of its metrics, such as `m` or `px`; "" for shares and counts.
+        less_is_better: whether the main metric is an error.
+    """
+
+    tasks: tuple[str, ...]
+    main_metric: str
+    unit: str = ""
+    less_is_better: bool = False
+
+
 AnySpec = Spec[Any, Any]
-Kind = Literal["task", "model", "attack", "defense"]
-KINDS: tuple[Kind, ...] = ("task", "model", "attack", "defense")
+Kind = Literal["task", "model", "attack", "defense", "metric"]
+KINDS: tuple[Kind, ...] = ("task", "model", "attack", "defense", "metric")
 SPEC_TYPES: dict[Kind, type[AnySpec]] = {
     "task": TaskSpec,
     "model": ModelSpec,
     "attack": AttackSpec,
     "defense": DefenseSpec,
+    "metric": MetricSpec,
 }

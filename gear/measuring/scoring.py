@@ -20,8 +20,9 @@ from gear.measuring.metric_json import known_json
 from gear.measuring.patch_area import MASK_FIGURES, mask_figures, patch_masks, widened
 from gear.measuring.plugin_selection import OUTSIDE_PATCH
 from gear.measuring.statistics import AnyEvaluator
-from gear.plugins.catalogue import PluginEntry, one_line
+from gear.plugins.catalogue import PluginEntry
 from gear.plugins.manager import DISTRIBUTION
+from gear.plugins.text import one_line
 from gear.values.errors import DatasetError, FieldError, GearError
 from gear.values.serial import Json, from_json
 

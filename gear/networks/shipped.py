@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import importlib.metadata
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,6 +12,7 @@ from safetensors import SafetensorError, safe_open
 
 from gear.dataset.sidecar import parse_json
 from gear.networks.options import NONE, SHIPPED
+from gear.values.entry_points import installed_entry_points
 from gear.values.errors import GearError
 from gear.values.serial import Json
 
@@ -149,7 +149,7 @@ def shipped_folders() -> tuple[Path, ...]:
         GearError: a package of that kind cannot be imported, or has no folder.
     """
     folders = []
-    for entry in sorted(importlib.metadata.entry_points(group=GROUP), key=lambda entry: (entry.name, entry.value)):
+    for entry in sorted(installed_entry_points(GROUP)[0], key=lambda entry: (entry.name, entry.value)):
         try:
             folders.append(Path(entry.load().FOLDER))
         except (ImportError, AttributeError, TypeError) as error:

@@ -13,8 +13,9 @@ from gear.config.nodes import Mapping, Node, Place
 from gear.config.reader import read_node
 from gear.contracts.specs import Kind, TaskSpec
 from gear.contracts.tasks import Task
-from gear.plugins.catalogue import PluginEntry, one_line
+from gear.plugins.catalogue import PluginEntry
 from gear.plugins.manager import DISTRIBUTION, catalogue
+from gear.plugins.text import one_line
 from gear.values.errors import GearError, PluginError
 
 NO_OPTIONS = Mapping({}, Place("defaults"))
@@ -56,9 +57,9 @@ def blamed(found: PluginEntry, stage: str) -> Iterator[None]:
     try:
         with contextlib.redirect_stdout(sys.stderr):
             yield
-    except GearError:
+    except (GearError, KeyboardInterrupt):
         raise
-    except (Exception, SystemExit) as error:
+    except BaseException as error:  # SystemExit, GeneratorExit and those of the plugin's own making, too
         owner = found.owner
         if owner.package == DISTRIBUTION:
             raise

@@ -108,12 +108,6 @@ class Catalogue:
         return tuple(result)
 
 
-def one_line(error: BaseException) -> str:
-    """An exception as one line: its type and the first line of its text."""
-    text = str(error).strip().splitlines()
-    return f"{type(error).__name__}: {text[0]}" if text else type(error).__name__
-
-
 def as_iterable(value: Any) -> Iterable[Any]:
     """What a hook returned, if it can be walked.
 

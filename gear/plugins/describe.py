@@ -11,10 +11,14 @@ from typing import Any
 from gear.config.dump import to_plain
 from gear.contracts.specs import AnySpec, ModelSpec, Spec
 from gear.plugins.catalogue import PluginEntry
+from gear.plugins.text import printable
 
 COMMON = {field.name for field in dataclasses.fields(Spec)}
 ELSEWHERE = {"recipe", "published", "convert", "parameters", "starts"}
 """What `training` and `gear models` say of a network."""
+
+LONGEST_MEANING = 2000
+"""Characters of an option's description."""
 
 UNITS = {
     "px": "pixels", "m": "metres", "mm": "millimetres", "deg": "degrees", "rad": "radians", "s": "seconds",
@@ -65,7 +69,7 @@ def options(config: type[Any], prefix: str = "") -> list[dict[str, Any]]:
                 "name": name,
                 "type": kind,
                 "default": to_plain(default),
-                "meaning": meanings.get(field.name, ""),
+                "meaning": printable(meanings.get(field.name, ""), LONGEST_MEANING),
                 "unit": unit,
             }
         )

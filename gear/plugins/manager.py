@@ -1,4 +1,4 @@
-"""Discovery: every plugin is loaded in a guard of its own; a broken one is reported, never fatal, never invisible."""
+"""Discovery of plugins: each is loaded under guard; a broken one is reported with its name and stops nothing else."""
 
 from __future__ import annotations
 
@@ -8,73 +8,63 @@ import importlib
 import importlib.metadata
 import io
 import os
-import re
-from collections.abc import Callable, Iterable, Mapping
-from functools import cache
+import signal
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from functools import cache, partial
+from itertools import islice
+from types import FrameType
 from typing import Any
 
 import pluggy
 
 from gear.contracts import hookspecs
-from gear.contracts.models import PublishedWeights, Recipe
-from gear.contracts.specs import PROTOCOL_VERSION, SPEC_TYPES, AnySpec, Kind, ModelSpec
 from gear.plugins.builtins import BUILTINS
-from gear.plugins.catalogue import Broken, Catalogue, Owner, PluginEntry, as_iterable, one_line
+from gear.plugins.catalogue import Broken, Catalogue, Owner, PluginEntry, as_iterable
+from gear.plugins.probe import unsafe_plugins
+from gear.plugins.spec_validation import HOOK_OF, spec_problem
+from gear.plugins.text import one_line, printable
+from gear.values.entry_points import identity, installed_entry_points
 
-GROUP = "gear"
-HOOK_OF: dict[Kind, str] = {
-    "task": "gear_tasks",
-    "model": "gear_models",
-    "attack": "gear_attacks",
-    "defense": "gear_defenses",
-}
-CAPABILITY_TYPES: dict[str, type] = {
-    "tasks": tuple,
-    "views": tuple,
-    "taps": tuple,
-    "outputs": frozenset,
-    "layout": str,
-    "gradient": str,
-    "has_gradients": bool,
-    "needs_gradients": bool,
-    "needs_calibration": bool,
-    "needs_model": bool,
-    "normalisation": str,
-    "parameters": int,
-    "input_scale": float,
-    "needs": tuple,
-    "published": tuple,
-    "starts": Mapping,
-    "original_name": str,
-    "figure": str,
-    "less_is_better": bool,
-    "needs_probes": bool,
-    "max_surfaces": int,
-    "is_control": bool,
-}
-ITEM_TYPES: dict[str, type] = {"published": PublishedWeights}
-"""Of what does not hold names."""
-
-NAME = re.compile(r"[a-z][a-z0-9_]*")
 DISTRIBUTION = "mujoco-gear"
+GROUP = "gear"
+"""Of entry points."""
+
+MOST_SPECS = 1000
+"""A hook that returns more specs than this is taken for an endless generator."""
 
 
 @cache
 def catalogue() -> Catalogue:
     """All plugins of this environment, found once a process.
 
-    `GEAR_DISABLE_PLUGINS` (names joined by commas, or `*` for all) keeps third-party plugins out.
+    `GEAR_DISABLE_PLUGINS` (names joined by commas, or `*` for all) keeps third-party plugins out. A plugin that is new
+    here is first loaded in a process of its own (`gear.plugins.probe`); one that ends or hangs that process, or that
+    raises KeyboardInterrupt there, is never loaded into this one.
     """
-    return discover(importlib.metadata.entry_points(group=GROUP), os.environ.get("GEAR_DISABLE_PLUGINS", ""))
+    entry_points, damaged = installed_entry_points(GROUP)
+    allowed = _allowed(entry_points, os.environ.get("GEAR_DISABLE_PLUGINS", ""))
+    unsafe = unsafe_plugins(allowed)
+    found = discover([one for one in allowed if one not in unsafe])
+    broken = [
+        Broken(owner=_owner(one.name, one.name, one.version), stage="entry_points.txt", problem=one_line(one.error))
+        for one in damaged
+    ]
+    broken += [Broken(owner=owner_of(one), stage=stage, problem=problem) for one, (stage, problem) in unsafe.items()]
+    return Catalogue(found.found, (*broken, *found.broken))
 
 
 def discover(entry_points: Iterable[importlib.metadata.EntryPoint], disabled: str = "") -> Catalogue:
-    """Loads built-ins and the given entry points.
+    """Loads built-ins and the given entry points into this process.
+
+    Args:
+        entry_points: of third parties.
+        disabled: names of entry points that are left out, joined by commas; `*` for all.
 
     Raises:
-        Exception: a built-in is broken: our bug, so it keeps its traceback.
+        Exception: a built-in is broken, which is a fault of gear and keeps its traceback.
+        KeyboardInterrupt: the user pressed Ctrl-C. One that a plugin raises is reported like any other exception.
     """
-    off = {name.strip() for name in disabled.split(",") if name.strip()}
     manager = pluggy.PluginManager(hookspecs.PROJECT)
     manager.add_hookspecs(hookspecs)
     owners: dict[str, Owner] = {}
@@ -83,54 +73,78 @@ def discover(entry_points: Iterable[importlib.metadata.EntryPoint], disabled: st
     for module in BUILTINS:
         manager.register(importlib.import_module(module), name=module)
         owners[module] = dataclasses.replace(own, plugin=module)
-    for entry_point in sorted(entry_points, key=lambda e: (e.name, e.value)):
-        if entry_point.name in off or "*" in off:
-            continue
-        package = entry_point.dist.name if entry_point.dist else entry_point.value.split(":")[0]
-        version = entry_point.dist.version if entry_point.dist else "?"
-        owner = Owner(plugin=entry_point.name, package=package, version=version)
-        failure = _register(manager, entry_point, f"{package}:{entry_point.name}")
+    for entry_point in sorted(_allowed(entry_points, disabled), key=lambda e: (e.name, e.value)):
+        owner = owner_of(entry_point)
+        name = f"{owner.package}:{entry_point.name}"
+        failure = _register(manager, entry_point, name)
         if failure is None:
-            owners[f"{package}:{entry_point.name}"] = owner
+            owners[name] = owner
         else:
             broken.append(Broken(owner=owner, stage=failure[0], problem=failure[1]))
     found, failed = _call_hooks(manager, owners)
     return Catalogue(tuple(found), (*broken, *failed))
 
 
+def owner_of(entry_point: importlib.metadata.EntryPoint) -> Owner:
+    """The distribution that brings an entry point; its module's name where the distribution is not known."""
+    package, version = entry_point.value.split(":")[0], "?"
+    if entry_point.dist is not None:
+        package, version = identity(entry_point.dist)
+    return _owner(entry_point.name, package, version)
+
+
+def _owner(plugin: str, package: str, version: str) -> Owner:
+    return Owner(plugin=printable(plugin), package=printable(package), version=printable(version))
+
+
+def _allowed(
+    entry_points: Iterable[importlib.metadata.EntryPoint], disabled: str
+) -> list[importlib.metadata.EntryPoint]:
+    off = {name.strip() for name in disabled.split(",")}
+    return [one for one in entry_points if one.name not in off and "*" not in off]
+
+
 def _register(
     manager: pluggy.PluginManager, entry_point: importlib.metadata.EntryPoint, name: str
 ) -> tuple[str, str] | None:
-    """Stage and problem where it fails, after which nothing of the plugin stays registered."""
+    """Imports a plugin and registers its hooks.
+
+    Returns:
+        None where that works; else stage and problem, and no hook of the plugin stays registered.
+    """
     stage = "import"
     try:
-        plugin = _quietly(entry_point.load)
+        plugin = guarded(entry_point.load)
         stage = "register"
-        manager.register(plugin, name=name)
+        guarded(partial(manager.register, plugin, name=name))
         manager.check_pending()  # a misspelt hook name is an error, not a no-op
-    except (Exception, SystemExit) as error:
-        if manager.has_plugin(name):
-            manager.unregister(name=name)
-        return stage, one_line(error)
-    return None
+    except PluginRaisedError as raised:
+        problem = raised.problem
+    except pluggy.PluginValidationError as error:
+        problem = one_line(error)
+    else:
+        return None
+    if manager.has_plugin(name):
+        manager.unregister(name=name)
+    return stage, problem
 
 
 def _call_hooks(manager: pluggy.PluginManager, owners: dict[str, Owner]) -> tuple[list[PluginEntry], list[Broken]]:
-    """Calls each implementation on its own, so that one that raises aborts nobody else's, and its owner is known."""
+    """Calls each implementation on its own, so that one that raises stops no other, and its owner is known."""
     found: list[PluginEntry] = []
     broken: list[Broken] = []
     for kind, hook in HOOK_OF.items():
         for implementation in getattr(manager.hook, hook).get_hookimpls():
             owner = owners[implementation.plugin_name]
             try:
-                specs = list(as_iterable(_quietly(implementation.function)))
-            except (Exception, SystemExit) as error:
+                specs = guarded(partial(_specs_of, implementation.function))
+                problems = [guarded(partial(spec_problem, kind, spec)) for spec in specs]
+            except PluginRaisedError as raised:
                 if owner.package == DISTRIBUTION:
-                    raise
-                broken.append(Broken(owner=owner, stage=f"hook {hook}", problem=one_line(error)))
+                    raise raised.error from None
+                broken.append(Broken(owner=owner, stage=f"hook {hook}", problem=raised.problem))
                 continue
-            for spec in specs:
-                problem = spec_problem(kind, spec)
+            for spec, problem in zip(specs, problems, strict=True):
                 if problem is None:
                     found.append(PluginEntry(kind=kind, spec=spec, owner=owner))
                 else:
@@ -138,73 +152,72 @@ def _call_hooks(manager: pluggy.PluginManager, owners: dict[str, Owner]) -> tupl
     return found, broken
 
 
-def spec_problem(kind: Kind, spec: Any) -> str | None:
-    """Why a spec cannot be used, or None."""
-    expected = SPEC_TYPES[kind]
-    if not isinstance(spec, expected):
-        return f"{HOOK_OF[kind]} returns {expected.__name__} objects, got {type(spec).__name__}"
-    if spec.protocol != PROTOCOL_VERSION:
-        return f"{spec.name!r} speaks protocol {spec.protocol}, this gear speaks {PROTOCOL_VERSION}; update one of them"
-    if not (isinstance(spec.name, str) and NAME.fullmatch(spec.name)):
-        return f"{spec.name!r} is not a plugin's name (lower case letters, digits, _)"
-    if not (dataclasses.is_dataclass(spec.config) and isinstance(spec.config, type)):
-        return f"{spec.name!r}: its config is not a dataclass"
-    if any(
-        f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING
-        for f in dataclasses.fields(spec.config)
-    ):
-        return f"{spec.name!r}: every option needs a default"
-    build: object = spec.build
-    if not callable(build):
-        return f"{spec.name!r}: its build cannot be called"
-    return _capability_problem(spec)
+def _specs_of(hook: Callable[[], Any]) -> list[Any]:
+    """The specs that a hook returns.
+
+    Raises:
+        TypeError: it returned something else than a collection of specs.
+        ValueError: it returned too many.
+    """
+    specs = list(islice(as_iterable(hook()), MOST_SPECS + 1))
+    if len(specs) > MOST_SPECS:
+        raise ValueError(f"returns more than {MOST_SPECS} specs")
+    return specs
 
 
-def _capability_problem(spec: AnySpec) -> str | None:
-    """What of a spec's data would trip whoever lists or checks it, or None."""
-    summary: object = spec.summary
-    if not isinstance(summary, str) or not summary.strip() or "\n" in summary:
-        return f"{spec.name!r}: its summary is not one line"
-    for name, kind in CAPABILITY_TYPES.items():
-        if not hasattr(spec, name):
-            continue
-        value = getattr(spec, name)
-        if not isinstance(value, (int, float) if kind is float else kind):
-            return f"{spec.name!r}: its {name} must be a {kind.__name__}, got {type(value).__name__}"
-        item_kind = ITEM_TYPES.get(name, str)
-        if isinstance(value, (tuple, frozenset)) and not all(isinstance(item, item_kind) for item in value):
-            return f"{spec.name!r}: its {name} must hold {'names' if item_kind is str else item_kind.__name__}"
-    if isinstance(spec, ModelSpec) and (problem := _model_problem(spec)) is not None:
-        return f"{spec.name!r}: {problem}"
+class PluginRaisedError(Exception):
+    """A plugin's code raised something.
+
+    Attributes:
+        error: what it raised, which need not be an `Exception`.
+        problem: the same as one printable line.
+    """
+
+    def __init__(self, error: BaseException) -> None:
+        self.problem = one_line(error)
+        super().__init__(self.problem)
+        self.error = error
+
+
+def guarded(call: Callable[[], Any]) -> Any:
+    """Runs a plugin's code; what it prints to stdout must not get into gear's output.
+
+    Raises:
+        PluginRaisedError: it raised anything, SystemExit, GeneratorExit and KeyboardInterrupt included.
+        KeyboardInterrupt: the user pressed Ctrl-C meanwhile.
+    """
+    with _noticing_interrupts() as interrupts:
+        try:
+            with contextlib.redirect_stdout(io.StringIO()):
+                return call()
+        except BaseException as error:
+            if interrupts:
+                raise KeyboardInterrupt from None
+            raise PluginRaisedError(error) from error
+
+
+@contextlib.contextmanager
+def _noticing_interrupts() -> Iterator[list[int]]:
+    """A list that gets an entry when the user presses Ctrl-C, so that a plugin's own KeyboardInterrupt is told apart.
+
+    Signals can be handled in the main thread alone, and only Python's usual handler is replaced; elsewhere a
+    KeyboardInterrupt counts as the plugin's.
+    """
+    seen: list[int] = []
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        seen.append(number)
+        raise KeyboardInterrupt
+
+    is_main = threading.current_thread() is threading.main_thread()
+    if not is_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield seen
+        return
+    signal.signal(signal.SIGINT, interrupt)
     try:
-        spec.config()
-    except Exception as error:
-        return f"{spec.name!r}: its own defaults are refused: {one_line(error)}"
-    return None
-
-
-def _model_problem(spec: ModelSpec[Any]) -> str | None:
-    recipe: object = spec.recipe
-    convert: object = spec.convert
-    starts: Mapping[Any, object] = spec.starts
-    if not (recipe is None or isinstance(recipe, Recipe)):
-        return f"its recipe must be a Recipe or None, got {type(recipe).__name__}"
-    if not (convert is None or callable(convert)):
-        return "its convert cannot be called"
-    if not all(isinstance(name, str) and callable(start) for name, start in starts.items()):
-        return "its starts must be functions by name"
-    for weights in spec.published:
-        texts: tuple[object, ...] = (weights.data, weights.source, weights.licence)
-        size_mb: object = weights.size_mb
-        if not (all(isinstance(text, str) for text in texts) and isinstance(size_mb, (int, float))):
-            return "its published must say data, source and licence as texts and size_mb as a number"
-    return None
-
-
-def _quietly(call: Callable[[], Any]) -> Any:
-    """Calls a plugin's code; what it prints to stdout must not get into ours."""
-    with contextlib.redirect_stdout(io.StringIO()):
-        return call()
+        yield seen
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def _version(distribution: str) -> str:

@@ -19,7 +19,7 @@ from gear.config.reader import read_node
 from gear.contracts.defenses import Defense, DefenseResult, Taught
 from gear.contracts.models import Model
 from gear.contracts.specs import DefenseSpec
-from gear.plugins.manager import spec_problem
+from gear.plugins.spec_validation import spec_problem
 from gear.values.frames import UInt8Image
 from gear.values.rng import derive_rng
 

@@ -9,7 +9,7 @@ from gear.config.dump import to_yaml
 from gear.config.nodes import parse_text
 from gear.config.reader import read_node
 from gear.contracts.specs import AnySpec, Kind
-from gear.plugins.manager import spec_problem
+from gear.plugins.spec_validation import spec_problem
 
 
 def check_spec(kind: Kind, spec: AnySpec, options: Mapping[str, Any]) -> None:

@@ -65,7 +65,8 @@ def installed(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
         made.append(name)
         entries.append(EntryPoint(name=name.replace("_", "-"), value=name, group="gear"))
 
-    monkeypatch.setattr(manager.importlib.metadata, "entry_points", lambda group: entries)
+    monkeypatch.setattr(manager, "installed_entry_points", lambda group: (entries, []))
+    monkeypatch.setattr(manager, "unsafe_plugins", lambda entry_points: {})
     manager.catalogue.cache_clear()
     yield install
     manager.catalogue.cache_clear()

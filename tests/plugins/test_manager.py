@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 
 from gear.contracts.hookspecs import hookimpl
-from gear.contracts.models import PublishedWeights, Recipe
-from gear.contracts.specs import PROTOCOL_VERSION, DefenseSpec, ModelSpec
+from gear.contracts.specs import PROTOCOL_VERSION, DefenseSpec
 from gear.plugins.build import build
 from gear.plugins.catalogue import Catalogue, PluginEntry
-from gear.plugins.manager import discover, spec_problem
+from gear.plugins.manager import discover
 from gear.values.errors import DuplicateNameError, PluginError, UnknownNameError
 
 
@@ -148,57 +147,6 @@ def test_every_option_needs_a_default(package: Any) -> None:
 
     found = discover([package("needy", lambda: [spec("thirdparty", config=Needy)])])
     assert found.broken[0].problem == "'thirdparty': every option needs a default"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Refused:
-    radius_px: int = 2
-
-    def __post_init__(self) -> None:
-        raise ValueError("never")
-
-
-@pytest.mark.parametrize(
-    ("facts", "problem"),
-    [
-        ({"tasks": {"depth"}}, "'thirdparty': its tasks must be a tuple, got set"),
-        ({"tasks": "depth"}, "'thirdparty': its tasks must be a tuple, got str"),
-        ({"tasks": None}, "'thirdparty': its tasks must be a tuple, got NoneType"),
-        ({"taps": (1,)}, "'thirdparty': its taps must hold names"),
-        ({"outputs": {"mask"}}, "'thirdparty': its outputs must be a frozenset, got set"),
-        ({"summary": "one\ntwo"}, "'thirdparty': its summary is not one line"),
-        ({"config": Refused}, "'thirdparty': its own defaults are refused: ValueError: never"),
-    ],
-)
-def test_rubbish_in_a_spec_is_reported(package: Any, facts: dict[str, Any], problem: str) -> None:
-    found = discover([package("good_one", lambda: [spec("thirdparty", **facts)])])
-    assert [b.problem for b in found.broken] == [problem]
-    assert strangers(found) == []
-
-
-@pytest.mark.parametrize(
-    ("facts", "problem"),
-    [
-        ({"starts": None}, "its starts must be a Mapping, got NoneType"),
-        ({"starts": {"imagenet": 1}}, "its starts must be functions by name"),
-        ({"published": None}, "its published must be a tuple, got NoneType"),
-        ({"published": ("x",)}, "its published must hold PublishedWeights"),
-        (
-            {"published": (PublishedWeights(data="d", source="s", licence="l", size_mb="9"),)},  # type: ignore[arg-type]
-            "its published must say data, source and licence as texts and size_mb as a number",
-        ),
-        ({"recipe": "sgd"}, "its recipe must be a Recipe or None, got str"),
-        ({"convert": "keys"}, "its convert cannot be called"),
-        ({"input_scale": "half"}, "its input_scale must be a float, got str"),
-        ({"needs": None}, "its needs must be a tuple, got NoneType"),
-    ],
-)
-def test_rubbish_in_a_models_spec_is_reported(facts: dict[str, Any], problem: str) -> None:
-    plain: dict[str, Any] = {"summary": "A network.", "config": Config, "build": Same, "tasks": (), "views": ("left",)}
-    published = PublishedWeights(data="d", source="s", licence="l", size_mb=9)
-    good = {"recipe": Recipe(), "published": (published,), "starts": {"imagenet": print}, "input_scale": 1}
-    assert spec_problem("model", ModelSpec(name="thirdparty", **plain | good)) is None
-    assert spec_problem("model", ModelSpec(name="thirdparty", **plain | facts)) == f"'thirdparty': {problem}"
 
 
 def test_a_build_that_leaves_says_whose_it_is(package: Any) -> None:

@@ -17,7 +17,7 @@ from safetensors.numpy import save as to_bytes
 
 from gear.contracts.attacks import Patch, State, surface_of
 from gear.dataset.files import write_whole
-from gear.plugins.catalogue import one_line
+from gear.plugins.text import one_line
 from gear.values.errors import DatasetError, ReplaceableError
 from gear.values.progress import Progress
 from gear.values.serial import from_json

@@ -13,7 +13,8 @@ from pathlib import Path
 
 from gear.contracts.specs import KINDS, Kind
 from gear.dataset.files import explained
-from gear.plugins.manager import HOOK_OF, catalogue
+from gear.plugins.manager import catalogue
+from gear.plugins.spec_validation import HOOK_OF
 from gear.values.errors import GearError, UnknownNameError
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")

@@ -16,7 +16,7 @@ from safetensors.torch import save as to_bytes
 from torch import Tensor, nn
 
 from gear.dataset.files import write_whole
-from gear.plugins.catalogue import one_line
+from gear.plugins.text import one_line
 from gear.values.errors import DatasetError, FieldError
 from gear.values.serial import Json, from_json
 from gear.verbs.train.feed import Position

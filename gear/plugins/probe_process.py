@@ -1,0 +1,48 @@
+"""The process that loads one plugin to see whether it survives: run by `gear.plugins.probe` alone.
+
+It notes in a file what it is about to do, and at its end that it came so far. The file is the only thing that the other
+process believes: the plugin may print, leave threads behind or register functions that run at exit.
+"""
+
+from __future__ import annotations
+
+import os
+from importlib.metadata import EntryPoint
+from itertools import islice
+from pathlib import Path
+
+import pluggy
+
+from gear.contracts import hookspecs
+from gear.plugins.catalogue import as_iterable
+from gear.plugins.manager import MOST_SPECS
+from gear.plugins.probe import DONE, INTERRUPTED
+from gear.plugins.spec_validation import HOOK_OF, spec_problem
+
+
+def main(name: str, value: str, group: str, notes: str) -> None:
+    """Imports the plugin, calls its hooks and checks its specs; never returns."""
+    path = Path(notes)
+
+    def note(line: str) -> None:
+        with path.open("a", encoding="utf-8") as file:
+            file.write(line + "\n")
+
+    try:
+        note("import")
+        plugin = EntryPoint(name=name, value=value, group=group).load()
+        note("register")
+        manager = pluggy.PluginManager(hookspecs.PROJECT)
+        manager.add_hookspecs(hookspecs)
+        manager.register(plugin)
+        for kind, hook in HOOK_OF.items():
+            for implementation in getattr(manager.hook, hook).get_hookimpls():
+                note(f"hook {hook}")
+                for spec in islice(as_iterable(implementation.function()), MOST_SPECS + 1):
+                    spec_problem(kind, spec)
+    except KeyboardInterrupt:
+        note(INTERRUPTED)
+    except BaseException:  # which the other process catches, too, and reports
+        pass
+    note(DONE)
+    os._exit(0)
