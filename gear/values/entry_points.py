@@ -53,10 +53,9 @@ def installed_entry_points(group: str) -> tuple[list[EntryPoint], list[DamagedDi
 def identity(distribution: importlib.metadata.Distribution) -> tuple[str, str]:
     """Name and version of a distribution; where its metadata are damaged, as the name of its folder says them."""
     try:
-        metadata = distribution.metadata
-        name, version = (metadata[key] if key in metadata else None for key in ("Name", "Version"))
+        name, version = str(distribution.name or ""), str(distribution.version or "")
     except Exception:
-        name = version = None
+        name = version = ""
     # There is no public way to a distribution's folder.
     folder = str(getattr(getattr(distribution, "_path", None), "stem", "?"))
-    return str(name or folder.partition("-")[0]), str(version or folder.partition("-")[2] or "?")
+    return name or folder.partition("-")[0], version or folder.partition("-")[2] or "?"
