@@ -60,9 +60,9 @@ def main() -> None:
     def attack_step(step: int) -> int:
         textures = optimiser.textures.clone().requires_grad_(True)
         indexes = batch_of(step, len(scenes.samples), args.batch, optimiser.seed)
-        direction, figures = ascend(textures, problem.seen(textures, indexes, step, optimiser.seed))
+        direction, values = ascend(textures, problem.seen(textures, indexes, step, optimiser.seed))
         optimiser.step(direction, 1.0)
-        return len(figures)
+        return len(values)
 
     def bare_step(batch: Seen) -> int:
         views = {name: picture.detach().requires_grad_(True) for name, picture in batch.views.items()}

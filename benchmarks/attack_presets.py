@@ -7,7 +7,7 @@
 `--attack NAME:KEY=VALUE:…`, repeatable, compares other attacks, or one with other options.
 
 Takes the pictures of finished scenes (`train`, `val`, and `none`, which patches are judged on). Prints, for each scene
-and attack, the task's figure of clean pictures, its change by the rendered patch, and the minutes of the attack; then
+and attack, the task's metric of clean pictures, its change by the rendered patch, and the minutes of the attack; then
 the mean change of each attack. What is finished is only read when it is called again.
 """
 
@@ -33,14 +33,14 @@ def main() -> None:
     parser.add_argument("--model", required=True)
     parser.add_argument("--steps", type=int, default=120)
     parser.add_argument("--attack", action="append", metavar="NAME:KEY=VALUE:…", help=f"({' '.join(ATTACKS)})")
-    parser.add_argument("--figure", help="of the task's evaluator (the task's own)")
+    parser.add_argument("--metric", help="of the task's evaluator (the task's own)")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--model-set", action="append", default=[])
     args = parser.parse_args()
     spec = find("task", args.task).spec
     assert isinstance(spec, TaskSpec)
-    figure = args.figure or spec.figure.rpartition(".")[2]
-    print(f"{figure} over scenes; {args.steps} steps each")
+    metric = args.metric or spec.metric.rpartition(".")[2]
+    print(f"{metric} over scenes; {args.steps} steps each")
     changes: dict[str, list[float]] = {attack: [] for attack in args.attack or ATTACKS}
     for folder in args.folders:
         for attack in changes:
@@ -54,10 +54,10 @@ def main() -> None:
                 folder / "none", patch=out / "patch", model=args.model, model_settings=args.model_set,
                 compositors=("transport",), out=out / "gap",
             ).as_json()["effect"]  # fmt: skip
-            changes[attack].append(found["rendered"][figure] - found["clean"][figure])
+            changes[attack].append(found["rendered"][metric] - found["clean"][metric])
             minutes = load_json(out / "patch/attack.json")["seconds"] / 60
             print(
-                f"{folder.name:24} {attack:40} clean {found['clean'][figure]:.3f}  change {changes[attack][-1]:+.3f}  "
+                f"{folder.name:24} {attack:40} clean {found['clean'][metric]:.3f}  change {changes[attack][-1]:+.3f}  "
                 f"{minutes:.1f} min",
                 flush=True,
             )

@@ -30,7 +30,7 @@ from gear.plugins.build import build, find
 from gear.plugins.datasets import open_dataset
 from gear.render import RENDERERS, open_renderer
 from gear.verbs.collect.run import manifest_facts
-from gear.verbs.gap.figures import picture_gap, visible_mask
+from gear.verbs.gap.picture_gap import picture_gap, visible_mask
 from gear.world.planner import ScenePlanner
 from gear.world.weather.air import camera_pipeline
 from gear.world.world import World

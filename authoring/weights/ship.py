@@ -1,4 +1,4 @@
-"""Trained weights into the weights package, with the figures of the held-out data and a card."""
+"""Trained weights into the weights package, with the metrics of the held-out data and a card."""
 
 from __future__ import annotations
 
@@ -114,12 +114,12 @@ class Measured:
     Attributes:
         results: all of `results.json`.
         samples: how many pictures.
-        figures: of the report over all of them: `value`, `low` and `high` by name.
+        metrics: of the report over all of them: `value`, `low` and `high` by name.
     """
 
     results: Any
     samples: int
-    figures: Mapping[str, Any]
+    metrics: Mapping[str, Any]
 
     @staticmethod
     def read(evaluation: Path, name: str, weights: Path) -> Measured:
@@ -132,14 +132,14 @@ class Measured:
         if results["model"]["weights_sha256"] != _digest(name, weights):
             raise GearError(f"{evaluation}: not an evaluation of {weights}")
         together = results["together"][0] if results["together"] else results["rows"][0]
-        figures: dict[str, Any] = together["figures"].get(REPORT, {})
-        if not figures:
+        metrics: dict[str, Any] = together["metrics"].get(REPORT, {})
+        if not metrics:
             raise GearError(f"{evaluation}: holds no report {REPORT!r}; evaluate again with --report {REPORT}")
-        return Measured(results, together["samples"], figures)
+        return Measured(results, together["samples"], metrics)
 
     def texts(self) -> dict[str, str]:
         """As a weights file has them."""
-        known = {key: one for key, one in self.figures.items() if one["value"] is not None}
+        known = {key: one for key, one in self.metrics.items() if one["value"] is not None}
         return {
             "metrics": json.dumps({key: one["value"] for key, one in known.items()}),
             "intervals": json.dumps({key: [one["low"], one["high"]] for key, one in known.items()}),
@@ -148,8 +148,8 @@ class Measured:
 
 def head(target: Path, metadata: Mapping[str, str], measured: Measured) -> list[str]:
     """Lines of a card: what the file is, and what was measured with it."""
-    data, figures = target.read_bytes(), measured.figures
-    absent = [key for key, one in figures.items() if one["value"] is None]
+    data, metrics = target.read_bytes(), measured.metrics
+    absent = [key for key, one in metrics.items() if one["value"] is None]
     measured_on = metadata.get("measured_look_hash", metadata["look_hash"])
     return [
         f"# {metadata['model']} for {metadata['task']}",
@@ -164,10 +164,10 @@ def head(target: Path, metadata: Mapping[str, str], measured: Measured) -> list[
         f"On {measured.samples} pictures at the task's own size, of two scenes and one weather that nothing was",
         "trained on (`python -m authoring.weights held-out`), 95 % intervals by bootstrap over pictures:",
         "",
-        "| figure | value | from | to |",
+        "| metric | value | from | to |",
         "|---|---|---|---|",
         *(f"| {key} | {_number(one['value'])} | {_number(one['low'])} | {_number(one['high'])} |"
-          for key, one in figures.items() if one["value"] is not None),
+          for key, one in metrics.items() if one["value"] is not None),
         "",
         *([f"Nothing to measure for: {', '.join(absent)}.", ""] if absent else []),
         *_rows(measured.results),
@@ -216,11 +216,11 @@ def wrapped(note: str) -> list[str]:
 
 
 def _rows(results: Any) -> list[str]:
-    """The first figure of every dataset."""
-    first = next(iter(results["rows"][0]["figures"][REPORT]))
+    """The first metric of every dataset."""
+    first = next(iter(results["rows"][0]["metrics"][REPORT]))
     lines = [f"| collection | samples | {first} |", "|---|---|---|"]
     for row in results["rows"]:
-        one, place = row["figures"][REPORT][first], Path(row["dataset"]["root"]).name
+        one, place = row["metrics"][REPORT][first], Path(row["dataset"]["root"]).name
         lines.append(f"| {place} | {row['samples']} | {_number(one['value'])} |")
     return [*lines, ""]
 

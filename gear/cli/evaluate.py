@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         dest="reports",
-        help="further figures: reference (what a shipped network is held to), outside_patch; repeatable",
+        help="further metrics: reference (what a shipped network is held to), outside_patch; repeatable",
     )
     parser.add_argument("--out", metavar="DIR", help="folder for the results (evaluations/<task>/<model>[+<defense>])")
     parser.add_argument(

@@ -63,8 +63,8 @@ def shipped_line(weights: ShippedWeights | None) -> str:
         return "none"
     facts = weights.to_json()
     metrics = facts["metrics"] if isinstance(facts["metrics"], dict) else {}
-    figures = ", ".join(f"{key} {value:.3g}" for key, value in metrics.items() if isinstance(value, (int, float)))
+    named = ", ".join(f"{key} {value:.3g}" for key, value in metrics.items() if isinstance(value, (int, float)))
     look = "look not stated"
     if weights.stale is not None:
         look = f"trained on another look ({', '.join(weights.stale)} changed)" if weights.stale else "look is current"
-    return f"{facts['size_mb']:.1f} MB; {figures or 'no figures'}; {look}"
+    return f"{facts['size_mb']:.1f} MB; {named or 'no metrics'}; {look}"

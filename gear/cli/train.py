@@ -118,14 +118,14 @@ class TrainingBar:
             bar_format="{l_bar}{bar}| {elapsed}<{remaining} {postfix}",
         )  # fmt: skip
 
-    def __call__(self, progress: TrainingState, share: float, figures: dict[str, float] | None) -> None:
-        """After a step, or, with figures, after a validation."""
+    def __call__(self, progress: TrainingState, share: float, metrics: dict[str, float] | None) -> None:
+        """After a step, or, with metrics, after a validation."""
         self._bar.update(100 * share - self._bar.n)
         if progress.steps:
             point = progress.steps[-1]
             self._bar.set_postfix_str(f"step {progress.step} loss {point['loss']:.3f} lr {point['rate']:.1e}")
-        if figures is not None:
-            chosen = [*list(figures.items())[: self.SHOWN], ("loss", figures["loss"])]
+        if metrics is not None:
+            chosen = [*list(metrics.items())[: self.SHOWN], ("loss", metrics["loss"])]
             text = "  ".join(f"{name} {value:.4f}" for name, value in dict(chosen).items())
             mark = " *" if progress.best_step == progress.step else ""
             self._bar.write(f"step {progress.step:>6}  {text}{mark}", file=sys.stderr)

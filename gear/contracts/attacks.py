@@ -72,7 +72,7 @@ class Watch(Protocol):
     def step(
         self,
         done: int,
-        figures: Mapping[str, float],
+        values: Mapping[str, float],
         patches: Callable[[], tuple[Patch, ...]],
         state: Callable[[], State],
     ) -> bool:
@@ -80,7 +80,7 @@ class Watch(Protocol):
 
         Args:
             done: steps so far.
-            figures: what is worth a curve: terms, losses, norms.
+            values: what is worth a curve: terms, losses, norms.
             patches: gives the patches as they are now; called only when they are wanted.
             state: gives the state to resume from, likewise; empty where the attack cannot be resumed.
         """

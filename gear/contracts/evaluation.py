@@ -22,14 +22,14 @@ Draws = npt.NDArray[np.int64]
 """(R, N): R times N numbers of gathered samples, drawn with repetition."""
 
 Spread = Mapping[str, npt.NDArray[np.float64]]
-"""(R,) values by figure."""
+"""(R,) values by metric."""
 
 
 @runtime_checkable
 class KeepsPredictions(Protocol):
     """A task whose predictions become files, in its format's own result layout.
 
-    Without it an evaluation writes figures alone, and one that was stopped predicts every sample anew.
+    Without it an evaluation writes metrics alone, and one that was stopped predicts every sample anew.
     """
 
     def encode_prediction(self, sample: Any, prediction: Any, info: SplitInfo) -> Encoded:
@@ -68,33 +68,33 @@ class Reports(Protocol):
 
 @runtime_checkable
 class Resampled(Protocol):
-    """An evaluator that has a quicker way to its figures over resampled pictures than merging one of each."""
+    """An evaluator that has a quicker way to its metrics over resampled pictures than merging one of each."""
 
     def resampled(self, draws: Draws) -> Spread:
-        """Figures as if the drawn samples had been gathered, in order of `update` from 0; NaN where nothing counts.
+        """Metrics as if the drawn samples had been gathered, in order of `update` from 0; NaN where nothing counts.
 
-        May leave figures out.
+        May leave metrics out.
         """
         ...
 
 
 @runtime_checkable
 class Additive(Protocol):
-    """An evaluator whose figures follow from sums over pictures: merging is adding."""
+    """An evaluator whose metrics follow from sums over pictures: merging is adding."""
 
     def totals(self) -> Mapping[str, npt.NDArray[Any]]:
         """The sums, by names and with shapes that are always the same."""
         ...
 
-    def figures(self, totals: Mapping[str, npt.NDArray[Any]]) -> Spread:
+    def metrics(self, totals: Mapping[str, npt.NDArray[Any]]) -> Spread:
         """What `result` would say of sums with an axis of length R in front: (R,) each, NaN where nothing counts."""
         ...
 
 
 @runtime_checkable
 class Limited(Protocol):
-    """An evaluator some of whose figures stay below 1 on few samples, however good the predictions are."""
+    """An evaluator some of whose metrics stay below 1 on few samples, however good the predictions are."""
 
     def ceilings(self) -> Mapping[str, float]:
-        """What perfect predictions of everything gathered would come to, for the figures where that is less than 1."""
+        """What perfect predictions of everything gathered would come to, for the metrics where that is less than 1."""
         ...

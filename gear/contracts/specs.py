@@ -48,15 +48,15 @@ class TaskSpec(Spec[ConfigT, Task[Any, Any]]):
         views: names of the cameras of its default rig, the reference first.
         layout: one line on the files that it writes.
         original_name: what CARLA-GeAR calls it in its configs and JSON, or "" if it does not know it.
-        figure: the evaluator's figure by which training chooses among checkpoints, or one of a report's as
-            `<report>.<figure>`; "" chooses by the loss.
-        less_is_better: whether that figure is an error.
+        metric: the evaluator's metric by which training chooses among checkpoints, or one of a report's as
+            `<report>.<metric>`; "" chooses by the loss.
+        less_is_better: whether that metric is an error.
     """
 
     views: tuple[str, ...]
     layout: str
     original_name: str = ""
-    figure: str = ""
+    metric: str = ""
     less_is_better: bool = False
 
 

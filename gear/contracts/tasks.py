@@ -108,7 +108,7 @@ class Evaluator(Protocol[SampleT_contra, PredictionT_contra]):
     """A metric over a data set, gathered sample by sample."""
 
     def update(self, sample: SampleT_contra, prediction: PredictionT_contra) -> Mapping[str, float]:
-        """Takes one sample in; returns its own figures where the metric has any for a single sample."""
+        """Takes one sample in; returns its own metrics where the metric has any for a single sample."""
         ...
 
     def merge(self, other: Any) -> None:
@@ -116,7 +116,7 @@ class Evaluator(Protocol[SampleT_contra, PredictionT_contra]):
         ...
 
     def result(self) -> Mapping[str, float]:
-        """The figures over everything gathered; NaN where nothing counts."""
+        """The metrics over everything gathered; NaN where nothing counts."""
         ...
 
 

@@ -48,15 +48,15 @@ def check_previews(given: Any) -> dict[str, UInt8Image]:
     return {str(name): pixels for name, pixels in pictures.items()}
 
 
-def check_figures(given: Any, method: str) -> dict[str, float]:
+def check_metrics(given: Any, method: str) -> dict[str, float]:
     """Takes what `method` of a task's evaluator returned, and gives it back by name.
 
     Raises:
         TypeError: it is no mapping of names to numbers.
     """
     if not isinstance(given, Mapping):
-        raise TypeError(f"{method} must give figures by name, got {type(given).__name__}")
+        raise TypeError(f"{method} must give metrics by name, got {type(given).__name__}")
     for name, value in given.items():
         if not isinstance(name, str) or not isinstance(value, Real):
-            raise TypeError(f"{method}: figure {name!r} must be a number, got {type(value).__name__}")
+            raise TypeError(f"{method}: metric {name!r} must be a number, got {type(value).__name__}")
     return dict(given)

@@ -42,7 +42,7 @@ def evaluate_row(dataset: Dataset[Any], scorer: Scorer, player: Player, *, batch
     Batches are always the same samples, those that are finished already among them, and there are as many lanes as the
     whole dataset has work for: networks round a batch otherwise than one sample, and on several threads otherwise than
     on one, and a run that was interrupted is to end with the same bytes. Each of several lanes takes a batch from its
-    files to its figures, since what changes hands less is done sooner; threads beside them wait for the disk. Else
+    files to its metrics, since what changes hands less is done sooner; threads beside them wait for the disk. Else
     pictures are decoded, and predictions measured and written, in threads beside the model. What waits is bounded, so
     memory does not grow with the dataset.
     """

@@ -17,7 +17,7 @@ Mask = npt.NDArray[np.bool_]
 MARGIN_PX = 5
 """What lies this near to the patch is left out with it: its light and the network's smoothing reach that far."""
 
-MASK_FIGURES = ("mask_iou", "mask_precision", "mask_recall", "mask_area")
+MASK_METRICS = ("mask_iou", "mask_precision", "mask_recall", "mask_area")
 """The last one is the share of the pictures that a mask covers; the others compare it with the patch."""
 
 SURE = 0.5
@@ -41,20 +41,20 @@ def widened(masks: Mapping[str, Mask], margin_px: int = MARGIN_PX) -> dict[str, 
     return {name: cv2.dilate(mask.astype(np.uint8), disc).astype(np.bool_) for name, mask in masks.items()}
 
 
-def mask_figures(sample: Sample, found: Mapping[str, Any]) -> dict[str, float]:
+def mask_metrics(sample: Sample, found: Mapping[str, Any]) -> dict[str, float]:
     """How a defense's mask lies on the true patch: over all of its cameras together.
 
-    `MASK_FIGURES`, NaN where nothing is to be compared.
+    `MASK_METRICS`, NaN where nothing is to be compared.
     """
     truth = patch_masks(sample)
     real = np.concatenate([truth[name].reshape(-1) for name in found])
     said = np.concatenate([np.asarray(mask).reshape(-1) >= SURE for mask in found.values()])
     both, either = int((real & said).sum()), int((real | said).sum())
     there = bool(real.any())
-    figures = (
+    metrics = (
         both / either if there else float("nan"),
         both / int(said.sum()) if said.any() and there else float("nan"),
         both / int(real.sum()) if there else float("nan"),
         float(said.mean()),
     )
-    return dict(zip(MASK_FIGURES, figures, strict=True))
+    return dict(zip(MASK_METRICS, metrics, strict=True))

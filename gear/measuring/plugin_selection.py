@@ -19,7 +19,7 @@ from gear.values.errors import GearError, UnknownNameError
 from gear.values.serial import Json
 
 OUTSIDE_PATCH = "outside_patch"
-"""The task's own figures with the ground truth on and next to the patch left out."""
+"""The task's own metrics with the ground truth on and next to the patch left out."""
 
 CAMERA = ("hfov_deg", "baseline_m")
 """Options that a model shares with its task, because pictures do not say them."""

@@ -1,4 +1,4 @@
-"""What is made of one answer: figures, result files, and the note that says that the sample is finished."""
+"""What is made of one answer: metrics, result files, and the note that says that the sample is finished."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from gear.dataset.sidecar import dump_json, load_json
 from gear.measuring.guarded_model import Answer, accusation
 from gear.measuring.metric_checks import said_of
 from gear.measuring.metric_json import known_json
-from gear.measuring.patch_area import MASK_FIGURES, mask_figures, patch_masks, widened
+from gear.measuring.patch_area import MASK_METRICS, mask_metrics, patch_masks, widened
 from gear.measuring.plugin_selection import OUTSIDE_PATCH
 from gear.measuring.statistics import AnyEvaluator
 from gear.plugins.catalogue import PluginEntry
@@ -44,7 +44,7 @@ class Note:
 
     Attributes:
         index: its number in the split.
-        figures: of this sample, by report.
+        metrics: of this sample, by report.
         parts: evaluators that have seen it alone, by report.
         cost: `model_s` and `defense_s`.
         score: of the defense, or None.
@@ -54,7 +54,7 @@ class Note:
     """
 
     index: int
-    figures: Mapping[str, Mapping[str, float]]
+    metrics: Mapping[str, Mapping[str, float]]
     parts: Mapping[str, AnyEvaluator]
     cost: Mapping[str, float]
     score: float | None
@@ -66,7 +66,7 @@ class Note:
         """As written beside the predictions."""
         return {
             "index": self.index,
-            "figures": {name: known_json(one) for name, one in self.figures.items()},
+            "metrics": {name: known_json(one) for name, one in self.metrics.items()},
             **self.cost,
             "score": self.score,
             "mask": None if self.mask is None else known_json(self.mask),
@@ -123,18 +123,18 @@ class Scorer:
     def measured(self, index: int, sample: Sample, answer: Answer) -> Unwritten:
         """What there is to say of an answer, with the files that say it."""
         with self._blamed(index):
-            figures, parts = self._measure(sample, answer.prediction)
+            metrics, parts = self._measure(sample, answer.prediction)
             encoded = self._keeper and check_encoded(
                 self._keeper.encode_prediction(sample, answer.prediction, self._dataset.plan.info), "encode_prediction"
             )
         files = encoded.files if encoded else {}
         note = Note(
             index=index,
-            figures=figures,
+            metrics=metrics,
             parts=parts,
             cost={"model_s": answer.model_s, "defense_s": answer.defense_s},
             score=answer.score,
-            mask=None if answer.mask is None else mask_figures(sample, answer.mask),
+            mask=None if answer.mask is None else mask_metrics(sample, answer.mask),
             facts=encoded.facts if encoded else None,
             sha256={name: sha256(data) for name, data in files.items()},
         )
@@ -169,14 +169,14 @@ class Scorer:
                     raise DatasetError(inside(folder, name), "is not what was written")
             with explained(path):
                 prediction = self._keeper.decode_prediction(folder, sample, there["facts"], self._dataset.plan.info)
-            figures, parts = self._measure(sample, prediction)  # which it could when it was written
+            metrics, parts = self._measure(sample, prediction)  # which it could when it was written
         except DatasetError as error:
             return DatasetError(error.path, error.problem.partition(";")[0])
         except (ValueError, KeyError, TypeError) as error:
             return DatasetError(path, f"cannot be read again ({one_line(error)})")
         return Note(
             index=index,
-            figures=figures,
+            metrics=metrics,
             parts=parts,
             cost={"model_s": there["model_s"], "defense_s": there["defense_s"]},
             score=there["score"],
@@ -195,13 +195,13 @@ class Scorer:
 
     def _measure(self, sample: Sample, prediction: Any) -> tuple[dict[str, dict[str, float]], dict[str, AnyEvaluator]]:
         parts = {name: make() for name, make in self.makers.items()}
-        figures = {}
+        metrics = {}
         for name, part in parts.items():
             seen = sample
             if name == OUTSIDE_PATCH:
                 seen = self._task.without(sample, widened(patch_masks(sample)))  # type: ignore[attr-defined]
-            figures[name] = said_of(self._dataset.plan, part.update(seen, prediction), "update")
-        return figures, parts
+            metrics[name] = said_of(self._dataset.plan, part.update(seen, prediction), "update")
+        return metrics, parts
 
     @contextmanager
     def _blamed(self, index: int) -> Iterator[None]:
@@ -233,10 +233,10 @@ def _read_note(path: Path) -> dict[str, Any]:
         note: dict[str, Any] = {name: from_json(kind, there[name], name) for name, kind in KEPT.items()}
     except FieldError as error:
         raise DatasetError(path, f"is no note of a sample ({error})") from error
-    if note["mask"] is not None and note["mask"].keys() != set(MASK_FIGURES):
-        raise DatasetError(path, "is no note of a sample (mask: has other figures)")
+    if note["mask"] is not None and note["mask"].keys() != set(MASK_METRICS):
+        raise DatasetError(path, "is no note of a sample (mask: has other metrics)")
     return note
 
 
-def _with_nan(figures: Mapping[str, float | None]) -> dict[str, float]:
-    return {name: float("nan") if value is None else value for name, value in figures.items()}
+def _with_nan(metrics: Mapping[str, float | None]) -> dict[str, float]:
+    return {name: float("nan") if value is None else value for name, value in metrics.items()}

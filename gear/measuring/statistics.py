@@ -1,4 +1,4 @@
-"""How sure a figure is: bootstrap over samples (Efron 1979), 95 % by percentiles; sign flips for pairs of samples.
+"""How sure a metric is: bootstrap over samples (Efron 1979), 95 % by percentiles; sign flips for pairs of samples.
 
 Samples that show the same street are a cluster: they are drawn, and their differences flipped, together.
 """
@@ -35,12 +35,12 @@ Values = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Figures:
-    """The figures of one metric over one dataset.
+class Metrics:
+    """The metrics of one evaluator over one dataset.
 
     Attributes:
         overall: over all samples.
-        spread: (R,) over resampled ones, for the figures that have any.
+        spread: (R,) over resampled ones, for the metrics that have any.
         ceilings: what perfect predictions would come to, where that is less than 1.
     """
 
@@ -92,8 +92,8 @@ def gather(
     parts: Sequence[AnyEvaluator],
     draws: Draws,
     held: Callable[[Any], dict[str, float]] = dict,
-) -> Figures:
-    """Figures over evaluators that have seen one sample each.
+) -> Metrics:
+    """Metrics over evaluators that have seen one sample each.
 
     Args:
         fresh: makes an empty evaluator.
@@ -107,7 +107,7 @@ def gather(
     overall = held(whole.result())
     ceilings = dict(whole.ceilings()) if isinstance(whole, Limited) else {}
     if not draws.size:
-        return Figures(overall=overall, spread={}, ceilings=ceilings)
+        return Metrics(overall=overall, spread={}, ceilings=ceilings)
     spread: dict[str, Values] = {}
     counts = (draws != FILLED).sum(axis=1)
     for count in np.unique(counts):  # evaluators want as many samples in every draw
@@ -116,7 +116,7 @@ def gather(
         block = block[block != FILLED].reshape(len(rows), count)
         for name, values in _spread(fresh, whole, parts, block, overall).items():
             spread.setdefault(name, np.full(len(draws), np.nan))[rows] = values
-    return Figures(overall=overall, spread=spread, ceilings=ceilings)
+    return Metrics(overall=overall, spread=spread, ceilings=ceilings)
 
 
 def _spread(
@@ -126,11 +126,11 @@ def _spread(
     draws: Draws,
     names: Iterable[str],
 ) -> Mapping[str, Values]:
-    """(R,) figures over each draw, by the quickest way that the evaluator of all parts has."""
+    """(R,) metrics over each draw, by the quickest way that the evaluator of all parts has."""
     if isinstance(whole, Resampled):
         return whole.resampled(draws)
     if isinstance(whole, Additive):
-        return whole.figures(_added(parts, draws))
+        return whole.metrics(_added(parts, draws))
     rows = []
     for drawn in draws:
         one = fresh()
@@ -199,7 +199,7 @@ def paired_p(differences: Values, seed: int) -> Values:
     Unlike Wilcoxon's test this looks at the mean, which is what is reported, and has no trouble with ties.
 
     Args:
-        differences: (N, F), a column a figure; NaN where a sample has no value and does not count. Where some of them
+        differences: (N, F), a column a metric; NaN where a sample has no value and does not count. Where some of them
             are not independent, of clusters (`clustered`).
         seed: of the drawn patterns.
 
@@ -210,9 +210,9 @@ def paired_p(differences: Values, seed: int) -> Values:
     pairs = is_known.sum(axis=0)
     found = np.where(pairs > 0, _as_far(np.where(is_known, differences, 0.0), seed), np.nan)
     if not _is_exact(len(differences)):
-        for figure in np.flatnonzero(pairs):
-            if _is_exact(int(pairs[figure])):
-                found[figure] = _as_far(differences[is_known[:, figure], figure, None], seed)[0]
+        for metric in np.flatnonzero(pairs):
+            if _is_exact(int(pairs[metric])):
+                found[metric] = _as_far(differences[is_known[:, metric], metric, None], seed)[0]
     return found
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from gear.contracts.evaluation import Draws, Spread
 from gear.formats.coco import CATEGORY_NAMES, Annotation, Detection, Picture, dataset_json, results_json
 from gear.metrics.coco_curves import known_mean, matches, resampled
-from gear.metrics.single_picture import boxes, single_figures
+from gear.metrics.single_picture import boxes, single_metrics
 from gear.values.serial import Json
 
 SampleT = TypeVar("SampleT", contravariant=True)
@@ -53,14 +53,14 @@ class CocoEvaluator(Generic[SampleT]):
         return self._single(picture, prediction)
 
     def _single(self, picture: Picture, found: Sequence[Detection]) -> dict[str, float]:
-        """One picture's own figures."""
-        return self._figures(picture, found, 0.0)
+        """One picture's own metrics."""
+        return self._metrics(picture, found, 0.0)
 
     @staticmethod
-    def _figures(picture: Picture, found: Sequence[Detection], low_px: float) -> dict[str, float]:
+    def _metrics(picture: Picture, found: Sequence[Detection], low_px: float) -> dict[str, float]:
         """The same, where detections less high than `low_px` are no false alarms."""
         edges = [(_edges(item.box_xywh), item) for item in picture.annotations]
-        return single_figures(
+        return single_metrics(
             boxes([(box, item.category_id, 1.0) for box, item in edges if not item.is_crowd]),
             boxes([(one.box_px, one.category_id, one.score) for one in found]),
             np.array([box for box, item in edges if item.is_crowd]).reshape(-1, 4),
@@ -73,7 +73,7 @@ class CocoEvaluator(Generic[SampleT]):
         self.detections += other.detections
 
     def result(self) -> Mapping[str, float]:
-        """COCO's twelve figures for boxes (`ap`, `ap50`, …, `ar100`, …) and `ap_<category>` for what occurs; 0..1 or
+        """COCO's twelve metrics for boxes (`ap`, `ap50`, …, `ar100`, …) and `ap_<category>` for what occurs; 0..1 or
         NaN."""
         names = (*STATS, *RECALLS)
         occurring = sorted({item.category_id for item in _labelled(self.pictures)})
@@ -83,15 +83,15 @@ class CocoEvaluator(Generic[SampleT]):
         with contextlib.redirect_stdout(io.StringIO()):
             evaluation.accumulate()
             evaluation.summarize()
-        figures = {name: _known(value) for name, value in zip(names, evaluation.stats, strict=True)}
+        metrics = {name: _known(value) for name, value in zip(names, evaluation.stats, strict=True)}
         precision = evaluation.eval["precision"]
         for index, category_id in enumerate(evaluation.params.catIds):
             if category_id in occurring:
                 # Axes: IoU, recall, category, area (all first), detections a picture (100 last).
-                figures[f"ap_{CATEGORY_NAMES[category_id].replace(' ', '_')}"] = float(
+                metrics[f"ap_{CATEGORY_NAMES[category_id].replace(' ', '_')}"] = float(
                     precision[:, :, index, 0, -1].mean()
                 )
-        return figures
+        return metrics
 
     def resampled(self, draws: Draws) -> Spread:
         """`ap`, `ap50`, `ap75` and `ap_<category>`."""

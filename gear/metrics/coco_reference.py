@@ -59,7 +59,7 @@ class TallObjects(CocoEvaluator[SampleT]):
             if CATEGORY_NAMES[item.category_id] in CATEGORIES
         ]
         counted = [one for one in found if CATEGORY_NAMES[one.category_id] in CATEGORIES]
-        return self._figures(replace(picture, annotations=tuple(labels)), counted, low_px)
+        return self._metrics(replace(picture, annotations=tuple(labels)), counted, low_px)
 
     def _found(self) -> dict[str, Matches]:
         if not self.pictures:

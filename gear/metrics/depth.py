@@ -1,4 +1,4 @@
-"""Monocular depth: the figures of KITTI's devkit and the customary ones of Eigen et al.; means over pictures."""
+"""Monocular depth: the metrics of KITTI's devkit and the customary ones of Eigen et al.; means over pictures."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class DepthTruth(Protocol):
 
 
 class DepthEvaluator:
-    """Gathers the figures of every picture.
+    """Gathers the metrics of every picture.
 
     Plain names are the devkit's, over every pixel whose ground truth its 16-bit pictures can say, which end at 256 m,
     with predictions as far as those pictures can say them; `eigen_` names look at ground truth between 1 mm and
@@ -63,10 +63,10 @@ class DepthEvaluator:
     def __init__(self, *, max_depth_m: float = 80.0, crop: Crop = "none") -> None:
         self.max_depth_m = max_depth_m
         self.crop = crop
-        self.figures: dict[str, list[float]] = {}
+        self.metrics: dict[str, list[float]] = {}
 
     def update(self, sample: DepthTruth, prediction: FloatImage) -> Mapping[str, float]:
-        """Takes (H, W) metres; returns this picture's figures.
+        """Takes (H, W) metres; returns this picture's metrics.
 
         Raises:
             ValueError: the prediction has another shape, or is not positive and finite where there is ground truth.
@@ -83,7 +83,7 @@ class DepthEvaluator:
         other_truth_m, other_found_m = truth_m[others], prediction[others]
         if not np.isfinite(other_found_m).all() or (other_found_m <= 0).any():
             raise ValueError("prediction must be positive and finite wherever there is ground truth")
-        shared = _summed(truth_m[both], prediction[both])  # most pixels, and worked on once for both kinds of figures
+        shared = _summed(truth_m[both], prediction[both])  # most pixels, and worked on once for both kinds of metrics
         found = {}
         if self._wants_devkit:
             told = other_truth_m <= MAX_PNG_DEPTH_M
@@ -93,7 +93,7 @@ class DepthEvaluator:
         clipped_m = other_found_m[strays].clip(MIN_DEPTH_M, self.max_depth_m)
         found |= _eigen(shared + _summed(other_truth_m[strays], clipped_m))
         for name, value in found.items():
-            self.figures.setdefault(name, []).append(value)
+            self.metrics.setdefault(name, []).append(value)
         return found
 
     def _window(self, shape: tuple[int, ...]) -> npt.NDArray[np.bool_]:
@@ -105,8 +105,8 @@ class DepthEvaluator:
 
     def merge(self, other: Any) -> None:
         """Takes in the pictures of another one."""
-        for name, values in other.figures.items():
-            self.figures.setdefault(name, []).extend(values)
+        for name, values in other.metrics.items():
+            self.metrics.setdefault(name, []).extend(values)
 
     def result(self) -> Mapping[str, float]:
         """Means over pictures that have ground truth.
@@ -115,13 +115,13 @@ class DepthEvaluator:
         (squared error over squared depth); `eigen_d1` to `eigen_d3`, `eigen_abs_rel`, `eigen_sq_rel` (over depth),
         `eigen_rmse_m`, `eigen_rmse_log`, `eigen_log10`, `eigen_silog`.
         """
-        known = {name: [v for v in self.figures.get(name, []) if v == v] for name in self._names()}
+        known = {name: [v for v in self.metrics.get(name, []) if v == v] for name in self._names()}
         # Sorted, so that the order in which pictures came does not reach the last digit.
         return {name: float(np.mean(np.sort(values))) if values else float("nan") for name, values in known.items()}
 
     def resampled(self, draws: Draws) -> Spread:
         """Means over the drawn pictures; of single ones in the order that they came in."""
-        values = {name: np.array(self.figures.get(name, []), np.float64) for name in self._names()}
+        values = {name: np.array(self.metrics.get(name, []), np.float64) for name in self._names()}
         return {name: _known_means(one[draws]) for name, one in values.items() if len(one)}
 
     @staticmethod
@@ -132,7 +132,7 @@ class DepthEvaluator:
 class NearDepth(DepthEvaluator):
     """What a reference network is held to: whole pictures below 80 m, predictions clipped there; no sky.
 
-    The devkit's figures are not shown.
+    The devkit's metrics are not shown.
     """
 
     _wants_devkit = False
@@ -141,7 +141,7 @@ class NearDepth(DepthEvaluator):
         super().__init__(max_depth_m=80.0, crop="none")
 
     def update(self, sample: DepthTruth, prediction: FloatImage) -> Mapping[str, float]:
-        """Takes (H, W) metres; returns this picture's figures."""
+        """Takes (H, W) metres; returns this picture's metrics."""
         return _renamed(super().update(sample, prediction))
 
     def result(self) -> Mapping[str, float]:
@@ -160,10 +160,10 @@ def _known_means(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     return np.asarray(np.where(known, values, 0).sum(axis=1) / np.where(count, count, np.nan), np.float64)
 
 
-def _renamed(figures: Mapping[str, T]) -> dict[str, T]:
-    """Eigen's figures without their prefix."""
+def _renamed(metrics: Mapping[str, T]) -> dict[str, T]:
+    """Eigen's metrics without their prefix."""
     prefix = "eigen_"
-    plain = {name.removeprefix(prefix): value for name, value in figures.items() if name.startswith(prefix)}
+    plain = {name.removeprefix(prefix): value for name, value in metrics.items() if name.startswith(prefix)}
     first = {name: plain[name] for name in ("d1", "rmse_m")}
     return first | plain
 

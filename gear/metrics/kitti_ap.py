@@ -29,7 +29,7 @@ from gear.metrics.kitti_match import (
     matched_scores,
     picture_boxes,
 )
-from gear.metrics.single_picture import boxes, single_figures
+from gear.metrics.single_picture import boxes, single_metrics
 from gear.values.geometry import Array
 
 SampleT = TypeVar("SampleT", contravariant=True)
@@ -60,7 +60,7 @@ class KittiEvaluator(Generic[SampleT]):
         labels = self._labels_of(sample)
         self.pictures.append(picture_boxes(labels, prediction))
         wanted = [label for label in labels if label.type in NEIGHBOURS]
-        return single_figures(
+        return single_metrics(
             boxes([(label.box_px, TYPES.index(label.type), 1.0) for label in wanted]),
             boxes(
                 [(one.box_px, TYPES.index(one.type), one.score or 0.0) for one in prediction if one.type in NEIGHBOURS]
@@ -78,13 +78,13 @@ class KittiEvaluator(Generic[SampleT]):
         `<class>_<2d|bev|3d>_<easy|moderate|hard>_<r11|r40>` and `<class>_aos_…`, and `ap_3d_moderate`, the mean of the
         classes' `3d_moderate_r40`.
         """
-        figures: dict[str, float] = {}
+        metrics: dict[str, float] = {}
         for kind in NEIGHBOURS:
             for overlap in OVERLAPS:
                 for difficulty in DIFFICULTIES:
-                    self._add(figures, kind, difficulty, overlap)
-        known = [v for k in NEIGHBOURS if (v := figures[f"{k.lower()}_3d_moderate_r40"]) == v]
-        return {"ap_3d_moderate": float(np.mean(known)) if known else float("nan"), **figures}
+                    self._add(metrics, kind, difficulty, overlap)
+        known = [v for k in NEIGHBOURS if (v := metrics[f"{k.lower()}_3d_moderate_r40"]) == v]
+        return {"ap_3d_moderate": float(np.mean(known)) if known else float("nan"), **metrics}
 
     def resampled(self, draws: Draws) -> Spread:
         """`<class>_<2d|bev|3d>_moderate_r40` and `ap_3d_moderate`."""
@@ -113,12 +113,12 @@ class KittiEvaluator(Generic[SampleT]):
         most = {"ap_3d_moderate": float(np.mean(known)) if known else 1.0, **most}
         return {name: value for name, value in most.items() if value < 1}
 
-    def _add(self, figures: dict[str, float], kind: str, difficulty: Difficulty, overlap: Overlap) -> None:
+    def _add(self, metrics: dict[str, float], kind: str, difficulty: Difficulty, overlap: Overlap) -> None:
         chosen = [choose(picture, kind, difficulty, overlap) for picture in self.pictures]
         precision, orientation = curves(chosen)
         curve_by_name = {overlap: precision} | ({"aos": orientation} if overlap == "2d" else {})
         for name, curve in curve_by_name.items():
-            figures |= _at_recalls(f"{kind.lower()}_{name}_{difficulty.name}", curve)
+            metrics |= _at_recalls(f"{kind.lower()}_{name}_{difficulty.name}", curve)
 
 
 def _check(found: KittiLabel) -> None:

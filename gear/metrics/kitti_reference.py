@@ -38,11 +38,11 @@ class NearCars(KittiEvaluator[SampleT]):
 
     def result(self) -> Mapping[str, float]:
         """`car_bev_<moderate|easy|hard>_r40`, shares, 0..1; NaN where no label is to be found."""
-        figures = {}
+        metrics = {}
         for difficulty in _moderate_first():
             precision, _ = curves(self._chosen(difficulty))
-            figures[_name(difficulty)] = float(precision[1 : STEPS + 1].mean())
-        return figures
+            metrics[_name(difficulty)] = float(precision[1 : STEPS + 1].mean())
+        return metrics
 
     def resampled(self, draws: Draws) -> Spread:
         """All of them."""

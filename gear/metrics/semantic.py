@@ -36,7 +36,7 @@ COUNT = len(LABELS)
 PIECE_PX = 1 << 17
 
 Values = npt.NDArray[np.float64]
-"""One figure, or as many as there are draws."""
+"""One metric, or as many as there are draws."""
 
 
 class SegmentedSample(Protocol):
@@ -114,7 +114,7 @@ class SemanticEvaluator:
 
     def result(self) -> Mapping[str, float]:
         """`miou`, `iiou`, `category_miou`, `category_iiou`, `pixel_accuracy`, and `iou_<class>`; shares, 0..1."""
-        return {name: float(value) for name, value in self.figures(self.totals()).items()}
+        return {name: float(value) for name, value in self.metrics(self.totals()).items()}
 
     def totals(self) -> Mapping[str, npt.NDArray[Any]]:
         """The counts, (COUNT, COUNT) of pixels and (COUNT,) of weighted ones."""
@@ -126,18 +126,18 @@ class SemanticEvaluator:
             "category_fn": self.weighted_category_fn,
         }
 
-    def figures(self, totals: Mapping[str, npt.NDArray[Any]]) -> dict[str, Values]:
+    def metrics(self, totals: Mapping[str, npt.NDArray[Any]]) -> dict[str, Values]:
         """As `result`, of counts with any axes in front."""
         confusion = totals["confusion"]
         classes = self._classes(confusion)
-        figures = {
+        metrics = {
             "miou": _mean(classes),
             "iiou": _mean(_instance_iou(confusion, totals["tp"], totals["fn"])),
             "category_miou": _mean(_category_iou(confusion)),
             "category_iiou": _mean(_category_instance_iou(confusion, totals["category_tp"], totals["category_fn"])),
             "pixel_accuracy": _accuracy(confusion),
         }
-        return figures | {f"iou_{name.replace(' ', '_')}": value for name, value in classes.items()}
+        return metrics | {f"iou_{name.replace(' ', '_')}": value for name, value in classes.items()}
 
     def _classes(self, confusion: npt.NDArray[Any]) -> dict[str, Values]:
         """IoU by name of the classes that the mean is over, of one picture or of all."""
@@ -151,7 +151,7 @@ class PresentClasses(SemanticEvaluator):
     that they belong to, and the class itself is NaN: absent.
     """
 
-    def figures(self, totals: Mapping[str, npt.NDArray[Any]]) -> dict[str, Values]:
+    def metrics(self, totals: Mapping[str, npt.NDArray[Any]]) -> dict[str, Values]:
         """`miou` and `iou_<class>`; shares, 0..1, NaN for what does not occur."""
         classes = self._classes(totals["confusion"])
         return {"miou": _mean(classes)} | {f"iou_{name.replace(' ', '_')}": iou for name, iou in classes.items()}
@@ -217,14 +217,14 @@ def _instance_iou(confusion: npt.NDArray[Any], tp: Values, fn: Values) -> dict[s
 
 
 def _category_instance_iou(confusion: npt.NDArray[Any], tp: Values, fn: Values) -> dict[str, Values]:
-    figures = {}
+    metrics = {}
     for category in CATEGORIES:
         # Here, unlike elsewhere, the benchmark's script takes a caravan or a trailer for a vehicle that was found.
         ids = _ids(category, LABELS)
         if all(LABELS[i].has_instances for i in ids):
             hit, missed = tp[..., ids].sum(axis=-1), fn[..., ids].sum(axis=-1)
-            figures[category] = _quotient(hit, hit + missed + _false_positives(confusion, ids))
-    return figures
+            metrics[category] = _quotient(hit, hit + missed + _false_positives(confusion, ids))
+    return metrics
 
 
 def _accuracy(confusion: npt.NDArray[Any]) -> Values:

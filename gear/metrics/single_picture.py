@@ -39,7 +39,7 @@ def boxes(rows: Sequence[tuple[Sequence[float], int, float]]) -> Boxes:
     )
 
 
-def single_figures(labels: Boxes, found: Boxes, ignored_px: Array, low_px: float = 0.0) -> dict[str, float]:
+def single_metrics(labels: Boxes, found: Boxes, ignored_px: Array, low_px: float = 0.0) -> dict[str, float]:
     """`found_share` of the labels, NaN without any, and the number of `false_alarms`.
 
     Detections of at least 0.5, surest first, each take the label of their class that they overlap most, by 0.5 at

@@ -35,8 +35,8 @@ class WeightsFile:
         shapes: by key.
         metadata: as written, all texts. gear writes, as far as it knows: `model`, `task`, `gear` (version), `source`
             and `source_sha256` (of a published file), `licence`, `command`, `seed`, `look_hash` (of the training),
-            `measured_look_hash` (of the figures, where it is another), and as JSON `data` (what it was trained on),
-            `metrics` (figures by name), `intervals` (their bounds of 95 %), `options` (of the model, such as
+            `measured_look_hash` (of the metrics, where it is another), and as JSON `data` (what it was trained on),
+            `metrics` (values by name), `intervals` (their bounds of 95 %), `options` (of the model, such as
             `input_scale`), `look` (`gear.measuring.appearance_hash.Look`) and `averaged`
             (hashes of the two states whose mean it is).
     """

@@ -69,14 +69,14 @@ class Watching:
     def step(
         self,
         done: int,
-        figures: Mapping[str, float],
+        values: Mapping[str, float],
         patches: Callable[[], tuple[Patch, ...]],
         state: Callable[[], State],
     ) -> bool:
         """Remembers; never asks to end."""
         self.told.append(done)
         self.states.append(state())
-        assert all(isinstance(value, float) for value in figures.values())
+        assert all(isinstance(value, float) for value in values.values())
         assert all(isinstance(patch, Patch) for patch in patches())
         return False
 

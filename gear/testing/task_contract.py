@@ -42,8 +42,8 @@ class TaskContract:
     """Attributes:
     spec: the task.
     options: of its config, small enough for quick tests.
-    headline: name of the figure that tells better from worse.
-    perfect: what the figure is for a perfect prediction.
+    headline: name of the metric that tells better from worse.
+    perfect: what the metric is for a perfect prediction.
     repeats: how often samples are shown to the evaluator before it is read.
     """
 
@@ -188,7 +188,7 @@ class TaskContract:
         assert not difference(dict(parts[0].result()), dict(whole))
 
     def test_an_empty_evaluator_says_nan(self) -> None:
-        """Nothing gathered, no figure."""
+        """Nothing gathered, no metric."""
         result = self.task().evaluator().result()
         assert all(value != value for value in result.values())
 
@@ -224,8 +224,8 @@ class TaskContract:
             evaluator = task.evaluator()
             for _ in range(self.repeats):
                 evaluator.update(task.without(sample, masks), prediction)
-            figure = evaluator.result()[self.headline]
-            assert math.isnan(figure) if value else math.isclose(figure, self.perfect, abs_tol=1e-9)
+            metric = evaluator.result()[self.headline]
+            assert math.isnan(metric) if value else math.isclose(metric, self.perfect, abs_tol=1e-9)
 
     def test_reports_are_evaluators(self) -> None:
         """Where there are further reports, each takes the same samples and says NaN before."""
@@ -243,7 +243,7 @@ class TaskContract:
             assert picture.dtype == np.uint8 and picture.ndim == 3 and picture.shape[2] == 3
 
     def evaluate(self, indexes: Sequence[int], *, spoilt: bool = False) -> Mapping[str, float]:
-        """The figures of ground truth as a prediction, as it is or spoilt."""
+        """The metrics of ground truth as a prediction, as it is or spoilt."""
         result: Mapping[str, float] = self._gather(self.task().evaluator(), indexes, spoilt=spoilt).result()
         return result
 

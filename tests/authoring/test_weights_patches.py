@@ -37,7 +37,7 @@ from gear.testing.tiny_networks import tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import GearError, UnknownNameError
 from gear.verbs.evaluate.report import Difference, Estimate, EvaluateReport, PairedTest, RowReport
-from gear.verbs.gap.figures import PictureGap
+from gear.verbs.gap.picture_gap import PictureGap
 from gear.verbs.gap.report import GapReport, SampleGap
 
 MODELS = {
@@ -98,7 +98,7 @@ def test_every_command_is_one_that_gear_understands(task: str) -> None:
         args = parser.parse_args(step.arguments[1:])
         if step.name == "evaluate":
             folders = [f"{Path(args.out).parent}/{kind}" for kind in ("none", "random", "patched")]
-            assert args.data == folders and args.settings == ["weights=none"]
+            assert args.data == folders and args.model_set == ["weights=none"]
         if step.name == "attack":
             assert (args.settings, args.model_set, args.every) == (["batch=1"], ["weights=none"], 25)
         if step.name == "gap":
@@ -176,14 +176,14 @@ def write_results(root: Path, plan: PatchPlan) -> None:
         RowReport(
             name=f"test-{label}", dataset=root, facts={"patch": label}, samples=2, made=2, cost={}, defense={},
             damaged=(),
-            figures={"task": {"miou": Estimate(value=value)}}, per_sample=[],
+            metrics={"task": {"miou": Estimate(value=value)}}, per_sample=[],
         )
         for label, value in values.items()
     ]  # fmt: skip
     changes = [
         Difference(
             row=rows[here].name, against=rows[there].name, auroc=None,
-            figures={"task": {"miou": Estimate(value=-0.1 * here, interval=(-0.3, 0.0))}},
+            metrics={"task": {"miou": Estimate(value=-0.1 * here, interval=(-0.3, 0.0))}},
             paired={"outside_patch": {"miou": PairedTest(mean=-0.01 * (here + there), p=0.5, pairs=2)}},
         )
         for here, there in ((1, 0), (2, 0), (2, 1))
@@ -276,9 +276,9 @@ def test_a_patch_is_made_measured_taken_up_again_and_installed(
     results = json.loads((root / "evaluation/results.json").read_text())
     none, random, patched = results["rows"]
     assert (none["dataset"]["patch"], random["dataset"]["patch"]) == ("none", "random")
-    assert found["metric"]["none"] == none["figures"]["task"]["miou"]["value"]
-    assert found["metric"]["patched"] == patched["figures"]["task"]["miou"]["value"]
-    here, there = ([s["figures"]["outside_patch"]["miou"] for s in row["per_sample"]] for row in (patched, random))
+    assert found["metric"]["none"] == none["metrics"]["task"]["miou"]["value"]
+    assert found["metric"]["patched"] == patched["metrics"]["task"]["miou"]["value"]
+    here, there = ([s["metrics"]["outside_patch"]["miou"] for s in row["per_sample"]] for row in (patched, random))
     assert found["outside"]["mean"] == pytest.approx(sum(a - b for a, b in zip(here, there, strict=True)) / 4)
     assert found["outside"]["pairs"] == 4 and found["outside"]["p"] in [n / 16 for n in range(2, 17)]
     assert found["effect"]["rendered"] == pytest.approx(found["metric"]["patched"] - found["metric"]["none"])

@@ -53,13 +53,13 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def evaluation(run: Path, tmp_path: Path) -> Path:
-    figures = {"reference": {"miou": estimate(0.625), "iou_train": estimate(None)}}
-    row: dict[str, Any] = {"samples": 3, "figures": figures, "dataset": {"root": "held-out/suburb-billboard05"}}
+    metrics = {"reference": {"miou": estimate(0.625), "iou_train": estimate(None)}}
+    row: dict[str, Any] = {"samples": 3, "metrics": metrics, "dataset": {"root": "held-out/suburb-billboard05"}}
     loaded = build(SegmentationOptions(weights=str(run / "model.safetensors"), device="cpu"))
     results = {
         "model": {"name": MODEL, "weights_sha256": weights_digest(loaded)},
         "rows": [row, row],
-        "together": [{"patch": "none", "samples": 6, "figures": figures}],
+        "together": [{"patch": "none", "samples": 6, "metrics": metrics}],
     }
     (tmp_path / "results.json").write_text(json.dumps(results))
     return tmp_path
@@ -115,7 +115,7 @@ def test_other_weights_and_other_reports_are_refused(run: Path, evaluation: Path
     path.write_text(json.dumps(results | {"model": {"name": MODEL, "weights_sha256": "0"}}))
     with pytest.raises(GearError, match="not an evaluation of"):
         ship([run], evaluation, run.parents[1], tmp_path / "models")
-    path.write_text(json.dumps(results | {"together": [{"samples": 6, "figures": {}}]}))
+    path.write_text(json.dumps(results | {"together": [{"samples": 6, "metrics": {}}]}))
     with pytest.raises(GearError, match="no report 'reference'"):
         ship([run], evaluation, run.parents[1], tmp_path / "models")
     assert not (tmp_path / "models").exists()
@@ -128,7 +128,7 @@ def test_what_is_measured_again_keeps_its_numbers_and_its_history(run: Path, eva
     trained = Look(assets={"nowhere": "1"}, renderers=("filament",), light="before", mujoco="4.0")
     write(path, state, texts | {"look": json.dumps(to_json(trained))}, halves=True)
     results = json.loads((evaluation / "results.json").read_text())
-    results["together"][0]["figures"]["reference"]["miou"] = estimate(0.7)
+    results["together"][0]["metrics"]["reference"]["miou"] = estimate(0.7)
     (evaluation / "results.json").write_text(json.dumps(results))
     first = path.with_suffix(".md").read_text()
     assert renew(MODEL, evaluation, "Then the light changed.", models) == path

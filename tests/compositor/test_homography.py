@@ -15,7 +15,7 @@ from gear.plugins.build import build_task
 from gear.testing.synthetic import synthetic_frame
 from gear.testing.things import CAR, Thing, board
 from gear.values.optics import CameraEffects
-from gear.verbs.gap.figures import visible_mask
+from gear.verbs.gap.picture_gap import visible_mask
 
 from .conftest import MakeTwins
 

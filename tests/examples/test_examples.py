@@ -172,9 +172,9 @@ def test_networks_from_a_folder_have_a_row_in_each_task(home: Path) -> None:
         found = json.loads(gear(home, "evaluate", *words, "--resamples", "20", "--json"))
         assert found["model"]["name"] == f"transformers_{task}"
         (row,) = found["rows"]
-        assert row["samples"] == 2 and metric in row["figures"]["task"]
+        assert row["samples"] == 2 and metric in row["metrics"]["task"]
         if task != "detect2d":  # two small pictures may hold nothing to detect, and then there is no precision
-            assert row["figures"]["task"][metric]["value"] is not None
+            assert row["metrics"]["task"][metric]["value"] is not None
 
 
 def test_a_foreign_attack_makes_a_patch_that_goes_back_into_the_world(home: Path) -> None:

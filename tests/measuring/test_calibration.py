@@ -166,9 +166,9 @@ def test_what_learnt_from_more_samples_is_another_defense(small: Small, learner:
     plan = path.with_name("plan.json")
     plan.write_text(json.dumps(json.loads(plan.read_text()) | {"samples": 1}))
     facts: dict[str, Any] = {"model": "tiny_segmenter", "defense": "learner"}
-    evaluate(small(), calibration=fewer, out=tmp_path / "figures", resamples=0, **facts)
+    evaluate(small(), calibration=fewer, out=tmp_path / "metrics", resamples=0, **facts)
     with pytest.raises(GearError, match=r"something else \(calibration_samples.*1.*2.*use another --out"):
-        evaluate(small(), calibration=whole, out=tmp_path / "figures", resamples=0, **facts)
+        evaluate(small(), calibration=whole, out=tmp_path / "metrics", resamples=0, **facts)
     facts |= {"attack": "square", "queries": 4, "settings": ["height_px=12", "width_px=24"]}
     attack(small(), calibration=fewer, out=tmp_path / "patches", **facts)
     with pytest.raises(GearError, match=r"made otherwise \(calibration_samples"):

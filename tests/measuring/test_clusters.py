@@ -53,7 +53,7 @@ class Summed(Mean):
     def totals(self) -> Mapping[str, Any]:
         return {"sum": np.array(sum(self.values)), "count": np.array(len(self.values))}
 
-    def figures(self, totals: Mapping[str, Any]) -> Mapping[str, Any]:
+    def metrics(self, totals: Mapping[str, Any]) -> Mapping[str, Any]:
         return {"mean": totals["sum"] / totals["count"]}
 
 

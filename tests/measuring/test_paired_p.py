@@ -31,12 +31,12 @@ def test_samples_without_a_value_do_not_count() -> None:
 
 
 def test_few_pairs_are_exact_among_many_samples_too() -> None:
-    """A class that few pictures show, and a figure of all of them beside it."""
+    """A class that few pictures show, and a metric of all of them beside it."""
     table = np.full((30, 3), np.nan)
     table[[2, 11, 29], 0] = 1, 2, 3
     table[:14, 1] = table[:, 2] = 0.1
     found = paired_p(table, 0)
-    assert found[0] == 2 / 8, "3 pairs have 8 patterns, however many samples lack the figure"
+    assert found[0] == 2 / 8, "3 pairs have 8 patterns, however many samples lack the metric"
     assert found[1] < 0.002 and found[2] == 1 / (FLIPS + 1), "14 and 30 pairs are drawn, as they were"
 
 

@@ -54,7 +54,7 @@ def test_the_mean_is_over_what_occurs() -> None:
     assert "ap_bus" not in result
 
 
-def test_a_pictures_own_figures_know_width_from_height() -> None:
+def test_a_pictures_own_metrics_know_width_from_height() -> None:
     """The upper half of a car that is 100 wide and 60 high, and its left half."""
     upper, left = (found(0.9, box) for box in ((20, 20, 120, 51), (20, 20, 71, 80)))
     for half in (upper, left):
@@ -79,7 +79,7 @@ def test_merged_pictures_may_share_their_numbers() -> None:
     assert first.result()["ap"] == pytest.approx(2 / 3, abs=0.01), "what the other one found has come along"
 
 
-def test_categories_have_their_figures_over_all_sizes_and_a_hundred_detections() -> None:
+def test_categories_have_their_metrics_over_all_sizes_and_a_hundred_detections() -> None:
     small = (3, (150.0, 150.0, 20.0, 20.0), False)
     alarms = [found(0.9 - i / 1000, (10 * i, 180, 10 * i + 8, 188), category_id=1) for i in range(11)]
     metric = evaluator()

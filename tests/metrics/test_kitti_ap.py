@@ -221,8 +221,8 @@ def test_the_ceiling_is_what_ground_truth_itself_comes_to(cars: int, kind: type[
         evaluator.update([CAR], [replace(CAR, score=1 - number / 100)])
     ceilings = evaluator.ceilings()
     assert ceilings == {name: value for name, value in evaluator.result().items() if value < 1}
-    figure = "car_bev_moderate_r40"
-    assert ceilings.get(figure, 1.0) == pytest.approx((cars - 1) / 40)
+    metric = "car_bev_moderate_r40"
+    assert ceilings.get(metric, 1.0) == pytest.approx((cars - 1) / 40)
 
 
 def test_half_found_is_half_as_good() -> None:

@@ -1,4 +1,4 @@
-"""Figures over resampled pictures, and those that reference networks are held to."""
+"""Metrics over resampled pictures, and those that reference networks are held to."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_coco_over_drawn_pictures_is_pycocotools_over_them() -> None:
 def test_tall_objects_are_pycocotools_without_the_low_ones() -> None:
     """An independent run: only tall labels, detections cut at 32 px unless they lie on a label."""
     evaluator = gathered(TallObjects(same), range(60))
-    figures = evaluator.result()
+    metrics = evaluator.result()
     counts = {
         name: sum(
             not a.is_crowd and a.box_xywh[3] >= 32 and a.category_id == category
@@ -83,12 +83,12 @@ def test_tall_objects_are_pycocotools_without_the_low_ones() -> None:
         )
         for name, category in (("person", 1), ("car", 3), ("bus", 6))
     }
-    assert {name: figures[f"instances_{name}"] for name in counts} == counts
+    assert {name: metrics[f"instances_{name}"] for name in counts} == counts
     assert all(count >= 50 for count in counts.values())
-    assert np.isnan(figures["ap50_truck"]) and figures["instances_truck"] == 0
-    assert figures["ap50"] == pytest.approx(np.mean([figures[f"ap50_{name}"] for name in counts]))
+    assert np.isnan(metrics["ap50_truck"]) and metrics["instances_truck"] == 0
+    assert metrics["ap50"] == pytest.approx(np.mean([metrics[f"ap50_{name}"] for name in counts]))
     spread = evaluator.resampled(np.array([np.arange(60)]))
-    assert spread["ap50"][0] == pytest.approx(figures["ap50"]) and spread["ap50_car"][0] == figures["ap50_car"]
+    assert spread["ap50"][0] == pytest.approx(metrics["ap50"]) and spread["ap50_car"][0] == metrics["ap50_car"]
 
 
 def test_a_low_label_is_neither_missed_nor_a_false_alarm() -> None:
@@ -208,12 +208,12 @@ def test_absent_classes_are_left_out_and_train_with_them() -> None:
     said[9] = 31
     evaluator = PresentClasses()
     single = evaluator.update(Labels(truth, truth.astype(np.uint16)), said)
-    figures = evaluator.result()
-    assert single == {"miou": figures["miou"]}, "a picture's own figure is the report's, not the benchmark's"
-    assert figures["iou_road"] == pytest.approx(45 / 50) and figures["iou_sidewalk"] == pytest.approx(40 / 50)
-    assert np.isnan(figures["iou_car"]) and "iou_train" not in figures
-    assert figures["miou"] == pytest.approx((45 / 50 + 40 / 50) / 2)
-    assert len(figures) == 1 + 18
+    metrics = evaluator.result()
+    assert single == {"miou": metrics["miou"]}, "a picture's own metric is the report's, not the benchmark's"
+    assert metrics["iou_road"] == pytest.approx(45 / 50) and metrics["iou_sidewalk"] == pytest.approx(40 / 50)
+    assert np.isnan(metrics["iou_car"]) and "iou_train" not in metrics
+    assert metrics["miou"] == pytest.approx((45 / 50 + 40 / 50) / 2)
+    assert len(metrics) == 1 + 18
 
 
 @dataclass(frozen=True)
@@ -230,12 +230,12 @@ def test_near_depth_is_eigens_without_a_crop() -> None:
     near, whole = NearDepth(), DepthEvaluator(max_depth_m=80, crop="none")
     single = near.update(Depths(truth), said)
     whole.update(Depths(truth), said)
-    figures = near.result()
-    assert figures == {n.removeprefix("eigen_"): v for n, v in whole.result().items() if n.startswith("eigen_")}
+    metrics = near.result()
+    assert metrics == {n.removeprefix("eigen_"): v for n, v in whole.result().items() if n.startswith("eigen_")}
     known = np.isfinite(truth) & (truth < 80)
     clipped = np.minimum(said[known].astype(float), 80)
-    assert figures["rmse_m"] == pytest.approx(np.sqrt(np.mean((clipped - truth[known]) ** 2)))
-    assert single["d1"] == figures["d1"] and 0.2 < figures["d1"] < 1
+    assert metrics["rmse_m"] == pytest.approx(np.sqrt(np.mean((clipped - truth[known]) ** 2)))
+    assert single["d1"] == metrics["d1"] and 0.2 < metrics["d1"] < 1
 
 
 def test_a_single_picture_says_what_was_found_and_what_was_made_up() -> None:

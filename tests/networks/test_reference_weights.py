@@ -70,7 +70,7 @@ UNSEEN: dict[str, tuple[str, dict[str, tuple[float, float]]]] = {
     "stereo_centre_lite0": ("task", {"pedestrian_2d_moderate_r40": (0.05, 1)}),
     "retinanet_lite0_fpn": ("task", {"ap50": (0.25, 1)}),  # there are too few of everything for the other report
 }
-"""Between what each network's figures must lie on two pictures of a street and weather that it never saw; it does far
+"""Between what each network's metrics must lie on two pictures of a street and weather that it never saw; it does far
 better than the worse of them."""
 
 
@@ -106,8 +106,8 @@ def test_on_a_street_that_nobody_has_seen_before(path: Path, tmp_path: Path) -> 
     )  # fmt: skip
     report = evaluate(tmp_path / "data", model=path.stem, reports=["reference"], resamples=0, out=tmp_path / "out")
     name, bounds = UNSEEN[path.stem]
-    figures = report.rows[0].figures[name]
-    assert all(low < figures[key].value < high for key, (low, high) in bounds.items()), figures
+    metrics = report.rows[0].metrics[name]
+    assert all(low < metrics[key].value < high for key, (low, high) in bounds.items()), metrics
     if task == "stereo3d":
         pairs = found_pairs(tmp_path / "data", path.stem)
         off = [abs(found.location_m[2] / label.location_m[2] - 1) for label, found in pairs]

@@ -13,7 +13,7 @@ from gear.testing.task_contract import TaskContract
 
 @pytest.mark.parametrize(
     ("facts", "message"),
-    [({"protocol": 0}, "speaks protocol 0"), ({"figure": 3}, "figure must be a str"), ({"summary": " "}, "summary")],
+    [({"protocol": 0}, "speaks protocol 0"), ({"metric": 3}, "metric must be a str"), ({"summary": " "}, "summary")],
 )
 def test_the_contract_catches_a_spec_that_gear_refuses(facts: dict[str, Any], message: str) -> None:
     spec = dataclasses.replace(depth, **facts)

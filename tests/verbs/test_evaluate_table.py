@@ -1,4 +1,4 @@
-"""What the table of an evaluation says beside its figures."""
+"""What the table of an evaluation says beside its metrics."""
 
 from pathlib import Path
 
@@ -8,28 +8,28 @@ from gear.verbs.evaluate.table import table
 NAN = float("nan")
 
 
-def report(figures: dict[str, Estimate]) -> EvaluateReport:
+def report(metrics: dict[str, Estimate]) -> EvaluateReport:
     row = RowReport(
         name="test-none-0123", dataset=Path("data"), facts={"patch": "none"}, samples=3, made=3, damaged=(),
-        figures={"task": figures}, cost={"model_s": 0.1, "defense_s": 0.0}, defense={}, per_sample=[],
+        metrics={"task": metrics}, cost={"model_s": 0.1, "defense_s": 0.0}, defense={}, per_sample=[],
     )  # fmt: skip
     facts = {"task": {"name": "stereo3d"}, "model": {"name": "odd"}, "defense": None}
     return EvaluateReport(out=Path("out"), facts=facts, rows=(row,), together=(), differences=())
 
 
 def test_it_says_how_far_perfect_predictions_come_where_that_is_not_all_the_way() -> None:
-    figures = {"car_r11": Estimate(value=0.5), "car_r40": Estimate(value=0.05, ceiling=0.075)}
-    lines = table(report(figures)).splitlines()
+    metrics = {"car_r11": Estimate(value=0.5), "car_r40": Estimate(value=0.05, ceiling=0.075)}
+    lines = table(report(metrics)).splitlines()
     assert lines[-1] == "perfect predictions would come to car_r40 0.075 in test-none-0123"
     assert not any("perfect" in line for line in table(report({"car_r11": Estimate(value=0.5)})).splitlines())
 
 
-def test_figures_of_one_beginning_without_any_value_are_named_once() -> None:
-    figures = {
+def test_metrics_of_one_beginning_without_any_value_are_named_once() -> None:
+    metrics = {
         "car_r40": Estimate(value=0.5), "car_r11": Estimate(value=NAN), "bus_r40": Estimate(value=NAN),
         "van_r11": Estimate(value=NAN), "van_r40": Estimate(value=NAN),
     }  # fmt: skip
-    assert table(report(figures)).splitlines()[-1] == (
+    assert table(report(metrics)).splitlines()[-1] == (
         "nothing to measure for car_r11, bus_r40, van_* in test-none-0123"
     )
 

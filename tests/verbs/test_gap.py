@@ -1,4 +1,4 @@
-"""`gear gap`: the figures, the report, the effect on a model, and what bad input gets."""
+"""`gear gap`: the metrics, the report, the effect on a model, and what bad input gets."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from gear.measuring import plugin_selection
 from gear.testing.tiny_networks import tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import DatasetError, GearError
-from gear.verbs.gap.figures import PERFECT_DB, picture_gap
+from gear.verbs.gap.picture_gap import PERFECT_DB, picture_gap
 from gear.verbs.gap.run import sample_gaps, shown_patches
 from tests.verbs.conftest import Copy
 
@@ -32,7 +32,7 @@ def pair(tmp_path: Path, copy_small: Copy) -> tuple[Path, Path]:
     return copy_small("semseg", clean, probes=True), copy_small("semseg", twin, patch="random")
 
 
-def test_figures_tell_inside_from_outside() -> None:
+def test_metrics_tell_inside_from_outside() -> None:
     rng = np.random.default_rng(1)
     rendered = rng.integers(0, 200, (8, 10, 3), dtype=np.uint8)
     mask = np.zeros((8, 10), bool)
@@ -74,7 +74,7 @@ def test_a_patch_in_lamplight_is_composed_as_exactly(tmp_path: Path, copy_small:
     assert dark < 0.6 * day
 
 
-def test_a_models_figures_are_taken_digitally_and_rendered(
+def test_a_models_metrics_are_taken_digitally_and_rendered(
     pair: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     owner = SimpleNamespace(package="mujoco-gear", version="0")
@@ -83,17 +83,17 @@ def test_a_models_figures_are_taken_digitally_and_rendered(
     report = gear.gap(clean, twin=twin, model="tiny", compositors=("transport",), samples=1)
     assert set(report.effect) == {"clean", "transport", "rendered"}
     assert report.effect["clean"].keys() == report.effect["rendered"].keys()
-    figures: Any = report.as_json()["rendered_share_of_digital_effect"]["transport"]
-    assert all(value is None or isinstance(value, float) for value in figures.values())
+    metrics: Any = report.as_json()["rendered_share_of_digital_effect"]["transport"]
+    assert all(value is None or isinstance(value, float) for value in metrics.values())
     assert "rendered / digital" in report.table()
     (alone,) = report.sample_effects
     assert alone.index == 0 and alone.change.keys() == {"transport", "rendered"}
-    figure = report.shown_figure()
-    # One sample: its own figure is the whole's, and so is what the patch changes of it.
+    metric = report.shown_metric()
+    # One sample: its own metric is the whole's, and so is what the patch changes of it.
     for way, change in alone.change.items():
-        assert alone.clean[figure] == pytest.approx(report.effect["clean"][figure])
-        assert change[figure] == pytest.approx(report.effect[way][figure] - report.effect["clean"][figure])
-    assert f"{change[figure]:+.4f}" in report.table()
+        assert alone.clean[metric] == pytest.approx(report.effect["clean"][metric])
+        assert change[metric] == pytest.approx(report.effect[way][metric] - report.effect["clean"][metric])
+    assert f"{change[metric]:+.4f}" in report.table()
 
 
 def test_a_model_sees_what_is_pasted_over_a_hidden_board(pair: tuple[Path, Path]) -> None:

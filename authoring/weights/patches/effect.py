@@ -83,8 +83,8 @@ def _metric(plan: PatchPlan, evaluation: Json) -> Json:
     report, figure = plan.figure
     return {
         "figure": f"{report}.{figure}".removeprefix(f"{TASK}."),
-        **{kind: row["figures"][report].get(figure, {}).get("value") for kind, row in _rows(evaluation).items()},
-        "patched_minus_random": _change(evaluation)["figures"][report].get(figure),
+        **{kind: row["metrics"][report].get(figure, {}).get("value") for kind, row in _rows(evaluation).items()},
+        "patched_minus_random": _change(evaluation)["metrics"][report].get(figure),
     }
 
 

@@ -128,7 +128,7 @@ class PatchPlan:
         """The task's own figure: the report that it is of, and its name."""
         spec = find("task", self.task).spec
         assert isinstance(spec, TaskSpec)
-        report, _, name = spec.figure.rpartition(".")
+        report, _, name = spec.metric.rpartition(".")
         return report or TASK, name
 
     def seed(self, split: str) -> int:

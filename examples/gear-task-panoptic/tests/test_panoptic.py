@@ -38,8 +38,8 @@ class TestPanoptic(TaskContract):
                 assert segment["area"] == int((ids == segment["id"]).sum())
                 x, y, w, h = segment["bbox"]
                 assert (ids[y : y + h, x : x + w] == segment["id"]).sum() == segment["area"]
-        figures = reference_quality(tmp_path, table, lambda ids: ids)
-        assert figures == {"pq": 1.0, "things": 1.0, "stuff": 1.0}
+        metrics = reference_quality(tmp_path, table, lambda ids: ids)
+        assert metrics == {"pq": 1.0, "things": 1.0, "stuff": 1.0}
 
     @pytest.mark.filterwarnings("ignore")
     def test_cityscapes_own_evaluation_finds_it_perfect(self, tmp_path: Path) -> None:
@@ -57,14 +57,14 @@ class TestPanoptic(TaskContract):
         for path, data in files.items():
             (tmp_path / "results" / path).parent.mkdir(parents=True, exist_ok=True)
             (tmp_path / "results" / path).write_bytes(data)
-        figures = evaluatePanoptic(
+        metrics = evaluatePanoptic(
             str(tmp_path / "annotations/panoptic_val.json"),
             str(tmp_path / "annotations/panoptic_val"),
             str(tmp_path / "results/panoptic.json"),
             str(tmp_path / "results/panoptic"),
             str(tmp_path / "official.json"),
         )
-        assert {name: figures[name]["pq"] for name in ("All", "Things", "Stuff")} == {
+        assert {name: metrics[name]["pq"] for name in ("All", "Things", "Stuff")} == {
             "All": 1.0,
             "Things": 1.0,
             "Stuff": 1.0,

@@ -100,10 +100,10 @@ class Nes:
                 break
             grid = np.clip(grid + config.step * np.sign(slope), 0, 1).astype(np.float32)
             done += 1
-            figures = {"harm": float(np.mean(seen)), "queries_left": float(oracle.left)}
+            values = {"harm": float(np.mean(seen)), "queries_left": float(oracle.left)}
             state = {"grid": grid, "seed": np.int64(seed), "done": np.int64(done), **oracle.state()}
             made = partial(as_patches, self._spread_out(grid))
-            if watch is not None and watch.step(done, figures, made, partial(dict, state)):
+            if watch is not None and watch.step(done, values, made, partial(dict, state)):
                 break
         return as_patches(self._spread_out(grid))
 

@@ -96,7 +96,7 @@ class Square:
                 if harm > best:
                     textures, best = tried, harm
             done += 1
-            figures = {"harm": best, "queries_left": float(oracle.left)}
+            values = {"harm": best, "queries_left": float(oracle.left)}
             state = {
                 "textures": textures,
                 "seed": np.int64(seed),
@@ -104,7 +104,7 @@ class Square:
                 "best": np.float64(best),
                 **oracle.state(),
             }
-            if watch is not None and watch.step(done, figures, partial(as_patches, textures), partial(dict, state)):
+            if watch is not None and watch.step(done, values, partial(as_patches, textures), partial(dict, state)):
                 break
         return as_patches(textures)
 

@@ -44,8 +44,8 @@ class DepthConfig(CameraOptions):
 
     Attributes:
         max_depth_m: what lies farther has no ground truth.
-        eval_max_depth_m: what lies farther is not evaluated by the `eigen_` figures; 80 m is customary.
-        eval_crop: part of the picture that the `eigen_` figures look at.
+        eval_max_depth_m: what lies farther is not evaluated by the `eigen_` metrics; 80 m is customary.
+        eval_crop: part of the picture that the `eigen_` metrics look at.
     """
 
     width_px: int = 1224
@@ -139,7 +139,7 @@ class DepthTask:
         return np.where(np.isfinite(sample.depth_m), sample.depth_m, np.float32(self.config.max_depth_m))
 
     def evaluator(self) -> Evaluator[DepthSample, FloatImage]:
-        """The devkit's figures and Eigen's."""
+        """The devkit's metrics and Eigen's."""
         return DepthEvaluator(max_depth_m=self.config.eval_max_depth_m, crop=self.config.eval_crop)
 
     def reports(self) -> Mapping[str, Evaluator[DepthSample, FloatImage]]:
@@ -185,7 +185,7 @@ depth: TaskSpec[DepthConfig] = TaskSpec(
     views=(VIEW,),
     layout="leftImg8bit/<split>/rgb_%04d.png, gtFine/<split>/rgb_%04d.{png,tiff}, filenames/<split>_list{,_kitti}.txt",
     original_name="depth",
-    figure="eigen_d1",
+    metric="eigen_d1",
 )
 
 

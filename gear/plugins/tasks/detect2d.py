@@ -307,7 +307,7 @@ detect2d: TaskSpec[Detect2dConfig] = TaskSpec(
     views=(VIEW,),
     layout="images/<split>/rgb_%04d.png, annotations/<split>/coco_annotations.json, annotations/instances_<split>.json",
     original_name="2dod",
-    figure="ap50",
+    metric="ap50",
 )
 
 

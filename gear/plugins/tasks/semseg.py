@@ -162,7 +162,7 @@ class SemsegTask:
         return {"reference": PresentClasses()}
 
     def without(self, sample: SemsegSample, masks: Masks) -> SemsegSample:
-        """Unlabelled inside the mask, which no figure counts."""
+        """Unlabelled inside the mask, which no metric counts."""
         silent = masks[VIEW]
         return replace(
             sample,
@@ -206,7 +206,7 @@ semseg: TaskSpec[SemsegConfig] = TaskSpec(
     views=(VIEW,),
     layout="{leftImg8bit,gtFine,camera}/<split>/<city>/<city>_<sequence>_<frame>_*.{png,json}",
     original_name="ss",
-    figure="miou",
+    metric="miou",
 )
 
 

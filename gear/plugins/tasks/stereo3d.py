@@ -297,7 +297,7 @@ stereo3d: TaskSpec[Stereo3dConfig] = TaskSpec(
     views=(LEFT, RIGHT),
     layout="<split>/{image_2,image_3,calib,label_2}/%06d.{png,txt}, splits/<split>.txt, ImageSets/<split>.txt",
     original_name="3dod",
-    figure="reference.car_bev_moderate_r40",
+    metric="reference.car_bev_moderate_r40",
 )
 
 

@@ -47,7 +47,7 @@ class Recorder:
         patience: validations without a better one until the attack is ended; 0 for never.
         queries: of the budget, where they are what is counted.
         told: of the steps done and of those in all; of queries where they are counted.
-        curves: values by figure, one a step.
+        curves: values by name, one a step.
         judged: (step, harm) of every validation.
         best: the patches that did most harm there.
         is_asked: whether the attack pays it attention.
@@ -107,18 +107,18 @@ class Recorder:
     def step(
         self,
         done: int,
-        figures: Mapping[str, float],
+        values: Mapping[str, float],
         patches: Callable[[], tuple[Patch, ...]],
         state: Callable[[], State],
     ) -> bool:
-        """Notes the figures, validates and saves when it is time; True where validation says that it is enough."""
+        """Notes the values, validates and saves when it is time; True where validation says that it is enough."""
         self.done = done
-        for name, value in figures.items():
+        for name, value in values.items():
             curve = self.curves.setdefault(name, [float("nan")] * (done - 1))
             curve += [float("nan")] * (done - 1 - len(curve)) + [float(value)]
         if self.judge is not None and (done % self.every == 0 or done == self.steps):
             self._validate(done, patches())
-        self._queries_left = figures.get("queries_left")
+        self._queries_left = values.get("queries_left")
         now = time.monotonic()
         if now - self._saved >= SECONDS_BETWEEN and not self.stopped:  # what resumes is to come to the same end
             self.save(done, state())

@@ -40,7 +40,7 @@ def as_picture(patch: Patch) -> UInt8Image:
 def write_curves(
     root: Path, title: str, curves: Mapping[str, Sequence[float]], judged: Sequence[tuple[int, float]]
 ) -> None:
-    """Writes `figures/curves.png`: every figure over the steps, and the validations."""
+    """Writes `figures/curves.png`: every value over the steps, and the validations."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -1,4 +1,4 @@
-"""A task's figure as bars: one group a network and defense, one bar a kind of patch."""
+"""A task's metric as bars: one group a network and defense, one bar a kind of patch."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ def chart(task: TaskResult, form: Literal["svg", "pdf", "png"]) -> bytes:
         y_in += GAP_IN
     axis.set_yticks([at for at, _ in ticks], [name for _, name in ticks], fontsize=8)
     axis.invert_yaxis()
-    assert task.figure is not None
-    better = "less" if task.figure.less_is_better else "more"
-    axis.set_xlabel(f"{task.figure.title} ({better} is better)", fontsize=8)
+    assert task.metric is not None
+    better = "less" if task.metric.less_is_better else "more"
+    axis.set_xlabel(f"{task.metric.title} ({better} is better)", fontsize=8)
     axis.tick_params(axis="x", labelsize=8)
     axis.grid(axis="x", alpha=0.3)
     axis.set_axisbelow(True)

@@ -50,9 +50,9 @@ def page(report: BenchReport, plan: Plan) -> str:
     ]
     for task, contest in zip(report.tasks, plan.contests, strict=True):
         parts += [f"<h2>{_safe(title(task))}</h2>", _table(task)]
-        if task.figure is not None:
+        if task.metric is not None:
             drawn = base64.b64encode(chart(task, "svg")).decode()
-            name = _safe(f"bars of {task.figure.title} by network, defense and patch")
+            name = _safe(f"bars of {task.metric.title} by network, defense and patch")
             parts.append(f'<p><img alt="{name}" src="data:image/svg+xml;base64,{drawn}"></p>')
         parts += [_scenes(task), *_pictures(plan, contest)]
     policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
@@ -76,7 +76,7 @@ def _table(task: TaskResult) -> str:
 
 
 def _scenes(task: TaskResult) -> str:
-    """The figure scene by scene, kinds of patches as columns."""
+    """The metric scene by scene, kinds of patches as columns."""
     kinds = list(dict.fromkeys(at.patch for one in task.results for at in one.scenes))
     rows = []
     for one in task.results:

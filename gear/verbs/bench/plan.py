@@ -284,10 +284,10 @@ class Plan:
 
 
 def reports_of(contest: Contest) -> tuple[str, ...]:
-    """Reports that the tables read: the task's figure may be of one, and what a patch does beside itself is another."""
+    """Reports that the tables read: the task's metric may be of one, and what a patch does beside itself is another."""
     product = build(find("task", contest.name))
-    figure_report, dot, _ = contest.task.figure.partition(".")
-    wanted = [figure_report] if dot and isinstance(product, Reports) else []
+    metric_report, dot, _ = contest.task.metric.partition(".")
+    wanted = [metric_report] if dot and isinstance(product, Reports) else []
     return (*wanted, *([OUTSIDE_PATCH] if isinstance(product, Maskable) else []))
 
 

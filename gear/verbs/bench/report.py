@@ -11,11 +11,11 @@ from gear.measuring.plugin_selection import OUTSIDE_PATCH
 from gear.measuring.scoring import TASK
 from gear.values.serial import Json
 from gear.verbs.bench.plan import RANDOM
-from gear.verbs.evaluate.report import Difference, Estimate, EvaluateReport, Figures, PairedTest, Pool
-from gear.verbs.evaluate.table import figure_title
+from gear.verbs.evaluate.report import Difference, Estimate, EvaluateReport, Metrics, PairedTest, Pool
+from gear.verbs.evaluate.table import metric_title
 
 FOUND_SHARE = "found_share"
-"""Figure of single samples of tasks whose own figure no single sample has."""
+"""Metric of single samples of tasks whose own metric no single sample has."""
 
 
 COLUMNS = (
@@ -26,7 +26,7 @@ COLUMNS = (
     "weather",
     "patch",
     "samples",
-    "figure",
+    "metric",
     "value",
     "low",
     "high",
@@ -36,12 +36,12 @@ COLUMNS = (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Figure:
-    """The figure by which a task's networks are compared.
+class Metric:
+    """The metric by which a task's networks are compared.
 
     Attributes:
         report: that it is of; `task` is the task's own evaluator.
-        name: of the figure.
+        name: of the metric.
         less_is_better: whether it is an error.
     """
 
@@ -50,30 +50,30 @@ class Figure:
     less_is_better: bool = False
 
     @classmethod
-    def of(cls, figure: str, *, less_is_better: bool) -> Figure:
+    def of(cls, metric: str, *, less_is_better: bool) -> Metric:
         """Reads `miou` or `reference.car_bev_moderate_r40`."""
-        report, dot, name = figure.rpartition(".")
+        report, dot, name = metric.rpartition(".")
         return cls(report=report if dot else TASK, name=name, less_is_better=less_is_better)
 
     @property
     def title(self) -> str:
         """As tables have it."""
-        return figure_title(self.report, self.name)
+        return metric_title(self.report, self.name)
 
-    def among(self, figures: Figures) -> Estimate | None:
+    def among(self, metrics: Metrics) -> Estimate | None:
         """Its value, where it was measured."""
-        return figures.get(self.report, {}).get(self.name)
+        return metrics.get(self.report, {}).get(self.name)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SceneFigure:
-    """The task's figure in one scene.
+class SceneMetric:
+    """The task's metric in one scene.
 
     Attributes:
         scene, weather: where.
         patch: kind of patch that was shown.
         samples: that it is of.
-        value: of the figure.
+        value: of the metric.
     """
 
     scene: str
@@ -89,14 +89,14 @@ class Result:
 
     Attributes:
         model, defense: their names in the config; None for no defense.
-        evaluation: all figures.
-        scenes: the task's figure scene by scene.
+        evaluation: all metrics.
+        scenes: the task's metric scene by scene.
     """
 
     model: str
     defense: str | None
     evaluation: EvaluateReport
-    scenes: tuple[SceneFigure, ...]
+    scenes: tuple[SceneMetric, ...]
 
     def pool(self, patch: str) -> Pool:
         """All scenes with one kind of patch.
@@ -121,31 +121,31 @@ class TaskResult:
 
     Attributes:
         name: of the task.
-        figure: by which networks are compared; None where the task names none.
+        metric: by which networks are compared; None where the task names none.
         results: in the config's order.
     """
 
     name: str
-    figure: Figure | None
+    metric: Metric | None
     results: tuple[Result, ...]
 
     def value(self, pool: Pool) -> Estimate | None:
-        """The task's figure over a pool."""
-        return None if self.figure is None else self.figure.among(pool.figures)
+        """The task's metric over a pool."""
+        return None if self.metric is None else self.metric.among(pool.metrics)
 
     def change(self, one: Difference | None) -> Estimate | None:
-        """Of the task's figure."""
-        return None if self.figure is None or one is None else self.figure.among(one.figures)
+        """Of the task's metric."""
+        return None if self.metric is None or one is None else self.metric.among(one.metrics)
 
     def beside(self, one: Difference | None) -> tuple[str, PairedTest] | None:
-        """The test of what single samples lose, with the figure's name: outside the patch where the task can tell."""
+        """The test of what single samples lose, with the metric's name: outside the patch where the task can tell."""
         if one is None:
             return None
         report = OUTSIDE_PATCH if OUTSIDE_PATCH in one.paired else TASK
         tests = one.paired.get(report, {})
-        wanted = ("" if self.figure is None else self.figure.name, FOUND_SHARE, *tests)
+        wanted = ("" if self.metric is None else self.metric.name, FOUND_SHARE, *tests)
         name = next((name for name in wanted if name in tests), None)
-        return None if name is None else (figure_title(report, name), tests[name])
+        return None if name is None else (metric_title(report, name), tests[name])
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -172,25 +172,25 @@ class BenchReport:
         }
 
     def records(self) -> Iterator[Mapping[str, Json]]:
-        """The task's figure of every pool and every scene, one flat record each: the lines of bench.csv."""
+        """The task's metric of every pool and every scene, one flat record each: the lines of bench.csv."""
         for task in self.tasks:
             for one in task.results:
                 who = {"task": task.name, "model": one.model, "defense": one.defense or ""}
-                figure = "" if task.figure is None else task.figure.title
+                metric = "" if task.metric is None else task.metric.title
                 for pool in one.evaluation.pools:
                     value, samples = task.value(pool), pool.samples
                     if value is not None:
                         where = {"scene": "all", "weather": "all", "patch": pool.name, "samples": samples}
-                        yield {**who, **where, "figure": figure, **value.as_json()}
+                        yield {**who, **where, "metric": metric, **value.as_json()}
                 for at in one.scenes:
                     where = {"scene": at.scene, "weather": at.weather, "patch": at.patch, "samples": at.samples}
-                    yield {**who, **where, "figure": figure, **at.value.as_json()}
+                    yield {**who, **where, "metric": metric, **at.value.as_json()}
 
 
 def _task_json(task: TaskResult, out: Path) -> Json:
-    figure = task.figure
+    metric = task.metric
     return {
-        "figure": None if figure is None else {"name": figure.title, "less_is_better": figure.less_is_better},
+        "metric": None if metric is None else {"name": metric.title, "less_is_better": metric.less_is_better},
         "results": [_result_json(task, one, out) for one in task.results],
     }
 
@@ -205,7 +205,7 @@ def _result_json(task: TaskResult, one: Result, out: Path) -> Json:
             "value": None if value is None else value.as_json(),
             "against": None if against is None else against.against,
             "change": None if change is None else change.as_json(),
-            "beside": None if beside is None else {"figure": beside[0], **beside[1].as_json()},
+            "beside": None if beside is None else {"metric": beside[0], **beside[1].as_json()},
             "auroc": None if against is None or against.auroc is None else against.auroc.as_json(),
             "defense": dict(pool.as_json()["defense"]),
             "cost": dict(pool.cost),

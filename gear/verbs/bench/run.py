@@ -28,7 +28,7 @@ from gear.verbs.bench.chart import chart
 from gear.verbs.bench.config import BenchConfig
 from gear.verbs.bench.page import page
 from gear.verbs.bench.plan import Match, Plan, Step, Verb
-from gear.verbs.bench.report import COLUMNS, BenchReport, Figure, Result, SceneFigure, TaskResult
+from gear.verbs.bench.report import COLUMNS, BenchReport, Metric, Result, SceneMetric, TaskResult
 from gear.verbs.bench.scenes import calibration_scene, located, measured_scenes
 from gear.verbs.bench.table import text
 from gear.verbs.bench.validation import contests, find_attack
@@ -61,7 +61,7 @@ def bench(
 ) -> BenchReport:
     """Compares networks and defenses over scenes and patches, the whole way; takes up again what was begun.
 
-    Under `out` lie `report.html`, `table.txt`, `bench.csv` (one line a figure), `bench.json` and charts in `figures`;
+    Under `out` lie `report.html`, `table.txt`, `bench.csv` (one line a metric), `bench.json` and charts in `figures`;
     `data`, `patches` and `evaluations`, as the other verbs write them; and `bench.yml`, the config with every default
     filled in.
 
@@ -120,7 +120,7 @@ def bench(
     write_whole(root, "bench.json", dump_json(report.as_json()))
     write_whole(root, "table.txt", text(report).encode())
     for task, contest in zip(report.tasks, plan.contests, strict=True):
-        if task.figure is not None:
+        if task.metric is not None:
             write_whole(root, f"figures/{contest.folder}.pdf", chart(task, "pdf"))
     write_whole(root, "report.html", page(report, plan).encode())
     clear_scratch(root)
@@ -210,9 +210,9 @@ def _report(plan: Plan, root: Path, evaluations: dict[str, EvaluateReport]) -> B
     tasks = []
     for contest in plan.contests:
         spec = contest.task
-        figure = Figure.of(spec.figure, less_is_better=spec.less_is_better) if spec.figure else None
-        results = [_result(match, figure, evaluations[str(match.out)], plan) for match in plan.matches(contest)]
-        tasks.append(TaskResult(name=contest.name, figure=figure, results=tuple(results)))
+        metric = Metric.of(spec.metric, less_is_better=spec.less_is_better) if spec.metric else None
+        results = [_result(match, metric, evaluations[str(match.out)], plan) for match in plan.matches(contest)]
+        tasks.append(TaskResult(name=contest.name, metric=metric, results=tuple(results)))
     notes = [note for task in tasks for one in task.results for note in one.evaluation.facts.get("notes", [])]
     facts = {
         "config": to_plain(plan.config),
@@ -224,12 +224,12 @@ def _report(plan: Plan, root: Path, evaluations: dict[str, EvaluateReport]) -> B
     return BenchReport(out=root, facts=facts, tasks=tuple(tasks))
 
 
-def _result(match: Match, figure: Figure | None, evaluation: EvaluateReport, plan: Plan) -> Result:
+def _result(match: Match, metric: Metric | None, evaluation: EvaluateReport, plan: Plan) -> Result:
     places = [(kind, *place) for kind in match.pools for place in plan.places()]
     scenes = [
-        SceneFigure(scene=scene.label, weather=weather.label, patch=kind, samples=row.samples, value=value)
+        SceneMetric(scene=scene.label, weather=weather.label, patch=kind, samples=row.samples, value=value)
         for (kind, scene, weather), row in zip(places, evaluation.rows, strict=True)
-        if figure is not None and (value := figure.among(row.figures)) is not None
+        if metric is not None and (value := metric.among(row.metrics)) is not None
     ]
     return Result(
         model=match.model.label,

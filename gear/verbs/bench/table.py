@@ -13,16 +13,16 @@ ALONE = "-"
 
 
 def text(report: BenchReport) -> str:
-    """All tasks, then what the figures are of."""
+    """All tasks, then what the metrics are of."""
     parts = ["\n".join([title(task), *aligned(columns(task))]) for task in report.tasks]
     return "\n\n".join([*parts, "\n".join([legend(), *report.facts["notes"]])]) + "\n"
 
 
 def title(task: TaskResult) -> str:
-    """Name, figure, and which way is better."""
-    if task.figure is None:
+    """Name, metric, and which way is better."""
+    if task.metric is None:
         return task.name
-    return f"{task.name}: {task.figure.title} ({'less' if task.figure.less_is_better else 'more'} is better)"
+    return f"{task.name}: {task.metric.title} ({'less' if task.metric.less_is_better else 'more'} is better)"
 
 
 def legend() -> str:
@@ -43,8 +43,8 @@ def columns(task: TaskResult) -> list[list[str]]:
 
 def head(task: TaskResult) -> list[str]:
     """Titles of the columns."""
-    figure = "" if task.figure is None else task.figure.title
-    return ["network", "defense", "patch", figure, "change", "beside", "p", "AUROC", "mask IoU", "s/picture"]
+    metric = "" if task.metric is None else task.metric.title
+    return ["network", "defense", "patch", metric, "change", "beside", "p", "AUROC", "mask IoU", "s/picture"]
 
 
 def lines(task: TaskResult) -> Iterator[list[str]]:

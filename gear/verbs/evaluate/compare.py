@@ -15,7 +15,7 @@ from gear.dataset.reading import Dataset, scenes_of
 from gear.measuring.metric_checks import said_of
 from gear.measuring.scoring import Note, Scorer
 from gear.measuring.statistics import (
-    Figures,
+    Metrics,
     Values,
     auroc,
     auroc_interval,
@@ -44,7 +44,7 @@ class Measured:
         streets: that they show. Samples of one street are no independent ones.
         made: how many of them were predicted now.
         damaged: what was kept of some of them and could not be read.
-        spreads: figures that were gathered before, by report and number of samples: resampling takes long.
+        spreads: metrics that were gathered before, by report and number of samples: resampling takes long.
     """
 
     name: str
@@ -54,9 +54,9 @@ class Measured:
     streets: list[Street]
     made: int
     damaged: tuple[DatasetError, ...]
-    spreads: dict[tuple[str, int], Figures] = field(default_factory=dict, repr=False)
+    spreads: dict[tuple[str, int], Metrics] = field(default_factory=dict, repr=False)
 
-    def gathered(self, report: str, seed: int, resamples: int, count: int | None = None) -> Figures:
+    def gathered(self, report: str, seed: int, resamples: int, count: int | None = None) -> Metrics:
         """One report over the first `count` samples, all unless given; the same seed and resamples each time."""
         notes = self.notes[:count]
         key = (report, len(notes))
@@ -79,7 +79,7 @@ def streets_of(dataset: Dataset[Any]) -> list[Street]:
 
 
 def row_report(row: Measured, seed: int, resamples: int) -> RowReport:
-    """Figures, intervals and costs of one dataset."""
+    """Metrics, intervals and costs of one dataset."""
     notes = row.notes
     plan = row.dataset.plan
     return RowReport(
@@ -97,7 +97,7 @@ def row_report(row: Measured, seed: int, resamples: int) -> RowReport:
         samples=len(notes),
         made=row.made,
         damaged=tuple(str(error) for error in row.damaged),
-        figures=figures_of(row, seed, resamples),
+        metrics=metrics_of(row, seed, resamples),
         cost=mean_cost(notes),
         defense=mask_means(notes, has_patch=plan.info.patch_label != NO_PATCH),
         per_sample=[{k: v for k, v in note.as_json().items() if k != "facts"} for note in notes],
@@ -110,7 +110,7 @@ def mean_cost(notes: Sequence[Note]) -> dict[str, float]:
 
 
 def mask_means(notes: Sequence[Note], *, has_patch: bool) -> dict[str, float]:
-    """Figures of the defense's masks, as far as there are any.
+    """Metrics of the defense's masks, as far as there are any.
 
     Without a patch there is nothing to be found, only something to be covered by mistake.
     """
@@ -144,20 +144,20 @@ def together(rows: Sequence[Measured], seed: int, resamples: int) -> Iterable[To
                 patch=patch,
                 rows=tuple(row.name for row in members),
                 samples=len(one.notes),
-                figures=figures_of(one, seed, resamples),
+                metrics=metrics_of(one, seed, resamples),
             )
 
 
-def figures_of(row: Measured, seed: int, resamples: int) -> dict[str, dict[str, Estimate]]:
-    """Figures over all samples, with their intervals."""
-    figures = {}
+def metrics_of(row: Measured, seed: int, resamples: int) -> dict[str, dict[str, Estimate]]:
+    """Metrics over all samples, with their intervals."""
+    metrics = {}
     for report in row.scorer.makers:
         one = row.gathered(report, seed, resamples)
-        figures[report] = {
+        metrics[report] = {
             name: Estimate(value=value, interval=one.interval(name), ceiling=one.ceilings.get(name, 1.0))
             for name, value in one.overall.items()
         }
-    return figures
+    return metrics
 
 
 def as_one(name: str, members: Sequence[Measured]) -> Measured:
@@ -183,7 +183,7 @@ def difference(row: Measured, other: Measured, seed: int, resamples: int) -> Dif
     return Difference(
         row=row.name,
         against=other.name,
-        figures={
+        metrics={
             report: _paired(
                 row.gathered(report, seed, resamples, count), other.gathered(report, seed, resamples, count)
             )
@@ -194,7 +194,7 @@ def difference(row: Measured, other: Measured, seed: int, resamples: int) -> Dif
     )
 
 
-def _paired(one: Figures, other: Figures) -> dict[str, Estimate]:
+def _paired(one: Metrics, other: Metrics) -> dict[str, Estimate]:
     found = {}
     for name in one.overall:
         if name in other.overall:
@@ -207,10 +207,10 @@ def _paired(one: Figures, other: Figures) -> dict[str, Estimate]:
 def _tested(
     here: list[Note], there: list[Note], streets: list[Street], report: str, seed: int
 ) -> dict[str, PairedTest]:
-    """Of every figure that a single sample of the report has."""
-    names = list(dict.fromkeys(name for note in here for name in note.figures[report]))
+    """Of every metric that a single sample of the report has."""
+    names = list(dict.fromkeys(name for note in here for name in note.metrics[report]))
     ours, theirs = (
-        np.array([[note.figures[report].get(name, np.nan) for name in names] for note in notes], np.float64)
+        np.array([[note.metrics[report].get(name, np.nan) for name in names] for note in notes], np.float64)
         for notes in (here, there)
     )
     differences = _finite(ours) - _finite(theirs)

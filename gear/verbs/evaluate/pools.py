@@ -8,7 +8,7 @@ from pathlib import Path
 
 from gear.contracts.tasks import CONTROLS, NO_PATCH
 from gear.values.errors import GearError
-from gear.verbs.evaluate.compare import Measured, as_one, difference, figures_of, mask_means, mean_cost
+from gear.verbs.evaluate.compare import Measured, as_one, difference, mask_means, mean_cost, metrics_of
 from gear.verbs.evaluate.report import Pool
 
 Pools = Mapping[str, Sequence[str | Path]]
@@ -47,7 +47,7 @@ def pooled(rows: Sequence[Measured], pools: Pools, seed: int, resamples: int) ->
             name=name,
             rows=tuple(row.name for row in members),
             samples=len(one.notes),
-            figures=figures_of(one, seed, resamples),
+            metrics=metrics_of(one, seed, resamples),
             cost=mean_cost(one.notes),
             defense=mask_means(one.notes, has_patch=name != NO_PATCH),
             differences=tuple(

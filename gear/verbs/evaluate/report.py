@@ -13,12 +13,12 @@ from gear.values.serial import Json
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate:
-    """A figure with its bounds of 95 %.
+    """A metric with its bounds of 95 %.
 
     Attributes:
         value: NaN where nothing counts.
         interval: bounds by bootstrap over samples, or None.
-        ceiling: what perfect predictions of the same samples would come to, for figures that count up to 1.
+        ceiling: what perfect predictions of the same samples would come to, for metrics that count up to 1.
     """
 
     value: float
@@ -32,8 +32,8 @@ class Estimate:
         return value | ({"ceiling": self.ceiling} if self.ceiling < 1 else {})
 
 
-Figures = Mapping[str, Mapping[str, Estimate]]
-"""By report (`task` is the task's own evaluator), then by figure."""
+Metrics = Mapping[str, Mapping[str, Estimate]]
+"""By report (`task` is the task's own evaluator), then by metric."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,10 +47,10 @@ class RowReport:
         samples: how many it has.
         made: how many of them this run predicted.
         damaged: what a former run had kept and could not be read; a line for each sample that was predicted again.
-        figures: over all samples.
+        metrics: over all samples.
         cost: mean seconds a sample: `model_s`, `defense_s`.
-        defense: mean figures of the defense's mask; empty without one.
-        per_sample: each sample's own figures; JSON.
+        defense: mean metrics of the defense's mask; empty without one.
+        per_sample: each sample's own metrics; JSON.
     """
 
     name: str
@@ -59,7 +59,7 @@ class RowReport:
     samples: int
     made: int
     damaged: tuple[str, ...]
-    figures: Figures
+    metrics: Metrics
     cost: Mapping[str, float]
     defense: Mapping[str, float]
     per_sample: Json
@@ -75,7 +75,7 @@ class RowReport:
             "name": self.name,
             "dataset": self.facts,
             "samples": self.samples,
-            "figures": figures_json(self.figures),
+            "metrics": metrics_json(self.metrics),
             "cost": dict(self.cost),
             "defense": known_json(self.defense),
             "per_sample": self.per_sample,
@@ -90,13 +90,13 @@ class Together:
         patch: the label.
         rows: names of their rows.
         samples: of all of them.
-        figures: over all samples.
+        metrics: over all samples.
     """
 
     patch: str
     rows: tuple[str, ...]
     samples: int
-    figures: Figures
+    metrics: Metrics
 
     def as_json(self) -> Json:
         """As written into results.json."""
@@ -104,18 +104,18 @@ class Together:
             "patch": self.patch,
             "rows": list(self.rows),
             "samples": self.samples,
-            "figures": figures_json(self.figures),
+            "metrics": metrics_json(self.metrics),
         }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairedTest:
-    """Whether the samples' own figures differ between twins by more than chance.
+    """Whether the samples' own metrics differ between twins by more than chance.
 
     Attributes:
         mean: of the differences, over the pairs; NaN without any.
         p: two-sided, by `gear.measuring.statistics.paired_p`; NaN without pairs.
-        pairs: samples that have a figure in both.
+        pairs: samples that have a metric in both.
     """
 
     mean: float
@@ -133,14 +133,14 @@ class Difference:
 
     Attributes:
         row, against: names of the rows; what is said is `row` minus `against`.
-        figures: of the differences.
+        metrics: of the differences.
         auroc: how well the defense's score tells the rows apart, or None without scores.
-        paired: tests of the figures that single samples have, by report, then by figure.
+        paired: tests of the metrics that single samples have, by report, then by metric.
     """
 
     row: str
     against: str
-    figures: Figures
+    metrics: Metrics
     auroc: Estimate | None
     paired: Mapping[str, Mapping[str, PairedTest]]
 
@@ -149,7 +149,7 @@ class Difference:
         return {
             "row": self.row,
             "against": self.against,
-            "figures": figures_json(self.figures),
+            "metrics": metrics_json(self.metrics),
             "auroc": None if self.auroc is None else self.auroc.as_json(),
             "paired": {
                 report: {name: one.as_json() for name, one in tests.items()} for report, tests in self.paired.items()
@@ -165,16 +165,16 @@ class Pool:
         name: of the pool.
         rows: names of the datasets' rows.
         samples: of all of them.
-        figures: over all samples.
+        metrics: over all samples.
         cost: mean seconds a sample: `model_s`, `defense_s`.
-        defense: mean figures of the defense's mask; empty without one.
+        defense: mean metrics of the defense's mask; empty without one.
         differences: to the pools `none` and `random`, where these show the same scenes; `row` and `against` name pools.
     """
 
     name: str
     rows: tuple[str, ...]
     samples: int
-    figures: Figures
+    metrics: Metrics
     cost: Mapping[str, float]
     defense: Mapping[str, float]
     differences: tuple[Difference, ...]
@@ -185,7 +185,7 @@ class Pool:
             "name": self.name,
             "rows": list(self.rows),
             "samples": self.samples,
-            "figures": figures_json(self.figures),
+            "metrics": metrics_json(self.metrics),
             "cost": dict(self.cost),
             "defense": known_json(self.defense),
             "differences": [one.as_json() for one in self.differences],
@@ -198,7 +198,7 @@ class EvaluateReport:
 
     Attributes:
         out: folder of results.json, table.txt and the predictions.
-        facts: model, defense, task, seed, versions, notes for whoever reads the figures; JSON.
+        facts: model, defense, task, seed, versions, notes for whoever reads the metrics; JSON.
         rows: the datasets, in the order given.
         together: datasets that differ in more than their patch, by the patch's label.
         differences: between twins.
@@ -236,6 +236,6 @@ class EvaluateReport:
         raise KeyError(patch)
 
 
-def figures_json(figures: Figures) -> Json:
-    """By report, then by figure."""
-    return {report: {name: one.as_json() for name, one in rows.items()} for report, rows in figures.items()}
+def metrics_json(metrics: Metrics) -> Json:
+    """By report, then by metric."""
+    return {report: {name: one.as_json() for name, one in rows.items()} for report, rows in metrics.items()}

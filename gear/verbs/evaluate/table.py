@@ -9,20 +9,20 @@ from gear.measuring.scoring import TASK
 from gear.verbs.evaluate.report import Difference, Estimate, EvaluateReport, RowReport
 
 COLUMNS, FURTHER = 4, 2
-"""Figures that are shown, of the task's own and of each report; all are in results.json."""
+"""Metrics that are shown, of the task's own and of each report; all are in results.json."""
 
 
 def table(report: EvaluateReport) -> str:
-    """Datasets as rows, each report's first figures as columns, twins' differences below the dataset."""
+    """Datasets as rows, each report's first metrics as columns, twins' differences below the dataset."""
     columns = _columns(report)
-    head = ["", "samples", *(figure_title(*column) for column in columns), "model s", "defense s", "mask IoU", "AUROC"]
+    head = ["", "samples", *(metric_title(*column) for column in columns), "model s", "defense s", "mask IoU", "AUROC"]
     lines = []
     for row in report.rows:
         lines.append(_row(row, columns))
         lines += [_difference(one, report, columns) for one in report.differences if one.row == row.name]
     for pooled in report.together:
-        figures = [shown(pooled.figures.get(name, {}).get(figure)) for name, figure in columns]
-        lines.append([f"all with patch {pooled.patch}", str(pooled.samples), *figures, "", "", "", ""])
+        metrics = [shown(pooled.metrics.get(name, {}).get(metric)) for name, metric in columns]
+        lines.append([f"all with patch {pooled.patch}", str(pooled.samples), *metrics, "", "", "", ""])
     used = [i for i, title in enumerate(head) if title in ("", "samples") or any(line[i] for line in lines)]
     text = aligned([[line[i] for i in used] for line in [head, *lines]])
     guarded = report.facts["defense"]
@@ -35,28 +35,28 @@ def table(report: EvaluateReport) -> str:
 def _columns(report: EvaluateReport) -> list[tuple[str, str]]:
     seen: dict[tuple[str, str], None] = {}
     for row in report.rows:
-        for name, figures in row.figures.items():
-            listed = list(figures)[: COLUMNS if name == TASK else FURTHER]
-            seen |= dict.fromkeys((name, figure) for figure in listed)
+        for name, metrics in row.metrics.items():
+            listed = list(metrics)[: COLUMNS if name == TASK else FURTHER]
+            seen |= dict.fromkeys((name, metric) for metric in listed)
     return list(seen)
 
 
-def figure_title(report: str, figure: str) -> str:
-    """Of a column: the figure's name, after that of its report where it is not the task's own."""
-    return figure if report == TASK else f"{report}.{figure}"
+def metric_title(report: str, metric: str) -> str:
+    """Of a column: the metric's name, after that of its report where it is not the task's own."""
+    return metric if report == TASK else f"{report}.{metric}"
 
 
 def _row(row: RowReport, columns: Iterable[tuple[str, str]]) -> list[str]:
-    figures = [shown(row.figures.get(report, {}).get(name)) for report, name in columns]
+    metrics = [shown(row.metrics.get(report, {}).get(name)) for report, name in columns]
     defended = f"{row.cost['defense_s']:.3f}" if row.cost["defense_s"] else ""
     mask = number(row.defense.get("mask_iou")) if "mask_iou" in row.defense else ""
-    return [row.name, str(row.samples), *figures, f"{row.cost['model_s']:.3f}", defended, mask, ""]
+    return [row.name, str(row.samples), *metrics, f"{row.cost['model_s']:.3f}", defended, mask, ""]
 
 
 def _difference(one: Difference, report: EvaluateReport, columns: Iterable[tuple[str, str]]) -> list[str]:
     against = next(row for row in report.rows if row.name == one.against)
-    figures = [shown(one.figures.get(name, {}).get(figure), is_signed=True) for name, figure in columns]
-    return [f"  minus {against.patch}", "", *figures, "", "", "", shown(one.auroc)]
+    metrics = [shown(one.metrics.get(name, {}).get(metric), is_signed=True) for name, metric in columns]
+    return [f"  minus {against.patch}", "", *metrics, "", "", "", shown(one.auroc)]
 
 
 def _paired(report: EvaluateReport) -> list[str]:
@@ -65,9 +65,9 @@ def _paired(report: EvaluateReport) -> list[str]:
     for one in report.differences:
         against = next(row for row in report.rows if row.name == one.against)
         tests = [
-            f"{figure_title(name, figure)} {number(test.mean, is_signed=True)} (p {test.p:.2g}, {test.pairs} pairs)"
-            for name, figures in one.paired.items()
-            for figure, test in list(figures.items())[: COLUMNS if name == TASK else FURTHER]
+            f"{metric_title(name, metric)} {number(test.mean, is_signed=True)} (p {test.p:.2g}, {test.pairs} pairs)"
+            for name, metrics in one.paired.items()
+            for metric, test in list(metrics.items())[: COLUMNS if name == TASK else FURTHER]
             if test.pairs
         ]
         lines += [f"  {one.row} minus {against.patch}: {', '.join(tests)}"] if tests else []
@@ -75,7 +75,7 @@ def _paired(report: EvaluateReport) -> list[str]:
 
 
 def shown(one: Estimate | None, *, is_signed: bool = False) -> str:
-    """A figure with its interval; empty where there is none."""
+    """A metric with its interval; empty where there is none."""
     if one is None:
         return ""
     text = number(one.value, is_signed=is_signed)
@@ -92,12 +92,12 @@ def number(value: float | None, *, is_signed: bool = False) -> str:
 
 def _limited(report: EvaluateReport, columns: Iterable[tuple[str, str]]) -> list[str]:
     """Columns in which not even perfect predictions would come to 1, because a dataset has too little to be found."""
-    rows = [(row.name, row.figures) for row in report.rows]
-    rows += [(f"all with patch {pooled.patch}", pooled.figures) for pooled in report.together]
+    rows = [(row.name, row.metrics) for row in report.rows]
+    rows += [(f"all with patch {pooled.patch}", pooled.metrics) for pooled in report.together]
     lines = []
-    for name, figures in rows:
-        known = [(column, figures.get(column[0], {}).get(column[1])) for column in columns]
-        low = [f"{figure_title(*column)} {number(one.ceiling)}" for column, one in known if one and one.ceiling < 1]
+    for name, metrics in rows:
+        known = [(column, metrics.get(column[0], {}).get(column[1])) for column in columns]
+        low = [f"{metric_title(*column)} {number(one.ceiling)}" for column, one in known if one and one.ceiling < 1]
         lines += [f"perfect predictions would come to {', '.join(low)} in {name}"] if low else []
     return lines
 
@@ -106,8 +106,8 @@ def _absent(report: EvaluateReport) -> list[str]:
     """What had nothing to be measured on; rows and reports that agree share a line."""
     where: dict[tuple[str, ...], list[str]] = {}
     for row in report.rows:
-        for name, figures in row.figures.items():
-            missing = _families([figure for figure, one in figures.items() if one.value != one.value], figures)
+        for name, metrics in row.metrics.items():
+            missing = _families([metric for metric, one in metrics.items() if one.value != one.value], metrics)
             if missing:
                 where.setdefault(missing, []).append(row.name if name == TASK else f"{row.name} ({name})")
     return [f"nothing to measure for {', '.join(missing)} in {', '.join(rows)}" for missing, rows in where.items()]

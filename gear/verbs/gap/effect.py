@@ -22,23 +22,23 @@ from gear.values.progress import Progress
 
 CLEAN, RENDERED = "clean", "rendered"
 
-Figures = Mapping[str, float]
+Metrics = Mapping[str, float]
 """A task's metric by name."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SampleEffect:
-    """What patches change of one sample's own figures.
+    """What patches change of one sample's own metrics.
 
     Attributes:
         index: which sample.
-        clean: its figures without a patch; those that a single sample has.
-        change: what is added to them, by compositor's name and `rendered`; NaN where either figure is.
+        clean: its metrics without a patch; those that a single sample has.
+        change: what is added to them, by compositor's name and `rendered`; NaN where either metric is.
     """
 
     index: int
-    clean: Figures
-    change: Mapping[str, Figures]
+    clean: Metrics
+    change: Mapping[str, Metrics]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,7 +49,7 @@ class Effect:
         player: the model, behind its defense if there is one.
         plan: of the dataset.
         evaluators: by `clean`, a compositor's name, or `rendered`.
-        figure: of the task, the one that is to be looked at first.
+        metric: of the task, the one that is to be looked at first.
         notes: what the user may not have meant: that the model sees the pictures at another size than it learnt from,
             or what there is to say of the data that the defense learns from.
         samples: of those taken in so far.
@@ -58,7 +58,7 @@ class Effect:
     player: Player
     plan: Plan
     evaluators: Mapping[str, Evaluator[Any, Any]]
-    figure: str
+    metric: str
     notes: tuple[str, ...] = ()
     samples: list[SampleEffect] = field(default_factory=list)
 
@@ -97,7 +97,7 @@ class Effect:
             player=Player(chosen, guard, calibration=learnt, seed=seed),
             plan=dataset.plan,
             evaluators={name: dataset.task.evaluator() for name in names},
-            figure=spec.figure.rpartition(".")[2],
+            metric=spec.metric.rpartition(".")[2],
             notes=tuple(
                 line
                 for line in (size_note(chosen, dataset), *learnt.doubts(), learnt.note(dataset))
@@ -107,17 +107,17 @@ class Effect:
 
     def update(self, index: int, clean: Any, shown: Mapping[str, Any]) -> None:
         """Takes in one sample: untouched, and with patches, by compositor and rendered."""
-        alone: dict[str, Figures] = {}
+        alone: dict[str, Metrics] = {}
         for name, sample in {CLEAN: clean, **shown}.items():
             (answer,) = self.player.play([sample.images], [index])
             alone[name] = said_of(self.plan, self.evaluators[name].update(sample, answer.prediction), "update")
         before = alone.pop(CLEAN)
         change = {
-            name: {figure: figures.get(figure, math.nan) - value for figure, value in before.items()}
-            for name, figures in alone.items()
+            name: {metric: metrics.get(metric, math.nan) - value for metric, value in before.items()}
+            for name, metrics in alone.items()
         }
         self.samples.append(SampleEffect(index=index, clean=before, change=change))
 
-    def result(self) -> dict[str, Figures]:
+    def result(self) -> dict[str, Metrics]:
         """The metric of each."""
         return {name: said_of(self.plan, one.result(), "result") for name, one in self.evaluators.items()}

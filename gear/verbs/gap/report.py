@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gear.values.serial import Json, to_json
-from gear.verbs.gap.effect import CLEAN, RENDERED, Figures, SampleEffect
-from gear.verbs.gap.figures import PictureGap
+from gear.verbs.gap.effect import CLEAN, RENDERED, Metrics, SampleEffect
+from gear.verbs.gap.picture_gap import PictureGap
 
 UNMOVED = 1e-9
 """Changes of a metric below this are none; no share of them is taken."""
@@ -45,8 +45,8 @@ class GapReport:
         split, patch, renderer, quality: of both.
         samples: pictures that show a patch; others have no gap.
         effect: the task's metric by `clean`, compositor and `rendered`; empty without a model.
-        sample_effects: what patches change of single samples' figures, by sample.
-        figure: the task's own, that a table shows by sample, or another where single samples do not have it.
+        sample_effects: what patches change of single samples' metrics, by sample.
+        metric: the task's own, that a table shows by sample, or another where single samples do not have it.
         model: whose effect it is.
         defense: that it stands behind.
         seed: of what the defense draws.
@@ -59,9 +59,9 @@ class GapReport:
     renderer: str
     quality: str
     samples: tuple[SampleGap, ...]
-    effect: Mapping[str, Figures]
+    effect: Mapping[str, Metrics]
     sample_effects: tuple[SampleEffect, ...] = ()
-    figure: str = ""
+    metric: str = ""
     model: str | None
     defense: str | None = None
     seed: int = 0
@@ -77,7 +77,7 @@ class GapReport:
         return tuple(self.samples[0].gaps) if self.samples else ()
 
     def kept(self, compositor: str) -> dict[str, float]:
-        """Rendered change of each figure as a share of the digital one; figures that the patch does not move lack."""
+        """Rendered change of each metric as a share of the digital one; metrics that the patch does not move lack."""
         if not self.effect:
             return {}
         clean, digital, rendered = self.effect[CLEAN], self.effect[compositor], self.effect[RENDERED]
@@ -88,7 +88,7 @@ class GapReport:
         }
 
     def as_json(self) -> Json:
-        """Everything; figures that are not finite become null."""
+        """Everything; metrics that are not finite become null."""
         content = to_json(self)
         content["median_psnr_db"] = {name: self.median_db(name) for name in self.compositors}
         content["rendered_share_of_digital_effect"] = {name: self.kept(name) for name in self.compositors}
@@ -109,23 +109,23 @@ class GapReport:
             lines.append("no picture shows a patch")
         return "\n".join(lines + self._sample_lines() + self._effect_lines())
 
-    def shown_figure(self) -> str:
-        """The figure of single samples that the table shows: the task's, or the first that has a value."""
+    def shown_metric(self) -> str:
+        """The metric of single samples that the table shows: the task's, or the first that has a value."""
         known = [name for one in self.sample_effects for name, value in one.clean.items() if math.isfinite(value)]
-        return self.figure if self.figure in known else next(iter(known), "")
+        return self.metric if self.metric in known else next(iter(known), "")
 
     def _sample_lines(self) -> list[str]:
-        """Changes of one figure, sample by sample, and their means over the samples that have it."""
-        figure = self.shown_figure()
-        if not figure:
+        """Changes of one metric, sample by sample, and their means over the samples that have it."""
+        metric = self.shown_metric()
+        if not metric:
             return []
         columns = list(self.sample_effects[0].change)
-        head = f"{'sample':>6} {figure:>17}" + "".join(f"{name:>14}" for name in columns)
+        head = f"{'sample':>6} {metric:>17}" + "".join(f"{name:>14}" for name in columns)
         lines = ["", head + "   change with the patch"]
         rows = [
-            (one.index, [one.clean.get(figure, math.nan), *(one.change[name][figure] for name in columns)])
+            (one.index, [one.clean.get(metric, math.nan), *(one.change[name][metric] for name in columns)])
             for one in self.sample_effects
-            if figure in one.clean
+            if metric in one.clean
         ]
         lines += [f"{index:6} {_numbers(values)}" for index, values in rows]
         whole = [values for _, values in rows if np.isfinite(values).all()]
@@ -140,10 +140,10 @@ class GapReport:
         whose = f"{self.model or ''}{f' behind {self.defense}' if self.defense else ''}"
         lines = ["", f"{whose:28}" + "".join(f"{name:>14}" for name in columns) + "   rendered / digital"]
         shares = {name: self.kept(name) for name in self.compositors}
-        for figure in self.effect[CLEAN]:
-            values = "".join(f"{self.effect[name].get(figure, math.nan):14.4f}" for name in columns)
-            share = "".join(f"  {name} {share[figure]:.2f}" for name, share in shares.items() if figure in share)
-            lines.append(f"{figure:28}{values}{share}")
+        for metric in self.effect[CLEAN]:
+            values = "".join(f"{self.effect[name].get(metric, math.nan):14.4f}" for name in columns)
+            share = "".join(f"  {name} {share[metric]:.2f}" for name, share in shares.items() if metric in share)
+            lines.append(f"{metric:28}{values}{share}")
         return lines
 
     def summary(self) -> str:
@@ -157,7 +157,7 @@ def _cells(gap: PictureGap) -> str:
 
 
 def _numbers(values: Sequence[float]) -> str:
-    """A sample's figure and its changes; `-` where there is none."""
+    """A sample's metric and its changes; `-` where there is none."""
     first, *changes = [
         f"{value:{sign}.4f}" if math.isfinite(value) else "-"
         for sign, value in zip(["", *"+" * (len(values) - 1)], values, strict=True)

@@ -25,7 +25,7 @@ from gear.values.frames import UInt8Image
 from gear.values.progress import Progress, Warn
 from gear.values.rng import check_seed
 from gear.verbs.gap.effect import RENDERED, Effect
-from gear.verbs.gap.figures import picture_gap, visible_mask
+from gear.verbs.gap.picture_gap import picture_gap, visible_mask
 from gear.verbs.gap.report import GapReport, SampleGap
 from gear.verbs.gap.twin import check_clean, collect_twin
 
@@ -154,7 +154,7 @@ def gap(
         samples=tuple(found),
         effect={} if effect is None else effect.result(),
         sample_effects=() if effect is None else tuple(effect.samples),
-        figure="" if effect is None else effect.figure,
+        metric="" if effect is None else effect.metric,
         model=model,
         defense=defense,
         seed=seed,
@@ -174,7 +174,7 @@ def sample_gaps(
     index: int,
     effect: Effect | None,
 ) -> list[SampleGap]:
-    """The figures of each view of one sample that shows a patch."""
+    """The metrics of each view of one sample that shows a patch."""
     clean, rendered = pairs[index]
     composed: dict[str, dict[str, UInt8Image]] = {name: dict(clean.images) for name in engines}
     found = []

@@ -42,7 +42,7 @@ class TrainingState:
         broken: steps in a row, up to the last one, that were left out.
         steps: `step`, `loss`, `rate` of stretches of the training.
         open_losses: of steps that are in no stretch yet.
-        validations: `step`, `elapsed_s`, `took_s`, `loss` and figures of every validation.
+        validations: `step`, `elapsed_s`, `took_s`, `loss` and metrics of every validation.
     """
 
     step: int = 0

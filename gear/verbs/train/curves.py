@@ -1,4 +1,4 @@
-"""The figure of a training: losses, learning rate, the task's figure."""
+"""The curves of a training: losses, learning rate, the task's metric."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ def write_curves(root: Path, spec: TaskSpec, progress: TrainingState, title: str
     left.grid(alpha=0.3)
     left.legend(frameon=False, fontsize=8)
 
-    if spec.figure:
-        values = [entry.get(spec.figure, float("nan")) for entry in progress.validations]
+    if spec.metric:
+        values = [entry.get(spec.metric, float("nan")) for entry in progress.validations]
         right.plot(steps, values, "o-", color=GREEN, ms=3)
         right.axvline(progress.best_step, color=GREEN, lw=0.8, ls=":")
-    right.set(xlabel="step", ylabel=spec.figure)
+    right.set(xlabel="step", ylabel=spec.metric)
     right.grid(alpha=0.3)
     if progress.steps:
         rate = right.twinx()

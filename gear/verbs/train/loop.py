@@ -229,10 +229,10 @@ class Training:
         parts, progress = self._parts, self.progress
         with self._timed() as spent:
             parts.twin.module().load_state_dict(self._mean.state)
-            figures = validate(parts.twin, parts.found, parts.task, parts.validation, parts.views)
+            metrics = validate(parts.twin, parts.found, parts.task, parts.validation, parts.views)
         best = max((rank(old, parts.spec) for old in progress.validations), default=(-math.inf, -math.inf))
-        is_better = rank(figures, parts.spec) > best or not progress.validations
-        entry = {"step": progress.step, "elapsed_s": progress.elapsed_s, "took_s": spent[0], **figures}
+        is_better = rank(metrics, parts.spec) > best or not progress.validations
+        entry = {"step": progress.step, "elapsed_s": progress.elapsed_s, "took_s": spent[0], **metrics}
         progress.validations.append(entry)
         progress.worse = 0 if is_better else progress.worse + 1
         if is_better:
@@ -241,8 +241,8 @@ class Training:
         else:
             self._save()
         if self._on_step is not None:
-            chosen = {name: figures[name] for name in (parts.spec.figure,) if name in figures}
-            self._on_step(progress, self.share, chosen | figures)
+            chosen = {name: metrics[name] for name in (parts.spec.metric,) if name in metrics}
+            self._on_step(progress, self.share, chosen | metrics)
 
     def _keep_best(self) -> None:
         """The checkpoint goes first: of the step that it is of, it can make the weights again, and they not it."""

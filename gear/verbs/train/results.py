@@ -59,7 +59,7 @@ class Origin:
     look: Look
     picture_share: float
 
-    def metadata(self, figures: AnyMapping[str, Any]) -> dict[str, str]:
+    def metadata(self, metrics: AnyMapping[str, Any]) -> dict[str, str]:
         """What stands in the weights file: texts, those of several values as JSON."""
         data = {"training": self.training.facts(), "validation": self.validation.facts()}
         return {
@@ -72,7 +72,7 @@ class Origin:
             "look": json.dumps(to_json(self.look), sort_keys=True),
             "look_hash": self.look.hash,
             "data": json.dumps(data, sort_keys=True),
-            "metrics": json.dumps(known(figures), sort_keys=True),
+            "metrics": json.dumps(known(metrics), sort_keys=True),
             "options": json.dumps(self._options(), sort_keys=True),
         }
 
@@ -86,12 +86,12 @@ class Origin:
         return options
 
 
-def known(figures: AnyMapping[str, Any]) -> dict[str, Any]:
+def known(metrics: AnyMapping[str, Any]) -> dict[str, Any]:
     """Without what is no finite number, for JSON."""
-    return {key: value for key, value in figures.items() if not isinstance(value, float) or math.isfinite(value)}
+    return {key: value for key, value in metrics.items() if not isinstance(value, float) or math.isfinite(value)}
 
 
-def figures_of(validation: AnyMapping[str, Any]) -> dict[str, float]:
+def metrics_of(validation: AnyMapping[str, Any]) -> dict[str, float]:
     """A validation without its times."""
     return {key: value for key, value in validation.items() if key not in ("step", "elapsed_s", "took_s")}
 
@@ -111,8 +111,8 @@ def command_of(
 
 def packed(origin: Origin, state: AnyMapping[str, Tensor], progress: TrainingState) -> bytes:
     """The file of weights that were validated last, matrices in float16."""
-    figures = figures_of(progress.validations[-1])
-    return serialised(state, origin.metadata(figures), halves=True)
+    metrics = metrics_of(progress.validations[-1])
+    return serialised(state, origin.metadata(metrics), halves=True)
 
 
 def write_weights(root: Path, weights: bytes) -> None:
@@ -193,9 +193,9 @@ def card(root: Path, origin: Origin, progress: TrainingState) -> str:
         "",
         f"On {len(origin.validation)} held-out sample{'s' * (len(origin.validation) != 1)}, whole pictures, float32:",
         "",
-        "| figure | value |",
+        "| metric | value |",
         "|---|---|",
-        *(f"| {name} | {value:.4f} |" for name, value in known(figures_of(best)).items()),
+        *(f"| {name} | {value:.4f} |" for name, value in known(metrics_of(best)).items()),
         "",
         "![curves](curves.png)",
         "",

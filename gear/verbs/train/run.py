@@ -32,7 +32,7 @@ from gear.verbs.train.curves import write_curves
 from gear.verbs.train.data import TRAINING, VALIDATION, keep_some, spread
 from gear.verbs.train.feed import Feed
 from gear.verbs.train.loop import OnStep, Parts, Training
-from gear.verbs.train.results import WEIGHTS, Origin, command_of, figures_of, known, packed, write_history
+from gear.verbs.train.results import WEIGHTS, Origin, command_of, known, metrics_of, packed, write_history
 from gear.verbs.train.sizes import picture_scale, without_empty_margins
 from gear.verbs.train.starting import (
     begin_with,
@@ -63,8 +63,8 @@ class TrainReport:
         steps: how many were made in all.
         elapsed_s: time that they took, with validations.
         best_step: after which the weights stood.
-        figures: of the validation of those weights.
-        figure: name of the one that chose them; "" is the loss.
+        metrics: of the validation of those weights.
+        metric: name of the one that chose them; "" is the loss.
     """
 
     root: Path
@@ -72,13 +72,13 @@ class TrainReport:
     steps: int
     elapsed_s: float
     best_step: int
-    figures: dict[str, float]
-    figure: str
+    metrics: dict[str, float]
+    metric: str
 
     def summary(self) -> str:
         """One line for a person."""
-        name = self.figure or "loss"
-        value = self.figures.get(name, float("nan"))
+        name = self.metric or "loss"
+        value = self.metrics.get(name, float("nan"))
         return (
             f"{self.weights}: {name} {value:.4f} after step {self.best_step} of {self.steps} "
             f"({self.elapsed_s / 60:.1f} minutes)"
@@ -191,8 +191,8 @@ def train(
         steps=progress.step,
         elapsed_s=progress.elapsed_s,
         best_step=progress.best_step,
-        figures=known(figures_of(best)),
-        figure=spec.figure,
+        metrics=known(metrics_of(best)),
+        metric=spec.metric,
     )
 
 

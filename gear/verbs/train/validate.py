@@ -1,4 +1,4 @@
-"""Validation: the task's own figures and the network's own losses over held-out samples."""
+"""Validation: the task's own metrics and the network's own losses over held-out samples."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import torch
 from gear.contracts.evaluation import Reports
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Task
-from gear.dataset.output_checks import check_figures
+from gear.dataset.output_checks import check_metrics
 from gear.plugins.build import blamed
 from gear.plugins.catalogue import PluginEntry
 from gear.readers import TorchDataset, as_pictures
@@ -23,12 +23,12 @@ LOSS = "loss"
 def validate(
     model: Any, found: PluginEntry, task: Task[Any, Any], samples: Sequence[Any], views: Sequence[str]
 ) -> dict[str, float]:
-    """Figures over the samples, with the model in eval mode.
+    """Metrics over the samples, with the model in eval mode.
 
-    Those of the task's evaluator, those of its reports as `<report>.<figure>`, and `loss`, the mean of summed losses.
+    Those of the task's evaluator, those of its reports as `<report>.<metric>`, and `loss`, the mean of summed losses.
 
     Raises:
-        GearError: a prediction cannot be measured, or the task's figures are no numbers.
+        GearError: a prediction cannot be measured, or the task's metrics are no numbers.
         PluginError: a third party's network failed, or gives something else than losses and the task's predictions.
     """
     evaluators = {"": task.evaluator()}
@@ -53,17 +53,17 @@ def validate(
                         f"what the network says of a validation picture cannot be measured ({error}); if it came "
                         "apart, train again with a lower --lr in another --out"
                     ) from error
-    figures = {
+    metrics = {
         f"{prefix}{name}": value
         for prefix, evaluator in evaluators.items()
         for name, value in _said(evaluator.result()).items()
     }
-    return {**figures, LOSS: math.fsum(losses) / len(losses)}
+    return {**metrics, LOSS: math.fsum(losses) / len(losses)}
 
 
 def _said(given: Any) -> dict[str, float]:
     try:
-        return check_figures(given, "result of the task's evaluator")
+        return check_metrics(given, "result of the task's evaluator")
     except TypeError as error:
         raise GearError(str(error)) from error
 
@@ -80,10 +80,10 @@ def total(losses: Mapping[str, torch.Tensor]) -> torch.Tensor:
     return torch.stack([loss.float() for loss in losses.values()]).sum()
 
 
-def rank(figures: Mapping[str, float], spec: TaskSpec[Any]) -> tuple[float, float]:
-    """How good a validation is; larger is better. The task's figure decides, between equals the loss."""
-    loss = -figures[LOSS] if figures[LOSS] == figures[LOSS] else -math.inf
-    value = figures.get(spec.figure, math.nan)
+def rank(metrics: Mapping[str, float], spec: TaskSpec[Any]) -> tuple[float, float]:
+    """How good a validation is; larger is better. The task's metric decides, between equals the loss."""
+    loss = -metrics[LOSS] if metrics[LOSS] == metrics[LOSS] else -math.inf
+    value = metrics.get(spec.metric, math.nan)
     if value != value:
         return (-math.inf, loss)
     return (-value if spec.less_is_better else value, loss)

@@ -35,7 +35,7 @@ def average_weights(
 ) -> ConvertReport:
     """Writes `(1 - share) · first + share · second`; counters are the second's.
 
-    The file says what the second says, without figures; its data are those of both, and `averaged` names both hashes.
+    The file says what the second says, without metrics; its data are those of both, and `averaged` names both hashes.
 
     Args:
         first: a safetensors file, or the name of a model whose shipped weights are meant.

@@ -21,7 +21,7 @@ def test_a_defense_is_looked_through(small: Small, install: Install, tmp_path: P
 
 
 def test_a_defense_around_the_model_is_looked_through(small: Small, install: Install, tmp_path: Path) -> None:
-    """As gear evaluate has it, whose figures the attack is for."""
+    """As gear evaluate has it, whose metrics the attack is for."""
     install(tiny_segmenter, wrapping)
     facts: dict[str, Any] = {"model": "tiny_segmenter", "steps": 2, "settings": SMALL}
     plain = attack(small(), out=tmp_path / "plain", **facts)

@@ -1,4 +1,4 @@
-"""The figure of an attack's samples."""
+"""The metric of an attack's samples."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ class Curveless(Unwatched):
         return patches
 
 
-def test_steps_need_no_figures(small: Small, install: Install, tmp_path: Path) -> None:
+def test_steps_need_no_metrics(small: Small, install: Install, tmp_path: Path) -> None:
     spec = AttackSpec(name="curveless", summary="x.", config=Nothing, build=Curveless, needs_gradients=False)
     install(tiny_segmenter, spec)
     report = attack(

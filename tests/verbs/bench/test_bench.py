@@ -58,7 +58,7 @@ def test_the_whole_way_and_again(tmp_path: Path, written: Callable[..., Path]) -
     assert [pool.name for pool in blurred.evaluation.pools] == [*KINDS, "adaptive patch"]
     assert [pool.name for pool in unusual.evaluation.pools] == KINDS
     assert all(pool.samples == 4 for one in task.results for pool in one.evaluation.pools)
-    _check_figures(report)
+    _check_metrics(report)
     _check_files(out, report)
 
     before = {path: path.stat().st_mtime_ns for path in out.rglob("*.png")}
@@ -69,8 +69,8 @@ def test_the_whole_way_and_again(tmp_path: Path, written: Callable[..., Path]) -
     assert [(out / n).read_bytes() for n in ("bench.json", "table.txt", "report.html", "figures/semseg.pdf")] == texts
 
 
-def _check_figures(report: BenchReport) -> None:
-    """A pool is its scenes' samples as one data set, and its difference that of the figures."""
+def _check_metrics(report: BenchReport) -> None:
+    """A pool is its scenes' samples as one data set, and its difference that of the metrics."""
     (task,) = report.tasks
     for one in task.results:
         for pool in one.evaluation.pools:
@@ -79,7 +79,7 @@ def _check_figures(report: BenchReport) -> None:
             value, against = task.value(pool), one.against(pool)
             assert value is not None
             alone = [at.value.value for at in one.scenes if at.patch == pool.name]
-            assert [row.figures["task"]["miou"].value for row in rows] == alone
+            assert [row.metrics["task"]["miou"].value for row in rows] == alone
             if pool.name == "none":
                 assert against is None
                 continue
@@ -94,7 +94,7 @@ def _check_figures(report: BenchReport) -> None:
 
 def _check_files(out: Path, report: BenchReport) -> None:
     assert sorted(path.name for path in out.iterdir()) == [
-        "bench.csv", "bench.json", "bench.yml", "data", "evaluations", "figures", "patches", "report.html", "table.txt",
+        "bench.csv", "bench.json", "bench.yml", "data", "evaluations", "metrics", "patches", "report.html", "table.txt",
     ]  # fmt: skip
     written: Any = json.loads((out / "bench.json").read_text())
     assert written == json.loads(json.dumps(report.as_json()))
@@ -111,7 +111,7 @@ def _check_files(out: Path, report: BenchReport) -> None:
     assert all(against in shown for shown in (page, (out / "table.txt").read_text()))
     assert "other pictures of a scene in each weather" in page, "a patch is made on those of all weathers together"
     patched = 2 * 2  # against two networks, alone and behind a defense that is looked through
-    assert page.count("<figure>") == (1 + patched * (1 + 1)) + (1 + patched * (1 + 2))  # scenes of one and two surfaces
+    assert page.count("<metric>") == (1 + patched * (1 + 1)) + (1 + patched * (1 + 2))  # scenes of one and two surfaces
     assert "http" not in page.replace("http-equiv", "")
 
 

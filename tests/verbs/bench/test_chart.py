@@ -6,19 +6,19 @@ from pathlib import Path
 from typing import Any
 
 from gear.verbs.bench.chart import chart
-from gear.verbs.bench.report import Figure, Result, TaskResult
+from gear.verbs.bench.report import Metric, Result, TaskResult
 from gear.verbs.evaluate.report import Estimate, EvaluateReport, Pool
 
 
 def task(*values: Estimate) -> TaskResult:
     facts: dict[str, Any] = {"rows": (), "cost": {}, "defense": {}, "differences": ()}
     pools = tuple(
-        Pool(name=name, samples=1, figures={"task": {"ap": value}}, **facts)
+        Pool(name=name, samples=1, metrics={"task": {"ap": value}}, **facts)
         for name, value in zip(("none", "random"), values, strict=True)
     )
     evaluation = EvaluateReport(out=Path(), facts={}, rows=(), together=(), differences=(), pools=pools)
     result = Result(model="net", defense=None, evaluation=evaluation, scenes=())
-    return TaskResult(name="detect2d", figure=Figure(report="task", name="ap"), results=(result,))
+    return TaskResult(name="detect2d", metric=Metric(report="task", name="ap"), results=(result,))
 
 
 def whiskers(*values: Estimate) -> int:
@@ -26,7 +26,7 @@ def whiskers(*values: Estimate) -> int:
 
 
 def test_bars_without_an_interval_have_no_whisker() -> None:
-    """One of no length said that the figure is certain."""
+    """One of no length said that the metric is certain."""
     sure, bare = Estimate(value=0.4, interval=(0.3, 0.5)), Estimate(value=0.2)
     assert [whiskers(sure, sure), whiskers(sure, bare), whiskers(bare, bare)] == [2, 1, 0]
 

@@ -51,10 +51,10 @@ def test_more_pictures_to_attack(tmp_path: Path, written: Written, made: Made) -
     assert len(times(out, "attack")) > len(kept["attack"])
     assert (out / "patches/semseg/small/tiny-board/patch_0.png").read_bytes() != patch
     fresh = gear.bench(written(*more), out=tmp_path / "fresh")
-    figures, wanted = (
-        [[row.figures for row in one.evaluation.rows] for one in bench.tasks[0].results] for bench in (report, fresh)
+    metrics, wanted = (
+        [[row.metrics for row in one.evaluation.rows] for one in bench.tasks[0].results] for bench in (report, fresh)
     )
-    assert str(figures) == str(wanted), "the tables are those of a bench that was begun with so many"
+    assert str(metrics) == str(wanted), "the tables are those of a bench that was begun with so many"
     assert [line.split()[0] for line in looks.notes] == ["attack", "collect", "attack", "collect", "evaluate"]
     assert all("is made again, for what is there" in line for line in looks.notes)
     again = Looks()

@@ -1,4 +1,4 @@
-"""`gear evaluate` on tiny datasets: figures, files, resuming, defenses, and who is blamed."""
+"""`gear evaluate` on tiny datasets: metrics, files, resuming, defenses, and who is blamed."""
 
 from __future__ import annotations
 
@@ -54,10 +54,10 @@ def test_the_truth_scores_perfect_and_is_kept_in_the_formats_layout(
     report = evaluate(data, model="odd", out=tmp_path / "out", reports=["reference"], resamples=20)
     (row,) = report.rows
     assert (row.samples, row.made) == (2, 2)
-    figure, perfect = HEADLINES[task]
+    metric, perfect = HEADLINES[task]
     if task != "stereo3d":  # two pictures have too few labels for forty recall steps
-        assert row.figures["task"][figure].value == pytest.approx(perfect)
-    assert "reference" in row.figures
+        assert row.metrics["task"][metric].value == pytest.approx(perfect)
+    assert "reference" in row.metrics
     folder = tmp_path / "out" / row.name / "predictions"
     dataset = gear.open_dataset(data)
     for index, sample in enumerate(dataset):
@@ -124,7 +124,7 @@ def test_a_sample_whose_result_is_damaged_is_predicted_again_and_that_is_told(
     else:
         note.write_text({"note": "[]", "half": note.read_text()[:40], "key": '{"index": 1}'}[damage])
     again = evaluate(data, model="odd", out=out, resamples=0)
-    assert again.rows[0].made == 1 and again.rows[0].figures == first.rows[0].figures
+    assert again.rows[0].made == 1 and again.rows[0].metrics == first.rows[0].metrics
     (told,) = again.rows[0].damaged
     assert str(row) in told and "0001" in told
     assert timeless(out) == whole
@@ -228,8 +228,8 @@ def test_the_official_script_finds_the_predictions_and_agrees(
     with contextlib.redirect_stdout(io.StringIO()):
         found = [tool.getPrediction(args, truth) for truth in truths]
         scores = tool.evaluateImgLists(found, truths, args)
-    assert row.figures["task"]["miou"].value == pytest.approx(scores["averageScoreClasses"])
-    assert 0 < row.figures["task"]["category_miou"].value == pytest.approx(scores["averageScoreCategories"])
+    assert row.metrics["task"]["miou"].value == pytest.approx(scores["averageScoreClasses"])
+    assert 0 < row.metrics["task"]["category_miou"].value == pytest.approx(scores["averageScoreCategories"])
 
 
 def test_batches_and_threads_change_nothing(tmp_path: Path, small: Small, install: Install) -> None:
@@ -240,8 +240,8 @@ def test_batches_and_threads_change_nothing(tmp_path: Path, small: Small, instal
     one, two = timeless(tmp_path / "one"), timeless(tmp_path / "two")
     assert one == two
     assert len(one["model"]["weights_sha256"]) == 64
-    figure = one["rows"][0]["figures"]["task"]["pixel_accuracy"]
-    assert 0 <= figure["low"] <= figure["value"] <= figure["high"] <= 1 and figure["low"] < figure["high"]
+    metric = one["rows"][0]["metrics"]["task"]["pixel_accuracy"]
+    assert 0 <= metric["low"] <= metric["value"] <= metric["high"] <= 1 and metric["low"] < metric["high"]
     assert [s["index"] for s in one["rows"][0]["per_sample"]] == [0, 1, 2, 3, 4]
 
 
@@ -309,8 +309,8 @@ def test_a_built_in_defense_by_the_command(
     assert said.endswith("}\n")
     facts = json.loads(said)
     assert facts["defense"]["options"]["quality"] == 5 and facts["model"]["name"] == "tiny_depth"
-    plain_figure = timeless(tmp_path / "plain")["rows"][0]["figures"]["task"]["mae_m"]["value"]
-    assert facts["rows"][0]["figures"]["task"]["mae_m"]["value"] != plain_figure
+    plain_metric = timeless(tmp_path / "plain")["rows"][0]["metrics"]["task"]["mae_m"]["value"]
+    assert facts["rows"][0]["metrics"]["task"]["mae_m"]["value"] != plain_metric
     assert facts == json.loads((tmp_path / "jpeg/results.json").read_text())
 
 

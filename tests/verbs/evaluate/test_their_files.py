@@ -58,15 +58,15 @@ def test_of_a_prediction(
 
 
 UNCOUNTABLE: list[tuple[Any, str]] = [
-    (None, "{} must give figures by name, got NoneType"),
-    ({"mae_m": "low"}, "{}: figure 'mae_m' must be a number, got str"),
-    ({3: 0.5}, "{}: figure 3 must be a number, got float"),
+    (None, "{} must give metrics by name, got NoneType"),
+    ({"mae_m": "low"}, "{}: metric 'mae_m' must be a number, got str"),
+    ({3: 0.5}, "{}: metric 3 must be a number, got float"),
 ]
 
 
 @pytest.mark.parametrize("method", ["update", "result"])
 @pytest.mark.parametrize(("given", "message"), UNCOUNTABLE)
-def test_of_figures(
+def test_of_metrics(
     tmp_path: Path,
     small: Small,
     install: Install,

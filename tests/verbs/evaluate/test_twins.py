@@ -1,4 +1,4 @@
-"""`gear evaluate` over several datasets: twins compared and tested, rows together, figures outside the patch."""
+"""`gear evaluate` over several datasets: twins compared and tested, rows together, metrics outside the patch."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ def test_twins_are_compared_and_the_patch_can_be_left_out(tmp_path: Path, small:
     install(model_spec(lambda _: Oracle(roots, fooled), "semseg"))
     report = evaluate(roots, model="odd", out=tmp_path / "out", reports=["outside_patch"], resamples=50)
     none, random = report.row("none"), report.row("random")
-    assert none.figures["task"]["miou"].value == 1
+    assert none.metrics["task"]["miou"].value == 1
     # The board is "static" in Cityscapes, which is not evaluated: nothing is lost by being wrong there.
     board = {p for s in gear.open_dataset(roots[0]) for p in np.unique(s.label_ids[patch_masks(s)["left"]]).tolist()}
-    assert board == {4} and random.figures["task"]["miou"].value == 1
+    assert board == {4} and random.metrics["task"]["miou"].value == 1
     (difference,) = report.differences
     assert (difference.row, difference.against) == (random.name, none.name)
-    assert difference.figures["task"]["miou"].value == 0 and difference.auroc is None
+    assert difference.metrics["task"]["miou"].value == 0 and difference.auroc is None
     assert {name: (test["miou"].mean, test["miou"].p) for name, test in difference.paired.items()} == {
         "task": (0, 1), "outside_patch": (0, 1),
     }  # fmt: skip
@@ -72,10 +72,10 @@ def test_pools_are_datasets_that_count_as_one(tmp_path: Path, small: Small, inst
     none, random, first = report.pools
     assert (none.name, none.samples, none.differences) == ("none", 6, ())
     assert none.rows == tuple(row.name for row in report.rows[:2])
-    assert [one.figures["task"]["mae_m"].value for one in report.pools] == pytest.approx([1, 2, 2], rel=1e-5)
+    assert [one.metrics["task"]["mae_m"].value for one in report.pools] == pytest.approx([1, 2, 2], rel=1e-5)
     (change,) = random.differences
     assert (change.row, change.against) == ("random", "none") and change.paired["task"]["mae_m"].pairs == 6
-    assert change.figures["task"]["mae_m"].value == pytest.approx(1, rel=1e-5)
+    assert change.metrics["task"]["mae_m"].value == pytest.approx(1, rel=1e-5)
     assert first.differences == (), "it shows fewer scenes than the others"
     assert json.loads((tmp_path / "out/results.json").read_text())["pools"][1] == random.as_json()
     for wrong, said in (({"none": []}, "'none' holds no dataset"), ({"a": [tmp_path / "no"]}, "not among the data")):
@@ -107,11 +107,11 @@ def test_a_street_in_two_weathers_is_no_two_streets(tmp_path: Path, install: Ins
     assert one.paired["task"]["mae_m"].p == whole.paired["task"]["mae_m"].p == 2 / 2**4
     assert whole.paired["task"]["mae_m"].pairs == 8
     together = next(row for row in report.together if row.patch == "random")
-    alone = report.rows[1].figures["task"]["mae_m"].interval
+    alone = report.rows[1].metrics["task"]["mae_m"].interval
     assert alone is not None and alone[0] < alone[1] - 1
-    for figures in (report.pools[1].figures, together.figures, whole.figures):
-        wanted = one.figures["task"]["mae_m"].interval if figures is whole.figures else alone
-        assert figures["task"]["mae_m"].interval == pytest.approx(wanted, rel=1e-3)
+    for metrics in (report.pools[1].metrics, together.metrics, whole.metrics):
+        wanted = one.metrics["task"]["mae_m"].interval if metrics is whole.metrics else alone
+        assert metrics["task"]["mae_m"].interval == pytest.approx(wanted, rel=1e-3)
 
 
 def test_a_pool_counts_nothing_twice_and_leaves_nothing_out(tmp_path: Path) -> None:
@@ -144,9 +144,9 @@ def test_datasets_of_one_label_have_a_row_together(tmp_path: Path, small: Small,
             whole.update(sample, dataset.task.as_prediction(sample) + error_m)
     (pooled,) = report.together
     assert (pooled.patch, pooled.samples, pooled.rows) == ("none", 3, tuple(row.name for row in report.rows))
-    figures = pooled.figures["task"]
-    assert {name: one.value for name, one in figures.items()} == pytest.approx(dict(whole.result()), nan_ok=True)
-    assert figures["mae_m"].interval is not None and figures["mae_m"].interval[0] < figures["mae_m"].value
+    metrics = pooled.metrics["task"]
+    assert {name: one.value for name, one in metrics.items()} == pytest.approx(dict(whole.result()), nan_ok=True)
+    assert metrics["mae_m"].interval is not None and metrics["mae_m"].interval[0] < metrics["mae_m"].value
     assert "all with patch none" in (tmp_path / "out" / "table.txt").read_text()
     alone = evaluate(roots[:1], model="odd", out=tmp_path / "alone", resamples=50)
     assert alone.together == ()
@@ -176,34 +176,34 @@ def test_twins_are_tested_sample_by_sample(tmp_path: Path, small: Small, install
     assert 0 < difference.paired["task"]["mae_m"].mean < test.mean
     written = json.loads((tmp_path / "out/results.json").read_text())["differences"][0]["paired"]
     assert written["outside_patch"]["mae_m"] == test.as_json()
-    assert len(json.loads((tmp_path / "out/results.json").read_text())["rows"][0]["per_sample"][0]["figures"]) == 2
+    assert len(json.loads((tmp_path / "out/results.json").read_text())["rows"][0]["per_sample"][0]["metrics"]) == 2
     line = (tmp_path / "out/table.txt").read_text().splitlines()[-1]
     assert "minus none: mae_m +" in line and "outside_patch.mae_m +2.000 (p 0.25, 3 pairs)" in line
 
 
 class Boundless(DepthEvaluator):
-    """Somebody's metric, one of whose figures is infinite where nothing is wrong."""
+    """Somebody's metric, one of whose metrics is infinite where nothing is wrong."""
 
     def update(self, sample: Any, prediction: Any) -> Mapping[str, float]:
         return {**super().update(sample, prediction), "psnr_db": np.inf}
 
     def result(self) -> Mapping[str, float]:
-        return {**super().result(), "psnr_db": np.inf if self.figures else np.nan}
+        return {**super().result(), "psnr_db": np.inf if self.metrics else np.nan}
 
     def resampled(self, draws: Any) -> Mapping[str, Any]:
         return {**super().resampled(draws), "psnr_db": np.full(len(draws), np.inf)}
 
 
 def test_one_sample_has_no_interval(tmp_path: Path, small: Small, install: Install) -> None:
-    """It was drawn again and again, and the figure seemed certain to the last digit."""
+    """It was drawn again and again, and the metric seemed certain to the last digit."""
     roots = [small("semseg", patch, samples=1) for patch in ("none", "random")]
     install(tiny_segmenter)
     report = evaluate(roots, model="tiny_segmenter", defense="lgs", out=tmp_path / "out")
     (difference,) = report.differences
     assert difference.auroc is not None and difference.auroc.interval is None
-    for figures in (report.rows[0].figures["task"], report.rows[1].figures["task"], difference.figures["task"]):
-        assert figures["pixel_accuracy"].value == figures["pixel_accuracy"].value
-        assert all(one.interval is None for one in figures.values())
+    for metrics in (report.rows[0].metrics["task"], report.rows[1].metrics["task"], difference.metrics["task"]):
+        assert metrics["pixel_accuracy"].value == metrics["pixel_accuracy"].value
+        assert all(one.interval is None for one in metrics.values())
     assert "[" not in (tmp_path / "out/table.txt").read_text()
     assert difference.paired["task"]["miou"].p == 1, "of one pair either sign is as far from 0"
 
@@ -216,9 +216,9 @@ def test_what_is_infinite_is_nothing_in_json(
     install(model_spec(lambda _: Oracle(roots), "depth"))
     report = evaluate(roots, model="odd", out=tmp_path / "out", resamples=20)
     found = json.loads((tmp_path / "out/results.json").read_text())
-    assert found["rows"][0]["figures"]["task"]["psnr_db"] == {"value": None, "low": None, "high": None}
+    assert found["rows"][0]["metrics"]["task"]["psnr_db"] == {"value": None, "low": None, "high": None}
     (difference,) = report.differences
-    assert difference.as_json()["figures"]["task"]["psnr_db"]["value"] is None
+    assert difference.as_json()["metrics"]["task"]["psnr_db"]["value"] is None
     assert difference.as_json()["paired"]["task"]["psnr_db"] == {"mean": None, "p": None, "pairs": 0}
     assert difference.paired["task"]["mae_m"].pairs > 0
 
@@ -237,7 +237,7 @@ def test_frames_of_a_drive_are_not_taken_for_scenes_without_a_word(
     assert note in (tmp_path / "out" / "table.txt").read_text()
 
 
-def test_figures_outside_the_patch_do_not_see_it(tmp_path: Path, small: Small, install: Install) -> None:
+def test_metrics_outside_the_patch_do_not_see_it(tmp_path: Path, small: Small, install: Install) -> None:
     data = small("depth")
 
     def wrong_there(sample: Any, prediction: Any) -> Any:
@@ -245,7 +245,7 @@ def test_figures_outside_the_patch_do_not_see_it(tmp_path: Path, small: Small, i
 
     install(model_spec(lambda _: Oracle([data], wrong_there), "depth"))
     (row,) = evaluate(data, model="odd", out=tmp_path / "out", reports=["outside_patch"]).rows
-    assert row.figures["task"]["rmse_m"].value > 0.1
-    assert row.figures["outside_patch"]["rmse_m"].value == 0
-    low, high = row.figures["task"]["rmse_m"].interval or (0, 0)
-    assert low <= row.figures["task"]["rmse_m"].value <= high
+    assert row.metrics["task"]["rmse_m"].value > 0.1
+    assert row.metrics["outside_patch"]["rmse_m"].value == 0
+    low, high = row.metrics["task"]["rmse_m"].interval or (0, 0)
+    assert low <= row.metrics["task"]["rmse_m"].value <= high

@@ -143,7 +143,7 @@ def test_training_against_patches_is_taken_up_again(
             settings=settings, on_step=watch,
         ).weights  # fmt: skip
 
-    def stop(progress: TrainingState, share: float, figures: Any) -> None:
+    def stop(progress: TrainingState, share: float, metrics: Any) -> None:
         if progress.step == stop_at:
             raise StopError
 

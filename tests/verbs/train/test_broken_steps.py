@@ -100,7 +100,7 @@ def test_steps_that_are_left_out_are_counted_over_a_stop(
     monkeypatch.setattr(loop, "CHECKPOINT_EVERY_S", 0.0)
     install(replace(tiny_segmenter, build=Overflowing, recipe=Recipe(batch=1, epochs=9)))
 
-    def stop(progress: TrainingState, share: float, figures: Any) -> None:
+    def stop(progress: TrainingState, share: float, metrics: Any) -> None:
         if progress.step == 13:
             raise StopError
 

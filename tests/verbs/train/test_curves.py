@@ -1,4 +1,4 @@
-"""The figure of a training that is a few steps long."""
+"""The metric of a training that is a few steps long."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def drawn(root: Path, progress: TrainingState) -> bytes:
 
 @pytest.mark.parametrize("is_stretch", [True, False])
 def test_the_only_loss_of_a_short_training_is_seen(tmp_path: Path, is_stretch: bool) -> None:
-    """One stretch of steps, or none that is whole: both were nowhere in the figure."""
+    """One stretch of steps, or none that is whole: both were nowhere in the metric."""
 
     def progress(loss: float) -> TrainingState:
         validations = [{"step": step, "loss": value, "eigen_d1": 0.5} for step, value in ((1, 6.0), (12, 1.0))]

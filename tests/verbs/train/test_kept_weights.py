@@ -31,7 +31,7 @@ def quick(street: Street, out: Path, **changes: Any) -> TrainReport:
     return train("semseg", "tiny_segmenter", street("semseg"), **(arguments | changes))
 
 
-def figures_in(weights: Path) -> dict[str, float]:
+def metrics_in(weights: Path) -> dict[str, float]:
     with safe_open(str(weights), framework="pt") as opened:
         found: dict[str, float] = json.loads(opened.metadata()["metrics"])
     return found
@@ -50,9 +50,9 @@ def cut_at(monkeypatch: pytest.MonkeyPatch, cut: int) -> None:
     monkeypatch.setattr(files, "_write_and_rename", write)
 
 
-def ranked(monkeypatch: pytest.MonkeyPatch, *figures: float) -> None:
-    """Validations come to these figures, one after the other."""
-    left = list(figures)
+def ranked(monkeypatch: pytest.MonkeyPatch, *metrics: float) -> None:
+    """Validations come to these metrics, one after the other."""
+    left = list(metrics)
     monkeypatch.setattr(loop, "validate", lambda *_: {"loss": 1.0, "miou": left.pop(0)})
 
 
@@ -71,10 +71,10 @@ def test_cut_between_any_two_files(
         ranked(patch, 0.05, 0.04, 0.03)
         report = quick(street, tmp_path / "out")
     card = (tmp_path / "out" / "card.md").read_text()
-    assert figures_in(report.weights) == report.figures
+    assert metrics_in(report.weights) == report.metrics
     assert f"sha256 `{sha256(report.weights.read_bytes())}`" in card
     assert f"the weights are those after step {report.best_step}" in card
-    assert f"| miou | {report.figures['miou']:.4f} |" in card
+    assert f"| miou | {report.metrics['miou']:.4f} |" in card
 
 
 def test_a_card_goes_before_the_weights_that_it_describes(
@@ -112,7 +112,7 @@ def test_that_the_best_weights_are_gone_is_told_before_the_training_goes_on(
 
     class StoppedError(Exception): ...
 
-    def stop(progress: Progress, share: float, figures: Any) -> None:
+    def stop(progress: Progress, share: float, metrics: Any) -> None:
         told.append(progress.step)
         if len(progress.validations) == 3:
             raise StoppedError

@@ -71,20 +71,20 @@ def test_biases_do_not_decay_and_frozen_weights_are_left_out() -> None:
 
 @dataclass(frozen=True)
 class Goal:
-    figure: str = "d1"
+    metric: str = "d1"
     less_is_better: bool = False
 
 
-def test_checkpoints_are_ranked_by_the_tasks_figure_and_then_by_the_loss() -> None:
-    def ranked(goal: Any, **figures: float) -> tuple[float, float]:
-        return rank(figures, goal)
+def test_checkpoints_are_ranked_by_the_tasks_metric_and_then_by_the_loss() -> None:
+    def ranked(goal: Any, **metrics: float) -> tuple[float, float]:
+        return rank(metrics, goal)
 
     more, less = Goal(), Goal(less_is_better=True)
     assert ranked(more, d1=0.9, loss=9) > ranked(more, d1=0.8, loss=1)
     assert ranked(less, d1=0.8, loss=9) > ranked(less, d1=0.9, loss=1)
     assert ranked(more, d1=0.5, loss=1) > ranked(more, d1=0.5, loss=2)
     assert ranked(more, d1=math.nan, loss=1) < ranked(more, d1=0.0, loss=9)
-    assert ranked(Goal(figure=""), loss=1) > ranked(Goal(figure=""), loss=2)
+    assert ranked(Goal(metric=""), loss=1) > ranked(Goal(metric=""), loss=2)
     assert ranked(more, d1=math.nan, loss=math.nan) < ranked(more, d1=math.nan, loss=9)
 
 

@@ -15,7 +15,7 @@ from gear.verbs.train.run import train
 def test_the_second_is_refused_and_the_first_goes_on(street: Callable[..., Path], tmp_path: Path, install: Any) -> None:
     tried: list[int] = []
 
-    def begin_another(progress: Any, share: float, figures: Any) -> None:
+    def begin_another(progress: Any, share: float, metrics: Any) -> None:
         tried.append(progress.step)
         with pytest.raises(DatasetError, match="another run is at work there just now; wait for its end"):
             train("semseg", "tiny_segmenter", street("semseg"), out=tmp_path / "out", epochs=1)

@@ -48,14 +48,14 @@ def test_it_learns_and_leaves_everything_behind(street: Street, tmp_path: Path, 
     history = json.loads((tmp_path / "out" / "train.json").read_text())
     losses = [entry["loss"] for entry in history["validations"]]
     assert len(losses) == 8 and losses[-1] < 0.8 * losses[0]
-    assert report.steps == 16 and report.figures["miou"] == max(e["miou"] for e in history["validations"])
+    assert report.steps == 16 and report.metrics["miou"] == max(e["miou"] for e in history["validations"])
     assert (tmp_path / "out" / "curves.png").stat().st_size > 5000
     card = (tmp_path / "out" / "card.md").read_text()
     assert report.weights.name in card and "gear train --task semseg --model tiny_segmenter" in card
     network = TinySegmenter(TinyConfig(seed=9))
     metadata = load_into(network, report.weights)
     assert metadata["model"] == "tiny_segmenter" and metadata["seed"] == "0"
-    assert json.loads(metadata["metrics"])["miou"] == report.figures["miou"]
+    assert json.loads(metadata["metrics"])["miou"] == report.metrics["miou"]
     assert json.loads(metadata["data"])["training"][0]["samples"] == 5
     sample = gear.open_dataset(street("semseg"))[0]
     seen = np.mean(network.predict(sample.images) == sample.label_ids)
@@ -83,7 +83,7 @@ def test_stopped_and_taken_up_again_is_as_if_never_stopped(
     settings = ["augmentation.colours.noise=1", "gradient_norm=1", "crop_px=[32, 64]", "scales=[0.8, 1.2]"]
     whole = quick(street, tmp_path / "whole", settings=settings)
 
-    def stop(progress: Progress, share: float, figures: Any) -> None:
+    def stop(progress: Progress, share: float, metrics: Any) -> None:
         if progress.step == stop_at:
             raise StopError
 
@@ -91,7 +91,7 @@ def test_stopped_and_taken_up_again_is_as_if_never_stopped(
         quick(street, tmp_path / "parts", settings=settings, on_step=stop)
     parts = quick(street, tmp_path / "parts", settings=settings, workers=2)
     assert parts.weights.read_bytes() == whole.weights.read_bytes()
-    assert parts.figures == whole.figures and parts.steps == whole.steps
+    assert parts.metrics == whole.metrics and parts.steps == whole.steps
     one, two = (json.loads((report.root / "train.json").read_text()) for report in (whole, parts))
     assert one["steps"] == two["steps"]
 
@@ -111,7 +111,7 @@ def test_a_killed_process_is_taken_up_again(street: Street, tmp_path: Path, inst
         "build.catalogue = lambda: Catalogue(found)\n"
         "loop.CHECKPOINT_EVERY_S = 0.0\n"
         "stop = int(sys.argv[3])\n"
-        "def watch(progress, share, figures):\n"
+        "def watch(progress, share, metrics):\n"
         "    if progress.step == stop: os.kill(os.getpid(), signal.SIGKILL)\n"
         "train('semseg', 'tiny_segmenter', sys.argv[1], out=sys.argv[2], epochs=3, batch=2, on_step=watch)\n"
     )
@@ -162,7 +162,7 @@ def test_damaged_work_is_said_in_a_line(street: Street, tmp_path: Path, install:
         with pytest.raises(DatasetError, match=r"is damaged .*; delete it to train from the start"):
             quick(street, tmp_path / "out")
     checkpoint.unlink()
-    assert quick(street, tmp_path / "out").figures == first.figures
+    assert quick(street, tmp_path / "out").metrics == first.metrics
 
 
 def test_a_checkpoint_that_somebody_changed_is_said_in_a_line(street: Street, tmp_path: Path, install: Any) -> None:
@@ -210,7 +210,7 @@ def test_depth_in_half_precision_with_validation_data_of_its_own(street: Street,
     )  # fmt: skip
     history = json.loads((tmp_path / "out" / "train.json").read_text())
     assert history["validation"][0]["split"] == "val" and history["validation"][0]["samples"] == 2
-    assert report.figure == "eigen_d1" and report.steps == 6
+    assert report.metric == "eigen_d1" and report.steps == 6
 
 
 def test_a_time_budget_ends_it(street: Street, tmp_path: Path, install: Any) -> None:
@@ -289,7 +289,7 @@ def test_what_cannot_be_trained_is_said_in_a_line(street: Street, tmp_path: Path
 def test_it_begins_with_what_it_is_told(street: Street, tmp_path: Path, install: Any) -> None:
     first = quick(street, tmp_path / "first", epochs=4, lr=0.02)
     second = quick(street, tmp_path / "second", epochs=1, lr=1e-9, init=first.weights, settings=["ema=0"])
-    assert second.figures["miou"] == pytest.approx(first.figures["miou"], abs=0.05)
+    assert second.metrics["miou"] == pytest.approx(first.metrics["miou"], abs=0.05)
 
     def zeros(model: Any) -> None:
         for parameter in model.parameters():
@@ -387,7 +387,7 @@ def test_what_was_begun_goes_on_when_the_file_that_it_began_with_is_gone(
     write(first, state, {"options": json.dumps({"input_scale": 0.75})})
     whole = quick(street, tmp_path / "whole", init=f"{before}{first}")
 
-    def stop(progress: Progress, share: float, figures: Any) -> None:
+    def stop(progress: Progress, share: float, metrics: Any) -> None:
         raise StopError
 
     with pytest.raises(StopError):

@@ -59,7 +59,7 @@ class QualityEvaluator:
         self.counts: dict[int, list[float]] = {}
 
     def update(self, sample: HasPanoptic, prediction: Panoptic) -> Mapping[str, float]:
-        """Takes one picture in; returns its own figures."""
+        """Takes one picture in; returns its own metrics."""
         own = QualityEvaluator(self.things)
         own.counts = match(sample.panoptic, prediction)
         self.merge(own)
@@ -74,10 +74,10 @@ class QualityEvaluator:
     def result(self) -> Mapping[str, float]:
         """NaN where nothing counts."""
         rows = {c: _quality(*counts) for c, counts in self.counts.items() if sum(counts[1:]) > 0}
-        figures = {name: _mean([row[i] for row in rows.values()]) for i, name in enumerate(("pq", "sq", "rq"))}
+        metrics = {name: _mean([row[i] for row in rows.values()]) for i, name in enumerate(("pq", "sq", "rq"))}
         for name, wanted in (("pq_things", True), ("pq_stuff", False)):
-            figures[name] = _mean([row[0] for c, row in rows.items() if (c in self.things) == wanted])
-        return figures
+            metrics[name] = _mean([row[0] for c, row in rows.items() if (c in self.things) == wanted])
+        return metrics
 
 
 def match(truth: Panoptic, prediction: Panoptic) -> dict[int, list[float]]:

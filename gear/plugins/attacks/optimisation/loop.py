@@ -137,7 +137,7 @@ class Seen:
 
 
 Ascend = Callable[[Tensor, Seen], tuple[Tensor, dict[str, float]]]
-"""From (S, 3, h, w) textures that ask for gradients and a batch with them in it: the direction to go, and figures,
+"""From (S, 3, h, w) textures that ask for gradients and a batch with them in it: the direction to go, and values,
 among them `gradient`, the length of the objective's gradient, unless nothing is left to be harmed."""
 
 
@@ -175,15 +175,15 @@ def climb(
                 before(done)
             indexes = batch_of(done, count, settings.batch, optimiser.seed)
             textures = optimiser.textures.clone().requires_grad_(True)
-            direction, figures = ascend(textures, problem.seen(textures, indexes, done, optimiser.seed))
+            direction, values = ascend(textures, problem.seen(textures, indexes, done, optimiser.seed))
             if not bool(direction.isfinite().all()):
                 raise not_finite(f"the gradient of step {done + 1}", indexes)
-            optimiser.feel(figures.get("gradient"))
+            optimiser.feel(values.get("gradient"))
             if optimiser.silent * settings.batch >= 2 * count + settings.batch:
                 raise GearError(NO_GRADIENT)
             share = 0.5 * (1 + math.cos(math.pi * done / budget.steps)) if settings.decay else 1.0
             optimiser.step(direction, share)
-            if watch is not None and watch.step(optimiser.done, figures, optimiser.patches, optimiser.state):
+            if watch is not None and watch.step(optimiser.done, values, optimiser.patches, optimiser.state):
                 break
     if optimiser.done > begun and not optimiser.felt:
         raise GearError(NO_GRADIENT)
@@ -208,7 +208,7 @@ def unit_gradients(problem: Problem, objective: Objective, settings: Settings) -
             for prefix, member in members_of(problem.model).items()
             for name, term in objective.terms(member, seen.views, seen.samples, seen.indexes).items()
         }
-        figures = {name: float(term.value.detach()) for name, term in terms.items()}
+        values = {name: float(term.value.detach()) for name, term in terms.items()}
         total = torch.zeros_like(textures)
         if settings.per_term:
             for number, term in enumerate(terms.values()):
@@ -216,14 +216,14 @@ def unit_gradients(problem: Problem, objective: Objective, settings: Settings) -
         elif terms:
             total += gradient_to(torch.stack([t.weight * t.value for t in terms.values()]).sum(), textures)
         if terms:
-            figures["gradient"] = float(total.norm())
+            values["gradient"] = float(total.norm())
         total = unit(total)
         for name, weight in (("smoothness", settings.smoothness), ("printability", settings.printability)):
             if weight:
                 penalty = torch.stack([REGULARISERS[name](one) for one in textures]).sum()
-                figures[name] = float(penalty.detach())
+                values[name] = float(penalty.detach())
                 total -= weight * unit(gradient_to(penalty, textures))
-        return total, figures
+        return total, values
 
     return ascend
 
@@ -246,14 +246,14 @@ def one_gradient(
     def ascend(textures: Tensor, seen: Seen) -> tuple[Tensor, dict[str, float]]:
         parts = value(textures, seen)
         others = {} if penalties is None else penalties(textures)
-        figures = {name: float(part.detach()) for name, part in {**parts, **others}.items()}
+        values = {name: float(part.detach()) for name, part in {**parts, **others}.items()}
         gradient = torch.zeros_like(textures)
         if parts:
             gradient = gradient_to(torch.stack(list(parts.values())).sum(), textures)
-            figures["gradient"] = float(gradient.norm())
+            values["gradient"] = float(gradient.norm())
         if others:
             gradient = gradient + gradient_to(torch.stack(list(others.values())).sum(), textures)
-        return gradient, figures
+        return gradient, values
 
     return ascend
 

@@ -135,7 +135,7 @@ def device_name(model: Model) -> str:
 
 
 def members_of(model: Model) -> Mapping[str, Model]:
-    """What is attacked, by a prefix for its figures: the members of a group, or the model itself under no name."""
+    """What is attacked, by a prefix for its metrics: the members of a group, or the model itself under no name."""
     if isinstance(model, Group):
         return {f"{name}/": member for name, member in model.members.items()}
     return {"": model}

@@ -137,7 +137,7 @@ class SemsegObjective:
         """With a fixed `gamma` as the terms, but of the pixels that are right and wrong without the patch.
 
         Those that the patch makes wrong change sides, and what is right still is what is harmed least: of it alone, the
-        figure would fall as the attack succeeds, to 0 where nothing is right any more.
+        metric would fall as the attack succeeds, to 0 where nothing is right any more.
         """
         if not self.asks_for_clean:
             terms = weighted(self, model, views, samples, indexes)

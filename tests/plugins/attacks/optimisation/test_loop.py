@@ -48,7 +48,7 @@ class Watching:
     def __init__(self, start: State | None = None, stop_at: int = 10**9) -> None:
         self.start, self.stop_at = start, stop_at
         self.states: list[State] = []
-        self.figures: list[Mapping[str, float]] = []
+        self.values: list[Mapping[str, float]] = []
 
     def resume(self) -> State | None:
         return self.start
@@ -56,12 +56,12 @@ class Watching:
     def step(
         self,
         done: int,
-        figures: Mapping[str, float],
+        values: Mapping[str, float],
         patches: Callable[[], tuple[Patch, ...]],
         state: Callable[[], State],
     ) -> bool:
         self.states.append(state())
-        self.figures.append(dict(figures))
+        self.values.append(dict(values))
         assert all(patch.rgb.shape == (12, 24, 3) for patch in patches())
         return done >= self.stop_at
 
@@ -91,7 +91,7 @@ def test_what_was_cut_off_goes_on_as_if_it_had_not_been() -> None:
     resumed = Watching(start=cut.states[-1])
     assert not difference(run(resumed), patches, "patches")
     assert not difference(resumed.states[-1], whole.states[-1], "state")
-    assert {"wrong", "gradient", "smoothness"} <= set(whole.figures[0])
+    assert {"wrong", "gradient", "smoothness"} <= set(whole.values[0])
 
 
 def test_what_was_felt_before_it_was_cut_off_counts() -> None:
@@ -173,14 +173,14 @@ def test_every_term_has_a_say_of_its_weight_however_long_its_gradient(per_term: 
     dataset = contract.dataset()
     problem = Problem(model=contract.model(), dataset=dataset, compositor=TinyCompositor(dataset), settings=settings)
     seen = Seen(views={"left": textures}, samples=[], indexes=[])
-    direction, figures = unit_gradients(problem, Slopes({"a": (long, 0.3), "b": (short, -0.7)}), settings)(
+    direction, values = unit_gradients(problem, Slopes({"a": (long, 0.3), "b": (short, -0.7)}), settings)(
         textures, seen
     )
     scales = (long.norm(), short.norm()) if per_term else (1.0, 1.0)
     total = 0.3 * long / scales[0] - 0.7 * short / scales[1]
     (penalty,) = torch.autograd.grad(smoothness(textures[0]), textures)
     torch.testing.assert_close(direction, total / total.norm() - 0.25 * penalty / penalty.norm(), atol=1e-5, rtol=1e-4)
-    assert figures["gradient"] == pytest.approx(float(total.norm()), rel=1e-4)
+    assert values["gradient"] == pytest.approx(float(total.norm()), rel=1e-4)
 
 
 def test_penalties_are_taken_along_but_are_no_gradient_of_the_objective() -> None:
@@ -194,14 +194,14 @@ def test_penalties_are_taken_along_but_are_no_gradient_of_the_objective() -> Non
     def penalties(patches: Tensor) -> dict[str, Tensor]:
         return {"penalty": -(patches * other).sum()}
 
-    direction, figures = one_gradient(harm, penalties)(textures, seen)
+    direction, values = one_gradient(harm, penalties)(textures, seen)
     torch.testing.assert_close(direction, 3 * slope - other)
-    assert figures["gradient"] == pytest.approx(float((3 * slope).norm()), rel=1e-5)
-    assert set(figures) == {"harm", "more", "penalty", "gradient"}
+    assert values["gradient"] == pytest.approx(float((3 * slope).norm()), rel=1e-5)
+    assert set(values) == {"harm", "more", "penalty", "gradient"}
     torch.testing.assert_close(one_gradient(harm)(textures, seen)[0], 3 * slope)
-    direction, figures = one_gradient(lambda *_: {}, penalties)(textures, seen)
+    direction, values = one_gradient(lambda *_: {}, penalties)(textures, seen)
     torch.testing.assert_close(direction, -other)
-    assert "gradient" not in figures
+    assert "gradient" not in values
 
 
 def test_without_a_surface_there_is_nothing_to_attack() -> None:

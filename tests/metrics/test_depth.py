@@ -46,14 +46,14 @@ def test_by_hand() -> None:
     assert evaluator.result() == pytest.approx(dict(result))
 
 
-def test_far_things_count_in_the_devkits_figures_alone() -> None:
+def test_far_things_count_in_the_devkits_metrics_alone() -> None:
     sample = Deep(np.array([[10.0, 200.0]], dtype=np.float32))
     result = DepthEvaluator().update(sample, np.array([[10.0, 100.0]], dtype=np.float32))
     assert result["mae_m"] == pytest.approx(50.0)
     assert result["eigen_rmse_m"] == 0.0
 
 
-def test_the_devkits_figures_are_those_of_its_own_pictures() -> None:
+def test_the_devkits_metrics_are_those_of_its_own_pictures() -> None:
     rng = np.random.default_rng(11)
     truth = rng.uniform(2, 900, (40, 60)).astype(np.float32)
     found = (truth * rng.uniform(0.7, 1.2, truth.shape)).astype(np.float32)
@@ -69,7 +69,7 @@ def test_the_devkits_figures_are_those_of_its_own_pictures() -> None:
 
 
 @pytest.mark.parametrize("most_m", [80.0, 500.0])
-def test_how_far_eigens_figures_look_changes_none_of_the_devkits(most_m: float) -> None:
+def test_how_far_eigens_metrics_look_changes_none_of_the_devkits(most_m: float) -> None:
     truth = np.linspace(2, 900, 4000, dtype=np.float32)[None]
     found = truth * np.float32(0.9)
     expected = DepthEvaluator().update(Deep(truth), found)
@@ -81,7 +81,7 @@ def test_how_far_eigens_figures_look_changes_none_of_the_devkits(most_m: float) 
     assert result["eigen_rmse_m"] == pytest.approx(np.sqrt(np.mean((0.1 * seen) ** 2)), rel=1e-3)
 
 
-def test_predictions_are_clipped_for_eigens_figures() -> None:
+def test_predictions_are_clipped_for_eigens_metrics() -> None:
     sample = Deep(np.array([[70.0]], dtype=np.float32))
     assert DepthEvaluator().update(sample, np.array([[500.0]], dtype=np.float32))["eigen_rmse_m"] == pytest.approx(10.0)
 
@@ -123,7 +123,7 @@ def test_merged_pictures_count_as_if_one_had_seen_them_all() -> None:
     assert first.result() == whole.result() and first.result()["mae_m"] == pytest.approx(7 / 3)
 
 
-def test_figures_are_means_over_pictures() -> None:
+def test_metrics_are_means_over_pictures() -> None:
     evaluator = DepthEvaluator()
     for wrong in (0.0, 3.0):
         truth = np.full((4, 4), 10.0, dtype=np.float32)
@@ -187,10 +187,10 @@ def test_absurd_depths_are_measured_as_files_say_them() -> None:
 
 
 @pytest.mark.parametrize("value", [1e-38, 1e-20, 1e20, 3e38])
-def test_absurd_depths_have_finite_figures(value: float) -> None:
+def test_absurd_depths_have_finite_metrics(value: float) -> None:
     truth, _ = two_pixels()
     result = DepthEvaluator().update(truth, np.full_like(truth.depth_m, value))
-    assert all(math.isfinite(figure) for figure in result.values())
+    assert all(math.isfinite(metric) for metric in result.values())
 
 
 @pytest.mark.parametrize("kind", [np.float16, np.float64, np.uint8])
@@ -200,6 +200,6 @@ def test_predictions_of_other_types_are_measured_as_they_are_kept(kind: type) ->
     assert DepthEvaluator().update(truth, found.astype(kind)) == expected
 
 
-def test_a_scale_alone_is_no_error_of_scale_invariant_figures() -> None:
+def test_a_scale_alone_is_no_error_of_scale_invariant_metrics() -> None:
     truth = np.linspace(2, 200, 5000, dtype=np.float32)[None]
     assert DepthEvaluator().update(Deep(truth), truth * np.float32(1.25))["silog"] < 1e-4
