@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -40,3 +41,44 @@ def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-n", "-q", "-b", "html", str(DOCS), str(tmp_path)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+RESULTS = [page for page in pages() if page.parent.name == "results" and page.stem != "index"]
+LINES = ("Date", "Commit", "Machine", "Command")
+
+
+@pytest.mark.parametrize("page", RESULTS, ids=lambda page: page.stem)
+def test_every_section_of_results_says_where_its_figures_come_from(page: Path) -> None:
+    sections = re.split(r"^## ", page.read_text(), flags=re.MULTILINE)[1:]
+    assert sections
+    for section in sections:
+        heading, *lines = section.splitlines()
+        found = [re.match(r"- \*\*(\w+):\*\* \S", line) for line in lines[1:5]]
+        assert [match and match[1] for match in found] == list(LINES), heading
+        assert re.search(r"\d{4}-\d{2}-\d{2}", lines[1]) and re.search(r"\b[0-9a-f]{8}\b", lines[2]), heading
+
+
+def test_commits_of_results_are_in_the_history() -> None:
+    shallow = subprocess.run(
+        ["git", "rev-parse", "--is-shallow-repository"], cwd=ROOT, capture_output=True, text=True, check=False
+    ).stdout.strip()
+    if shallow != "false":
+        pytest.skip("the whole history is not here")
+    named = {
+        commit
+        for page in RESULTS
+        for line in re.findall(r"- \*\*Commit:\*\* (.*)", page.read_text())
+        for commit in re.findall(r"\b[0-9a-f]{8}\b", line)
+    }
+    asked = "".join(f"{commit}\n" for commit in sorted(named))
+    answer = subprocess.run(
+        ["git", "cat-file", "--batch-check"], cwd=ROOT, input=asked, capture_output=True, text=True, check=True
+    ).stdout
+    assert [line for line in answer.splitlines() if " commit " not in line] == []
+
+
+def test_the_map_of_rooms_is_what_the_code_is() -> None:
+    made = runpy.run_path(str(DOCS / "make_map.py"))
+    hint = "run: python docs/make_map.py"
+    assert made["PICTURE"].read_text(encoding="utf-8") == made["picture"](), hint
+    assert made["PAGE"].read_text(encoding="utf-8") == made["page"](), hint
