@@ -20,7 +20,7 @@ from gear.values.scene import Weather
 from gear.values.serial import holds_places
 from gear.world.assets.library import AssetLibrary
 from gear.world.scene_spec import SceneLibrary, SceneSpec
-from gear.world.surfaces.surface_carriers import check_assets
+from gear.world.surfaces.surface_carriers import check_scene_assets
 from gear.world.weather.presets import PRESETS
 
 ROOMY_FACTOR = 100
@@ -73,7 +73,7 @@ def look_up(config: CollectionConfig) -> Named:
         scenes = find_scenes(library, config.scenes)
     with told_at(config.places, "scene"):
         scene = find_scene(config, scenes)
-        check_assets(library, scene, f"scenes.{config.scene}")
+        check_scene_assets(library, scene, f"scenes.{config.scene}")
     roomy = 1 if scene.boards else ROOMY_FACTOR
     scene = scene.capped(simulation.max_vehicles * roomy, simulation.max_pedestrians)
     scene = _mixed(scene.crowded(config.crowd), config)

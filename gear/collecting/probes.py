@@ -60,7 +60,7 @@ def shoot_probes(world: World, renderer: Renderer, placed: PlacedStage, record: 
 
     def seen(name: str | None, byte: int) -> Raws:
         shown = np.full((1, 1, 3), byte, np.uint8)
-        stage = world.redressed(placed, {other: shown if other == name else "black" for other in names})
+        stage = world.with_surfaces(placed, {other: shown if other == name else "black" for other in names})
         return renderer.render(stage, record.cameras, shapes=shapes)
 
     black = seen(None, 0) if names else ()

@@ -20,8 +20,8 @@ from gear.plugins.catalogue import PluginEntry
 from gear.render.registry import open_renderer
 from gear.values.frames import Frame, GeomTable, SceneObject
 from gear.values.scene import SceneRecord
-from gear.world.compilation.memory import forget_shown, map_large_buffers, release_memory
-from gear.world.compilation.world_cache import ready_world
+from gear.world.compilation.memory import map_large_buffers, release_memory, release_render_arrays
+from gear.world.compilation.world_cache import load_or_compile
 from gear.world.planner import ScenePlanner
 from gear.world.weather.air import camera_pipeline
 from gear.world.weather.mirror_view import render_mirror_view
@@ -110,10 +110,10 @@ def open_session(job: Job) -> Iterator[Session]:
     task: Task[Any, Any] = build(plugin, job.config.options)
     with blamed(plugin, "rig"):
         rig = task.rig()
-    world = ready_world(town=job.config.town, scene_name=job.config.scene, scene=job.scene, weather=job.weather)
+    world = load_or_compile(town=job.config.town, scene_name=job.config.scene, scene=job.scene, weather=job.weather)
     night = night_of(world, job.weather, job.config.renderer)
     renderer = open_renderer(job.config.renderer, world.model, quality=job.config.quality)
-    forget_shown(world.model)
+    release_render_arrays(world.model)
     release_memory()
     try:
         planner = ScenePlanner(world, rig, job.split, split_name=job.config.split)

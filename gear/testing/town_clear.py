@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from gear.testing.town_facts import DOWN, LOOK_FROM_M, Rays, TownUnderTest
+from gear.testing.town_facts import DOWN, RAY_START_M, Rays, TownUnderTest
 from gear.values.geometry import Array
 from gear.world.roads.polyline import Polyline
 
@@ -19,7 +19,7 @@ CAR_SIDE_M = 1.3
 """Half the width of a bus, the widest that drives; lanes that are narrower are looked at up to `LANE_EDGE_M`."""
 
 LANE_EDGE_M = 0.2
-FELT_GAP_M, SEEN_GAP_M = 0.2, 0.4
+COLLISION_GAP_M, VISIBLE_GAP_M = 0.2, 0.4
 """Between the rays across a lane. What is seen alone is more and costs more; posts are felt too."""
 
 PERSON_HEIGHTS_M = (0.4, 0.8, 1.3, 1.7)
@@ -38,7 +38,7 @@ def blocked_lanes(town: TownUnderTest) -> list[str]:
     problems = []
     for lane in town.graph.lanes.values():
         side_m = max(0.0, min(CAR_SIDE_M, lane.width_m / 2 - LANE_EDGE_M))
-        for rays, gap_m in ((town.obstacles, FELT_GAP_M), (town.seen, SEEN_GAP_M)):
+        for rays, gap_m in ((town.obstacles, COLLISION_GAP_M), (town.visible, VISIBLE_GAP_M)):
             across_m = np.linspace(-side_m, side_m, math.ceil(2 * side_m / gap_m) + 1)
             hits = _hits(rays, lane.line, across_m, CAR_HEIGHTS_M)
             if hit := next(hits, None):
@@ -67,7 +67,7 @@ def _stopped(town: TownUnderTest, start_m: Array, end_m: Array, edge_m: float) -
     across_m = np.linspace(-side_m, side_m, math.ceil(2 * side_m / PERSON_GAP_M) + 1)
     free, named = np.ones(len(across_m), bool), ""
     for column, lateral_m in enumerate(across_m.tolist()):
-        for rays in (town.obstacles, town.seen):
+        for rays in (town.obstacles, town.visible):
             hit = _first(rays, start_m, end_m, lateral_m, PERSON_HEIGHTS_M)
             if hit is not None:
                 free[column] = False
@@ -75,7 +75,7 @@ def _stopped(town: TownUnderTest, start_m: Array, end_m: Array, edge_m: float) -
                 break
         if is_short and free[column] and abs(lateral_m) > edge_m:
             middle_m = (start_m + end_m) / 2 + lateral_m * _left(end_m - start_m)
-            height_m = town.ground.height_m(middle_m, LOOK_FROM_M)
+            height_m = town.ground.height_m(middle_m, RAY_START_M)
             free[column] = abs(height_m - middle_m[2]) <= STEP_UP_M
     if np.convolve(free, np.ones(PERSON_RAYS), "valid").max() == PERSON_RAYS:
         return ""
@@ -103,7 +103,7 @@ def _first(
     left = _left(along)
     for height_m in heights_m:
         origin_m = start_m + lateral_m * left - height_m * DOWN
-        share, geom = rays.first(origin_m, along)
+        share, geom = rays.first_hit(origin_m, along)
         if share <= 1:
             return origin_m + share * along, geom
     return None

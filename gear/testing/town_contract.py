@@ -20,7 +20,7 @@ from typing import ClassVar
 from gear.testing import town_clear, town_materials, town_scenes, town_streets
 from gear.testing.town_facts import TownUnderTest, town_under_test
 from gear.values.labels import LABEL_BY_NAME
-from gear.world.assets.geom_classes import FIRST_HIDDEN_GROUP, own_class
+from gear.world.assets.geom_classes import FIRST_HIDDEN_GROUP, unprefixed_class
 from gear.world.compilation.model_compilation import COLLISION_CLASS
 
 MESSAGES_SHOWN = 12
@@ -87,8 +87,8 @@ class TownContract:
 
     def test_what_is_seen_is_labelled(self) -> None:
         """The first part of every visible geom's class is a label."""
-        tell("visible geoms have no label: their class must start with one, such as `building.brick`", [
-            f"geom {geom.name!r} of body {geom.parent.name!r} has class {own_class(geom.classname.name)!r}"
+        fail_if("visible geoms have no label: their class must start with one, such as `building.brick`", [
+            f"geom {geom.name!r} of body {geom.parent.name!r} has class {unprefixed_class(geom.classname.name)!r}"
             for geom in self.under_test().compiled[0].geoms
             if geom.group < FIRST_HIDDEN_GROUP
             and _label(geom.classname.name) not in (LABEL_BY_NAME.keys() - {"sky"})
@@ -113,14 +113,14 @@ class TownContract:
                 )
             elif not is_collision and geom.group < FIRST_HIDDEN_GROUP and (geom.contype or geom.conaffinity):
                 problems.append(f"geom {geom.name!r} is seen and has contype or conaffinity, so it is felt")
-        tell("geoms are seen and felt", problems)
+        fail_if("geoms are seen and felt", problems)
 
     def test_nothing_is_transparent(self) -> None:
         """Ids and depth know every pixel, so nothing shines through."""
         town = self.under_test()
         # What the town's own file holds is told by the names that it has there.
         problems = town_materials.transparent(town.compiled[1])
-        tell("visible geoms are transparent", problems or town_materials.transparent(town.first_world[0].model))
+        fail_if("visible geoms are transparent", problems or town_materials.transparent(town.first_world[0].model))
 
     def test_materials_are_physical(self) -> None:
         """Renderers can show every texture, colours are marked as such, and nothing gives back more light than it
@@ -130,7 +130,7 @@ class TownContract:
         if not problems:
             world = town.first_world[0]
             problems = town_materials.unphysical(world.model, self.albedo, world.classes.is_face)
-        tell("materials are not physical", problems)
+        fail_if("materials are not physical", problems)
 
     def test_every_class_of_a_street_is_there(self) -> None:
         """No class that networks know from streets is missing."""
@@ -139,48 +139,50 @@ class TownContract:
             for geom in self.under_test().compiled[0].geoms
             if geom.group < FIRST_HIDDEN_GROUP and (label := _label(geom.classname.name)) in LABEL_BY_NAME
         }
-        tell("names in `expected` are no labels", sorted(self.expected - LABEL_BY_NAME.keys()))
+        fail_if("names in `expected` are no labels", sorted(self.expected - LABEL_BY_NAME.keys()))
         missing = sorted(name for name in self.expected if LABEL_BY_NAME[name].cityscapes_id not in there)
-        tell("labels are missing from the town (if it needs none, take them out of `expected`)", missing)
+        fail_if("labels are missing from the town (if it needs none, take them out of `expected`)", missing)
 
     def test_one_can_drive_for_ever(self) -> None:
         """Every lane is continued, without a gap."""
-        tell("lanes end or tear", town_streets.dead_ends(self.under_test().graph, self.open_ends, self.join_m))
+        fail_if("lanes end or tear", town_streets.dead_ends(self.under_test().graph, self.open_ends, self.join_m))
 
     def test_headings_are_continuous(self) -> None:
         """No lane turns on the spot."""
-        tell("lanes have kinks", town_streets.kinks(self.under_test().graph, self.max_turn_deg))
+        fail_if("lanes have kinks", town_streets.kinks(self.under_test().graph, self.max_turn_deg))
 
     def test_widths_and_speeds_are_sane(self) -> None:
         """As wide and as fast as roads are."""
         graph = self.under_test().graph
-        tell("lanes have odd sizes", town_streets.odd_sizes(graph, self.lane_width_m, self.speed_mps))
+        fail_if("lanes have odd sizes", town_streets.odd_sizes(graph, self.lane_width_m, self.speed_mps))
 
     def test_neighbours_run_side_by_side(self) -> None:
         """`left` is left, `right` is right, and both go the same way."""
-        tell("neighbours are elsewhere", town_streets.lost_neighbours(self.under_test().graph))
+        fail_if("neighbours are elsewhere", town_streets.lost_neighbours(self.under_test().graph))
 
     def test_lanes_lie_on_the_road(self) -> None:
         """Felt and seen, at the lane's height, all along and as wide as a car."""
-        tell("lanes are off the road", town_streets.lanes_off_the_road(self.under_test(), self.ground_m, self.wheel_m))
+        fail_if(
+            "lanes are off the road", town_streets.lanes_off_the_road(self.under_test(), self.ground_m, self.wheel_m)
+        )
 
     def test_lanes_are_clear(self) -> None:
         """Nothing stands or hangs on a lane, felt or only seen, as wide and as high as what drives there."""
-        tell("lanes are blocked", town_clear.blocked_lanes(self.under_test()))
+        fail_if("lanes are blocked", town_clear.blocked_lanes(self.under_test()))
 
     def test_people_can_walk(self) -> None:
         """Sidewalks and crosswalks lie on the ground and let people pass; crosswalks join sidewalks across lanes."""
-        tell("walks are in the air", town_streets.walks_off_the_ground(self.under_test(), self.ground_m))
-        tell("walks are blocked", town_clear.blocked_walks(self.under_test()))
-        tell("crosswalks lead nowhere", town_streets.idle_crosswalks(self.under_test().graph))
+        fail_if("walks are in the air", town_streets.walks_off_the_ground(self.under_test(), self.ground_m))
+        fail_if("walks are blocked", town_clear.blocked_walks(self.under_test()))
+        fail_if("crosswalks lead nowhere", town_streets.idle_crosswalks(self.under_test().graph))
 
     def test_cars_can_park(self) -> None:
         """Bays are on the ground, empty and beside the lanes."""
-        tell("parking bays cannot be used", town_streets.bad_bays(self.under_test(), self.ground_m))
+        fail_if("parking bays cannot be used", town_streets.bad_bays(self.under_test(), self.ground_m))
 
     def test_bounds_hold_everything(self) -> None:
         """Nothing that road users keep to leaves `town.bounds`."""
-        tell("things are out of bounds", town_streets.out_of_bounds(self.under_test().graph))
+        fail_if("things are out of bounds", town_streets.out_of_bounds(self.under_test().graph))
 
     def test_depth_has_a_range(self) -> None:
         """Clipping planes are where a car's camera needs them."""
@@ -191,28 +193,30 @@ class TownContract:
             problems.append(f"nearest is {near_m:.3g} m, not {self.near_m[0]:g} to {self.near_m[1]:g} m")
         if far_m < self.far_m:
             problems.append(f"furthest is {far_m:.3g} m, not at least {self.far_m:g} m")
-        tell("clipping planes are wrong; set <statistic extent> and <map znear zfar>, whose product counts", problems)
+        fail_if(
+            "clipping planes are wrong; set <statistic extent> and <map znear zfar>, whose product counts", problems
+        )
 
     def test_scenes_belong_to_the_town(self) -> None:
         """The library names the town, and its boards stand inside of it."""
-        tell("scenes are elsewhere", town_scenes.misplaced(self.under_test()))
+        fail_if("scenes are elsewhere", town_scenes.misplaced(self.under_test()))
 
     def test_every_scene_can_be_planned_with_its_boards_in_view(self) -> None:
         """Samples of every scene are drawn, and rays from the camera reach the faces."""
         town = self.under_test()
         names = tuple(town.scenes.scenes) if self.planned_scenes is None else tuple(self.planned_scenes)
-        tell("scenes cannot be used", town_scenes.unusable(town, names, self.samples, self.min_visible))
+        fail_if("scenes cannot be used", town_scenes.unusable(town, names, self.samples, self.min_visible))
 
     def test_the_ground_is_closed(self) -> None:
         """Meshes that meet in a T leave cracks of a pixel: a slab below the town keeps the sky out of them."""
-        tell("there are cracks in the ground", town_scenes.cracks(self.under_test(), self.samples))
+        fail_if("there are cracks in the ground", town_scenes.cracks(self.under_test(), self.samples))
 
     def test_ids_and_depth_are_those_of_rays(self) -> None:
         """The classic renderer and MuJoCo's own rays agree on the first scene."""
-        tell("pixels and rays differ", town_scenes.disagreement(self.under_test(), self.min_agreement))
+        fail_if("pixels and rays differ", town_scenes.disagreement(self.under_test(), self.min_agreement))
 
 
-def tell(what: str, problems: Sequence[str]) -> None:
+def fail_if(what: str, problems: Sequence[str]) -> None:
     """Fails with what was found, if anything was.
 
     Raises:
@@ -226,4 +230,4 @@ def tell(what: str, problems: Sequence[str]) -> None:
 
 
 def _label(classname: str) -> str:
-    return own_class(classname).partition(".")[0]
+    return unprefixed_class(classname).partition(".")[0]

@@ -24,9 +24,9 @@ from gear.world.scene_spec import SceneLibrary
 from gear.world.world import World
 
 DOWN = np.array([0.0, 0.0, -1.0])
-SEEN_GROUPS = (0, 1, 2)
+VISIBLE_GROUPS = (0, 1, 2)
 
-LOOK_FROM_M = 0.6
+RAY_START_M = 0.6
 """Ground is looked for from so far above where it should be: higher than kerbs, lower than whatever hangs above."""
 
 
@@ -38,7 +38,7 @@ class Rays:
     data: mujoco.MjData
     groups: tuple[int, ...]
 
-    def first(self, start_m: Array, along: Array) -> tuple[float, int]:
+    def first_hit(self, start_m: Array, along: Array) -> tuple[float, int]:
         """Distance in lengths of `along` to the first geom that is hit, and its id; infinity and -1 for nothing."""
         groups, hit = np.zeros(6, np.uint8), np.full(1, -1, np.int32)
         groups[list(self.groups)] = 1
@@ -48,7 +48,7 @@ class Rays:
     def height_m(self, point_m: npt.ArrayLike, above_m: float) -> float:
         """Height of what is hit first below a place, looking down from so far above it; NaN for nothing."""
         start_m = np.asarray(point_m, dtype=np.float64) - above_m * DOWN
-        distance_m, geom = self.first(start_m, DOWN)
+        distance_m, geom = self.first_hit(start_m, DOWN)
         return float(start_m[2] - distance_m) if geom >= 0 else float("nan")
 
     def name(self, geom: int) -> str:
@@ -95,12 +95,12 @@ class TownUnderTest:
         return LaneGraph.from_model(self.compiled[1], self.path)
 
     @cached_property
-    def seen(self) -> Rays:
+    def visible(self) -> Rays:
         """Rays that hit what can be seen of the town alone."""
         model = self.compiled[1]
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
-        return Rays(model, data, SEEN_GROUPS)
+        return Rays(model, data, VISIBLE_GROUPS)
 
     @cached_property
     def first_world(self) -> tuple[World, float]:
@@ -112,12 +112,12 @@ class TownUnderTest:
     @cached_property
     def ground(self) -> Rays:
         """Rays that hit what one stands on."""
-        return self._felt(GROUND_GROUP)
+        return self._placement_rays(GROUND_GROUP)
 
     @cached_property
     def obstacles(self) -> Rays:
         """Rays that hit what stands in the way, the first scene's boards too."""
-        return self._felt(OBSTACLE_GROUP)
+        return self._placement_rays(OBSTACLE_GROUP)
 
     def world(self, scene: str) -> World:
         """Gear's world of a scene, freshly composed.
@@ -130,7 +130,7 @@ class TownUnderTest:
             raise UnknownNameError(f"scene of {self.scenes.town}", scene, self.scenes.scenes)
         return World.build(town=self.path, scene_name=scene, scene=self.scenes.scenes[scene], weather=CLEAR)
 
-    def _felt(self, group: int) -> Rays:
+    def _placement_rays(self, group: int) -> Rays:
         model = self.first_world[0].placement_model
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)

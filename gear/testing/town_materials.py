@@ -9,7 +9,7 @@ import numpy.typing as npt
 from gear.camera.response import decode_srgb
 from gear.values.geometry import Array
 from gear.world.assets.geom_classes import FIRST_HIDDEN_GROUP
-from gear.world.compilation.materials import TEXTURE_KINDS, effective_rgba, seen_materials, textures_of
+from gear.world.compilation.materials import TEXTURE_KINDS, effective_rgba, textures_of, visible_materials
 
 Mask = npt.NDArray[np.bool_]
 
@@ -42,7 +42,7 @@ def unphysical(model: mujoco.MjModel, most_albedo: float, faces: Mask | None = N
     """
     looked_at = (model.geom_group < FIRST_HIDDEN_GROUP) & ~(np.zeros(model.ngeom, bool) if faces is None else faces)
     problems = []
-    for material, geom in seen_materials(model).items():
+    for material, geom in visible_materials(model).items():
         if not looked_at[geom]:
             continue
         found = _odd_numbers(model, material)

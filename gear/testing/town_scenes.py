@@ -10,7 +10,7 @@ import numpy as np
 
 from gear.config.collection import SplitConfig
 from gear.render.registry import open_renderer
-from gear.testing.town_facts import SEEN_GROUPS, Rays, TownUnderTest
+from gear.testing.town_facts import VISIBLE_GROUPS, Rays, TownUnderTest
 from gear.values.errors import GearError
 from gear.values.frames import FloatImage, IdImage
 from gear.values.labels import GROUND_CODES
@@ -110,7 +110,7 @@ def disagreement(town: TownUnderTest, min_agreement: float) -> list[str]:
     wrong: dict[tuple[str, str], int] = {}
     for row, column in zip(rows[chosen] + 1, columns[chosen] + 1, strict=True):
         along = pose.rotation @ camera.intrinsics.unproject([column, row], 1.0)
-        distance_m, geom = rays.first(pose.translation_m, np.ascontiguousarray(along))
+        distance_m, geom = rays.first_hit(pose.translation_m, np.ascontiguousarray(along))
         pixel_id, depth_m = int(view.geom_id[row, column]), float(view.depth_m[row, column])
         if pixel_id != geom or (geom >= 0 and abs(depth_m / distance_m - 1) > DEPTH_TOLERANCE):
             told = (
@@ -162,7 +162,7 @@ def _hidden_faces(world: World, record: SceneRecord, min_visible: float) -> list
         inside = (camera_m[:, 2] > 0) & np.all(
             (pixels > -0.5) & (pixels < (camera.width_px - 0.5, camera.height_px - 0.5)), axis=1
         )
-        seen = sum(rays.first(eye_m, point_m - eye_m)[1] == face.geom_id for point_m in points_m[inside])
+        seen = sum(rays.first_hit(eye_m, point_m - eye_m)[1] == face.geom_id for point_m in points_m[inside])
         share = seen / len(points_m)
         if share < min_visible:
             problems.append(
@@ -172,7 +172,7 @@ def _hidden_faces(world: World, record: SceneRecord, min_visible: float) -> list
 
 
 def _rays(placed: PlacedStage) -> Rays:
-    return Rays(placed.stage.model, placed.stage.data, SEEN_GROUPS)
+    return Rays(placed.stage.model, placed.stage.data, VISIBLE_GROUPS)
 
 
 def _named(rays: Rays, geom: int) -> str:

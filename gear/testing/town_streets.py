@@ -7,9 +7,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gear.testing.town_facts import DOWN, LOOK_FROM_M, Rays, TownUnderTest
+from gear.testing.town_facts import DOWN, RAY_START_M, Rays, TownUnderTest
 from gear.values.geometry import Array, wrap_angle_rad
-from gear.world.assets.geom_classes import own_class
+from gear.world.assets.geom_classes import unprefixed_class
 from gear.world.roads.lanes import Lane, LaneGraph, ParkingBay
 from gear.world.roads.polyline import Polyline
 
@@ -94,19 +94,19 @@ def lost_neighbours(graph: LaneGraph) -> list[str]:
 
 def lanes_off_the_road(town: TownUnderTest, tolerance_m: float, wheel_m: float) -> list[str]:
     """Lanes without ground at their height, or over something that is no road."""
-    label = {geom.id: own_class(geom.classname.name).partition(".")[0] for geom in town.compiled[0].geoms}
+    label = {geom.id: unprefixed_class(geom.classname.name).partition(".")[0] for geom in town.compiled[0].geoms}
     problems = []
     for lane in town.graph.lanes.values():
         for point_m, place in _along(lane.line):
             if problem := _off_ground(town.ground, point_m, tolerance_m):
                 problems.append(f"{lane.name} {problem} at {place}")
                 break
-            distance_m, geom = town.seen.first(point_m - LOOK_FROM_M * DOWN, DOWN)
-            if geom < 0 or abs(distance_m - LOOK_FROM_M) > 2 * tolerance_m:
+            distance_m, geom = town.visible.first_hit(point_m - RAY_START_M * DOWN, DOWN)
+            if geom < 0 or abs(distance_m - RAY_START_M) > 2 * tolerance_m:
                 problems.append(f"{lane.name}: no surface is seen at its height at {place}")
                 break
             if label[geom] not in DRIVABLE:
-                problems.append(f"{lane.name} leads over {label[geom]} ({town.seen.name(geom)!r}) at {place}")
+                problems.append(f"{lane.name} leads over {label[geom]} ({town.visible.name(geom)!r}) at {place}")
                 break
         else:
             problems += _wheels_off(town, lane, tolerance_m, wheel_m)
@@ -160,7 +160,7 @@ def bad_bays(town: TownUnderTest, tolerance_m: float) -> list[str]:
             problems.append(f"{bay.name} {off[0]} in a corner")
             continue
         for start_m, end_m in ((corners[0], corners[2]), (corners[1], corners[3])):
-            share, geom = town.obstacles.first(start_m - BUMPER_M * DOWN, end_m - start_m)
+            share, geom = town.obstacles.first_hit(start_m - BUMPER_M * DOWN, end_m - start_m)
             if share <= 1:
                 problems.append(f"{bay.name} holds {town.obstacles.name(geom)!r}")
                 break
@@ -188,7 +188,7 @@ def out_of_bounds(graph: LaneGraph) -> list[str]:
 
 
 def _off_ground(ground: Rays, point_m: Array, tolerance_m: float) -> str:
-    height_m = ground.height_m(point_m, LOOK_FROM_M)
+    height_m = ground.height_m(point_m, RAY_START_M)
     if math.isnan(height_m):
         return "has no collision geom named ground.… below it"
     if abs(height_m - point_m[2]) > tolerance_m:

@@ -33,7 +33,7 @@ OVERLAP_M = 1e-4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Standing:
+class GroundPose:
     """How an actor stands.
 
     Attributes:
@@ -86,21 +86,23 @@ class PlacementSpace:
             return None
         return float(start_m[2] - distance_m)
 
-    def stand(self, kind: ActorType, x_m: float, y_m: float, near_z_m: float, yaw_rad: float) -> Standing | None:
+    def ground_pose(
+        self, actor_type: ActorType, x_m: float, y_m: float, near_z_m: float, yaw_rad: float
+    ) -> GroundPose | None:
         """An actor on the ground; None where there is none.
 
         People stand upright at their middle. A vehicle's four feet are fitted to what is below them.
         """
-        if kind.facts.kind == "person":
+        if actor_type.kind == "person":
             z_m = self.ground_m(x_m, y_m, near_z_m)
             if z_m is None:
                 return None
-            return Standing(RigidTransform.from_yaw("world", "actor", (x_m, y_m, z_m), yaw_rad), True)
-        stance = kind.stance
+            return GroundPose(RigidTransform.from_yaw("world", "actor", (x_m, y_m, z_m), yaw_rad), True)
+        placement_body = actor_type.placement_body
         c, s = math.cos(yaw_rad), math.sin(yaw_rad)
         feet: list[tuple[float, float, float]] = []
         for sx, sy in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
-            ahead_m, left_m = sx * stance.half_length_m, sy * stance.half_width_m
+            ahead_m, left_m = sx * placement_body.half_length_m, sy * placement_body.half_width_m
             height_m = self.ground_m(x_m + c * ahead_m - s * left_m, y_m + s * ahead_m + c * left_m, near_z_m)
             if height_m is None:
                 return None
@@ -118,7 +120,7 @@ class PlacementSpace:
         left /= np.linalg.norm(left)
         rotation = np.stack([forward, left, np.cross(forward, left)], axis=1)
         pose = RigidTransform.from_parts("world", "actor", rotation, (x_m, y_m, z_m))
-        return Standing(pose, bool(uneven_m <= EVEN_M))
+        return GroundPose(pose, bool(uneven_m <= EVEN_M))
 
     def overlaps(self, poses: Mapping[str, RigidTransform]) -> list[tuple[str, str]]:
         """Pairs of bodies that overlap; the second is "" where an actor overlaps the town or a board."""
@@ -159,11 +161,11 @@ class PlacementSpace:
         self._pose({})
         return settled
 
-    def sees(self, eye_m: Array, targets_m: Array) -> npt.NDArray[np.bool_]:
+    def visible(self, eye_m: Array, targets_m: Array) -> npt.NDArray[np.bool_]:
         """Which of (N, 3) points can be seen from a point past the town, its boards and its ground."""
         return self._rays(eye_m, targets_m, _STATIC)[0] < 0
 
-    def blockers(self, eye_m: Array, targets_m: Array, poses: Mapping[str, RigidTransform]) -> list[str | None]:
+    def occluders(self, eye_m: Array, targets_m: Array, poses: Mapping[str, RigidTransform]) -> list[str | None]:
         """For each of (N, 3) points the actor that hides it from a point, if any."""
         self._pose(poses)
         geoms = self._rays(eye_m, targets_m, _ACTORS)[0]

@@ -12,13 +12,13 @@ from gear.values.rig import Rig
 from gear.values.scene import POSE_DIGITS, ActorRecord, Pose, SceneRecord, Vec3
 from gear.world.placement import PlacementSpace
 from gear.world.surfaces.view_limits import reference_camera
-from gear.world.traffic.crowd import Cast, Crowd, HidingTest
-from gear.world.traffic.ego_sampling import Leads
-from gear.world.traffic.sequence import Director, Moment
-from gear.world.traffic.spawn import Draft, Spawner
+from gear.world.traffic.crowd import Crowd, OcclusionTest, RoadUsers
+from gear.world.traffic.ego_sampling import EgoSampler
+from gear.world.traffic.sequence import FrameState, SequenceSimulator
+from gear.world.traffic.spawn import Spawn, Spawner
 from gear.world.world import World
 
-SEQUENCES_KEPT = 4
+SEQUENCES_CACHED = 4
 
 
 class ScenePlanner:
@@ -40,7 +40,7 @@ class ScenePlanner:
         bodies = {slot.body: world.types[slot.actor.name] for slot in world.slots}
         space = PlacementSpace(world.placement_model, bodies, world.parked_m)
         spawner = Spawner(world.lanes)
-        self._leads = Leads(
+        self._ego_sampler = EgoSampler(
             scene_name=world.scene_name,
             scene=world.scene,
             rig=rig,
@@ -50,8 +50,8 @@ class ScenePlanner:
             spawner=spawner,
             space=space,
         )
-        self._director = Director(world.scene_name, world.lanes, space)
-        self._kept: dict[int, Sequence[Moment]] = {}
+        self._simulator = SequenceSimulator(world.scene_name, world.lanes, space)
+        self._cached: dict[int, Sequence[FrameState]] = {}
         self._crowd = Crowd(
             scene_name=world.scene_name, scene=world.scene, types=world.types, spawner=spawner, space=space
         )
@@ -63,42 +63,44 @@ class ScenePlanner:
             PlacementError: the scene's limits are too tight; says which.
         """
         sequence, frame = divmod(index, self._split.frames)
-        moment = self._moments(sequence)[frame]
-        return self._record(moment, index, sequence, frame)
+        state = self._frames_of(sequence)[frame]
+        return self._record(state, index, sequence, frame)
 
-    def _moments(self, sequence: int) -> Sequence[Moment]:
+    def _frames_of(self, sequence: int) -> Sequence[FrameState]:
         """All frames of a sequence. The last few are kept: frames are mostly asked for in their order."""
-        if sequence not in self._kept:
-            self._kept[sequence] = self._stage(sequence)
-            if len(self._kept) > SEQUENCES_KEPT:
-                self._kept.pop(next(iter(self._kept)))
-        return self._kept[sequence]
+        if sequence not in self._cached:
+            self._cached[sequence] = self._sample(sequence)
+            if len(self._cached) > SEQUENCES_CACHED:
+                self._cached.pop(next(iter(self._cached)))
+        return self._cached[sequence]
 
-    def _stage(self, sequence: int) -> Sequence[Moment]:
+    def _sample(self, sequence: int) -> Sequence[FrameState]:
         split = self._split
         duration_s = split.frames * split.interval_s if split.frames > 1 else 0.0
-        cast = self._leads.draw(split.seed, sequence, duration_s)
-        self._crowd.fill(cast, split.seed, sequence, self._hiding(cast))
+        road_users = self._ego_sampler.draw(split.seed, sequence, duration_s)
+        self._crowd.fill(road_users, split.seed, sequence, self._occlusion_test(road_users))
         if split.frames == 1:
-            return [Moment(drafts=cast.drafts, poses=cast.poses)]
-        return self._director.drive(cast, split.seed, sequence, split.frames, split.interval_s)
+            return [FrameState(spawns=road_users.spawns, poses=road_users.poses)]
+        return self._simulator.drive(road_users, split.seed, sequence, split.frames, split.interval_s)
 
-    def _hiding(self, cast: Cast) -> HidingTest | None:
-        if not self._leads.faces:
+    def _occlusion_test(self, road_users: RoadUsers) -> OcclusionTest | None:
+        if not self._ego_sampler.faces:
             return None
-        ego = next(iter(cast.poses.values()))
+        ego = next(iter(road_users.poses.values()))
         _, camera = reference_camera(self._rig, RigidTransform("world", "ego", ego.matrix))
-        grids_m = tuple(face.grid_m for face in self._leads.faces_in_world(cast))
-        return HidingTest(camera.world_from_camera_transform.translation_m, grids_m, self._leads.limits.min_free)
+        grids_m = tuple(face.grid_m for face in self._ego_sampler.faces_in_world(road_users))
+        return OcclusionTest(
+            camera.world_from_camera_transform.translation_m, grids_m, self._ego_sampler.limits.min_free
+        )
 
-    def _record(self, moment: Moment, index: int, sequence: int, frame: int) -> SceneRecord:
+    def _record(self, state: FrameState, index: int, sequence: int, frame: int) -> SceneRecord:
         world = self._world
-        if len(moment.drafts) >= STATIC_OBJECT_BASE:
+        if len(state.spawns) >= STATIC_OBJECT_BASE:
             most = STATIC_OBJECT_BASE - 1
-            raise PlacementError(world.scene_name, f"{len(moment.drafts)} road users, {most} at most; lower the counts")
+            raise PlacementError(world.scene_name, f"{len(state.spawns)} road users, {most} at most; lower the counts")
         actors = tuple(
-            _actor(number, draft, moment.poses[body])
-            for number, (body, draft) in enumerate(moment.drafts.items(), start=1)
+            _actor(number, spawn, state.poses[body])
+            for number, (body, spawn) in enumerate(state.spawns.items(), start=1)
         )
         carrier = next((actor.id for actor in actors if actor.role == "carrier"), None)
         return SceneRecord(
@@ -117,15 +119,15 @@ class ScenePlanner:
         )
 
 
-def _actor(number: int, draft: Draft, world_from_actor: RigidTransform) -> ActorRecord:
-    velocity = world_from_actor.rotation[:, 0] * draft.speed_mps
+def _actor(number: int, spawn: Spawn, world_from_actor: RigidTransform) -> ActorRecord:
+    velocity = world_from_actor.rotation[:, 0] * spawn.speed_mps
     rounded = [round(float(v), POSE_DIGITS) + 0.0 for v in velocity]
     velocity_mps: Vec3 = (rounded[0], rounded[1], rounded[2])
     return ActorRecord(
         id=number,
-        asset=draft.kind.facts.name,
-        role=draft.role,
+        asset=spawn.actor_type.facts.name,
+        role=spawn.role,
         world_from_actor=Pose.from_transform(world_from_actor),
         velocity_world_mps=velocity_mps,
-        paint_rgb=draft.paint_rgb,
+        paint_rgb=spawn.paint_rgb,
     )

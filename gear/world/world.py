@@ -20,7 +20,7 @@ from gear.values.scene import ActorRecord, SceneRecord, SurfaceRecord, Vec3, Wea
 from gear.world.assets.actor_types import ActorType, StaticObjects, actor_types, static_objects, visible_geoms
 from gear.world.assets.geom_classes import GeomClasses
 from gear.world.assets.library import AssetLibrary
-from gear.world.compilation.compiled_world import Compiled, compile_world
+from gear.world.compilation.compiled_world import CompiledWorld, compile_world
 from gear.world.compilation.compose import PARKED_DEPTH_M, Slot
 from gear.world.compilation.memory import release_memory
 from gear.world.roads.lanes import LaneGraph
@@ -113,7 +113,9 @@ class World:
         return World.of(library, scene_name, scene, weather, compile_world(library, scene, weather))
 
     @staticmethod
-    def of(library: AssetLibrary, scene_name: str, scene: SceneSpec, weather: Weather, compiled: Compiled) -> World:
+    def of(
+        library: AssetLibrary, scene_name: str, scene: SceneSpec, weather: Weather, compiled: CompiledWorld
+    ) -> World:
         """What was compiled of a scene, measured.
 
         Raises:
@@ -142,7 +144,7 @@ class World:
     @property
     def shapes(self) -> dict[str, Shape]:
         """Visible triangles of the pool's assets by name."""
-        return {name: kind.shape for name, kind in self.types.items()}
+        return {name: actor_type.shape for name, actor_type in self.types.items()}
 
     @property
     def parked_m(self) -> float:
@@ -191,7 +193,7 @@ class World:
             objects=objects,
         )
 
-    def redressed(self, placed: PlacedStage, surfaces: SurfaceAlbedos) -> Stage:
+    def with_surfaces(self, placed: PlacedStage, surfaces: SurfaceAlbedos) -> Stage:
         """What was placed last, with other faces; nothing is moved.
 
         Args:
@@ -214,7 +216,7 @@ class World:
         heights_m = self._data.geom_xpos[is_ground, 2]
         self._data.geom_xpos[is_ground, 2] = _OUT_OF_SIGHT_M
         try:
-            yield self.redressed(placed, {})
+            yield self.with_surfaces(placed, {})
         finally:
             self._data.geom_xpos[is_ground, 2] = heights_m
 
@@ -237,7 +239,7 @@ class World:
         for actor in record.actors:
             for candidate in free:
                 slot = candidate.slot
-                if slot.actor.name == actor.asset and slot.bears_surface == (actor.role == "carrier"):
+                if slot.actor.name == actor.asset and slot.carries_surface == (actor.role == "carrier"):
                     free.remove(candidate)
                     taken.append(candidate)
                     break
@@ -260,15 +262,15 @@ class World:
         mujoco.mj_camlight(self.model, self._data)
 
     def _object(self, actor: ActorRecord) -> SceneObject:
-        kind = self.types[actor.asset]
+        actor_type = self.types[actor.asset]
         return SceneObject(
             id=actor.id,
             asset=actor.asset,
-            label_code=kind.label.code,
-            kitti_type=kind.label.kitti_type,
+            label_code=actor_type.label.code,
+            kitti_type=actor_type.label.kitti_type,
             is_ego=actor.role == "ego",
             world_from_object=actor.world_from_actor.transform("world", "object"),
-            shape=kind.shape,
+            shape=actor_type.shape,
         )
 
     def _show(self, face: Face, albedo: SurfaceAlbedo) -> UInt8Image:

@@ -38,7 +38,7 @@ def tiny() -> Town:
 
 @pytest.fixture(scope="module")
 def tiny_map(tiny: Town) -> UInt8Image:
-    return town_map.draw_map(tiny, ground_layer.Relief.of(TINY_TOWN))
+    return town_map.draw_map(tiny, ground_layer.TownGeometry.of(TINY_TOWN))
 
 
 def only(town: Town, *names: str) -> Town:
@@ -105,13 +105,13 @@ def test_a_town_is_read_by_every_spelling_that_collections_take(
     path = path.rename(path.with_name(file))
     town = read_town(path.with_name(said), TINY_SCENES)
     assert town.library.town == path.resolve() and town.to_json() | {"path": ""} == tiny.to_json() | {"path": ""}
-    assert np.array_equal(town_map.draw_map(town, ground_layer.Relief.of(path)), tiny_map)
+    assert np.array_equal(town_map.draw_map(town, ground_layer.TownGeometry.of(path)), tiny_map)
 
 
 def test_an_unlabelled_geom_stops_the_map(tmp_path: Path) -> None:
     path = edited_town(tmp_path, '<geom name="lamp_post" class="pole"', '<geom name="lamp_post" class="seen"')
     with pytest.raises(TownError, match="geom 'lamp_post' can be seen but has class 'seen'"):
-        ground_layer.Relief.of(path)
+        ground_layer.TownGeometry.of(path)
 
 
 def test_a_height_field_stops_the_map(tmp_path: Path) -> None:
@@ -120,7 +120,7 @@ def test_a_height_field_stops_the_map(tmp_path: Path) -> None:
     hill = '<geom name="hill" class="terrain" type="hfield" hfield="h"/><geom name="lamp_post"'
     path.write_text(path.read_text(encoding="utf-8").replace('<geom name="lamp_post"', hill), encoding="utf-8")
     with pytest.raises(TownError, match=f"{path.name}: geom 'hill' is a hfield, which has no finite surface; make it"):
-        town_map.draw_map(read_town(path), ground_layer.Relief.of(path))
+        town_map.draw_map(read_town(path), ground_layer.TownGeometry.of(path))
 
 
 def pixel(picture: UInt8Image, x_m: float, y_m: float) -> tuple[int, ...]:
@@ -152,16 +152,16 @@ def test_what_closes_cracks_from_below_hides_nothing(tmp_path: Path, tiny_map: U
     under = '<geom name="under" class="ground" material="asphalt" size="90 70 0.1" pos="0 0 -9"/>'
     square = '<geom name="square" class="ground" material="asphalt" size="9 9 0.1" pos="-60 40 -0.5"/>'
     path.write_text(text.replace(post, under + post), encoding="utf-8")
-    assert np.array_equal(town_map.draw_map(read_town(path, TINY_SCENES), ground_layer.Relief.of(path)), tiny_map)
+    assert np.array_equal(town_map.draw_map(read_town(path, TINY_SCENES), ground_layer.TownGeometry.of(path)), tiny_map)
     path.write_text(text.replace(post, square + post), encoding="utf-8")
     paved = ground_layer.COVERS[1][2]
-    assert pixel(town_map.draw_map(read_town(path), ground_layer.Relief.of(path)), -60, 40) == paved
+    assert pixel(town_map.draw_map(read_town(path), ground_layer.TownGeometry.of(path)), -60, 40) == paved
 
 
 def test_the_map_shows_boards_and_limits(tiny: Town) -> None:
-    relief = ground_layer.Relief.of(TINY_TOWN)
-    with_board = town_map.draw_map(only(tiny, "board"), relief)
-    without = town_map.draw_map(only(tiny, "no_billboard"), relief)
+    geometry = ground_layer.TownGeometry.of(TINY_TOWN)
+    with_board = town_map.draw_map(only(tiny, "board"), geometry)
+    without = town_map.draw_map(only(tiny, "no_billboard"), geometry)
     colour = scene_layer.PALETTE[0]
     assert pixel(with_board, 55, -8.5) == colour
     inside, outside = (25.0, -10.0), (60.0, -10.0)

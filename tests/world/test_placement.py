@@ -51,13 +51,13 @@ def test_a_towns_own_options_change_nothing_of_what_is_felt(tmp_path: Path, opti
     text = TINY_TOWN.read_text()
     assert compiler in text
     town.write_text(text.replace(compiler, compiler + option))
-    for kind in ("vehicles", "pedestrians", "surfaces"):
-        (tmp_path / kind).symlink_to(TINY_TOWN.parents[1] / kind)
+    for actor_type in ("vehicles", "pedestrians", "surfaces"):
+        (tmp_path / actor_type).symlink_to(TINY_TOWN.parents[1] / actor_type)
     world = World.build(town=town, scene_name="no_billboard", scene=tiny_scenes().scenes["no_billboard"], weather=CLEAR)
     space = PlacementSpace(world.placement_model, {slot.body: world.types[slot.actor.name] for slot in world.slots})
     apart, within = flat(0, 0), flat(1, 0)
     assert space.overlaps({"car_saloon_0": apart, "van_small_0": within}) == [("van_small_0", "car_saloon_0")]
-    standing = space.stand(CAR, 0, -3.0, 0, 0.3)
+    standing = space.ground_pose(CAR, 0, -3.0, 0, 0.3)
     assert standing is not None
     settled, expected = (
         one.settle({"car_saloon_0": standing.world_from_actor})["car_saloon_0"] for one in (space, SPACE)
@@ -66,24 +66,24 @@ def test_a_towns_own_options_change_nothing_of_what_is_felt(tmp_path: Path, opti
 
 
 def test_a_car_on_the_hill_is_even() -> None:
-    standing = SPACE.stand(CAR, 30, 40, 2, np.pi / 2)
+    standing = SPACE.ground_pose(CAR, 30, 40, 2, np.pi / 2)
     assert standing is not None
     assert standing.is_even
     assert standing.world_from_actor.rotation[2, 0] == pytest.approx(0.0995, abs=1e-3)
 
 
 def test_a_car_half_on_the_kerb_comes_to_rest_on_its_wheels() -> None:
-    standing = SPACE.stand(CAR, 0, -3.0, 0, 0.3)
+    standing = SPACE.ground_pose(CAR, 0, -3.0, 0, 0.3)
     assert standing is not None
     assert not standing.is_even
     settled = SPACE.settle({"car_saloon_0": standing.world_from_actor})["car_saloon_0"]
     assert np.linalg.norm(settled.translation_m[:2] - (0, -3.0)) < 0.1
     assert settled.rotation[2, 2] > 0.98
-    stance = CAR.stance
+    placement_body = CAR.placement_body
     heights_m = []
     for sx in (-1, 1):
         for sy in (-1, 1):
-            foot = settled.apply([sx * stance.half_length_m, sy * stance.half_width_m, 0.0])
+            foot = settled.apply([sx * placement_body.half_length_m, sy * placement_body.half_width_m, 0.0])
             ground_m = SPACE.ground_m(foot[0], foot[1], 0)
             assert ground_m is not None
             heights_m.append(foot[2] - ground_m)
@@ -95,11 +95,11 @@ def test_a_car_half_on_the_kerb_comes_to_rest_on_its_wheels() -> None:
 
 def test_lines_of_sight() -> None:
     eye = np.array([-40.0, 18.0, 2.0])
-    seen = SPACE.sees(eye, np.array([[-40.0, 40.0, 2.0], [10.0, 18.0, 2.0], [-39.0, 18.0, 2.0]]))
+    seen = SPACE.visible(eye, np.array([[-40.0, 40.0, 2.0], [10.0, 18.0, 2.0], [-39.0, 18.0, 2.0]]))
     assert list(seen) == [True, False, True], "a house stands between"
     poses = {"van_small_0": flat(-45, 18)}
-    blockers = SPACE.blockers(eye, np.array([[-60.0, 18.0, 1.0], [-60.0, 40.0, 1.0]]), poses)
-    assert blockers == ["van_small_0", None]
+    occluders = SPACE.occluders(eye, np.array([[-60.0, 18.0, 1.0], [-60.0, 40.0, 1.0]]), poses)
+    assert occluders == ["van_small_0", None]
 
 
 @pytest.mark.parametrize(

@@ -22,8 +22,8 @@ from gear.values.serial import from_json, to_json
 from gear.world.planner import ScenePlanner
 from gear.world.scene_spec import EgoLimits, NpcLimits, SceneSpec, VehicleLimits
 from gear.world.traffic import spawn
-from gear.world.traffic.crowd import Cast
-from gear.world.traffic.sequence import Director
+from gear.world.traffic.crowd import RoadUsers
+from gear.world.traffic.sequence import SequenceSimulator
 from gear.world.world import World
 
 SCENES = ("board", "double", "truck", "no_billboard")
@@ -159,8 +159,8 @@ def lowered(folder: Path, depth_m: float) -> Path:
     town = folder / "towns" / "tiny.xml"
     town.parent.mkdir()
     tree.write(town)
-    for kind in ("vehicles", "pedestrians", "surfaces"):
-        (folder / kind).symlink_to(TINY_TOWN.parents[1] / kind)
+    for actor_type in ("vehicles", "pedestrians", "surfaces"):
+        (folder / actor_type).symlink_to(TINY_TOWN.parents[1] / actor_type)
     return town
 
 
@@ -364,13 +364,13 @@ def test_sequences_drive_without_overlaps(scene: str) -> None:
 
 def test_a_busy_sequence_is_driven_until_nobody_overlaps(monkeypatch: pytest.MonkeyPatch) -> None:
     """After the eighth who was in the way, it was the ego car that could not drive."""
-    rehearse, clashes = Director._rehearse, 0
+    rehearse, clashes = SequenceSimulator._simulate_once, 0
 
-    def clash(self: Director, cast: Cast, *rest: Any) -> Any:
+    def clash(self: SequenceSimulator, road_users: RoadUsers, *rest: Any) -> Any:
         nonlocal clashes
-        others = [body for body in cast.drafts if body not in cast.leads]
+        others = [body for body in road_users.spawns if body not in road_users.protected]
         if len(others) == 1:
-            return rehearse(self, cast, *rest)
+            return rehearse(self, road_users, *rest)
         clashes += 1
         return [], others[-1]
 
@@ -379,10 +379,12 @@ def test_a_busy_sequence_is_driven_until_nobody_overlaps(monkeypatch: pytest.Mon
         scene, npc_vehicles=VehicleLimits(count=(5, 5)), pedestrians=NpcLimits(count=(12, 12), radius_m=(0.0, 60.0))
     )
     world = World.build(town=TINY_TOWN, scene_name="busy", scene=busy, weather=CLEAR)
-    monkeypatch.setattr(Director, "_rehearse", clash)
+    monkeypatch.setattr(SequenceSimulator, "_simulate_once", clash)
     assert len(ScenePlanner(world, SMALL_RIG, DRIVE, split_name="video").plan(59).actors) == 2
     assert clashes == 16
-    monkeypatch.setattr(Director, "_rehearse", lambda self, cast, *_: ([], next(iter(cast.leads))))
+    monkeypatch.setattr(
+        SequenceSimulator, "_simulate_once", lambda self, road_users, *_: ([], next(iter(road_users.protected)))
+    )
     with pytest.raises(PlacementError, match="sequence 0: the ego car cannot drive 60 frames without an overlap"):
         ScenePlanner(world, SMALL_RIG, DRIVE, split_name="video").plan(0)
 

@@ -15,12 +15,16 @@ def test_actors_stand_as_their_assets_do(scene: str) -> None:
     felt = world.placement_model
     assert len(world.slots) > 5
     for slot in world.slots:
-        stance, body = world.types[slot.actor.name].stance, felt.body(slot.body)
-        length_m, width_m, height_m = 2 * stance.half_length_m, 2 * stance.half_width_m, stance.height_m
-        assert body.mass[0] == pytest.approx(stance.mass_kg, rel=1e-5)
+        wanted, body = world.types[slot.actor.name].placement_body, felt.body(slot.body)
+        length_m, width_m, height_m = (
+            2 * wanted.half_length_m,
+            2 * wanted.half_width_m,
+            wanted.height_m,
+        )
+        assert body.mass[0] == pytest.approx(wanted.mass_kg, rel=1e-5)
         assert body.ipos == pytest.approx([0, 0, 0.4 * height_m], rel=1e-5)
         squares = np.square([length_m, width_m, height_m])
-        assert body.inertia == pytest.approx(stance.mass_kg / 12 * (squares.sum() - squares), rel=1e-4)
+        assert body.inertia == pytest.approx(wanted.mass_kg / 12 * (squares.sum() - squares), rel=1e-4)
         first, count = int(body.geomadr[0]), int(body.geomnum[0])
         feet = [g for g in range(first, first + count) if felt.geom_group[g] == FOOT_GROUP]
         assert [felt.geom(g).name for g in feet] == [f"{slot.body}_foot_{k}" for k in range(4)]

@@ -18,9 +18,9 @@ from gear.values.frames import STATIC_OBJECT_BASE
 from gear.values.labels import GROUND_CODES, LABEL_BY_NAME
 from gear.values.optics import CameraEffects
 from gear.values.scene import ActorRecord, Pose, SceneRecord, Weather
-from gear.world.assets.geom_classes import NEVER_SEEN
-from gear.world.compilation.asset_prefetch import AssetsAhead
-from gear.world.compilation.instances import AssetParts
+from gear.world.assets.geom_classes import HIDDEN_CODE
+from gear.world.compilation.asset_prefetch import AssetPrefetcher
+from gear.world.compilation.instances import AssetInstances
 from gear.world.compilation.quiet_mjcf import mjcf
 from gear.world.surfaces.face_texture import FACE_SIZE_PX
 from gear.world.weather.air import camera_pipeline
@@ -75,7 +75,7 @@ def test_instances_share_meshes_and_materials() -> None:
 
 def test_instances_wear_number_plates_by_turns() -> None:
     root = mjcf.RootElement(model="town")
-    parts = AssetParts(root, AssetsAhead(None))
+    parts = AssetInstances(root, AssetPrefetcher(None))
     worn = []
     for k in range(8):
         body = root.worldbody.add("body", name=f"car_{k}")
@@ -98,7 +98,7 @@ def test_every_board_has_a_material_and_a_texture_of_its_own() -> None:
 def test_collision_geoms_are_not_in_the_render_model() -> None:
     world = tiny_world()
     assert not (world.model.geom_group >= 3).any()
-    assert not (world.classes.label_code == NEVER_SEEN).any()
+    assert not (world.classes.label_code == HIDDEN_CODE).any()
     assert {int(c) for c in world.classes.label_code} <= {label.code for label in LABEL_BY_NAME.values()} - {0}
 
 

@@ -12,7 +12,7 @@ from gear.values.errors import ConfigError, GearError, UnknownNameError
 from gear.verbs.bench.config import BenchConfig
 from gear.world.assets.library import AssetLibrary
 from gear.world.scene_spec import SceneSpec
-from gear.world.surfaces.surface_carriers import check_assets
+from gear.world.surfaces.surface_carriers import check_scene_assets
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,7 +86,7 @@ def _named(town: str, names: tuple[str, ...]) -> Iterator[Scene]:
             raise UnknownNameError(f"scene of {path or town}", bare, known)
         if not _surfaces(known[bare]):
             raise GearError(f"scene {bare!r} has neither a board nor the truck, so no patch would be seen")
-        check_assets(library, known[bare], f"scenes.{bare}")
+        check_scene_assets(library, known[bare], f"scenes.{bare}")
         yield Scene(town=town, name=name, surfaces=_surfaces(known[bare]))
 
 

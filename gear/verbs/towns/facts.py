@@ -15,7 +15,7 @@ from gear.world.assets.library import AssetLibrary, read_numbers
 from gear.world.assets.mjspec import read_spec
 from gear.world.roads.lanes import LaneGraph
 from gear.world.scene_spec import SceneLibrary
-from gear.world.surfaces.surface_carriers import check_assets
+from gear.world.surfaces.surface_carriers import check_scene_assets
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -112,5 +112,5 @@ def _scenes(library: AssetLibrary, given: str | Path | None) -> SceneLibrary | N
             return None
         raise
     for name, scene in scenes.scenes.items():
-        check_assets(library, scene, f"scenes.{name}")
+        check_scene_assets(library, scene, f"scenes.{name}")
     return scenes

@@ -48,7 +48,7 @@ LEAST_FENCE_M = 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Relief:
+class TownGeometry:
     """A compiled town, as far as a map needs it.
 
     Attributes:
@@ -64,7 +64,7 @@ class Relief:
     classes: GeomClasses
 
     @staticmethod
-    def of(path: Path) -> Relief:
+    def of(path: Path) -> TownGeometry:
         """Compiles a town.
 
         Raises:
@@ -77,7 +77,7 @@ class Relief:
             raise TownError(path, f"MuJoCo cannot compile it: {without_breaks(error)}") from error
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
-        return Relief(path=path, model=model, data=data, classes=classify(spec, path))
+        return TownGeometry(path=path, model=model, data=data, classes=classify(spec, path))
 
     def corners_m(self, geom: int) -> Array:
         """(N, 3, 3) triangles of a geom in the world; a plane reaches as far as it is rendered.
@@ -123,14 +123,14 @@ class Obstacle:
         return not self.is_building and self.size_m[0] >= LEAST_FENCE_M
 
 
-def obstacles(relief: Relief) -> list[Obstacle]:
+def obstacles(geometry: TownGeometry) -> list[Obstacle]:
     """Every collision geom on which nobody stands."""
     found = []
-    for geom in np.flatnonzero(relief.model.geom_group >= FIRST_HIDDEN_GROUP):
-        is_plane = relief.model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE
-        if is_plane or relief.model.geom(int(geom)).name.startswith(GROUND_PREFIX):
+    for geom in np.flatnonzero(geometry.model.geom_group >= FIRST_HIDDEN_GROUP):
+        is_plane = geometry.model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE
+        if is_plane or geometry.model.geom(int(geom)).name.startswith(GROUND_PREFIX):
             continue
-        corners = relief.corners_m(int(geom)).reshape(-1, 3)
+        corners = geometry.corners_m(int(geom)).reshape(-1, 3)
         flat = corners[:, :2].astype(np.float32)
         sides = sorted(cv2.minAreaRect(flat)[1], reverse=True)
         outline = np.asarray(cv2.convexHull(flat), dtype=np.float64).reshape(-1, 2)
@@ -138,21 +138,21 @@ def obstacles(relief: Relief) -> list[Obstacle]:
     return found
 
 
-def draw_ground(canvas: Canvas, relief: Relief, bounds_m: Bounds) -> None:
+def draw_ground(canvas: Canvas, geometry: TownGeometry, bounds_m: Bounds) -> None:
     """Draws ground covers, plants, fences and buildings of a town with those bounds."""
-    corners_m = {geom: relief.corners_m(geom) for _, labels, _ in COVERS for geom in _labelled(relief, labels)}
-    hidden = _underground(corners_m, _labelled(relief, ("ground",)), bounds_m)
+    corners_m = {geom: geometry.corners_m(geom) for _, labels, _ in COVERS for geom in _labelled(geometry, labels)}
+    hidden = _underground(corners_m, _labelled(geometry, ("ground",)), bounds_m)
     for _, labels, colour in COVERS:
         mask = canvas.mask()
-        for geom in _labelled(relief, labels):
+        for geom in _labelled(geometry, labels):
             if geom != hidden:
                 canvas.fill_triangles(mask, _from_above(corners_m[geom]))
         canvas.blend(mask, colour)
     plants = canvas.mask()
-    for geom in _labelled(relief, ("vegetation",)):
-        canvas.fill_triangles(plants, _from_above(relief.corners_m(geom)))
+    for geom in _labelled(geometry, ("vegetation",)):
+        canvas.fill_triangles(plants, _from_above(geometry.corners_m(geom)))
     canvas.blend(plants, VEGETATION, 0.55)
-    blocks = obstacles(relief)
+    blocks = obstacles(geometry)
     for fence in (block for block in blocks if block.is_fence):
         canvas.line(canvas.to_px(fence.outline_m), FENCE, 0.8, closed=True)
     buildings = canvas.mask()
@@ -176,9 +176,9 @@ def _underground(corners_m: Mapping[int, Array], ground: Sequence[int], bounds_m
     return lowest if is_under and is_wide and lowest in ground else None
 
 
-def _labelled(relief: Relief, names: tuple[str, ...]) -> list[int]:
+def _labelled(geometry: TownGeometry, names: tuple[str, ...]) -> list[int]:
     codes = [LABEL_BY_NAME[name].code for name in names]
-    return [int(geom) for geom in np.flatnonzero(np.isin(relief.classes.label_code, codes))]
+    return [int(geom) for geom in np.flatnonzero(np.isin(geometry.classes.label_code, codes))]
 
 
 def _from_above(corners_m: Array) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 from gear.values.errors import TownError
 from gear.values.geometry import Array
 from gear.verbs.towns.canvas import Canvas, Colour
-from gear.world.assets.geom_classes import own_class
+from gear.world.assets.geom_classes import unprefixed_class
 from gear.world.assets.geom_triangles import geom_triangles
 from gear.world.assets.library import AssetLibrary
 from gear.world.assets.mjspec import read_spec
@@ -145,7 +145,7 @@ def face_width_m(library: AssetLibrary, asset: str) -> float:
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     for geom in spec.geoms:
-        if own_class(geom.classname.name).endswith(".face"):
+        if unprefixed_class(geom.classname.name).endswith(".face"):
             vertices = geom_triangles(model, geom.id)[0] @ data.geom_xmat[geom.id].reshape(3, 3).T
             return float(np.ptp(vertices[:, 1]))
     raise TownError(path, "has no geom of a class ending in `.face`")

@@ -22,12 +22,12 @@ GREY = (120, 120, 126)
 TICK_PX = 7.0
 
 
-def draw_map(town: Town, relief: ground_layer.Relief) -> UInt8Image:
+def draw_map(town: Town, geometry: ground_layer.TownGeometry) -> UInt8Image:
     """Draws a town with all of its scenes.
 
     Args:
         town: its lanes and scenes.
-        relief: the town, compiled.
+        geometry: the town, compiled.
 
     Returns:
         (H, W, 3) uint8 RGB.
@@ -48,7 +48,7 @@ def draw_map(town: Town, relief: ground_layer.Relief) -> UInt8Image:
         origin_px=(MARGIN_PX - xmin * px_per_m, top_px + ymax * px_per_m),
         box_px=(MARGIN_PX, top_px, MARGIN_PX + width_px, top_px + height_px),
     )
-    ground_layer.draw_ground(canvas, relief, town.lanes.bounds_m)
+    ground_layer.draw_ground(canvas, geometry, town.lanes.bounds_m)
     traffic_layer.draw_traffic(canvas, town.lanes)
     colours = scene_colours(scenes)
     for name, colour in colours.items():

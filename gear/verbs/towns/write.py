@@ -15,7 +15,7 @@ from gear.values.errors import GearError, PlacementError, UnknownNameError
 from gear.values.frames import UInt8Image
 from gear.values.progress import Progress
 from gear.verbs.towns.facts import Town, read_town
-from gear.verbs.towns.ground_layer import Relief
+from gear.verbs.towns.ground_layer import TownGeometry
 from gear.verbs.towns.sheet import SheetOptions, draw_sheet
 from gear.verbs.towns.town_map import draw_map
 from gear.world.weather.presets import PRESETS
@@ -82,7 +82,7 @@ def write_town(
     with explained(folder):  # before minutes are spent on drawing
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
-    map_path = _write(folder / f"{found.name}_map.png", draw_map(found, Relief.of(found.library.town)))
+    map_path = _write(folder / f"{found.name}_map.png", draw_map(found, TownGeometry.of(found.library.town)))
     sheet_path: Path | None = None
     problems: list[PlacementError] = []
     if found.scenes is not None:

@@ -14,11 +14,11 @@ from gear.values.errors import TownError
 from gear.values.frames import STATIC_OBJECT_BASE, SceneObject, Shape
 from gear.values.geometry import RigidTransform
 from gear.values.labels import LABELS, Label
-from gear.world.assets.geom_classes import NEVER_SEEN, GeomClasses
+from gear.world.assets.geom_classes import HIDDEN_CODE, GeomClasses
 from gear.world.assets.geom_triangles import body_shape
-from gear.world.assets.library import ActorFacts
+from gear.world.assets.library import ActorFacts, ActorKind
 from gear.world.compilation.compose import Slot
-from gear.world.compilation.model_compilation import Stance
+from gear.world.compilation.model_compilation import PlacementBody
 
 MASS_KG = {"person": 75.0, "bicycle": 95.0, "motorcycle": 300.0}
 VEHICLE_MASS_KG = 1500.0
@@ -47,8 +47,13 @@ class ActorType:
     half_width_m: float
 
     @property
+    def kind(self) -> ActorKind:
+        """What kind of road user it is, such as `car` or `person`."""
+        return self.facts.kind
+
+    @property
     def label(self) -> Label:
-        """What it mainly is."""
+        """The semantic label of its kind."""
         return self.facts.label
 
     @property
@@ -62,9 +67,9 @@ class ActorType:
         return float(self.shape.box_size_m[0] / 2 - self.shape.box_centre_m[0])
 
     @property
-    def stance(self) -> Stance:
+    def placement_body(self) -> PlacementBody:
         """How it stands: its feet are a fifth inside its footprint, where wheels are."""
-        return Stance(
+        return PlacementBody(
             half_length_m=0.8 * self.half_length_m,
             half_width_m=0.8 * self.half_width_m,
             height_m=float(self.shape.box_centre_m[2] + self.shape.box_size_m[2] / 2),
@@ -81,7 +86,7 @@ def body_tree(model: mujoco.MjModel, body_id: int) -> list[int]:
 def visible_geoms(model: mujoco.MjModel, body_id: int, label_code: npt.NDArray[np.uint8]) -> list[int]:
     """Ids of the visible geoms of a body and of all below it."""
     owners = np.isin(model.geom_bodyid, body_tree(model, body_id))
-    return [int(geom) for geom in np.flatnonzero(owners & (label_code != NEVER_SEEN))]
+    return [int(geom) for geom in np.flatnonzero(owners & (label_code != HIDDEN_CODE))]
 
 
 def actor_types(

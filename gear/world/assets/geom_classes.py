@@ -12,7 +12,7 @@ import numpy.typing as npt
 from gear.values.errors import TownError
 from gear.values.labels import LABEL_BY_NAME
 
-NEVER_SEEN = 255
+HIDDEN_CODE = 255
 """Label code of geoms that no renderer draws."""
 
 FIRST_HIDDEN_GROUP = 3
@@ -24,7 +24,7 @@ class GeomClasses:
     """Labels by geom id of a compiled model.
 
     Attributes:
-        label_code: (ngeom,) uint8, `NEVER_SEEN` for hidden geoms.
+        label_code: (ngeom,) uint8, `HIDDEN_CODE` for hidden geoms.
         is_paint: (ngeom,) bool, whether a sample may choose the geom's colour.
         is_face: (ngeom,) bool, whether the geom is a face that takes a patch.
     """
@@ -34,7 +34,7 @@ class GeomClasses:
     is_face: npt.NDArray[np.bool_]
 
 
-def own_class(classname: str) -> str:
+def unprefixed_class(classname: str) -> str:
     """The class as its own file names it: dm_control puts `<file>/` before it when files are composed."""
     return classname.rsplit("/", 1)[-1]
 
@@ -50,12 +50,12 @@ def classify(spec: mujoco.MjSpec, path: Path) -> GeomClasses:
         TownError: a visible geom has no known label.
     """
     geoms = spec.geoms
-    label_code = np.full(len(geoms), NEVER_SEEN, np.uint8)
+    label_code = np.full(len(geoms), HIDDEN_CODE, np.uint8)
     is_paint, is_face = np.zeros(len(geoms), bool), np.zeros(len(geoms), bool)
     for geom in geoms:
         if geom.group >= FIRST_HIDDEN_GROUP:
             continue
-        name = own_class(geom.classname.name)
+        name = unprefixed_class(geom.classname.name)
         first, _, rest = name.partition(".")
         label = LABEL_BY_NAME.get(first)
         if label is None or label.code == 0:

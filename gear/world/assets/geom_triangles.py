@@ -71,7 +71,7 @@ def _revolved(radii: Array, heights: Array, y_scale: float = 1.0) -> Triangles:
     return vertices, np.array(faces, dtype=np.int32)
 
 
-def world_corners(model: mujoco.MjModel, data: mujoco.MjData, geom_id: int) -> Array:
+def world_triangles(model: mujoco.MjModel, data: mujoco.MjData, geom_id: int) -> Array:
     """(N, 3, 3) corners of one geom's triangles in the world; kinematics up to date.
 
     Raises:
@@ -81,7 +81,7 @@ def world_corners(model: mujoco.MjModel, data: mujoco.MjData, geom_id: int) -> A
     return np.asarray((vertices @ data.geom_xmat[geom_id].reshape(3, 3).T + data.geom_xpos[geom_id])[faces])
 
 
-def standing_geoms(model: mujoco.MjModel) -> npt.NDArray[np.bool_]:
+def static_geoms(model: mujoco.MjModel) -> npt.NDArray[np.bool_]:
     """(ngeom,) what is part of the town and of its boards, and of no actor."""
     return np.asarray(model.body_mocapid[model.body_rootid[model.geom_bodyid]] < 0)
 

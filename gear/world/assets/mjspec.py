@@ -25,10 +25,10 @@ def read_spec(path: Path) -> mujoco.MjSpec:
             include.set("file", str(path.parent.absolute() / include.get("file", "")))
         spec = mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
         spec.modelfiledir = str(path.parent.absolute())
-    bear_flat_bodies(spec)
+    accept_flat_bodies(spec)
     return spec
 
 
-def bear_flat_bodies(spec: mujoco.MjSpec) -> None:
+def accept_flat_bodies(spec: mujoco.MjSpec) -> None:
     """Lets a flat sign be a body of its own: it is at the edge of what inertia can be, and rounding decides."""
     spec.compiler.balanceinertia = True

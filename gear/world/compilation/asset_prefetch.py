@@ -14,7 +14,7 @@ from pathlib import Path
 
 import mujoco
 
-from gear.world.compilation.memory import keep_no_assets
+from gear.world.compilation.memory import disable_asset_cache
 
 _SHARE_BYTES = 2 << 20
 """Of files that one thread reads at a time: what it needs besides the meshes is given back after each share."""
@@ -26,13 +26,13 @@ _INERTIA = "shell"
 """As gear's files have it; with MuJoCo's own default an open surface is refused."""
 
 
-class AssetsAhead:
+class AssetPrefetcher:
     """Files on their way into the cache."""
 
     def __init__(self, readers: ThreadPoolExecutor | None) -> None:
         self._readers = readers
 
-    def expect(self, files: Iterable[str]) -> None:
+    def prefetch(self, files: Iterable[str]) -> None:
         """Begins to read files: PNGs, and else meshes. What is wrong with one is for those to say who need it."""
         if self._readers is not None:
             for share in _shares(files):
@@ -45,26 +45,26 @@ class AssetsAhead:
 
 
 @contextlib.contextmanager
-def assets_ahead(readers: int) -> Iterator[AssetsAhead]:
+def asset_prefetcher(readers: int) -> Iterator[AssetPrefetcher]:
     """Lets files be read ahead, and forgets them in the end.
 
     Args:
         readers: threads that read; with 0 nothing is read ahead, and nothing is in memory twice.
     """
-    keep_no_assets()
+    disable_asset_cache()
     if not readers:
-        yield AssetsAhead(None)
+        yield AssetPrefetcher(None)
         return
     mujoco.mj_setCacheCapacity(mujoco.mj_getCache(), _CACHE_BYTES)
     try:
         with ThreadPoolExecutor(readers) as threads:
             try:
-                yield AssetsAhead(threads)
+                yield AssetPrefetcher(threads)
             except BaseException:
                 threads.shutdown(cancel_futures=True)
                 raise
     finally:
-        keep_no_assets()
+        disable_asset_cache()
 
 
 def _shares(files: Iterable[str]) -> Iterator[list[str]]:

@@ -19,7 +19,7 @@ from gear.values.serial import from_json
 from gear.world.assets.asset_hash import asset_files
 from gear.world.assets.library import AssetLibrary
 from gear.world.compilation.compiled_world import compile_world
-from gear.world.compilation.world_cache import DONE, MAY_KEEP, order_of
+from gear.world.compilation.world_cache import DONE, MAY_CACHE, world_key
 from gear.world.scene_spec import SceneSpec
 from gear.world.weather.light import Lighting, lighting_of
 
@@ -43,21 +43,21 @@ def main(folder: str) -> None:
     order = json.loads(sys.stdin.readline())
     library = AssetLibrary(Path(order["town"]))
     scene, weather = from_json(SceneSpec, order["scene"]), from_json(Weather, order["weather"])
-    lighting = _lighting_beside(weather)
-    threading.Thread(target=_follow_customer, daemon=True).start()
+    lighting = _lighting_in_process(weather)
+    threading.Thread(target=_exit_with_parent, daemon=True).start()
     known = {os.path.realpath(path) for path in asset_files(library).values()}
-    heard = _watched()
+    files_read = _record_files_read()
     compiled = compile_world(library, scene, weather, lighting, readers=min(_READERS, cores()))
-    is_covered = heard <= known
+    is_covered = files_read <= known
     with ThreadPoolExecutor(1) as aside:
-        read = aside.submit(order_of, library, scene, weather)
+        read = aside.submit(world_key, library, scene, weather)
         compiled.save(Path(folder))
     if is_covered and read.result() == order:
-        (Path(folder) / MAY_KEEP).touch()
+        (Path(folder) / MAY_CACHE).touch()
     os.write(sys.stdout.fileno(), DONE)
 
 
-def _lighting_beside(weather: Weather) -> Callable[[], Lighting] | None:
+def _lighting_in_process(weather: Weather) -> Callable[[], Lighting] | None:
     """What waits for a weather's light, which another process works out: in this one Python would hold it up."""
     if sys.platform != "linux":
         return None
@@ -81,7 +81,7 @@ def _lighting_beside(weather: Weather) -> Callable[[], Lighting] | None:
     return wait
 
 
-def _follow_customer() -> None:
+def _exit_with_parent() -> None:
     """Ends this process when the one that waits for the world is gone, killed perhaps: who gives the command again
     should have the machine for itself."""
     while os.read(0, 1):
@@ -89,15 +89,15 @@ def _follow_customer() -> None:
     os._exit(1)
 
 
-def _watched() -> set[str]:
+def _record_files_read() -> set[str]:
     """Real paths of the files that Python opens to read from now on, code left out."""
     read: set[str] = set()
 
-    def hear(event: str, details: tuple[Any, ...]) -> None:
+    def record(event: str, details: tuple[Any, ...]) -> None:
         if event == "open" and isinstance(details[0], str) and str(details[1] or "").startswith("r"):
             path = os.path.realpath(details[0])
             if not path.endswith(_CODE_SUFFIXES):
                 read.add(path)
 
-    sys.addaudithook(hear)
+    sys.addaudithook(record)
     return read

@@ -18,23 +18,23 @@ from gear.world.assets.actor_types import actor_types
 from gear.world.assets.geom_classes import GeomClasses
 from gear.world.assets.library import ActorFacts, AssetLibrary
 from gear.world.compilation.actor_pool import plan_pool, vehicles_of
-from gear.world.compilation.asset_prefetch import assets_ahead
+from gear.world.compilation.asset_prefetch import asset_prefetcher
 from gear.world.compilation.compose import Slot, compose, slots_of
-from gear.world.compilation.drop_bvh import without_mesh_trees
-from gear.world.compilation.instances import FaceName
+from gear.world.compilation.drop_bvh import without_mesh_bvh
+from gear.world.compilation.instances import FaceNames
 from gear.world.compilation.mjb import read_model, write_model
 from gear.world.compilation.model_compilation import placement_model, placement_spec, render_model
-from gear.world.compilation.normal_maps import upright_relief
+from gear.world.compilation.normal_maps import align_normal_maps
 from gear.world.scene_spec import SceneSpec
 from gear.world.weather.light import Lighting
 from gear.world.weather.presets import wetness
 from gear.world.weather.wet_ground import wet_own_colours
 
-_SEEN, _FELT, _FACTS = "seen.mjb", "felt.mjb", "facts.json"
+_RENDER, _PLACEMENT, _FACTS = "render.mjb", "placement.mjb", "facts.json"
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Compiled:
+class CompiledWorld:
     """A world's two models and what they do not say of themselves.
 
     Attributes:
@@ -49,13 +49,13 @@ class Compiled:
     placement_model: mujoco.MjModel
     classes: GeomClasses
     slots: tuple[Slot, ...]
-    faces: tuple[FaceName, ...]
+    faces: tuple[FaceNames, ...]
 
     def save(self, folder: Path) -> None:
         """Writes it into an empty folder, without what rays find triangles by."""
-        with without_mesh_trees(self.model):
-            crc32 = {_SEEN: write_model(self.model, folder / _SEEN)}
-        crc32[_FELT] = write_model(self.placement_model, folder / _FELT)
+        with without_mesh_bvh(self.model):
+            crc32 = {_RENDER: write_model(self.model, folder / _RENDER)}
+        crc32[_PLACEMENT] = write_model(self.placement_model, folder / _PLACEMENT)
         facts = {
             "faces": to_json(self.faces),
             "label_code": self.classes.label_code.tolist(),
@@ -66,7 +66,7 @@ class Compiled:
         (folder / _FACTS).write_text(json.dumps(facts), encoding="utf-8")
 
     @staticmethod
-    def load(folder: Path, library: AssetLibrary, scene: SceneSpec) -> Compiled:
+    def load(folder: Path, library: AssetLibrary, scene: SceneSpec) -> CompiledWorld:
         """Reads what `save` wrote for the same library and scene.
 
         Raises:
@@ -74,7 +74,7 @@ class Compiled:
             ValueError, KeyError, GearError: something else lies there, or half of it.
         """
         facts = json.loads((folder / _FACTS).read_text(encoding="utf-8"))
-        model, felt = (read_model(folder / name, facts["crc32"][name]) for name in (_SEEN, _FELT))
+        model, placement = (read_model(folder / name, facts["crc32"][name]) for name in (_RENDER, _PLACEMENT))
         classes = GeomClasses(
             label_code=np.array(facts["label_code"], np.uint8),
             is_paint=np.array(facts["is_paint"], np.bool_),
@@ -82,12 +82,12 @@ class Compiled:
         )
         for array in (classes.label_code, classes.is_paint, classes.is_face):
             array.setflags(write=False)
-        return Compiled(
+        return CompiledWorld(
             model=model,
-            placement_model=felt,
+            placement_model=placement,
             classes=classes,
             slots=slots_of(plan_pool(scene, library), carrier_of(scene, library)),
-            faces=from_json(tuple[FaceName, ...], facts["faces"]),
+            faces=from_json(tuple[FaceNames, ...], facts["faces"]),
         )
 
 
@@ -98,7 +98,7 @@ def compile_world(
     lighting: Callable[[], Lighting] | None = None,
     *,
     readers: int = 0,
-) -> Compiled:
+) -> CompiledWorld:
     """Composes and compiles.
 
     Args:
@@ -111,25 +111,27 @@ def compile_world(
         TownError: a file breaks the conventions.
     """
     with (
-        assets_ahead(readers) as ahead,
+        asset_prefetcher(readers) as prefetcher,
         tempfile.TemporaryDirectory(prefix="gear-") as folder,
         ThreadPoolExecutor(1) as aside,
     ):
         pool, carrier = plan_pool(scene, library), carrier_of(scene, library)
-        composition = compose(library, scene.boards, pool, carrier, weather, lighting, ahead).laid_out(Path(folder))
-        ahead.expect(composition.pictures)
-        ahead.wait()
-        felt = aside.submit(placement_spec, composition)
+        composition = compose(library, scene.boards, pool, carrier, weather, lighting, prefetcher).laid_out(
+            Path(folder)
+        )
+        prefetcher.prefetch(composition.pictures)
+        prefetcher.wait()
+        placement = aside.submit(placement_spec, composition)
         model, classes = render_model(composition)
-    upright_relief(model)
+    align_normal_maps(model)
     wet_own_colours(model, classes.label_code, wetness(weather))
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     types = actor_types(model, data, classes, composition.slots)
-    stances = {slot.body: types[slot.actor.name].stance for slot in composition.slots}
-    return Compiled(
+    placement_bodies = {slot.body: types[slot.actor.name].placement_body for slot in composition.slots}
+    return CompiledWorld(
         model=model,
-        placement_model=placement_model(composition, felt.result(), stances),
+        placement_model=placement_model(composition, placement.result(), placement_bodies),
         classes=classes,
         slots=composition.slots,
         faces=composition.faces,

@@ -22,10 +22,10 @@ from typing import Any
 from gear.values.errors import TownError
 from gear.values.scene import Weather
 from gear.world.assets.library import ActorFacts, AssetLibrary
-from gear.world.compilation.asset_prefetch import AssetsAhead
-from gear.world.compilation.instances import AssetParts, FaceName, load_mjcf
+from gear.world.compilation.asset_prefetch import AssetPrefetcher
+from gear.world.compilation.instances import AssetInstances, FaceNames, load_mjcf
 from gear.world.compilation.quiet_mjcf import mjcf
-from gear.world.compilation.static_parts import Place, Statics, split_town
+from gear.world.compilation.static_parts import MeshPath, StaticParts, split_town
 from gear.world.scene_spec import BoardSpec
 from gear.world.weather.light import Lighting, lighting_of
 from gear.world.weather.presets import apply_weather
@@ -41,12 +41,12 @@ class Slot:
     Attributes:
         body: its body in both models.
         actor: what it is an instance of.
-        bears_surface: whether its face has a texture of its own.
+        carries_surface: whether its face has a texture of its own.
     """
 
     body: str
     actor: ActorFacts
-    bears_surface: bool = False
+    carries_surface: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -68,7 +68,7 @@ class Composition:
     town: Path
     files: tuple[Path, ...]
     slots: tuple[Slot, ...]
-    faces: tuple[FaceName, ...]
+    faces: tuple[FaceNames, ...]
     folder: Path | None = None
 
     @property
@@ -81,13 +81,13 @@ class Composition:
         copies what is in memory, all of it at once.
         """
         for name, content in self.assets.items():
-            if not isinstance(content, Place):
+            if not isinstance(content, MeshPath):
                 (folder / name).write_bytes(content)
         tree = copy.deepcopy(self.tree)
         for element in tree.iter():
             element.attrib.pop("strippath", None)
             place = self.assets.get(element.get("file", ""))
-            if isinstance(place, Place):
+            if isinstance(place, MeshPath):
                 element.set("file", os.fsdecode(place))
         return replace(self, tree=tree, assets={}, folder=folder)
 
@@ -99,7 +99,7 @@ def compose(
     carrier: ActorFacts | None,
     weather: Weather,
     lighting: Callable[[], Lighting] | None,
-    ahead: AssetsAhead,
+    prefetcher: AssetPrefetcher,
 ) -> Composition:
     """Puts a town, its boards and its actors into one tree.
 
@@ -110,7 +110,7 @@ def compose(
         carrier: an actor that bears a surface, besides the pool.
         weather: light and air.
         lighting: waits for the weather's light, where that is being worked out already; else None.
-        ahead: is told of meshes as soon as they are known.
+        prefetcher: is told of meshes as soon as they are known.
 
     Raises:
         TownError: a file cannot be composed.
@@ -119,12 +119,12 @@ def compose(
     with ThreadPoolExecutor(1) as aside:
         light = aside.submit(lighting or partial(lighting_of, weather))
         text, statics = split_town(library.town)
-        ahead.expect(map(os.fsdecode, statics.places.values()))
-        root = load_mjcf(library.town, text, statics.places)
+        prefetcher.prefetch(map(os.fsdecode, statics.mesh_paths.values()))
+        root = load_mjcf(library.town, text, statics.mesh_paths)
         slots = slots_of(pool, carrier)
-        parts = AssetParts(root, ahead)
+        parts = AssetInstances(root, prefetcher)
         faces = _fill(root, parts, library, statics, boards, slots)
-    apply_weather(root, weather, light.result(), statics.worn)
+    apply_weather(root, weather, light.result(), statics.geom_materials)
     tree = ET.fromstring(statics.put_into(parts.put_defaults_into(root.to_xml_string())))
     parts.put_copies_into(tree)
     return Composition(
@@ -139,30 +139,30 @@ def compose(
 
 def _fill(
     root: mjcf.RootElement,
-    parts: AssetParts,
+    parts: AssetInstances,
     library: AssetLibrary,
-    statics: Statics,
+    statics: StaticParts,
     boards: Sequence[BoardSpec],
     slots: Iterable[Slot],
-) -> tuple[FaceName, ...]:
+) -> tuple[FaceNames, ...]:
     """Puts boards and actors into the town's tree."""
-    faces: list[FaceName] = []
+    faces: list[FaceNames] = []
     for index, board in enumerate(boards):
         path = library.path("surface", board.asset)
         body = _new_body(root, library.town, statics, f"board_{index}", **_placed(board))
-        faces.append(parts.add_bearer(path, body, is_carried=False))
+        faces.append(parts.add_surface_instance(path, body, is_carried=False))
     for slot in slots:
         if slot.body in {face.owner for face in faces}:
             problem = f"is called {slot.actor.name!r}, so its instances would have the names of the boards; rename it"
             raise TownError(slot.actor.path, problem)
         path = slot.actor.path
-        if not slot.bears_surface and parts.has_instance(path):
+        if not slot.carries_surface and parts.has_instance(path):
             _refuse_taken(root, library.town, statics, slot.body)
             parts.copy_instance(path, slot.body)
             continue
         body = _new_body(root, library.town, statics, slot.body, mocap=True)
-        if slot.bears_surface:
-            faces.append(parts.add_bearer(path, body, is_carried=True))
+        if slot.carries_surface:
+            faces.append(parts.add_surface_instance(path, body, is_carried=True))
         else:
             parts.add_instance(path, body)
     parts.drop_templates()
@@ -175,16 +175,16 @@ def slots_of(pool: Sequence[tuple[ActorFacts, int]], carrier: ActorFacts | None)
         Slot(body=f"{actor.name}_{index}", actor=actor) for actor, count in _merged(pool) for index in range(count)
     ]
     if carrier is not None:
-        slots.append(Slot(body="carrier", actor=carrier, bears_surface=True))
+        slots.append(Slot(body="carrier", actor=carrier, carries_surface=True))
     return tuple(slots)
 
 
-def _new_body(root: mjcf.RootElement, town: Path, statics: Statics, name: str, **attributes: Any) -> Any:
+def _new_body(root: mjcf.RootElement, town: Path, statics: StaticParts, name: str, **attributes: Any) -> Any:
     _refuse_taken(root, town, statics, name)
     return root.worldbody.add("body", name=name, **attributes)
 
 
-def _refuse_taken(root: mjcf.RootElement, town: Path, statics: Statics, name: str) -> None:
+def _refuse_taken(root: mjcf.RootElement, town: Path, statics: StaticParts, name: str) -> None:
     if name in statics.body_names or root.find("body", name) is not None:
         raise TownError(town, f"has a body named {name!r}, a name that gear gives to what it puts there")
 

@@ -19,7 +19,7 @@ _ALIGNMENT_BYTES = 64
 
 
 @contextlib.contextmanager
-def without_mesh_trees(model: mujoco.MjModel) -> Iterator[None]:
+def without_mesh_bvh(model: mujoco.MjModel) -> Iterator[None]:
     """For a while a model has its bodies' trees alone; one that is saved then comes back so.
 
     All its meshes share one box without a size in place of their trees, so that rays miss them. A model with

@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from gear.values.errors import TownError
-from gear.world.compilation.asset_prefetch import AssetsAhead
+from gear.world.compilation.asset_prefetch import AssetPrefetcher
 from gear.world.compilation.copies import Copy, put_copies_into
-from gear.world.compilation.mujoco_errors import refusal_of, without_breaks
+from gear.world.compilation.mujoco_errors import compile_problem, without_breaks
 from gear.world.compilation.quiet_mjcf import mjcf
-from gear.world.compilation.static_parts import UNNAMED, Place, split_asset
+from gear.world.compilation.static_parts import UNNAMED, MeshPath, split_asset
 from gear.world.surfaces.face_texture import FACE_SIZE_PX
 
 _UNREAD = ("frame", "replicate", "attach")
@@ -23,7 +23,7 @@ _UNREAD = ("frame", "replicate", "attach")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FaceName:
+class FaceNames:
     """A face that takes a patch, by its names in the composed MJCF.
 
     Attributes:
@@ -42,13 +42,15 @@ class FaceName:
     neutral_material: str
 
 
-def load_mjcf(path: Path, text: str | None = None, places: Mapping[str, Place] | None = None) -> mjcf.RootElement:
+def load_mjcf(
+    path: Path, text: str | None = None, mesh_paths: Mapping[str, MeshPath] | None = None
+) -> mjcf.RootElement:
     """Reads one file; its model is named after the file and everything in it has a name.
 
     Args:
         path: of the file.
         text: what is read in its place.
-        places: files of the text that stay where they are.
+        mesh_paths: files of the text that stay where they are.
 
     Raises:
         TownError: dm_control cannot read it.
@@ -57,7 +59,7 @@ def load_mjcf(path: Path, text: str | None = None, places: Mapping[str, Place] |
         if text is None:
             root = mjcf.from_path(str(path))
         else:
-            root = mjcf.from_xml_string(text, model_dir=str(path.parent), assets=places)
+            root = mjcf.from_xml_string(text, model_dir=str(path.parent), assets=mesh_paths)
     except (KeyError, ValueError, OSError, AttributeError, SyntaxError, RecursionError) as error:
         if text is not None:
             load_mjcf(path)  # fails too, and its lines are those of the file
@@ -67,7 +69,7 @@ def load_mjcf(path: Path, text: str | None = None, places: Mapping[str, Place] |
                 what += "; write bodies where it says frame, replicate or attach"
         elif isinstance(error, (SyntaxError, RecursionError)):
             # The file itself is XML: it is one that it includes, which MuJoCo names.
-            what = refusal_of(path) or without_breaks(error)
+            what = compile_problem(path) or without_breaks(error)
         else:
             what = without_breaks(error)
         raise TownError(path, f"cannot be read as MJCF: {what}") from error
@@ -92,12 +94,12 @@ def free_name(root: mjcf.RootElement, kind: str, name: str) -> str:
     return name
 
 
-class AssetParts:
+class AssetInstances:
     """The assets that a composition has taken in, each file once."""
 
-    def __init__(self, root: mjcf.RootElement, ahead: AssetsAhead) -> None:
+    def __init__(self, root: mjcf.RootElement, prefetcher: AssetPrefetcher) -> None:
         self._root = root
-        self._ahead = ahead
+        self._prefetcher = prefetcher
         self._turns = _turns_of(root)
         self._models: dict[Path, mjcf.RootElement] = {}
         self._textures: dict[tuple[str, ...], Any] = {}
@@ -148,7 +150,7 @@ class AssetParts:
         self._instances[path] += 1
         return {geom: plates[turn % len(plates)] for geom, plates in self._plates[path]}
 
-    def add_bearer(self, path: Path, body: Any, *, is_carried: bool) -> FaceName:
+    def add_surface_instance(self, path: Path, body: Any, *, is_carried: bool) -> FaceNames:
         """Fills `body` with an instance whose face has a texture of its own.
 
         Raises:
@@ -166,7 +168,7 @@ class AssetParts:
             raise TownError(path, f"face {face.name!r} has the material {face.material!r}, which is not there")
         geom = self._root.find("geom", f"{body.name}_{face.name}")
         geom.material = self._own_material(face.material, geom.name)
-        return FaceName(
+        return FaceNames(
             asset=path.stem,
             owner=body.name,
             is_carried=is_carried,
@@ -201,8 +203,8 @@ class AssetParts:
                 if other.stem == path.stem:
                     raise TownError(path, f"has the name of {other}, which is in the same world; rename one of them")
             split = split_asset(path)
-            self._ahead.expect(map(os.fsdecode, split.places.values()))
-            model = load_mjcf(path, split.text, split.places)
+            self._prefetcher.prefetch(map(os.fsdecode, split.mesh_paths.values()))
+            model = load_mjcf(path, split.text, split.mesh_paths)
             if _turns_of(model) != self._turns:
                 told = "turns geoms by {} and the town by {}; write both with the same compiler setting"
                 raise TownError(path, told.format(_turns_of(model), self._turns))

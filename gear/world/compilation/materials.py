@@ -31,12 +31,12 @@ def effective_rgba(model: mujoco.MjModel) -> Array:
     return rgba
 
 
-def seen_materials(model: mujoco.MjModel) -> dict[int, int]:
+def visible_materials(model: mujoco.MjModel) -> dict[int, int]:
     """A visible geom, the first, for each material that one wears."""
-    worn: dict[int, int] = {}
+    first_geoms: dict[int, int] = {}
     for geom in np.flatnonzero((model.geom_group < FIRST_HIDDEN_GROUP) & (model.geom_matid >= 0)).tolist():
-        worn.setdefault(int(model.geom_matid[geom]), geom)
-    return worn
+        first_geoms.setdefault(int(model.geom_matid[geom]), geom)
+    return first_geoms
 
 
 def textures_of(model: mujoco.MjModel, material: int) -> list[tuple[int, int]]:
@@ -44,7 +44,7 @@ def textures_of(model: mujoco.MjModel, material: int) -> list[tuple[int, int]]:
     return [(role, int(texture)) for role, texture in enumerate(model.mat_texid[material]) if texture >= 0]
 
 
-def refuse_deadly(model: mujoco.MjModel, path: Path) -> None:
+def reject_fatal_textures(model: mujoco.MjModel, path: Path) -> None:
     """Filament ends the process, without a word, over some textures.
 
     Args:
@@ -54,15 +54,15 @@ def refuse_deadly(model: mujoco.MjModel, path: Path) -> None:
     Raises:
         TownError: a visible geom wears such a texture.
     """
-    for material, geom in seen_materials(model).items():
+    for material, geom in visible_materials(model).items():
         for _, texture in textures_of(model, material):
-            deadly = _deadly(model, material, texture)
-            if deadly:
+            problem = _fatal_texture(model, material, texture)
+            if problem:
                 wearing, wearer = _own(model.mat(material).name), _own(model.geom(geom).name)
-                raise TownError(path, f"material {wearing!r} of geom {wearer!r} has {deadly}")
+                raise TownError(path, f"material {wearing!r} of geom {wearer!r} has {problem}")
 
 
-def _deadly(model: mujoco.MjModel, material: int, texture: int) -> str:
+def _fatal_texture(model: mujoco.MjModel, material: int, texture: int) -> str:
     """What a material has of a texture that Filament cannot draw, and what to do; empty if it can."""
     name = _own(model.tex(texture).name)
     width, height = int(model.tex_width[texture]), int(model.tex_height[texture])

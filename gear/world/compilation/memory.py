@@ -33,7 +33,7 @@ _LARGE_BYTES = 8 << 20
 _KEPT_BYTES = 32 << 20
 
 
-def keep_no_assets() -> None:
+def disable_asset_cache() -> None:
     """Turns off MuJoCo's cache of decoded meshes and pictures; a worker compiles once."""
     mujoco.mj_setCacheCapacity(mujoco.mj_getCache(), 0)
 
@@ -59,7 +59,7 @@ def release_memory() -> None:
         trim(0)
 
 
-def forget_shown(model: mujoco.MjModel) -> None:
+def release_render_arrays(model: mujoco.MjModel) -> None:
     """Gives up the texels and triangles of a model that a renderer has been opened for, and has copies of.
 
     Afterwards no other renderer can be opened for it.

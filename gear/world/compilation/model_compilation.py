@@ -12,11 +12,11 @@ from pathlib import Path
 import mujoco
 
 from gear.values.errors import TownError
-from gear.world.assets.geom_classes import GeomClasses, classify, own_class
-from gear.world.assets.mjspec import bear_flat_bodies
+from gear.world.assets.geom_classes import GeomClasses, classify, unprefixed_class
+from gear.world.assets.mjspec import accept_flat_bodies
 from gear.world.compilation.compose import Composition
-from gear.world.compilation.materials import refuse_deadly
-from gear.world.compilation.mujoco_errors import refused
+from gear.world.compilation.materials import reject_fatal_textures
+from gear.world.compilation.mujoco_errors import compile_error
 
 COLLISION_CLASS = "collision"
 GROUND_PREFIX = "ground"
@@ -39,7 +39,7 @@ _PLACEMENT_SECTIONS = ("compiler", "size", "default", "worldbody", "custom")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stance:
+class PlacementBody:
     """How an actor stands: what the placement model must know of it.
 
     Attributes:
@@ -63,10 +63,10 @@ def render_model(composition: Composition) -> tuple[mujoco.MjModel, GeomClasses]
     tree = copy.deepcopy(composition.tree)
     for parent, geom in _geoms(tree, _collides):
         parent.remove(geom)
-    with _refusing(composition):
+    with _naming_the_file(composition):
         spec = _read(composition, tree, composition.assets)
         model = spec.compile()
-    refuse_deadly(model, composition.town)
+    reject_fatal_textures(model, composition.town)
     return model, classify(spec, composition.town)
 
 
@@ -85,7 +85,7 @@ def placement_spec(composition: Composition) -> mujoco.MjSpec:
         for geom in default.findall("geom"):
             for reference in _ASSET_REFERENCES:
                 geom.attrib.pop(reference, None)
-    for parent, geom in _geoms(tree, lambda felt: not felt):
+    for parent, geom in _geoms(tree, lambda placement: not placement):
         parent.remove(geom)
     worldbody = tree.find("worldbody")
     assert worldbody is not None  # dm_control always writes one
@@ -108,24 +108,26 @@ def placement_spec(composition: Composition) -> mujoco.MjSpec:
         else:
             for geom in element.iter("geom"):
                 _fix(geom)
-    with _refusing(composition):
+    with _naming_the_file(composition):
         return _read(composition, tree, {})
 
 
-def placement_model(composition: Composition, spec: mujoco.MjSpec, stances: Mapping[str, Stance]) -> mujoco.MjModel:
+def placement_model(
+    composition: Composition, spec: mujoco.MjSpec, placement_bodies: Mapping[str, PlacementBody]
+) -> mujoco.MjModel:
     """Compiles what is felt.
 
     Args:
         composition: the world.
         spec: of it, as `placement_spec` gives it.
-        stances: by name of the slot's body.
+        placement_bodies: by name of the slot's body.
 
     Raises:
         TownError: MuJoCo refuses it.
     """
-    for name, stance in stances.items():
-        _stand(spec, name, stance)
-    with _refusing(composition):
+    for name, placement_body in placement_bodies.items():
+        _set_placement_body(spec, name, placement_body)
+    with _naming_the_file(composition):
         return spec.compile()
 
 
@@ -136,8 +138,8 @@ def _files_of_bodies(composition: Composition) -> dict[str, Path]:
     return boards | {slot.body: slot.actor.path for slot in composition.slots}
 
 
-def _collides(felt: bool) -> bool:
-    return felt
+def _collides(placement: bool) -> bool:
+    return placement
 
 
 def _geoms(tree: ET.Element, wanted: Callable[[bool], bool]) -> list[tuple[ET.Element, ET.Element]]:
@@ -148,7 +150,7 @@ def _geoms(tree: ET.Element, wanted: Callable[[bool], bool]) -> list[tuple[ET.El
         inherited = parent.get("childclass", inherited)
         for child in parent:
             if child.tag == "geom":
-                name = own_class(child.get("class", inherited))
+                name = unprefixed_class(child.get("class", inherited))
                 if wanted(name.partition(".")[0] == COLLISION_CLASS):
                     found.append((parent, child))
             elif child.tag in ("body", "frame"):
@@ -169,7 +171,7 @@ def _fix(geom: ET.Element) -> None:
 
 
 def _free(body: ET.Element) -> None:
-    """Makes an actor of the pool free to move, with all that `_stand` gives a size and a place."""
+    """Makes an actor of the pool free to move, with all that `_set_placement_body` gives a size and a place."""
     body.attrib.pop("mocap")
     name = body.get("name", "")
     for geom in body.iter("geom"):
@@ -191,19 +193,19 @@ def _free(body: ET.Element) -> None:
         )
 
 
-def _stand(spec: mujoco.MjSpec, name: str, stance: Stance) -> None:
+def _set_placement_body(spec: mujoco.MjSpec, name: str, placement_body: PlacementBody) -> None:
     """Stands an actor of the pool on its feet.
 
     Numbers are rounded so that they do not hang on the last digits of what is seen, and everything stands as before
     where those change.
     """
     body = spec.body(name)
-    x, y, z = 2 * stance.half_length_m, 2 * stance.half_width_m, stance.height_m
-    body.mass, body.ipos = _rounded(stance.mass_kg, 6), [0, 0, _rounded(0.4 * z, 6)]
-    body.inertia = [_rounded(stance.mass_kg / 12 * (a * a + b * b), 9) for a, b in ((y, z), (x, z), (x, y))]
+    x, y, z = 2 * placement_body.half_length_m, 2 * placement_body.half_width_m, placement_body.height_m
+    body.mass, body.ipos = _rounded(placement_body.mass_kg, 6), [0, 0, _rounded(0.4 * z, 6)]
+    body.inertia = [_rounded(placement_body.mass_kg / 12 * (a * a + b * b), 9) for a, b in ((y, z), (x, z), (x, y))]
     # Its last geoms: to find them by name, MuJoCo would look at every geom before them.
     for foot, (sx, sy) in zip(body.geoms[-len(_CORNERS) :], _CORNERS, strict=True):
-        place = sx * stance.half_length_m, sy * stance.half_width_m, FOOT_RADIUS_M
+        place = sx * placement_body.half_length_m, sy * placement_body.half_width_m, FOOT_RADIUS_M
         foot.pos = [_rounded(along, 9) for along in place]
 
 
@@ -217,14 +219,14 @@ def _read(composition: Composition, tree: ET.Element, assets: Mapping[str, bytes
         spec.meshdir = spec.texturedir = str(composition.folder)
     # Either would make away with bodies and geoms that are looked for by name.
     spec.compiler.discardvisual = spec.compiler.fusestatic = False
-    bear_flat_bodies(spec)
+    accept_flat_bodies(spec)
     return spec
 
 
 @contextlib.contextmanager
-def _refusing(composition: Composition) -> Iterator[None]:
+def _naming_the_file(composition: Composition) -> Iterator[None]:
     """What MuJoCo has against a world, with the file that it is in."""
     try:
         yield
     except ValueError as error:
-        raise refused(error, composition.files) from error
+        raise compile_error(error, composition.files) from error

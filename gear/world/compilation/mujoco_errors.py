@@ -20,7 +20,7 @@ def without_breaks(error: BaseException) -> str:
     return " ".join(str(error).split())
 
 
-def refusal_of(path: Path) -> str:
+def compile_problem(path: Path) -> str:
     """What stock MuJoCo has against a file alone; empty where it compiles it."""
     try:
         read_spec(path).compile()
@@ -29,7 +29,7 @@ def refusal_of(path: Path) -> str:
     return ""
 
 
-def refused(error: ValueError, files: Sequence[Path]) -> TownError:
+def compile_error(error: ValueError, files: Sequence[Path]) -> TownError:
     """The error for a world that MuJoCo cannot compile.
 
     Args:
@@ -37,7 +37,7 @@ def refused(error: ValueError, files: Sequence[Path]) -> TownError:
         files: what the world was composed of; the first one is named where each is fine alone.
     """
     for path in files:
-        if said := refusal_of(path):
+        if said := compile_problem(path):
             return TownError(path, f"MuJoCo cannot compile it: {said}")
     # The lines are those of a text that nobody has.
     return TownError(files[0], f"MuJoCo cannot compile it: {_LINE.sub('', without_breaks(error))}")

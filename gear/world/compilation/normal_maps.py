@@ -34,7 +34,7 @@ _SLACK_M = 1e-4
 """Boxes of flat meshes have no thickness, and turned vertices are rounded."""
 
 
-def upright_relief(model: mujoco.MjModel) -> None:
+def align_normal_maps(model: mujoco.MjModel) -> None:
     """Turns normal maps, and the frames of meshes that wear them, so that Filament reads them as they were meant.
 
     Geoms stay where they are, and so do their triangles; what is turned is the frame between them. Primitives, meshes

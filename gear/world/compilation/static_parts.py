@@ -29,25 +29,26 @@ _MAIN = "main"
 _WORLD = "<worldbody>"
 
 
-class Place(bytes):
+class MeshPath(bytes):
     """Where a file lies, for its content."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Statics:
+class StaticParts:
     """Elements of a town's worldbody, in their order.
 
     Attributes:
         xml: as MJCF; every geom has a name.
         body_names: of the bodies.
-        worn: default class and own material, if it has one, of the geoms; each pair once, in the order of the file.
-        places: of the meshes, by what the rest of the town calls their files.
+        geom_materials: default class and own material, if it has one, of the geoms; each pair once, in the order of the
+            file.
+        mesh_paths: of the meshes, by what the rest of the town calls their files.
     """
 
     xml: str = ""
     body_names: frozenset[str] = frozenset()
-    worn: tuple[tuple[str, str | None], ...] = ()
-    places: Mapping[str, Place] = field(default_factory=dict)
+    geom_materials: tuple[tuple[str, str | None], ...] = ()
+    mesh_paths: Mapping[str, MeshPath] = field(default_factory=dict)
 
     def put_into(self, xml: str) -> str:
         """MJCF with them before everything else in its worldbody."""
@@ -55,7 +56,7 @@ class Statics:
         return before + world + self.xml + after if self.xml else xml
 
 
-def split_town(path: Path) -> tuple[str | None, Statics]:
+def split_town(path: Path) -> tuple[str | None, StaticParts]:
     """A town's MJCF without its geoms and bodies, and those.
 
     Nothing is taken out of a town whose geoms and bodies are not all plain ones: such with joints, cameras or sites in
@@ -72,17 +73,17 @@ def split_town(path: Path) -> tuple[str | None, Statics]:
     worlds = root.findall("worldbody")
     taken = [child for world in worlds for child in world if child.tag in _PLAIN]
     if len(worlds) != 1 or next(root.iter("include"), None) is not None or not all(map(_is_plain, taken)):
-        return ET.tostring(root, encoding="unicode") if named else None, Statics()
+        return ET.tostring(root, encoding="unicode") if named else None, StaticParts()
     for child in taken:
         worlds[0].remove(child)
     geoms = [geom for child in taken for geom in child.iter("geom")]
     for index, geom in enumerate(geoms):
         geom.attrib.setdefault("name", f"{UNNAMED}geom_{index}")
-    statics = Statics(
+    statics = StaticParts(
         xml="".join(ET.tostring(child, encoding="unicode") for child in taken),
         body_names=frozenset(body.get("name", "") for child in taken for body in child.iter("body")),
-        worn=tuple(dict.fromkeys((geom.get("class", ""), geom.get("material")) for geom in geoms)),
-        places=_meshes_in_place(root, path),
+        geom_materials=tuple(dict.fromkeys((geom.get("class", ""), geom.get("material")) for geom in geoms)),
+        mesh_paths=_meshes_in_place(root, path),
     )
     return ET.tostring(root, encoding="unicode"), statics
 
@@ -94,12 +95,12 @@ class SplitAsset:
     Attributes:
         text: without its default classes; None where it is to be read whole.
         defaults: those, named as dm_control names them in a town.
-        places: of the meshes, by what `text` calls their files.
+        mesh_paths: of the meshes, by what `text` calls their files.
     """
 
     text: str | None = None
     defaults: str = ""
-    places: Mapping[str, Place] = field(default_factory=dict)
+    mesh_paths: Mapping[str, MeshPath] = field(default_factory=dict)
 
 
 def split_asset(path: Path) -> SplitAsset:
@@ -121,29 +122,29 @@ def split_asset(path: Path) -> SplitAsset:
     root.remove(sections[0])
     for default in sections[0].iter("default"):
         default.set("class", f"{path.stem}/{default.get('class', '')}")
-    places = _meshes_in_place(root, path)
+    mesh_paths = _meshes_in_place(root, path)
     return SplitAsset(
         text=ET.tostring(root, encoding="unicode"),
         defaults=ET.tostring(sections[0], encoding="unicode").strip(),
-        places=places,
+        mesh_paths=mesh_paths,
     )
 
 
-def _meshes_in_place(root: ET.Element, path: Path) -> dict[str, Place]:
+def _meshes_in_place(root: ET.Element, path: Path) -> dict[str, MeshPath]:
     """Has meshes named by their whole paths, and where those lead to."""
     folders = {name: folder for part in root.iter("compiler") for name, folder in part.items()}
     base = path.parent / folders.get("meshdir", folders.get("assetdir", ""))
-    places: dict[str, Place] = {}
+    mesh_paths: dict[str, MeshPath] = {}
     for mesh in root.iterfind("asset/mesh[@file]"):
         file = (base / mesh.get("file", "")).absolute()
         try:
             # MuJoCo is the one to read it: whether that is possible, and which file it is, shows here.
             with file.open("rb"):
-                places[str(file)] = Place(os.fsencode(file))
+                mesh_paths[str(file)] = MeshPath(os.fsencode(file))
         except OSError as error:
             raise TownError(path, f"cannot be read as MJCF: {error}") from error
         mesh.set("file", str(file))
-    return places
+    return mesh_paths
 
 
 def _is_plain(element: ET.Element) -> bool:

@@ -26,17 +26,17 @@ from gear.values.scene import Weather
 from gear.values.serial import Json, to_json
 from gear.world.assets.asset_hash import asset_files, assets_digest
 from gear.world.assets.library import AssetLibrary
-from gear.world.compilation.compiled_world import Compiled, compile_world
+from gear.world.compilation.compiled_world import CompiledWorld, compile_world
 from gear.world.scene_spec import SceneSpec
 from gear.world.world import World
 
-KEPT_BYTES = 3 << 30
+CACHE_BYTES = 3 << 30
 """Worlds that were used last are kept up to this, about sixteen towns."""
 
-SMALL_BYTES = 4 << 20
+NOT_CACHED_BELOW_BYTES = 4 << 20
 """A town with fewer bytes of assets compiles sooner than a process starts."""
 
-MAY_KEEP = "may-keep"
+MAY_CACHE = "may-cache"
 """Name of the file by which the compiling process says that the hash covers all that it read."""
 
 DONE = b"done"
@@ -47,33 +47,36 @@ _SCRATCH = ".making-"
 _ABANDONED_S = 3600.0
 
 
-def ready_world(
-    *, town: str | Path, scene_name: str, scene: SceneSpec, weather: Weather, shelf: Path | None = None
+def load_or_compile(
+    *, town: str | Path, scene_name: str, scene: SceneSpec, weather: Weather, cache_dir: Path | None = None
 ) -> World:
     """As `World.build`, from the shelf where the same world lies there.
 
     Args:
         town, scene_name, scene, weather: as for `World.build`.
-        shelf: folder that worlds are kept in; the user's cache unless given.
+        cache_dir: folder that worlds are kept in; the user's cache unless given.
 
     Raises:
         UnknownNameError: there is no such town, board or truck.
         TownError: a file breaks the conventions.
     """
     library = AssetLibrary.for_town(town)
-    if shelf is None and sum(path.stat().st_size for path in asset_files(library).values()) < SMALL_BYTES:
+    if (
+        cache_dir is None
+        and sum(path.stat().st_size for path in asset_files(library).values()) < NOT_CACHED_BELOW_BYTES
+    ):
         compiled = compile_world(library, scene, weather)
     else:
-        with _folder(shelf) as folder:
-            compiled = _take(folder, library, scene, weather)
+        with _folder(cache_dir) as folder:
+            compiled = _from_cache(folder, library, scene, weather)
     return World.of(library, scene_name, scene, weather, compiled)
 
 
 @contextlib.contextmanager
-def _folder(shelf: Path | None) -> Iterator[Path]:
+def _folder(cache_dir: Path | None) -> Iterator[Path]:
     """The shelf; one that is gone afterwards where the user's cache cannot be written."""
     try:
-        folder = shelf or Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gear" / "worlds"
+        folder = cache_dir or Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gear" / "worlds"
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         usable = os.access(folder, os.W_OK)
     except (OSError, RuntimeError):
@@ -85,29 +88,29 @@ def _folder(shelf: Path | None) -> Iterator[Path]:
             yield Path(passing)
 
 
-def _take(shelf: Path, library: AssetLibrary, scene: SceneSpec, weather: Weather) -> Compiled:
-    order = order_of(library, scene, weather)
-    place = shelf / hashlib.sha256(json.dumps(order, sort_keys=True).encode()).hexdigest()[:32]
-    compiled = _load(place, library, scene)
+def _from_cache(cache_dir: Path, library: AssetLibrary, scene: SceneSpec, weather: Weather) -> CompiledWorld:
+    order = world_key(library, scene, weather)
+    entry = cache_dir / hashlib.sha256(json.dumps(order, sort_keys=True).encode()).hexdigest()[:32]
+    compiled = _load(entry, library, scene)
     if compiled is not None:
         return compiled
-    with contextlib.suppress(OSError), _alone(place):  # a disk that takes no more files must stand in nobody's way
-        compiled = _load(place, library, scene)
+    with contextlib.suppress(OSError), _locked(entry):  # a disk that takes no more files must stand in nobody's way
+        compiled = _load(entry, library, scene)
         if compiled is not None:
             return compiled
-        with tempfile.TemporaryDirectory(prefix=_SCRATCH, dir=shelf, ignore_cleanup_errors=True) as name:
+        with tempfile.TemporaryDirectory(prefix=_SCRATCH, dir=cache_dir, ignore_cleanup_errors=True) as name:
             scratch = Path(name) / "world"
             scratch.mkdir()
-            with _compiled_apart(order, scratch) as is_done:
+            with _compiled_in_subprocess(order, scratch) as is_done:
                 if is_done:
                     compiled = _load(scratch, library, scene)
-                    if (scratch / MAY_KEEP).exists():
-                        _keep(scratch, place)
+                    if (scratch / MAY_CACHE).exists():
+                        _store(scratch, entry)
     # Where it failed, it fails here too, and says why.
     return compiled or compile_world(library, scene, weather)
 
 
-def order_of(library: AssetLibrary, scene: SceneSpec, weather: Weather) -> dict[str, Json]:
+def world_key(library: AssetLibrary, scene: SceneSpec, weather: Weather) -> dict[str, Json]:
     """Everything that decides a compiled world, as JSON."""
     return {
         "town": str(library.town.resolve()),
@@ -130,17 +133,17 @@ def _code_digest() -> str:
     return digest.hexdigest()
 
 
-def _load(place: Path, library: AssetLibrary, scene: SceneSpec) -> Compiled | None:
+def _load(entry: Path, library: AssetLibrary, scene: SceneSpec) -> CompiledWorld | None:
     try:
-        compiled = Compiled.load(place, library, scene)
-        os.utime(place)
+        compiled = CompiledWorld.load(entry, library, scene)
+        os.utime(entry)
     except (OSError, ValueError, KeyError, GearError, mujoco.FatalError):
         return None
     return compiled
 
 
 @contextlib.contextmanager
-def _compiled_apart(order: dict[str, Json], folder: Path) -> Iterator[bool]:
+def _compiled_in_subprocess(order: dict[str, Json], folder: Path) -> Iterator[bool]:
     """Compiles into a folder, in another process; whether that went well.
 
     That process says so before it ends: giving back its memory takes a tenth of a second, in which others can load.
@@ -168,32 +171,32 @@ def _compiled_apart(order: dict[str, Json], folder: Path) -> Iterator[bool]:
 
 
 @contextlib.contextmanager
-def _alone(place: Path) -> Iterator[None]:
+def _locked(entry: Path) -> Iterator[None]:
     """Of several workers that need a world one compiles it; without such locks each of them does."""
     if sys.platform == "win32":
         yield
         return
     import fcntl
 
-    with place.with_suffix(".lock").open("w") as lock:
+    with entry.with_suffix(".lock").open("w") as lock:
         with contextlib.suppress(OSError):  # a network file system
             fcntl.flock(lock, fcntl.LOCK_EX)
         yield
 
 
-def _keep(scratch: Path, place: Path) -> None:
+def _store(scratch: Path, entry: Path) -> None:
     """Puts a world on the shelf, and takes down those that were not used for longest."""
     with contextlib.suppress(OSError):
-        shutil.rmtree(place, ignore_errors=True)
-        scratch.rename(place)
+        shutil.rmtree(entry, ignore_errors=True)
+        scratch.rename(entry)
         kept_bytes = 0
-        worlds = [path for path in place.parent.iterdir() if path.is_dir()]
+        worlds = [path for path in entry.parent.iterdir() if path.is_dir()]
         for world in sorted(worlds, key=lambda path: path.stat().st_mtime, reverse=True):
             if world.name.startswith(_SCRATCH):
                 if time.time() - world.stat().st_mtime > _ABANDONED_S:
                     shutil.rmtree(world, ignore_errors=True)
                 continue
             kept_bytes += sum(path.stat().st_size for path in world.iterdir())
-            if kept_bytes > KEPT_BYTES and world != place:
+            if kept_bytes > CACHE_BYTES and world != entry:
                 shutil.rmtree(world, ignore_errors=True)
                 world.with_suffix(".lock").unlink(missing_ok=True)

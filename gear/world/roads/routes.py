@@ -67,7 +67,7 @@ class Route:
         return min(self.speeds_mps[self.lane_at(s_m) : self.lane_at(s_m + BRAKING_WAY_M) + 1])
 
 
-def drive_on(graph: LaneGraph, lane: str, length_m: float, rng: np.random.Generator) -> tuple[str, ...]:
+def extend_route(graph: LaneGraph, lane: str, length_m: float, rng: np.random.Generator) -> tuple[str, ...]:
     """Lanes from the start of `lane` that together have a length, or end where the road does."""
     names = [lane]
     total_m = graph.lanes[lane].line.length_m
@@ -78,7 +78,7 @@ def drive_on(graph: LaneGraph, lane: str, length_m: float, rng: np.random.Genera
     return tuple(names)
 
 
-def back_up(
+def trace_back(
     graph: LaneGraph, lane: str, s_m: float, distance_m: float, rng: np.random.Generator
 ) -> tuple[tuple[str, ...], float] | None:
     """The place so far before another one: the lanes from it to there, and its arc length on the first of them."""
@@ -101,7 +101,7 @@ def vehicle_pose(line: Polyline, s_m: float, half_length_m: float, lateral_m: fl
     return point, math.atan2(front[1] - rear[1], front[0] - rear[0])
 
 
-def beside(point_m: Array, yaw_rad: float, lateral_m: float) -> Array:
+def offset_left(point_m: Array, yaw_rad: float, lateral_m: float) -> Array:
     """A point to the left of another, by a heading that turns as its owner does.
 
     By the left of the line's pieces, who moves would jump where two of them meet, and back on the inside of a turn.
@@ -109,12 +109,12 @@ def beside(point_m: Array, yaw_rad: float, lateral_m: float) -> Array:
     return point_m + lateral_m * np.array([-math.sin(yaw_rad), math.cos(yaw_rad), 0.0])
 
 
-def driven_pose(line: Polyline, s_m: float, half_length_m: float, lateral_m: float = 0.0) -> tuple[Array, float, float]:
+def moving_pose(line: Polyline, s_m: float, half_length_m: float, lateral_m: float = 0.0) -> tuple[Array, float, float]:
     """As `vehicle_pose`, of one that moves; and its way for each metre of the line, which is less inside a turn."""
 
     def at(place_m: float) -> tuple[Array, float]:
         point, yaw_rad = vehicle_pose(line, place_m, half_length_m)
-        return beside(point, yaw_rad, lateral_m), yaw_rad
+        return offset_left(point, yaw_rad, lateral_m), yaw_rad
 
     (rear, _), (point, yaw_rad), (front, _) = (at(s_m + ahead_m) for ahead_m in (-PACE_M, 0.0, PACE_M))
     return point, yaw_rad, float(np.linalg.norm((front - rear)[:2])) / (2 * PACE_M)

@@ -14,9 +14,9 @@ from gear.values.frames import UInt8Image
 from gear.values.geometry import RigidTransform
 from gear.values.scene import Pose, SurfaceRecord
 from gear.world.assets.geom_triangles import geom_triangles
-from gear.world.compilation.instances import FaceName
+from gear.world.compilation.instances import FaceNames
 from gear.world.surfaces.face_texture import SurfaceAlbedo, face_from_patch, srgb_from_linear, uniform_face
-from gear.world.surfaces.upright import what_is_wrong
+from gear.world.surfaces.upright import texture_problem
 
 FLATNESS_M = 0.01
 FACE_SIDE_M = (0.1, 100.0)
@@ -66,7 +66,7 @@ class Face:
         return uniform_face(255 if albedo == "white" else 0)
 
 
-def find_faces(model: mujoco.MjModel, data: mujoco.MjData, names: Sequence[FaceName], path: Path) -> tuple[Face, ...]:
+def find_faces(model: mujoco.MjModel, data: mujoco.MjData, names: Sequence[FaceNames], path: Path) -> tuple[Face, ...]:
     """Measures the faces of a compiled model; actors stand at their own origins in `data`.
 
     Raises:
@@ -76,7 +76,7 @@ def find_faces(model: mujoco.MjModel, data: mujoco.MjData, names: Sequence[FaceN
     return tuple(_face(model, data, number, name, path) for number, name in enumerate(names))
 
 
-def _face(model: mujoco.MjModel, data: mujoco.MjData, number: int, name: FaceName, path: Path) -> Face:
+def _face(model: mujoco.MjModel, data: mujoco.MjData, number: int, name: FaceNames, path: Path) -> Face:
     surface = f"surface_{number}"
     geom_id, site_id = model.geom(name.geom).id, model.site(name.site).id
     world_from_surface = RigidTransform.from_parts(
@@ -103,7 +103,7 @@ def _face(model: mujoco.MjModel, data: mujoco.MjData, number: int, name: FaceNam
     world_from_geom = RigidTransform.from_parts(
         "world", "geom", data.geom_xmat[geom_id].reshape(3, 3), data.geom_xpos[geom_id]
     )
-    if wrong := what_is_wrong(model, geom_id, world_from_surface.inverse() @ world_from_geom):
+    if wrong := texture_problem(model, geom_id, world_from_surface.inverse() @ world_from_geom):
         raise TownError(path, f"{name.asset}: the face {wrong}")
     body = model.body(name.owner).id
     world_from_owner = RigidTransform.from_parts("world", "actor", data.xmat[body].reshape(3, 3), data.xpos[body])

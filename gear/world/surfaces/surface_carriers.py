@@ -7,7 +7,7 @@ from gear.world.assets.library import AssetLibrary
 from gear.world.scene_spec import SceneSpec
 
 
-def check_assets(library: AssetLibrary, scene: SceneSpec, key: str) -> None:
+def check_scene_assets(library: AssetLibrary, scene: SceneSpec, key: str) -> None:
     """Whether a town has the boards and the truck of a scene; `key` is where that stands in its library.
 
     Raises:

@@ -16,7 +16,7 @@ _BOX_TEXTURE = ((1, -2), (0, -2), (0, -1))
 show it, on opposite sides the same, so that one of the two is a mirror."""
 
 
-def what_is_wrong(model: mujoco.MjModel, geom_id: int, surface_from_geom: RigidTransform) -> str:
+def texture_problem(model: mujoco.MjModel, geom_id: int, surface_from_geom: RigidTransform) -> str:
     """What keeps a face from showing a patch; empty if nothing does.
 
     Args:

@@ -85,7 +85,7 @@ class ViewLimits:
             if cosine < math.cos(math.radians(self.max_incidence_deg)):
                 return "too oblique"
         for face in faces:
-            if float(np.mean(space.sees(eye_m, face.grid_m))) < self.min_free:
+            if float(np.mean(space.visible(eye_m, face.grid_m))) < self.min_free:
                 return "hidden"
         return "seen"
 

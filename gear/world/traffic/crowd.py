@@ -15,7 +15,7 @@ from gear.world.placement import PlacementSpace
 from gear.world.roads.regions import Region
 from gear.world.scene_spec import BoardSpec, NpcLimits, SceneSpec
 from gear.world.traffic.footprints import Footprint
-from gear.world.traffic.spawn import Draft, FreeSlots, Spawner
+from gear.world.traffic.spawn import FreeSlots, Spawn, Spawner
 
 TRIES = 40
 ROUNDS = 5
@@ -33,37 +33,48 @@ SLIP_M = 0.5
 
 
 @dataclass(eq=False, kw_only=True)
-class Cast:
+class RoadUsers:
     """Who takes part, and where everybody stands.
 
     Attributes:
-        drafts: by body of the placement model; the ego car first, then the carrier if there is one, then the others in
+        spawns: by body of the placement model; the ego car first, then the carrier if there is one, then the others in
             the order in which they were drawn.
         poses: by the same bodies.
         keep_out: where nobody else may be.
         free: what is left of the pool.
-        leads: bodies of the ego car and the carrier.
-        ways: lanes that the ego car must take, from where it starts, by its body.
-        way_m: length of its way to the end of its limits, 0 where it only stands or has none.
+        protected: bodies of the ego car and the carrier.
+        required_lanes: lanes that the ego car must take, from where it starts, by its body.
+        drive_m: length of its way to the end of its limits, 0 where it only stands or has none.
     """
 
-    drafts: dict[str, Draft]
+    spawns: dict[str, Spawn]
     poses: dict[str, RigidTransform]
     keep_out: list[Footprint]
     free: FreeSlots
-    leads: frozenset[str] = field(default_factory=frozenset)
-    ways: dict[str, tuple[str, ...]] = field(default_factory=dict)
-    way_m: float = 0.0
+    protected: frozenset[str] = field(default_factory=frozenset)
+    required_lanes: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    drive_m: float = 0.0
 
     def drop(self, body: str) -> None:
         """Somebody leaves."""
-        draft = self.drafts.pop(body)
+        spawn = self.spawns.pop(body)
         self.poses.pop(body, None)
-        self.free.give_back(draft.kind.facts.name, body)
+        self.free.release(spawn.actor_type.facts.name, body)
 
     def count(self, *, people: bool) -> int:
         """How many others there are of one sort."""
-        return sum((draft.walk is not None) == people for body, draft in self.drafts.items() if body not in self.leads)
+        return sum(
+            (spawn.walk is not None) == people for body, spawn in self.spawns.items() if body not in self.protected
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Draw:
+    """What the random numbers of one round of drawing derive from."""
+
+    seed: int
+    sequence: int
+    attempt: int
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -83,18 +94,20 @@ class Crowd:
     spawner: Spawner
     space: PlacementSpace
 
-    def fill(self, cast: Cast, seed: int, sequence: int, hiding: HidingTest | None = None) -> None:
+    def fill(
+        self, road_users: RoadUsers, seed: int, sequence: int, occlusion_test: OcclusionTest | None = None
+    ) -> None:
         """Adds vehicles and people around the leads of a cast.
 
         Args:
-            cast: has its leads; is changed.
+            road_users: has its leads; is changed.
             seed, sequence: what the draws derive from.
-            hiding: who stands in the way of the board.
+            occlusion_test: who stands in the way of the board.
 
         Raises:
             PlacementError: fewer than the least count could be placed; says which limit is too tight.
         """
-        ego = next(iter(cast.drafts.values()))
+        ego = next(iter(road_users.spawns.values()))
         wanted: dict[str, int] = {}
         regions: dict[str, Region] = {}
         for name, limits in self._limits():
@@ -102,13 +115,14 @@ class Crowd:
             wanted[name] = int(derive_rng(seed, self.scene_name, name, "count", sequence).integers(low, high + 1))
             regions[name] = region_of(limits, self.scene.boards, (ego.x_m, ego.y_m))
         for attempt in range(ROUNDS):
-            fresh = self._draw_vehicles(cast, regions["npc_vehicles"], wanted["npc_vehicles"], seed, sequence, attempt)
-            fresh += self._draw_people(cast, regions["pedestrians"], wanted["pedestrians"], seed, sequence, attempt)
-            fell = self._stand_up(cast, fresh)
-            if not self._drop_offenders(cast, hiding) and not fell:
+            draw = _Draw(seed, sequence, attempt)
+            fresh = self._draw_vehicles(road_users, regions["npc_vehicles"], wanted["npc_vehicles"], draw)
+            fresh += self._draw_people(road_users, regions["pedestrians"], wanted["pedestrians"], draw)
+            fell = self._place_on_ground(road_users, fresh)
+            if not self._drop_overlapping(road_users, occlusion_test) and not fell:
                 break
         for name, limits in self._limits():
-            placed = cast.count(people=name == "pedestrians")
+            placed = road_users.count(people=name == "pedestrians")
             if placed < limits.count[0]:
                 raise PlacementError(
                     self.scene_name,
@@ -119,94 +133,92 @@ class Crowd:
     def _limits(self) -> tuple[tuple[str, NpcLimits], ...]:
         return ("npc_vehicles", self.scene.npc_vehicles), ("pedestrians", self.scene.pedestrians)
 
-    def _draw_vehicles(
-        self, cast: Cast, region: Region, wanted: int, seed: int, sequence: int, attempt: int
-    ) -> list[str]:
+    def _draw_vehicles(self, road_users: RoadUsers, region: Region, wanted: int, draw: _Draw) -> list[str]:
         pieces = self.spawner.lane_table.inside(region)
         bays = self.spawner.bays_inside(region)
         added: list[str] = []
-        for number in range(wanted - cast.count(people=False)):
-            rng = derive_rng(seed, self.scene_name, "npc_vehicles", sequence, attempt, number)
+        for number in range(wanted - road_users.count(people=False)):
+            rng = derive_rng(draw.seed, self.scene_name, "npc_vehicles", draw.sequence, draw.attempt, number)
             parks = rng.random() < self.scene.npc_vehicles.parked_share
             for _ in range(TRIES):
-                kind = cast.free.draw(self.types, rng, people=False)
-                if kind is None:
+                actor_type = road_users.free.draw(self.types, rng, people=False)
+                if actor_type is None:
                     return added
-                body = cast.free.bodies[kind.facts.name][0]
-                draft: Draft | None = None
-                if parks and bays and kind.facts.kind not in ("bicycle", "motorcycle"):
-                    draft = self.spawner.in_bay(kind, body, bays[int(rng.integers(len(bays)))], rng)
+                body = road_users.free.bodies[actor_type.facts.name][0]
+                spawn: Spawn | None = None
+                if parks and bays and actor_type.kind not in ("bicycle", "motorcycle"):
+                    spawn = self.spawner.in_bay(actor_type, body, bays[int(rng.integers(len(bays)))], rng)
                 elif len(pieces) and not parks:
                     lane, s_m = self.spawner.lane_table.draw(pieces, rng)
-                    if self.spawner.belongs(kind, lane):
-                        draft = self.spawner.on_lane(kind, body, "npc", lane, s_m, rng)
-                if draft is not None and self._add(cast, draft, VEHICLE_GAP_M):
+                    if self.spawner.is_allowed_on(actor_type, lane):
+                        spawn = self.spawner.on_lane(actor_type, body, "npc", lane, s_m, rng)
+                if spawn is not None and self._add(road_users, spawn, VEHICLE_GAP_M):
                     added.append(body)
                     break
                 parks = parks and bool(bays) and rng.random() < 0.9
         return added
 
-    def _draw_people(
-        self, cast: Cast, region: Region, wanted: int, seed: int, sequence: int, attempt: int
-    ) -> list[str]:
+    def _draw_people(self, road_users: RoadUsers, region: Region, wanted: int, draw: _Draw) -> list[str]:
         pieces = self.spawner.walk_table.inside(region)
         added: list[str] = []
         if not len(pieces):
             return added
-        for number in range(wanted - cast.count(people=True)):
-            rng = derive_rng(seed, self.scene_name, "pedestrians", sequence, attempt, number)
+        for number in range(wanted - road_users.count(people=True)):
+            rng = derive_rng(draw.seed, self.scene_name, "pedestrians", draw.sequence, draw.attempt, number)
             for _ in range(TRIES):
-                kind = cast.free.draw(self.types, rng, people=True)
-                if kind is None:
+                actor_type = road_users.free.draw(self.types, rng, people=True)
+                if actor_type is None:
                     return added
-                body = cast.free.bodies[kind.facts.name][0]
-                draft = self.spawner.on_walk(kind, body, pieces, rng)
-                if draft is not None and self._add(cast, draft, PERSON_GAP_M):
+                body = road_users.free.bodies[actor_type.facts.name][0]
+                spawn = self.spawner.on_walk(actor_type, body, pieces, rng)
+                if spawn is not None and self._add(road_users, spawn, PERSON_GAP_M):
                     added.append(body)
                     break
         return added
 
-    def _add(self, cast: Cast, draft: Draft, gap_m: tuple[float, float]) -> bool:
-        wide = draft.footprint.grown(*gap_m)
-        if any(wide.overlaps(other) for other in cast.keep_out):
+    def _add(self, road_users: RoadUsers, spawn: Spawn, gap_m: tuple[float, float]) -> bool:
+        wide = spawn.footprint.grown(*gap_m)
+        if any(wide.overlaps(other) for other in road_users.keep_out):
             return False
-        if any(wide.overlaps(other.footprint) for other in cast.drafts.values()):
+        if any(wide.overlaps(other.footprint) for other in road_users.spawns.values()):
             return False
-        cast.free.take(draft.kind.facts.name)
-        cast.drafts[draft.body] = draft
+        road_users.free.take(spawn.actor_type.facts.name)
+        road_users.spawns[spawn.body] = spawn
         return True
 
-    def _stand_up(self, cast: Cast, bodies: Sequence[str]) -> bool:
+    def _place_on_ground(self, road_users: RoadUsers, bodies: Sequence[str]) -> bool:
         """Puts drafts on the ground and drops who cannot stand there; whether there was anybody."""
-        before = len(cast.drafts)
+        before = len(road_users.spawns)
         uneven: dict[str, RigidTransform] = {}
         for body in bodies:
-            draft = cast.drafts[body]
-            standing = self.space.stand(draft.kind, draft.x_m, draft.y_m, draft.near_z_m, draft.yaw_rad)
-            if standing is None or (standing.is_even and not is_upright(standing.world_from_actor)):
-                cast.drop(body)
+            spawn = road_users.spawns[body]
+            grounded = self.space.ground_pose(spawn.actor_type, spawn.x_m, spawn.y_m, spawn.near_z_m, spawn.yaw_rad)
+            if grounded is None or (grounded.is_even and not is_upright(grounded.world_from_actor)):
+                road_users.drop(body)
                 continue
-            cast.poses[body] = standing.world_from_actor
-            if not standing.is_even:
-                uneven[body] = standing.world_from_actor
+            road_users.poses[body] = grounded.world_from_actor
+            if not grounded.is_even:
+                uneven[body] = grounded.world_from_actor
         if uneven:
             for body, pose in self.space.settle(uneven).items():
                 if not is_upright(pose) or _distance_m(pose, uneven[body]) > SLIP_M:
-                    cast.drop(body)
+                    road_users.drop(body)
                 else:
-                    cast.poses[body] = pose
-        return len(cast.drafts) < before
+                    road_users.poses[body] = pose
+        return len(road_users.spawns) < before
 
-    def _drop_offenders(self, cast: Cast, hiding: HidingTest | None) -> bool:
+    def _drop_overlapping(self, road_users: RoadUsers, occlusion_test: OcclusionTest | None) -> bool:
         """Drops who overlaps somebody drawn before, or the town, or hides the board; whether there was anybody."""
-        order = {body: number for number, body in enumerate(cast.drafts)}
-        offenders = {max(pair, key=lambda body: order.get(body, -1)) for pair in self.space.overlaps(cast.poses)}
-        if hiding is not None:
-            offenders |= hiding.who(self.space, cast.poses)
-        offenders -= cast.leads
-        for body in sorted(offenders):
-            cast.drop(body)
-        return bool(offenders)
+        order = {body: number for number, body in enumerate(road_users.spawns)}
+        overlapping = {
+            max(pair, key=lambda body: order.get(body, -1)) for pair in self.space.overlaps(road_users.poses)
+        }
+        if occlusion_test is not None:
+            overlapping |= occlusion_test.occluders(self.space, road_users.poses)
+        overlapping -= road_users.protected
+        for body in sorted(overlapping):
+            road_users.drop(body)
+        return bool(overlapping)
 
 
 def is_upright(pose: RigidTransform) -> bool:
@@ -230,7 +242,7 @@ def region_of(limits: NpcLimits, boards: Sequence[BoardSpec], centre_m: tuple[fl
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class HidingTest:
+class OcclusionTest:
     """Who stands between the reference camera and the faces.
 
     Attributes:
@@ -243,12 +255,12 @@ class HidingTest:
     grids_m: tuple[Array, ...]
     min_free: float
 
-    def who(self, space: PlacementSpace, poses: Mapping[str, RigidTransform]) -> set[str]:
+    def occluders(self, space: PlacementSpace, poses: Mapping[str, RigidTransform]) -> set[str]:
         """Bodies that together hide too much of a face."""
         found: set[str] = set()
         for grid_m in self.grids_m:
-            blockers = space.blockers(self.eye_m, grid_m, poses)
-            hidden = [body for body in blockers if body is not None]
-            if len(hidden) > (1 - self.min_free) * len(blockers):
+            occluders = space.occluders(self.eye_m, grid_m, poses)
+            hidden = [body for body in occluders if body is not None]
+            if len(hidden) > (1 - self.min_free) * len(occluders):
                 found.update(hidden)
         return found

@@ -20,15 +20,15 @@ from gear.world.compilation.actor_pool import EGO_ASSET
 from gear.world.compilation.compose import Slot
 from gear.world.placement import PlacementSpace
 from gear.world.roads.regions import Region
-from gear.world.roads.routes import back_up, vehicle_pose
+from gear.world.roads.routes import trace_back, vehicle_pose
 from gear.world.scene_spec import SceneSpec
 from gear.world.surfaces.patch_faces import Face
 from gear.world.surfaces.view_limits import FaceInWorld, Verdict, ViewLimits, reference_camera
-from gear.world.traffic.crowd import Cast, is_upright
+from gear.world.traffic.crowd import RoadUsers, is_upright
 from gear.world.traffic.footprints import Footprint
-from gear.world.traffic.spawn import Draft, FreeSlots, Spawner
+from gear.world.traffic.spawn import FreeSlots, Spawn, Spawner
 
-LEAD_TRIES = 60
+EGO_TRIES = 60
 LONGEST_WAY_M = 40.0
 USUAL_MPS = 5.0
 """A driving ego car starts at most so far before its limits, and no further than it comes at this speed."""
@@ -38,7 +38,7 @@ CORRIDOR_M = 1.3
 
 
 @dataclass(eq=False, kw_only=True)
-class Leads:
+class EgoSampler:
     """Draws ego cars and carriers for one scene.
 
     Attributes:
@@ -59,7 +59,7 @@ class Leads:
     spawner: Spawner
     space: PlacementSpace
 
-    def draw(self, seed: int, sequence: int, duration_s: float = 0.0) -> Cast:
+    def draw(self, seed: int, sequence: int, duration_s: float = 0.0) -> RoadUsers:
         """A cast with its leads alone.
 
         Args:
@@ -71,55 +71,53 @@ class Leads:
             PlacementError: no place keeps the limits; says which is too tight.
         """
         problems: Counter[str] = Counter()
-        for attempt in range(LEAD_TRIES):
-            cast = self.fresh_cast()
+        for attempt in range(EGO_TRIES):
+            road_users = self.empty()
             # Failures bring the start nearer to the limits, so that the last tries begin where the board is in view.
             before_s = duration_s * 0.5 ** (attempt // 6)
-            problem = self._place(cast, derive_rng(seed, self.scene_name, "ego", sequence, attempt), before_s)
+            problem = self._place(road_users, derive_rng(seed, self.scene_name, "ego", sequence, attempt), before_s)
             if problem is None:
-                return cast
+                return road_users
             problems[problem] += 1
         told = ", ".join(f"{count} {what}" for what, count in problems.most_common())
-        raise PlacementError(
-            self.scene_name, f"no place for the ego car in {LEAD_TRIES} tries ({told}); {self._advice}"
-        )
+        raise PlacementError(self.scene_name, f"no place for the ego car in {EGO_TRIES} tries ({told}); {self._advice}")
 
-    def fresh_cast(self) -> Cast:
+    def empty(self) -> RoadUsers:
         """Nobody yet."""
-        return Cast(drafts={}, poses={}, keep_out=[], free=FreeSlots.of(self.slots))
+        return RoadUsers(spawns={}, poses={}, keep_out=[], free=FreeSlots.of(self.slots))
 
-    def enter(self, cast: Cast, drafts: Sequence[Draft]) -> str | None:
+    def enter(self, road_users: RoadUsers, spawns: Sequence[Spawn]) -> str | None:
         """Stands leads up in a cast; what is wrong with their places, if anything is."""
-        for draft in drafts:
-            standing = self.space.stand(draft.kind, draft.x_m, draft.y_m, draft.near_z_m, draft.yaw_rad)
-            if standing is None:
+        for spawn in spawns:
+            grounded = self.space.ground_pose(spawn.actor_type, spawn.x_m, spawn.y_m, spawn.near_z_m, spawn.yaw_rad)
+            if grounded is None:
                 return "without ground below"
-            pose = standing.world_from_actor
-            if not standing.is_even:
-                pose = self.space.settle({draft.body: pose})[draft.body]
+            pose = grounded.world_from_actor
+            if not grounded.is_even:
+                pose = self.space.settle({spawn.body: pose})[spawn.body]
             if not is_upright(pose):
                 return "tipping over"
-            cast.drafts[draft.body] = draft
-            cast.poses[draft.body] = pose
-        cast.leads = frozenset(cast.drafts)
-        if self.space.overlaps(cast.poses):
+            road_users.spawns[spawn.body] = spawn
+            road_users.poses[spawn.body] = pose
+        road_users.protected = frozenset(road_users.spawns)
+        if self.space.overlaps(road_users.poses):
             return "overlapping the town or a board"
         return None
 
-    def judge(self, cast: Cast) -> Verdict:
+    def judge(self, road_users: RoadUsers) -> Verdict:
         """Whether the ego car of a cast sees every face."""
-        ego = next(iter(cast.drafts))
-        mount, camera = reference_camera(self.rig, Pose.from_transform(cast.poses[ego]).transform("world", "ego"))
-        return self.limits.judge(self.space, self.faces_in_world(cast), mount, camera)
+        ego = next(iter(road_users.spawns))
+        mount, camera = reference_camera(self.rig, Pose.from_transform(road_users.poses[ego]).transform("world", "ego"))
+        return self.limits.judge(self.space, self.faces_in_world(road_users), mount, camera)
 
-    def faces_in_world(self, cast: Cast) -> list[FaceInWorld]:
+    def faces_in_world(self, road_users: RoadUsers) -> list[FaceInWorld]:
         """Every face, on its board or on the carrier of a cast."""
         placed = []
         for face in self.faces:
             frame = face.parent_from_surface
             if face.is_carried:
-                carrier = next(body for body, draft in cast.drafts.items() if draft.role == "carrier")
-                frame = cast.poses[carrier] @ frame
+                carrier = next(body for body, spawn in road_users.spawns.items() if spawn.role == "carrier")
+                frame = road_users.poses[carrier] @ frame
             placed.append(FaceInWorld.of(face, frame))
         return placed
 
@@ -141,33 +139,33 @@ class Leads:
             return "widen truck.gap_m"
         return "widen ego.ahead_m or ego.lateral_m" if self.scene.boards else "the town's lanes are blocked"
 
-    def _place(self, cast: Cast, rng: np.random.Generator, before_s: float) -> str | None:
+    def _place(self, road_users: RoadUsers, rng: np.random.Generator, before_s: float) -> str | None:
         if self.scene.truck is not None:
-            drafts = self._draw_behind_truck(cast, rng)
+            spawns = self._draw_behind_truck(road_users, rng)
         else:
-            drafts = self._draw_alone(cast, rng, before_s)
-        if isinstance(drafts, str):
-            return drafts
-        problem = self.enter(cast, drafts)
+            spawns = self._draw_alone(road_users, rng, before_s)
+        if isinstance(spawns, str):
+            return spawns
+        problem = self.enter(road_users, spawns)
         if problem is not None or not self.faces:
             return problem
-        verdict = self.judge(cast)
+        verdict = self.judge(road_users)
         return None if verdict == "seen" else f"with a face {verdict}"
 
-    def _draw_alone(self, cast: Cast, rng: np.random.Generator, before_s: float) -> list[Draft] | str:
+    def _draw_alone(self, road_users: RoadUsers, rng: np.random.Generator, before_s: float) -> list[Spawn] | str:
         lane, s_m = self.spawner.lane_table.draw(self.places, rng)
         lanes: tuple[str, ...] = (lane,)
         if self.scene.boards and before_s > 0:
             first_m, last_m = self._run(lane, s_m)
             s_m = first_m + float(rng.uniform(0.0, 0.15)) * (last_m - first_m)
             before_m = float(rng.uniform(0.4, 0.8)) * min(LONGEST_WAY_M, before_s * USUAL_MPS)
-            cast.way_m = before_m + last_m - s_m
-            way = back_up(self.spawner.lanes, lane, s_m, before_m, rng)
+            road_users.drive_m = before_m + last_m - s_m
+            way = trace_back(self.spawner.lanes, lane, s_m, before_m, rng)
             if way is None:
                 return "before the start of the road"
             lanes, s_m = way
-        ego = self.ego_on(cast, lanes[0], s_m, rng)
-        cast.ways[ego.body] = lanes
+        ego = self.ego_on_lane(road_users, lanes[0], s_m, rng)
+        road_users.required_lanes[ego.body] = lanes
         return [ego]
 
     def _run(self, lane: str, s_m: float) -> tuple[float, float]:
@@ -183,24 +181,24 @@ class Leads:
             last += 1
         return float(table.s_m[first]), float(table.s_m[last])
 
-    def ego_on(self, cast: Cast, lane: str, s_m: float, rng: np.random.Generator) -> Draft:
+    def ego_on_lane(self, road_users: RoadUsers, lane: str, s_m: float, rng: np.random.Generator) -> Spawn:
         """The ego car on a lane."""
-        return self.spawner.on_lane(self.ego_type, cast.free.take(EGO_ASSET), "ego", lane, s_m, rng)
+        return self.spawner.on_lane(self.ego_type, road_users.free.take(EGO_ASSET), "ego", lane, s_m, rng)
 
-    def _draw_behind_truck(self, cast: Cast, rng: np.random.Generator) -> list[Draft] | str:
+    def _draw_behind_truck(self, road_users: RoadUsers, rng: np.random.Generator) -> list[Spawn] | str:
         assert self.scene.truck is not None
-        slot = next(slot for slot in self.slots if slot.bears_surface)
-        kind = self.types[slot.actor.name]
+        slot = next(slot for slot in self.slots if slot.carries_surface)
+        actor_type = self.types[slot.actor.name]
         lane, s_m = self.spawner.lane_table.draw(self.places, rng)
-        truck = self.spawner.on_lane(kind, slot.body, "carrier", lane, s_m, rng)
+        truck = self.spawner.on_lane(actor_type, slot.body, "carrier", lane, s_m, rng)
         gap_m = float(rng.uniform(*self.scene.truck.gap_m))
-        way = back_up(self.spawner.lanes, lane, s_m, kind.rear_m + gap_m + self.ego_type.front_m, rng)
+        way = trace_back(self.spawner.lanes, lane, s_m, actor_type.rear_m + gap_m + self.ego_type.front_m, rng)
         if way is None:
             return "before the start of the road"
         lanes, ego_s_m = way
-        ego = self.ego_on(cast, lanes[0], ego_s_m, rng)
-        cast.keep_out.append(_between(ego, truck))
-        cast.ways[ego.body] = lanes
+        ego = self.ego_on_lane(road_users, lanes[0], ego_s_m, rng)
+        road_users.keep_out.append(_between(ego, truck))
+        road_users.required_lanes[ego.body] = lanes
         return [ego, truck]
 
     @cached_property
@@ -236,7 +234,7 @@ class Leads:
         return self.limits.judge(self.space, faces, mount, camera)
 
 
-def _between(ego: Draft, truck: Draft) -> Footprint:
+def _between(ego: Spawn, truck: Spawn) -> Footprint:
     """The strip from the ego car to its truck."""
     dx, dy = truck.x_m - ego.x_m, truck.y_m - ego.y_m
     return Footprint(

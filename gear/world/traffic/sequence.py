@@ -13,10 +13,10 @@ from gear.values.rng import derive_rng
 from gear.world.placement import PlacementSpace
 from gear.world.roads.junctions import Junctions
 from gear.world.roads.lanes import LaneGraph
-from gear.world.roads.routes import Route, drive_on, driven_pose, vehicle_pose
-from gear.world.traffic.crowd import Cast
-from gear.world.traffic.simulation import Driver, Traffic, Walker, vehicle_discs
-from gear.world.traffic.spawn import Draft
+from gear.world.roads.routes import Route, extend_route, moving_pose, vehicle_pose
+from gear.world.traffic.crowd import RoadUsers
+from gear.world.traffic.simulation import MovingPedestrian, MovingVehicle, TrafficSimulation, vehicle_discs
+from gear.world.traffic.spawn import Spawn
 
 ROOM_M = 80.0
 SLOWEST_MPS = 1.5
@@ -26,19 +26,19 @@ OFF_THE_ROAD_M = 1.2
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Moment:
+class FrameState:
     """Everybody at one frame.
 
     Attributes:
-        drafts: by body, with the speeds of this moment.
+        spawns: by body, with the speeds of this moment.
         poses: by body.
     """
 
-    drafts: Mapping[str, Draft]
+    spawns: Mapping[str, Spawn]
     poses: Mapping[str, RigidTransform]
 
 
-class Director:
+class SequenceSimulator:
     """Drives casts through time."""
 
     def __init__(self, scene_name: str, lanes: LaneGraph, space: PlacementSpace) -> None:
@@ -48,7 +48,9 @@ class Director:
         self._space = space
         self._junctions = Junctions(lanes)
 
-    def drive(self, cast: Cast, seed: int, sequence: int, frames: int, interval_s: float) -> list[Moment]:
+    def drive(
+        self, road_users: RoadUsers, seed: int, sequence: int, frames: int, interval_s: float
+    ) -> list[FrameState]:
         """All frames of a sequence.
 
         It is driven, who overlaps is taken out of the cast, and it is driven again, until nobody does. So there may be
@@ -58,136 +60,143 @@ class Director:
             PlacementError: the ego car itself cannot drive without an overlap.
         """
         while True:
-            moments, offender = self._rehearse(cast, seed, sequence, frames, interval_s)
-            if offender is None:
-                return moments
-            if offender in cast.leads:
+            states, overlapping = self._simulate_once(road_users, seed, sequence, frames, interval_s)
+            if overlapping is None:
+                return states
+            if overlapping in road_users.protected:
                 raise PlacementError(
                     self._scene_name,
                     f"sequence {sequence}: the ego car cannot drive {frames} frames without an overlap",
                 )
-            cast.drop(offender)
+            road_users.drop(overlapping)
 
-    def _rehearse(
-        self, cast: Cast, seed: int, sequence: int, frames: int, interval_s: float
-    ) -> tuple[list[Moment], str | None]:
+    def _simulate_once(
+        self, road_users: RoadUsers, seed: int, sequence: int, frames: int, interval_s: float
+    ) -> tuple[list[FrameState], str | None]:
         """Drives until the end or until somebody overlaps."""
         duration_s = frames * interval_s
         drivers = {
-            body: self._driver(cast, draft, seed, sequence, duration_s)
-            for body, draft in cast.drafts.items()
-            if draft.lane
+            body: self._driver(road_users, spawn, seed, sequence, duration_s)
+            for body, spawn in road_users.spawns.items()
+            if spawn.lane
         }
         walkers = {
-            body: self._walker(draft)
-            for body, draft in cast.drafts.items()
-            if draft.walk is not None and draft.speed_mps > 0
+            body: self._walker(spawn)
+            for body, spawn in road_users.spawns.items()
+            if spawn.walk is not None and spawn.speed_mps > 0
         }
-        standing = [
+        grounded = [
             disc
-            for body, draft in cast.drafts.items()
+            for body, spawn in road_users.spawns.items()
             if body not in drivers and body not in walkers
-            for disc in _discs(draft)
+            for disc in _discs(spawn)
         ]
-        traffic = Traffic(list(drivers.values()), list(walkers.values()), standing, self._junctions)
-        order = {body: number for number, body in enumerate(cast.drafts)}
-        moments: list[Moment] = []
+        traffic = TrafficSimulation(list(drivers.values()), list(walkers.values()), grounded, self._junctions)
+        order = {body: number for number, body in enumerate(road_users.spawns)}
+        states: list[FrameState] = []
         for frame in range(frames):
             if frame:
                 traffic.advance(interval_s)
-            moment, fallen = self._moment(cast, drivers, walkers, is_still=frames == 1)
-            pairs = self._space.overlaps(moment.poses)
-            offenders = [max(pair, key=lambda body: order.get(body, -1)) for pair in pairs] + fallen
-            if offenders:
-                return moments, max(offenders, key=lambda body: order[body])
-            moments.append(moment)
-        return moments, None
+            state, fallen = self._frame_state(road_users, drivers, walkers, is_still=frames == 1)
+            pairs = self._space.overlaps(state.poses)
+            overlapping = [max(pair, key=lambda body: order.get(body, -1)) for pair in pairs] + fallen
+            if overlapping:
+                return states, max(overlapping, key=lambda body: order[body])
+            states.append(state)
+        return states, None
 
-    def _moment(
-        self, cast: Cast, drivers: Mapping[str, Driver], walkers: Mapping[str, Walker], *, is_still: bool
-    ) -> tuple[Moment, list[str]]:
+    def _frame_state(
+        self,
+        road_users: RoadUsers,
+        drivers: Mapping[str, MovingVehicle],
+        walkers: Mapping[str, MovingPedestrian],
+        *,
+        is_still: bool,
+    ) -> tuple[FrameState, list[str]]:
         """Where everybody is now, and who has no ground below.
 
         A single picture keeps to the pieces of lanes and walks, as its data set's seed has always placed it.
         """
-        drafts: dict[str, Draft] = {}
+        spawns: dict[str, Spawn] = {}
         poses: dict[str, RigidTransform] = {}
         fallen: list[str] = []
-        for body, draft in cast.drafts.items():
+        for body, spawn in road_users.spawns.items():
             if body in drivers:
                 driver = drivers[body]
-                half_length_m = draft.kind.half_length_m
+                half_length_m = spawn.actor_type.half_length_m
                 if is_still:
                     point, yaw_rad = vehicle_pose(driver.route.line, driver.s_m, half_length_m, driver.lateral_m)
-                    now = _at(draft, point, yaw_rad, driver.speed_mps)
+                    now = _at(spawn, point, yaw_rad, driver.speed_mps)
                 else:
-                    point, yaw_rad, pace = driven_pose(driver.route.line, driver.s_m, half_length_m, driver.lateral_m)
-                    now = _at(draft, point, yaw_rad, driver.speed_mps * pace)
+                    point, yaw_rad, pace = moving_pose(driver.route.line, driver.s_m, half_length_m, driver.lateral_m)
+                    now = _at(spawn, point, yaw_rad, driver.speed_mps * pace)
             elif body in walkers:
                 walker = walkers[body]
                 point, yaw_rad = walker.first_place() if is_still else walker.place()
-                now = _at(draft, point, yaw_rad, walker.speed_mps)
+                now = _at(spawn, point, yaw_rad, walker.speed_mps)
             else:
-                drafts[body], poses[body] = draft, cast.poses[body]
+                spawns[body], poses[body] = spawn, road_users.poses[body]
                 continue
-            standing = self._space.stand(draft.kind, now.x_m, now.y_m, now.near_z_m, now.yaw_rad)
-            if standing is None:
+            grounded = self._space.ground_pose(spawn.actor_type, now.x_m, now.y_m, now.near_z_m, now.yaw_rad)
+            if grounded is None:
                 fallen.append(body)
                 continue
-            drafts[body], poses[body] = now, standing.world_from_actor
-        return Moment(drafts=drafts, poses=poses), fallen
+            spawns[body], poses[body] = now, grounded.world_from_actor
+        return FrameState(spawns=spawns, poses=poses), fallen
 
-    def _driver(self, cast: Cast, draft: Draft, seed: int, sequence: int, duration_s: float) -> Driver:
-        lane = self._lanes.lanes[draft.lane]
+    def _driver(
+        self, road_users: RoadUsers, spawn: Spawn, seed: int, sequence: int, duration_s: float
+    ) -> MovingVehicle:
+        lane = self._lanes.lanes[spawn.lane]
         cruise_mps = lane.speed_mps * float(
-            derive_rng(seed, self._scene_name, "cruise", sequence, draft.body).uniform(0.6, 1.0)
+            derive_rng(seed, self._scene_name, "cruise", sequence, spawn.body).uniform(0.6, 1.0)
         )
-        if draft.role == "ego" and cast.way_m > 0:
-            cruise_mps = min(lane.speed_mps, max(SLOWEST_MPS, cast.way_m / duration_s))
-        elif draft.kind.facts.kind == "bicycle":
+        if spawn.role == "ego" and road_users.drive_m > 0:
+            cruise_mps = min(lane.speed_mps, max(SLOWEST_MPS, road_users.drive_m / duration_s))
+        elif spawn.actor_type.kind == "bicycle":
             cruise_mps = min(cruise_mps, CYCLING_MPS)
-        way = cast.ways.get(draft.body, (draft.lane,))
+        way = road_users.required_lanes.get(spawn.body, (spawn.lane,))
         # The ego car and its truck turn the same way at every junction, because they draw the same numbers.
         turns = derive_rng(
-            seed, self._scene_name, "route", sequence, "leads" if draft.body in cast.leads else draft.body
+            seed, self._scene_name, "route", sequence, "leads" if spawn.body in road_users.protected else spawn.body
         )
         spent_m = sum(self._lanes.lanes[name].line.length_m for name in way[:-1])
-        length_m = draft.s_m + lane.speed_mps * duration_s + ROOM_M - spent_m
-        lanes = (*way[:-1], *drive_on(self._lanes, way[-1], max(1.0, length_m), turns))
-        return Driver(
+        length_m = spawn.s_m + lane.speed_mps * duration_s + ROOM_M - spent_m
+        lanes = (*way[:-1], *extend_route(self._lanes, way[-1], max(1.0, length_m), turns))
+        return MovingVehicle(
             route=Route.along(self._lanes, lanes),
-            s_m=draft.s_m,
-            lateral_m=draft.lateral_m,
-            speed_mps=draft.speed_mps,
+            s_m=spawn.s_m,
+            lateral_m=spawn.lateral_m,
+            speed_mps=spawn.speed_mps,
             cruise_mps=cruise_mps,
-            front_m=draft.kind.front_m,
-            rear_m=draft.kind.rear_m,
-            half_width_m=draft.kind.half_width_m,
+            front_m=spawn.actor_type.front_m,
+            rear_m=spawn.actor_type.rear_m,
+            half_width_m=spawn.actor_type.half_width_m,
         )
 
-    def _walker(self, draft: Draft) -> Walker:
-        assert draft.walk is not None
-        walk = self._lanes.walks[draft.walk.walk]
-        return Walker(
+    def _walker(self, spawn: Spawn) -> MovingPedestrian:
+        assert spawn.walk is not None
+        walk = self._lanes.walks[spawn.walk.walk]
+        return MovingPedestrian(
             line=walk.line,
-            s_m=draft.walk.s_m,
-            lateral_m=draft.walk.lateral_m,
-            direction=draft.walk.direction,
-            pace_mps=draft.speed_mps,
-            speed_mps=draft.speed_mps,
+            s_m=spawn.walk.s_m,
+            lateral_m=spawn.walk.lateral_m,
+            direction=spawn.walk.direction,
+            pace_mps=spawn.speed_mps,
+            speed_mps=spawn.speed_mps,
             beyond_m=OFF_THE_ROAD_M if walk.is_crossing else -OFF_THE_ROAD_M,
         )
 
 
-def _discs(draft: Draft) -> list[tuple[float, float, float, float]]:
-    kind = draft.kind
-    point_m = np.array([draft.x_m, draft.y_m, draft.near_z_m])
-    return vehicle_discs(point_m, draft.yaw_rad, kind.front_m, kind.rear_m, kind.half_width_m)
+def _discs(spawn: Spawn) -> list[tuple[float, float, float, float]]:
+    actor_type = spawn.actor_type
+    point_m = np.array([spawn.x_m, spawn.y_m, spawn.near_z_m])
+    return vehicle_discs(point_m, spawn.yaw_rad, actor_type.front_m, actor_type.rear_m, actor_type.half_width_m)
 
 
-def _at(draft: Draft, point_m: Array, yaw_rad: float, speed_mps: float) -> Draft:
+def _at(spawn: Spawn, point_m: Array, yaw_rad: float, speed_mps: float) -> Spawn:
     return replace(
-        draft,
+        spawn,
         x_m=float(point_m[0]),
         y_m=float(point_m[1]),
         near_z_m=float(point_m[2]),

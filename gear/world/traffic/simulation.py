@@ -15,7 +15,7 @@ import numpy as np
 from gear.values.geometry import Array
 from gear.world.roads.junctions import Junctions
 from gear.world.roads.polyline import Polyline
-from gear.world.roads.routes import Route, beside
+from gear.world.roads.routes import Route, offset_left
 from gear.world.traffic.footprints import LEVEL_M
 
 MAX_STEP_S = 0.05
@@ -44,7 +44,7 @@ GIVE_WAY_M = 25.0
 
 
 @dataclass(slots=True, eq=False, kw_only=True)
-class Driver:
+class MovingVehicle:
     """A vehicle under way.
 
     Attributes:
@@ -64,7 +64,7 @@ class Driver:
 
 
 @dataclass(slots=True, eq=False, kw_only=True)
-class Walker:
+class MovingPedestrian:
     """A person under way.
 
     Attributes:
@@ -91,7 +91,7 @@ class Walker:
     def place(self) -> tuple[Array, float]:
         """Point on the ground and heading, under way."""
         heading_rad = self.line.heading(self.s_m, TURNING_M * max(1.0, abs(self.lateral_m)))
-        point = beside(self.line.at(self.s_m)[0], heading_rad, self.lateral_m)
+        point = offset_left(self.line.at(self.s_m)[0], heading_rad, self.lateral_m)
         return point, heading_rad if self.direction > 0 else heading_rad + math.pi
 
     def first_place(self) -> tuple[Array, float]:
@@ -132,20 +132,20 @@ def vehicle_discs(
     return discs
 
 
-class Traffic:
+class TrafficSimulation:
     """Drivers and walkers among things that stand still."""
 
     def __init__(
         self,
-        drivers: Sequence[Driver],
-        walkers: Sequence[Walker],
-        standing: Sequence[tuple[float, float, float, float]],
+        drivers: Sequence[MovingVehicle],
+        walkers: Sequence[MovingPedestrian],
+        grounded: Sequence[tuple[float, float, float, float]],
         junctions: Junctions,
     ) -> None:
-        """Takes the moving by reference and moves them; `standing` are discs (x, y, z, radius)."""
+        """Takes the moving by reference and moves them; `grounded` are discs (x, y, z, radius)."""
         self.drivers = list(drivers)
         self.walkers = list(walkers)
-        self._standing = list(standing)
+        self._standing = list(grounded)
         self._junctions = junctions
         for index, driver in enumerate(self.drivers):
             gap_m, _ = self._gap(index, self._discs())
@@ -199,8 +199,8 @@ class Traffic:
         near = np.hypot(offsets[..., 0], offsets[..., 1]) < radii_m + driver.half_width_m + SIDE_MARGIN_M
         near &= np.abs(offsets[..., 2]) < LEVEL_M
         # What touches the strip only beside the car's own front is beside it, not ahead of it.
-        beside = (offsets[0, :, 0] * np.cos(headings[0]) + offsets[0, :, 1] * np.sin(headings[0])) > 0
-        near &= ~beside
+        offset_left = (offsets[0, :, 0] * np.cos(headings[0]) + offsets[0, :, 1] * np.sin(headings[0])) > 0
+        near &= ~offset_left
         hits = near.any(axis=1)
         if not hits.any():
             return gap_m, 0.0

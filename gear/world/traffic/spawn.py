@@ -46,12 +46,12 @@ class WalkPlace:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Draft:
+class Spawn:
     """A road user as drawn.
 
     Attributes:
         role: as in its record.
-        kind: what it is.
+        actor_type: its asset, measured.
         body: its body in the placement model.
         x_m, y_m, near_z_m, yaw_rad: place and heading; the ground is near that height.
         speed_mps: along the heading.
@@ -61,7 +61,7 @@ class Draft:
     """
 
     role: Role
-    kind: ActorType
+    actor_type: ActorType
     body: str
     x_m: float
     y_m: float
@@ -77,8 +77,10 @@ class Draft:
     @property
     def footprint(self) -> Footprint:
         """What it covers of the ground."""
-        kind = self.kind
-        return Footprint(self.x_m, self.y_m, self.near_z_m, self.yaw_rad, kind.half_length_m, kind.half_width_m)
+        actor_type = self.actor_type
+        return Footprint(
+            self.x_m, self.y_m, self.near_z_m, self.yaw_rad, actor_type.half_length_m, actor_type.half_width_m
+        )
 
 
 @dataclass(slots=True, eq=False)
@@ -96,7 +98,7 @@ class FreeSlots:
         """The whole pool, but for what bears a surface."""
         free = FreeSlots()
         for slot in slots:
-            if not slot.bears_surface:
+            if not slot.carries_surface:
                 free.bodies.setdefault(slot.actor.name, []).append(slot.body)
         return free
 
@@ -104,26 +106,26 @@ class FreeSlots:
         """A free body of an asset."""
         return self.bodies[asset].pop(0)
 
-    def give_back(self, asset: str, body: str) -> None:
+    def release(self, asset: str, body: str) -> None:
         """A body is free again."""
         self.bodies[asset].append(body)
 
     def draw(self, types: Mapping[str, ActorType], rng: np.random.Generator, *, people: bool) -> ActorType | None:
         """A kind that still has a free body, by how common it is; None where all are taken."""
         kinds = [
-            kind
-            for name, kind in types.items()
-            if self.bodies.get(name) and (kind.facts.kind == "person") == people and kind.facts.weight > 0
+            actor_type
+            for name, actor_type in types.items()
+            if self.bodies.get(name) and (actor_type.kind == "person") == people and actor_type.facts.weight > 0
         ]
         if not kinds:
             return None
-        shares = np.cumsum([kind.facts.weight for kind in kinds])
+        shares = np.cumsum([actor_type.facts.weight for actor_type in kinds])
         return kinds[min(int(np.searchsorted(shares, rng.random() * shares[-1])), len(kinds) - 1)]
 
 
-def draw_paint(kind: ActorType, rng: np.random.Generator) -> Vec3 | None:
+def draw_paint(actor_type: ActorType, rng: np.random.Generator) -> Vec3 | None:
     """A colour of its palette."""
-    palette = kind.facts.palette
+    palette = actor_type.facts.palette
     total = sum(weight for _, weight in palette)
     if total <= 0:
         return None
@@ -151,90 +153,90 @@ class Spawner:
             [self.lanes.bays[i] for i in np.flatnonzero(region.holds(self._bays_m[:, :2]))] if len(self._bays_m) else []
         )
 
-    def belongs(self, kind: ActorType, lane: str) -> bool:
+    def is_allowed_on(self, actor_type: ActorType, lane: str) -> bool:
         """Whether such a vehicle is met on a lane: bicycles keep off motorways."""
-        return kind.facts.kind != "bicycle" or self.lanes.lanes[lane].speed_mps < MOTORWAY_MPS
+        return actor_type.kind != "bicycle" or self.lanes.lanes[lane].speed_mps < MOTORWAY_MPS
 
     def on_lane(
         self,
-        kind: ActorType,
+        actor_type: ActorType,
         body: str,
         role: Role,
         lane: str,
         s_m: float,
         rng: np.random.Generator,
-    ) -> Draft:
+    ) -> Spawn:
         """A vehicle on a lane, a little off its middle and its heading; two-wheelers keep to the right."""
         road = self.lanes.lanes[lane]
-        room_m = max(0.0, road.width_m / 2 - kind.half_width_m - 0.2)
+        room_m = max(0.0, road.width_m / 2 - actor_type.half_width_m - 0.2)
         lateral_m = float(np.clip(rng.normal(0.0, 0.12), -room_m, room_m))
-        if kind.facts.kind in ("bicycle", "motorcycle"):
+        if actor_type.kind in ("bicycle", "motorcycle"):
             lateral_m = -room_m * float(rng.uniform(0.3, 0.8))
-        point, yaw_rad = vehicle_pose(road.line, s_m, kind.half_length_m, lateral_m)
+        point, yaw_rad = vehicle_pose(road.line, s_m, actor_type.half_length_m, lateral_m)
         stands = rng.random() < STANDING_SHARE and not road.is_junction
-        most_mps = min(road.speed_mps, 6.0) if kind.facts.kind == "bicycle" else road.speed_mps
+        most_mps = min(road.speed_mps, 6.0) if actor_type.kind == "bicycle" else road.speed_mps
         speed_mps = most_mps * float(rng.uniform(0.35, 1.0))
-        return Draft(
+        return Spawn(
             role=role,
-            kind=kind,
+            actor_type=actor_type,
             body=body,
             x_m=float(point[0]),
             y_m=float(point[1]),
             near_z_m=float(point[2]),
             yaw_rad=yaw_rad + float(np.clip(rng.normal(0.0, 0.01), -0.03, 0.03)),
             speed_mps=0.0 if stands and role == "npc" else speed_mps,
-            paint_rgb=draw_paint(kind, rng),
+            paint_rgb=draw_paint(actor_type, rng),
             lane=lane,
             s_m=s_m,
             lateral_m=lateral_m,
         )
 
-    def in_bay(self, kind: ActorType, body: str, bay: ParkingBay, rng: np.random.Generator) -> Draft | None:
+    def in_bay(self, actor_type: ActorType, body: str, bay: ParkingBay, rng: np.random.Generator) -> Spawn | None:
         """A parked vehicle, or None where it does not fit."""
-        spare_m = bay.length_m / 2 - kind.half_length_m, bay.width_m / 2 - kind.half_width_m
+        spare_m = bay.length_m / 2 - actor_type.half_length_m, bay.width_m / 2 - actor_type.half_width_m
         if min(spare_m) < 0:
             return None
         ahead_m, left_m = (float(rng.uniform(-1, 1)) * min(0.25, spare) for spare in spare_m)
         c, s = math.cos(bay.yaw_rad), math.sin(bay.yaw_rad)
         turned = math.pi if rng.random() < 0.15 else 0.0
-        return Draft(
+        return Spawn(
             role="parked",
-            kind=kind,
+            actor_type=actor_type,
             body=body,
             x_m=bay.position_m[0] + c * ahead_m - s * left_m,
             y_m=bay.position_m[1] + s * ahead_m + c * left_m,
             near_z_m=bay.position_m[2],
             yaw_rad=bay.yaw_rad + turned + float(np.clip(rng.normal(0.0, 0.015), -0.03, 0.03)),
-            paint_rgb=draw_paint(kind, rng),
+            paint_rgb=draw_paint(actor_type, rng),
         )
 
     def on_walk(
-        self, kind: ActorType, body: str, pieces: npt.NDArray[np.intp], rng: np.random.Generator
-    ) -> Draft | None:
+        self, actor_type: ActorType, body: str, pieces: npt.NDArray[np.intp], rng: np.random.Generator
+    ) -> Spawn | None:
         """A person on a sidewalk or crossing: walkers keep to their right half, those who stand look anywhere.
 
         Nobody stands about on a crossing: None where that was drawn.
         """
         name, s_m = self.walk_table.draw(pieces, rng)
         walk = self.lanes.walks[name]
-        if walk.is_crossing and kind.facts.gait != "walk":
+        if walk.is_crossing and actor_type.facts.gait != "walk":
             return None
         direction = 1 if rng.random() < 0.5 else -1
         room_m = max(0.0, walk.width_m / 2 - SIDE_CLEARANCE_M)
-        walks = kind.facts.gait == "walk"
+        walks = actor_type.facts.gait == "walk"
         lateral_m = -direction * room_m * float(rng.uniform(0.1, 1.0)) if walks else room_m * float(rng.uniform(-1, 1))
         point, heading_rad = walk.line.at(s_m, lateral_m)
         if direction < 0:
             heading_rad += math.pi
-        return Draft(
+        return Spawn(
             role="pedestrian",
-            kind=kind,
+            actor_type=actor_type,
             body=body,
             x_m=float(point[0]),
             y_m=float(point[1]),
             near_z_m=float(point[2]),
             yaw_rad=heading_rad if walks else float(rng.uniform(-math.pi, math.pi)),
             speed_mps=float(rng.uniform(0.8, 1.7)) if walks else 0.0,
-            paint_rgb=draw_paint(kind, rng),
+            paint_rgb=draw_paint(actor_type, rng),
             walk=WalkPlace(walk=name, s_m=s_m, lateral_m=lateral_m, direction=direction),
         )

@@ -21,11 +21,11 @@ from gear.values.scene import Weather
 from gear.world.weather.light import (
     Floats,
     Lighting,
-    even_light,
-    horizon_light,
+    airlight,
+    ambient_radiance,
     lamplit_houses,
     lighting_of,
-    mirrored_light,
+    mirrored_radiance,
 )
 from gear.world.weather.presets import wetness
 
@@ -79,7 +79,7 @@ def camera_pipeline(
         shapes: of the assets that may take part, which shade the ground about them; without them nothing does.
     """
     left = night.sky_level if night else 1.0
-    mirrored = left * mirrored_light(weather, _MIRROR_ROWS, _MIRROR_COLUMNS)
+    mirrored = left * mirrored_radiance(weather, _MIRROR_ROWS, _MIRROR_COLUMNS)
     if night is not None:
         mirrored += night.lit * lamplit_houses(_MIRROR_ROWS)
     return CameraPipeline(
@@ -97,7 +97,7 @@ def camera_pipeline(
         rain=Rain.of(
             weather.precipitation,
             weather.wind_intensity,
-            np.minimum(_shown(left * DROP_LIGHT * horizon_light(weather).mean(axis=0), renderer_name), 1.0),
+            np.minimum(_shown(left * DROP_LIGHT * airlight(weather).mean(axis=0), renderer_name), 1.0),
         ),
         effects=effects or CameraEffects(),
     )
@@ -111,7 +111,7 @@ def shade_of(weather: Weather, renderer_name: str, shapes: Mapping[str, Shape]) 
 
 def even_share(weather: Weather, light: Lighting) -> float:
     """How much of the light on open level ground is not the sun's, 0..1."""
-    even = even_light(weather)[0].mean()
+    even = ambient_radiance(weather)[0].mean()
     sun = light.sun.mean() * max(light.towards_sun[2], 0) / math.pi
     return float(even / (even + sun))
 
@@ -128,7 +128,7 @@ def air_of(weather: Weather, renderer_name: str, left: float = 1.0) -> Air:
     return Air(
         fogs=fogs_of(weather),
         clear_per_m=weather.scattering_intensity * (aerosol + molecules),
-        ring=_shown(left * horizon_light(weather), renderer_name),
+        ring=_shown(left * airlight(weather), renderer_name),
     )
 
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from gear.camera.beams import Lamps, globe_beam, street_beam
 from gear.camera.glow import Windows
 from gear.values.geometry import Array
-from gear.world.assets.geom_triangles import standing_geoms, world_corners
+from gear.world.assets.geom_triangles import static_geoms, world_triangles
 
 PALETTE, LAMP_GLASS = "palette", (0.5, 0.5, 0.625, 0.625)
 """Material of gear's street furniture, and where its picture has the glass of lamps: the least u and v, v from above,
@@ -68,7 +68,7 @@ WARM, COOL = np.array([1.0, 0.78, 0.50]), np.array([0.80, 0.92, 1.0])
 
 def _standing(model: mujoco.MjModel, names: Collection[str]) -> Iterator[tuple[str, int]]:
     """Materials of these names and the geoms of the town that wear them."""
-    for geom in np.flatnonzero(standing_geoms(model) & (model.geom_matid >= 0)).tolist():
+    for geom in np.flatnonzero(static_geoms(model) & (model.geom_matid >= 0)).tolist():
         name = model.mat(int(model.geom_matid[geom])).name
         if name in names:
             yield name, geom
@@ -90,11 +90,11 @@ def find_lamps(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, Lamps]:
     for name, geom in _standing(model, (PALETTE, LAMP_MATERIAL)):
         places = _texture_places(model, geom)
         if name == LAMP_MATERIAL:
-            glass.append(world_corners(model, data, geom))
+            glass.append(world_triangles(model, data, geom))
         elif places is not None:
             u, v = np.moveaxis(places.mean(axis=1), 1, 0)
             u0, v0, u1, v1 = LAMP_GLASS
-            glass.append(world_corners(model, data, geom)[(u > u0) & (u < u1) & (v > v0) & (v < v1)])
+            glass.append(world_triangles(model, data, geom)[(u > u0) & (u < u1) & (v > v0) & (v < v1)])
     corners = np.concatenate(glass) if glass else np.zeros((0, 3, 3))
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
     area, middle = np.linalg.norm(normal, axis=1), corners.mean(axis=1)
@@ -157,7 +157,7 @@ def find_windows(model: mujoco.MjModel, data: mujoco.MjData, rng: np.random.Gene
         if places is None:
             continue
         glazing = GLAZINGS[name]
-        quads = _panes(*_quads(world_corners(model, data, geom), places), glazing)
+        quads = _panes(*_quads(world_triangles(model, data, geom), places), glazing)
         quads = quads[rng.random(len(quads)) < glazing.lit]
         count = len(quads)
         coolness = rng.uniform(0, 1 if name == "curtain_wall" else 0.35, (count, 1))

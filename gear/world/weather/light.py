@@ -88,7 +88,7 @@ def lighting_of(weather: Weather, *, sky_face_px: int = SKY_FACE_PX) -> Lighting
     )
 
 
-def mirrored_light(weather: Weather, rows: int, columns: int) -> Floats:
+def mirrored_radiance(weather: Weather, rows: int, columns: int) -> Floats:
     """(rows, columns, 3) what still water in a street mirrors, in units of the frame.
 
     Rows stand at evenly spaced sines of height, from level to overhead; column 0 is east, counter-clockwise.
@@ -103,7 +103,7 @@ def mirrored_light(weather: Weather, rows: int, columns: int) -> Floats:
 
 
 def lamplit_houses(rows: int) -> Floats:
-    """(rows, 1, 3) what still water mirrors at night of houses in lamplight; rows as `mirrored_light`'s."""
+    """(rows, 1, 3) what still water mirrors at night of houses in lamplight; rows as `mirrored_radiance`'s."""
     return np.asarray(_house_share(np.linspace(0, 1, rows))[:, None, None] * LAMPLIT_HOUSES)
 
 
@@ -122,7 +122,7 @@ def _house_share(height: Floats) -> Floats:
     return np.where(height > -0.02, STREET_SHARE * (1 - t * t * (3 - 2 * t)), 0.0)
 
 
-def even_light(weather: Weather) -> Floats:
+def ambient_radiance(weather: Weather) -> Floats:
     """(3, 3) what a white surface shows that faces up, sideways on average, and down, by channel, without the sun."""
     sky = Sky.of(weather)
     coarse, solid_angle = face_directions(_INTEGRATION_PX), _solid_angles(_INTEGRATION_PX)
@@ -133,7 +133,7 @@ def even_light(weather: Weather) -> Floats:
     return np.stack([up, aside, down]) / math.pi
 
 
-def horizon_light(weather: Weather) -> Floats:
+def airlight(weather: Weather) -> Floats:
     """(`HORIZON_AZIMUTHS`, 3) light of distant air by azimuth, counter-clockwise from east, in units of the frame.
 
     Once the sun is down it no longer reaches the air of the street, which has the colour of the light from the whole

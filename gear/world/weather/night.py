@@ -14,9 +14,9 @@ from gear.values.labels import LABEL_BY_NAME
 from gear.values.rng import derive_rng
 from gear.values.scene import Weather
 from gear.world.weather.lamps import find_lamps, find_windows
-from gear.world.weather.light import even_light
+from gear.world.weather.light import ambient_radiance
 from gear.world.weather.presets import wetness
-from gear.world.weather.shadow_casters import find_casters
+from gear.world.weather.shadow_casters import find_shadow_casters
 from gear.world.world import World
 
 LEVEL, SKY_LEVEL = 0.03, 0.14
@@ -54,16 +54,16 @@ def night_of(world: World, weather: Weather, renderer_name: str) -> Night | None
         level=level,
         sky_level=SKY_LEVEL**weather.night,
         lit=1 - level,
-        even=even_light(weather),
+        even=ambient_radiance(weather),
         lamps=lamps,
         windows=find_windows(model, data, derive_rng(0, "windows", world.town_name)),
         vehicles={
             name: Headlamps(
-                front_m=kind.front_m,
-                half_gauge_m=0.0 if kind.facts.kind == "motorcycle" else GAUGE_SHARE * kind.half_width_m,
+                front_m=actor_type.front_m,
+                half_gauge_m=0.0 if actor_type.kind == "motorcycle" else GAUGE_SHARE * actor_type.half_width_m,
             )
-            for name, kind in world.types.items()
-            if kind.facts.kind in HEADLAMP_KINDS
+            for name, actor_type in world.types.items()
+            if actor_type.kind in HEADLAMP_KINDS
         },
         wetness=wetness(weather),
         is_signal=np.array([index >= 0 and model.mat_emission[index] > 0 for index in model.geom_matid]),
@@ -71,7 +71,7 @@ def night_of(world: World, weather: Weather, renderer_name: str) -> Night | None
         is_pane=panes_of_buses(material, world.classes.label_code),
         is_display=renderer_name == "classic",
         shadows=LampShadows(
-            casters=Casters.of(find_casters(model, data, world.classes.label_code)), shapes=world.shapes
+            casters=Casters.of(find_shadow_casters(model, data, world.classes.label_code)), shapes=world.shapes
         ),
     )
 

@@ -17,7 +17,7 @@ from gear.values.scene import Weather
 from gear.world.compilation.instances import free_name
 from gear.world.compilation.quiet_mjcf import mjcf
 from gear.world.weather.light import FACE_ORDER, Floats, Lighting, encode_srgb, lighting_of
-from gear.world.weather.wet_ground import Worn, wet_materials
+from gear.world.weather.wet_ground import GeomMaterial, wet_materials
 
 _CLASSIC_WHITE = 1.1
 _CLASSIC_SKY_SHARE = (0.48, 0.95)
@@ -44,7 +44,10 @@ PRESETS: dict[str, Weather] = _read_presets()
 
 
 def apply_weather(
-    root: mjcf.RootElement, weather: Weather, lighting: Lighting | None = None, worn: Sequence[Worn] = ()
+    root: mjcf.RootElement,
+    weather: Weather,
+    lighting: Lighting | None = None,
+    geom_materials: Sequence[GeomMaterial] = (),
 ) -> None:
     """Puts a weather into a composed world, in place of the light that its town came with.
 
@@ -56,7 +59,7 @@ def apply_weather(
         root: of the world.
         weather: to put there.
         lighting: of it, where that is known already.
-        worn: default class and own material of geoms of the world that are not in the tree.
+        geom_materials: default class and own material of geoms of the world that are not in the tree.
     """
     lighting = lighting or lighting_of(weather)
     _remove_old_light(root)
@@ -64,7 +67,7 @@ def apply_weather(
     _add_sun(root, lighting, weather.night)
     amount = wetness(weather)
     if amount > 0:
-        wet_materials(root, amount, worn)
+        wet_materials(root, amount, geom_materials)
     root.custom.add("text", name="filament.material.base_color_type", data="linear")
     # Gear's renderers have their own, which costs less and loses no memory.
     root.custom.add("numeric", name="filament.ao.enabled", data=[0])

@@ -8,12 +8,12 @@ import numpy.typing as npt
 
 from gear.values.labels import GROUND_CODES
 from gear.world.assets.geom_classes import FIRST_HIDDEN_GROUP
-from gear.world.assets.geom_triangles import standing_geoms, world_corners
+from gear.world.assets.geom_triangles import static_geoms, world_triangles
 
 _ENDLESS = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
 
 
-def find_casters(
+def find_shadow_casters(
     model: mujoco.MjModel, data: mujoco.MjData, label_code: npt.NDArray[np.uint8]
 ) -> npt.NDArray[np.float32]:
     """(N, 3, 3) triangles in the world of all that is seen of a town and its boards, but for the ground.
@@ -23,8 +23,8 @@ def find_casters(
         data: kinematics up to date.
         label_code: (ngeom,) labels of all geoms.
     """
-    chosen = standing_geoms(model) & (model.geom_group < FIRST_HIDDEN_GROUP) & ~np.isin(label_code, GROUND_CODES)
+    chosen = static_geoms(model) & (model.geom_group < FIRST_HIDDEN_GROUP) & ~np.isin(label_code, GROUND_CODES)
     found = [np.zeros((0, 3, 3), np.float32)]
     for geom in np.flatnonzero(chosen & ~np.isin(model.geom_type, _ENDLESS)).tolist():
-        found.append(world_corners(model, data, geom).astype(np.float32))
+        found.append(world_triangles(model, data, geom).astype(np.float32))
     return np.concatenate(found)

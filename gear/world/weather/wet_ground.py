@@ -20,22 +20,22 @@ from gear.world.compilation.quiet_mjcf import mjcf
 WET_LABELS = frozenset({"road", "road_marking", "sidewalk", "parking", "ground"})
 """What lies open to the rain and holds its water."""
 
-Worn = tuple[str, str | None]
+GeomMaterial = tuple[str, str | None]
 """A default class, and a material that a geom has besides."""
 
 _DARKENING = 0.45
 _SMOOTHING = 0.7
 
 
-def wet_materials(root: mjcf.RootElement, amount: float, worn: Sequence[Worn] = ()) -> None:
+def wet_materials(root: mjcf.RootElement, amount: float, geom_materials: Sequence[GeomMaterial] = ()) -> None:
     """Wets the materials of open ground.
 
     Args:
         root: of a world.
         amount: 0 is dry, 1 as wet as can be.
-        worn: default class and own material of geoms of the world that are not in the tree.
+        geom_materials: default class and own material of geoms of the world that are not in the tree.
     """
-    for material in _open_materials(root, worn):
+    for material in _open_materials(root, geom_materials):
         rgba = np.array(material.rgba if material.rgba is not None else (1.0, 1.0, 1.0, 1.0))
         rgba[:3] *= 1 - _DARKENING * amount
         material.rgba = rgba
@@ -55,11 +55,11 @@ def wet_own_colours(model: mujoco.MjModel, label_code: npt.NDArray[np.uint8], am
     model.geom_rgba[is_open & has_own_colour(model), :3] *= np.float32(1 - _DARKENING * amount)
 
 
-def _open_materials(root: mjcf.RootElement, worn: Sequence[Worn]) -> list[Any]:
+def _open_materials(root: mjcf.RootElement, geom_materials: Sequence[GeomMaterial]) -> list[Any]:
     """Materials of geoms whose label is in `WET_LABELS`, each once."""
     pairs: list[tuple[Any, Any]] = [
         (root.find("default", name), None if own is None else root.find("material", own))
-        for name, own in worn
+        for name, own in geom_materials
         if _is_open(name)
     ]
     pairs += [(geom.dclass, geom.material) for geom in root.find_all("geom") if _is_open(class_name(geom.dclass))]

@@ -14,9 +14,9 @@ import pytest
 from gear.testing.tiny_town import CLEAR, TINY_TOWN, tiny_scenes
 from gear.values.errors import TownError
 from gear.world.assets.library import AssetLibrary
-from gear.world.compilation import asset_prefetch as ahead_module
+from gear.world.compilation import asset_prefetch as prefetch_module
 from gear.world.compilation import compiled_world
-from gear.world.compilation.asset_prefetch import assets_ahead
+from gear.world.compilation.asset_prefetch import asset_prefetcher
 from gear.world.compilation.compiled_world import compile_world
 from gear.world.compilation.compose import Composition
 from gear.world.compilation.model_compilation import render_model
@@ -54,9 +54,9 @@ def kept_bytes() -> int:
 
 def test_a_world_that_was_read_ahead_is_the_same(town: Path) -> None:
     library = AssetLibrary.for_town(town)
-    plain, ahead = (compile_world(library, SCENE, CLEAR, readers=readers) for readers in (0, 3))
-    assert (plain.classes.label_code == ahead.classes.label_code).all() and plain.faces == ahead.faces
-    for one, other in ((plain.model, ahead.model), (plain.placement_model, ahead.placement_model)):
+    plain, prefetcher = (compile_world(library, SCENE, CLEAR, readers=readers) for readers in (0, 3))
+    assert (plain.classes.label_code == prefetcher.classes.label_code).all() and plain.faces == prefetcher.faces
+    for one, other in ((plain.model, prefetcher.model), (plain.placement_model, prefetcher.placement_model)):
         others = arrays(other)
         different = [name for name, value in arrays(one).items() if not np.array_equal(value, others[name])]
         # The folder that textures are laid out in has another name each time.
@@ -95,19 +95,19 @@ def test_a_broken_mesh_is_named_as_without(town: Path) -> None:
 
 
 def test_what_nobody_waits_for_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ahead_module, "_SHARE_BYTES", 1)
+    monkeypatch.setattr(prefetch_module, "_SHARE_BYTES", 1)
     first_ends, read = threading.Event(), []
 
     def slow(files: list[str]) -> None:
         read.append(files)
         first_ends.wait(60)
 
-    monkeypatch.setattr(ahead_module, "_read", slow)
+    monkeypatch.setattr(prefetch_module, "_read", slow)
     files = [tmp_path / f"{number}.obj" for number in range(40)]
     for file in files:
         file.write_text("v 0 0 0\n")
-    with pytest.raises(KeyboardInterrupt), assets_ahead(1) as ahead:
-        ahead.expect(map(os.fspath, files))
+    with pytest.raises(KeyboardInterrupt), asset_prefetcher(1) as prefetcher:
+        prefetcher.prefetch(map(os.fspath, files))
         threading.Timer(0.3, first_ends.set).start()
         raise KeyboardInterrupt
     assert len(read) < len(files)

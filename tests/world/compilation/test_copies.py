@@ -11,9 +11,9 @@ import pytest
 
 from gear.testing.tiny_town import CLEAR, TINY_TOWN, tiny_scenes
 from gear.world.assets.library import AssetLibrary
-from gear.world.compilation.compiled_world import Compiled, compile_world
+from gear.world.compilation.compiled_world import CompiledWorld, compile_world
 from gear.world.compilation.copies import Copy, put_copies_into
-from gear.world.compilation.instances import AssetParts
+from gear.world.compilation.instances import AssetInstances
 
 
 def content(model: mujoco.MjModel) -> bytes:
@@ -25,19 +25,19 @@ def content(model: mujoco.MjModel) -> bytes:
 
 @pytest.mark.parametrize("scene", ["board", "truck"])
 def test_a_world_of_copies_is_the_same(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    copied, made = [], AssetParts.copy_instance
+    copied, made = [], AssetInstances.copy_instance
 
-    def copy(parts: AssetParts, *details: object) -> None:
+    def copy(parts: AssetInstances, *details: object) -> None:
         copied.append(details)
         made(parts, *details)  # type: ignore[arg-type]
 
-    def build() -> Compiled:
+    def build() -> CompiledWorld:
         return compile_world(AssetLibrary.for_town(TINY_TOWN), tiny_scenes().scenes[scene], CLEAR)
 
-    monkeypatch.setattr(AssetParts, "copy_instance", copy)
+    monkeypatch.setattr(AssetInstances, "copy_instance", copy)
     world = build()
     assert len(copied) > 5
-    monkeypatch.setattr(AssetParts, "has_instance", lambda *_: False)
+    monkeypatch.setattr(AssetInstances, "has_instance", lambda *_: False)
     expected = build()
     assert content(world.placement_model) == content(expected.placement_model)
     assert content(world.model) == content(expected.model)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gear.world.compilation import drop_bvh
-from gear.world.compilation.drop_bvh import without_mesh_trees
+from gear.world.compilation.drop_bvh import without_mesh_bvh
 from gear.world.compilation.mjb import read_model, write_model
 
 CUBE = "1 1 1  1 1 -1  1 -1 1  1 -1 -1  -1 1 1  -1 1 -1  -1 -1 1  -1 -1 -1"
@@ -49,7 +49,7 @@ def hits(model: mujoco.MjModel) -> list[tuple[float, int]]:
 def test_a_model_comes_back_without_them(tmp_path: Path) -> None:
     model = mujoco.MjModel.from_xml_string(XML)
     before, whole = content(model), hits(model)
-    with without_mesh_trees(model):
+    with without_mesh_bvh(model):
         crc32 = write_model(model, tmp_path / "a.mjb")
     assert content(model) == before and hits(model) == whole
     there = read_model(tmp_path / "a.mjb", crc32)
@@ -66,7 +66,7 @@ def test_what_is_laid_out_otherwise_is_left_alone(monkeypatch: pytest.MonkeyPatc
     model = mujoco.MjModel.from_xml_string(XML)
     before = content(model)
     monkeypatch.setattr(drop_bvh, "_NBVH", 6)
-    with without_mesh_trees(model):
+    with without_mesh_bvh(model):
         assert content(model) == before
 
 
@@ -74,13 +74,13 @@ def test_what_is_laid_out_otherwise_is_left_alone(monkeypatch: pytest.MonkeyPatc
 def test_a_model_without_meshes_is_left_alone(xml: str) -> None:
     model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{xml}</worldbody></mujoco>")
     before = content(model)
-    with without_mesh_trees(model):
+    with without_mesh_bvh(model):
         assert content(model) == before
 
 
 def test_it_is_as_before_after_an_error() -> None:
     model = mujoco.MjModel.from_xml_string(XML)
     before = content(model)
-    with pytest.raises(OSError, match="full"), without_mesh_trees(model):
+    with pytest.raises(OSError, match="full"), without_mesh_bvh(model):
         raise OSError("full")
     assert content(model) == before

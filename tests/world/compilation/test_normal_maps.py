@@ -12,7 +12,7 @@ from gear.contracts.rendering import Stage
 from gear.render import open_renderer
 from gear.values.geometry import RigidTransform
 from gear.values.scene import CameraRecord, Pose
-from gear.world.compilation.normal_maps import tangents, upright_relief
+from gear.world.compilation.normal_maps import align_normal_maps, tangents
 
 RIGHT, UP = 0.35, 0.2
 """How the map's normals lean, in shares of their length."""
@@ -45,7 +45,7 @@ def town(sun: np.ndarray) -> tuple[mujoco.MjModel, list[tuple[str, np.ndarray, n
 
     What belongs together is one mesh with a scrap at its side, so that its inertia lies askew.
     """
-    meshes, geoms, places = [], [], []
+    meshes, geoms, mesh_paths = [], [], []
     for number, (name, (right, up)) in enumerate(sheets().items()):
         normal = np.cross(right, up)
         corners = np.array([-right - up, right - up, right + up, -right + up])
@@ -61,7 +61,7 @@ def town(sun: np.ndarray) -> tuple[mujoco.MjModel, list[tuple[str, np.ndarray, n
             'contype="0" conaffinity="0"/>'
             for material, middle in zip(("flat", "leaning"), middles, strict=True)
         ]
-        places.append((name, normal, middles[0], middles[1]))
+        mesh_paths.append((name, normal, middles[0], middles[1]))
     maps = {"flat": (0.5, 0.5, 1.0), "leaning": ((RIGHT + 1) / 2, (UP + 1) / 2, (OUT + 1) / 2)}
     materials = "".join(
         f'<texture name="{name}_n" type="2d" builtin="flat" rgb1="{numbers(rgb)}" width="4" height="4"/>'
@@ -78,7 +78,7 @@ def town(sun: np.ndarray) -> tuple[mujoco.MjModel, list[tuple[str, np.ndarray, n
         f'<light type="directional" dir="{numbers(-sun)}" diffuse="0.6 0.6 0.6" intensity="200000" castshadow="false"/>'
         f"{''.join(geoms)}</worldbody></mujoco>"
     )
-    return model, places
+    return model, mesh_paths
 
 
 def facing(normal: np.ndarray, middle: np.ndarray) -> CameraRecord:
@@ -93,11 +93,11 @@ def facing(normal: np.ndarray, middle: np.ndarray) -> CameraRecord:
 @pytest.mark.parametrize("name", ["filament", "raster"])
 @pytest.mark.parametrize("sun", SUNS, ids=["40", "130", "220", "310"])
 def test_every_surface_is_as_bright_as_its_map_says(sun: np.ndarray, name: str) -> None:
-    model, places = town(sun)
-    upright_relief(model)
+    model, mesh_paths = town(sun)
+    align_normal_maps(model)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    cameras = [facing(normal, middle) for _, normal, *middles in places for middle in middles]
+    cameras = [facing(normal, middle) for _, normal, *middles in mesh_paths for middle in middles]
     renderer = open_renderer(name, model, quality="fast")
     try:
         views = renderer.render(Stage(model=model, data=data), cameras)
@@ -105,7 +105,7 @@ def test_every_surface_is_as_bright_as_its_map_says(sun: np.ndarray, name: str) 
         renderer.close()
     light = [float(view.linear_rgb[4:12, 4:12].mean()) for view in views if view.linear_rgb is not None]
     seen = 0
-    for (place, normal, *_), flat, leaning in zip(places, light[::2], light[1::2], strict=True):
+    for (place, normal, *_), flat, leaning in zip(mesh_paths, light[::2], light[1::2], strict=True):
         right, up = sheets()[place]
         lambert = [max(float(direction @ sun), 0.0) for direction in (normal, RIGHT * right + UP * up + OUT * normal)]
         if lambert[0] > 0.15:
@@ -117,7 +117,7 @@ def test_every_surface_is_as_bright_as_its_map_says(sun: np.ndarray, name: str) 
 def test_nothing_moves() -> None:
     model, _ = town(SUNS[0])
     before = corners(model)
-    upright_relief(model)
+    align_normal_maps(model)
     np.testing.assert_allclose(corners(model), before, atol=1e-5)
 
 
@@ -135,12 +135,12 @@ def corners(model: mujoco.MjModel) -> np.ndarray:
 
 
 def test_rays_hit_what_they_hit() -> None:
-    model, places = town(SUNS[0])
-    upright_relief(model)
+    model, mesh_paths = town(SUNS[0])
+    align_normal_maps(model)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     geom = np.zeros(1, np.int32)
-    for number, (_, normal, *middles) in enumerate(places):
+    for number, (_, normal, *middles) in enumerate(mesh_paths):
         for which, middle in enumerate(middles):
             right, up = list(sheets().values())[number]
             for offset in (0.9 * right - 0.9 * up, -0.9 * right + 0.9 * up, 1.5 * right + 0.3 * up):
@@ -202,7 +202,7 @@ RELIEF = worn('<layer role="rgb" texture="c"/><layer role="normal" texture="n"/>
 )
 def test_what_has_no_relief_stays_as_it_is(model: mujoco.MjModel) -> None:
     kept = [getattr(model, name).copy() for name in ("tex_data", "mesh_vert", "mesh_quat", "geom_quat")]
-    upright_relief(model)
+    align_normal_maps(model)
     for name, values in zip(("tex_data", "mesh_vert", "mesh_quat", "geom_quat"), kept, strict=True):
         np.testing.assert_array_equal(getattr(model, name), values)
 
@@ -216,7 +216,7 @@ def test_a_picture_that_is_colour_too_keeps_its_channels(is_colour_too: bool) ->
         SCRAP.format(name="a", uvs=UVS),
     )
     before = model.tex_data.reshape(-1, 3).copy()
-    upright_relief(model)
+    align_normal_maps(model)
     after = model.tex_data.reshape(-1, 3)
     size = model.tex_width[0] * model.tex_height[0]
     np.testing.assert_array_equal(after[:size], before[:size] if is_colour_too else before[:size, [1, 0, 2]])
@@ -232,7 +232,7 @@ def test_bodies_that_are_one_mesh_and_meshes_that_others_wear_too_stay_where_the
         SCRAP.format(name="a", uvs=UVS),
     )
     before = corners(model)
-    upright_relief(model)
+    align_normal_maps(model)
     np.testing.assert_allclose(corners(model), before, atol=1e-6)
     for geom in range(model.ngeom):
         np.testing.assert_allclose(

@@ -14,8 +14,8 @@ from gear.testing.tiny_town import CLEAR, TINY_TOWN, tiny_scenes
 from gear.values.errors import TownError
 from gear.world.assets.library import AssetLibrary
 from gear.world.compilation import compose, instances
-from gear.world.compilation.compiled_world import Compiled, compile_world
-from gear.world.compilation.static_parts import Place, SplitAsset, Statics, split_asset, split_town
+from gear.world.compilation.compiled_world import CompiledWorld, compile_world
+from gear.world.compilation.static_parts import MeshPath, SplitAsset, StaticParts, split_asset, split_town
 
 WET = dataclasses.replace(CLEAR, wetness=100.0)
 FIELDS = (
@@ -35,10 +35,10 @@ def alike(one: mujoco.MjModel, other: mujoco.MjModel) -> bool:
     )
 
 
-def compiled(monkeypatch: pytest.MonkeyPatch, town: Path, *, is_whole: bool) -> Compiled:
+def compiled(monkeypatch: pytest.MonkeyPatch, town: Path, *, is_whole: bool) -> CompiledWorld:
     with monkeypatch.context() as patch:
         if is_whole:
-            patch.setattr(compose, "split_town", lambda path: (None, Statics()))
+            patch.setattr(compose, "split_town", lambda path: (None, StaticParts()))
             patch.setattr(instances, "split_asset", lambda path: SplitAsset())
         return compile_world(AssetLibrary.for_town(town), tiny_scenes().scenes["board"], WET)
 
@@ -72,7 +72,7 @@ def test_a_town_with_anything_else_is_left_whole(thing: str, tmp_path: Path) -> 
     text = TINY_TOWN.read_text().replace("<worldbody>", f"<worldbody>{thing}", 1)
     town.write_text(text)
     left, statics = split_town(town)
-    assert left is None and statics == Statics()
+    assert left is None and statics == StaticParts()
     assert statics.put_into("<worldbody><light/></worldbody>") == "<worldbody><light/></worldbody>"
 
 
@@ -122,7 +122,7 @@ def test_an_asset_keeps_its_classes_and_its_meshes_stay_where_they_are(tmp_path:
     assert split.defaults.startswith('<default class="cart/"><default class="cart/seen"><mesh')
     assert '<default class="cart/car.paint"' in split.defaults
     mesh = str(tmp_path / "parts" / "box.obj")
-    assert split.places == {mesh: Place(mesh.encode())} and f'file="{mesh}"' in split.text
+    assert split.mesh_paths == {mesh: MeshPath(mesh.encode())} and f'file="{mesh}"' in split.text
 
 
 @pytest.mark.parametrize(

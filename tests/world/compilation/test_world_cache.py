@@ -20,8 +20,8 @@ from gear.values.errors import TownError
 from gear.values.scene import Weather
 from gear.world.assets.library import AssetLibrary
 from gear.world.compilation import world_cache
-from gear.world.compilation.drop_bvh import without_mesh_trees
-from gear.world.compilation.world_cache import ready_world
+from gear.world.compilation.drop_bvh import without_mesh_bvh
+from gear.world.compilation.world_cache import load_or_compile
 from gear.world.world import World
 
 SCENE = "truck"
@@ -35,13 +35,13 @@ def town(tmp_path: Path) -> Path:
 
 
 def take(tmp_path: Path, town: Path = TINY_TOWN, weather: Weather = CLEAR) -> World:
-    return ready_world(
-        town=town, scene_name=SCENE, scene=tiny_scenes().scenes[SCENE], weather=weather, shelf=tmp_path / "shelf"
+    return load_or_compile(
+        town=town, scene_name=SCENE, scene=tiny_scenes().scenes[SCENE], weather=weather, cache_dir=tmp_path / "cache"
     )
 
 
 def worlds(tmp_path: Path) -> set[str]:
-    return {path.name for path in (tmp_path / "shelf").iterdir() if path.is_dir()}
+    return {path.name for path in (tmp_path / "cache").iterdir() if path.is_dir()}
 
 
 def never(*_: object) -> bool:
@@ -55,10 +55,10 @@ def model_bytes(model: mujoco.MjModel) -> bytes:
     return content.tobytes().replace(model.paths, bytes(len(model.paths)))
 
 
-def test_a_world_of_the_shelf_is_the_one_that_is_built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_world_of_the_cache_is_the_one_that_is_built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     built, made = build_tiny_world(SCENE), take(tmp_path)
-    monkeypatch.setattr(world_cache, "_compiled_apart", never)
-    with without_mesh_trees(built.model):
+    monkeypatch.setattr(world_cache, "_compiled_in_subprocess", never)
+    with without_mesh_bvh(built.model):
         seen = model_bytes(built.model)
     for world in (made, take(tmp_path)):
         assert model_bytes(world.model) == seen
@@ -121,7 +121,7 @@ def test_a_town_that_strips_paths_finds_its_meshes(tmp_path: Path, town: Path) -
 def test_half_a_world_is_made_anew(tmp_path: Path) -> None:
     whole = model_bytes(take(tmp_path).model)
     (name,) = worlds(tmp_path)
-    seen = tmp_path / "shelf" / name / "seen.mjb"
+    seen = tmp_path / "cache" / name / "render.mjb"
     content = seen.read_bytes()
     middle = len(content) // 2
     for spoiled in (content[:middle], b"", content[:middle] + bytes(4096) + content[middle + 4096 :]):
@@ -133,7 +133,7 @@ def test_half_a_world_is_made_anew(tmp_path: Path) -> None:
 
 def test_who_compiles_for_others_ends_with_them(tmp_path: Path) -> None:
     """A batch system kills workers; what they had begun would take the memory of the next ones."""
-    order = world_cache.order_of(AssetLibrary.for_town(TINY_TOWN), tiny_scenes().scenes[SCENE], CLEAR)
+    order = world_cache.world_key(AssetLibrary.for_town(TINY_TOWN), tiny_scenes().scenes[SCENE], CLEAR)
     endless = (
         "import sys, time; from gear.world.compilation import compile_worker; "
         "compile_worker.compile_world = lambda *_, **__: time.sleep(40); "
@@ -154,7 +154,7 @@ def test_who_compiles_for_others_ends_with_them(tmp_path: Path) -> None:
 
 
 def test_what_was_not_used_for_longest_goes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(world_cache, "KEPT_BYTES", 1)
+    monkeypatch.setattr(world_cache, "CACHE_BYTES", 1)
     take(tmp_path)
     first = worlds(tmp_path)
     take(tmp_path, weather=dataclasses.replace(CLEAR, sun_altitude_deg=20.0))
@@ -164,15 +164,15 @@ def test_what_was_not_used_for_longest_goes(tmp_path: Path, monkeypatch: pytest.
 def test_a_cache_that_knows_no_locks_keeps_worlds_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Homes on Lustre or NFS are often such."""
 
-    def refused(*_: object) -> None:
+    def unsupported(*_: object) -> None:
         raise OSError(errno.ENOSYS, "Function not implemented")
 
-    monkeypatch.setattr("fcntl.flock", refused)
+    monkeypatch.setattr("fcntl.flock", unsupported)
     take(tmp_path)
     assert len(worlds(tmp_path)) == 1
 
 
-@pytest.mark.parametrize("step", ["_alone", "tempfile.TemporaryDirectory"])
+@pytest.mark.parametrize("step", ["_locked", "tempfile.TemporaryDirectory"])
 def test_a_cache_that_takes_no_more_files_stands_in_nobodys_way(
     step: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

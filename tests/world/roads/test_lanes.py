@@ -16,8 +16,8 @@ from gear.values.geometry import wrap_angle_rad
 from gear.world.roads.junctions import Junctions
 from gear.world.roads.lanes import LaneGraph
 from gear.world.roads.polyline import Polyline
-from gear.world.roads.routes import Route, back_up, drive_on, driven_pose, vehicle_pose
-from gear.world.traffic.simulation import Walker
+from gear.world.roads.routes import Route, extend_route, moving_pose, trace_back, vehicle_pose
+from gear.world.traffic.simulation import MovingPedestrian
 
 GRAPH = LaneGraph.from_model(mujoco.MjModel.from_xml_path(str(TINY_TOWN)), TINY_TOWN)
 
@@ -134,7 +134,7 @@ def test_the_nearest_lane_is_found_on_its_own_side() -> None:
 @given(st.sampled_from(NAMES), st.floats(0, 1), st.floats(0, 50), st.integers(0, 1000))
 def test_backing_up_and_driving_on_meet(name: str, share: float, distance_m: float, seed: int) -> None:
     start_s_m = share * GRAPH.lanes[name].line.length_m
-    way = back_up(GRAPH, name, start_s_m, distance_m, np.random.default_rng(seed))
+    way = trace_back(GRAPH, name, start_s_m, distance_m, np.random.default_rng(seed))
     if way is None:
         return
     lanes, s_m = way
@@ -147,7 +147,7 @@ def test_backing_up_and_driving_on_meet(name: str, share: float, distance_m: flo
 
 @given(st.sampled_from(NAMES), st.floats(1, 300), st.integers(0, 1000))
 def test_driving_on_follows_next(name: str, length_m: float, seed: int) -> None:
-    lanes = drive_on(GRAPH, name, length_m, np.random.default_rng(seed))
+    lanes = extend_route(GRAPH, name, length_m, np.random.default_rng(seed))
     assert lanes[0] == name
     assert all(after in GRAPH.lanes[before].next for before, after in itertools.pairwise(lanes))
     total_m = sum(GRAPH.lanes[lane].line.length_m for lane in lanes)
@@ -175,7 +175,9 @@ def test_people_do_not_jump_where_a_line_turns(turn_deg: float, lateral_m: float
         np.array([[0.0, 0.0, 0.0], [20.0, 0.0, 0.0], [20 + 20 * math.cos(turn), 20 * math.sin(turn), 0.0]])
     )
     places = [
-        Walker(line=line, s_m=s_m, lateral_m=lateral_m, direction=1, pace_mps=1.0, speed_mps=1.0, beyond_m=0.0).place()
+        MovingPedestrian(
+            line=line, s_m=s_m, lateral_m=lateral_m, direction=1, pace_mps=1.0, speed_mps=1.0, beyond_m=0.0
+        ).place()
         for s_m in np.arange(10.0, 30.0, 0.05)
     ]
     for (before, was_rad), (after, is_rad) in itertools.pairwise(places):
@@ -195,7 +197,7 @@ def test_vehicles_beside_the_middle_do_not_jump_where_pieces_of_a_lane_meet() ->
     )
     line = Polyline.through(np.column_stack([points_m, np.zeros(len(points_m))]))
     for lateral_m in (-0.96, 0.96):
-        places = [driven_pose(line, s_m, 0.9, lateral_m) for s_m in np.arange(2.0, line.length_m - 2.0, 0.05)]
+        places = [moving_pose(line, s_m, 0.9, lateral_m) for s_m in np.arange(2.0, line.length_m - 2.0, 0.05)]
         for (before, _, _), (after, yaw_rad, pace) in itertools.pairwise(places):
             assert (after - before)[:2] @ (math.cos(yaw_rad), math.sin(yaw_rad)) > 0
             assert np.linalg.norm(after - before) == pytest.approx(0.05 * pace, abs=0.01)

@@ -10,7 +10,7 @@ from gear.contracts.rendering import Stage
 from gear.render.registry import open_renderer
 from gear.values.geometry import RigidTransform
 from gear.values.scene import CameraRecord, Pose
-from gear.world.surfaces.upright import what_is_wrong
+from gear.world.surfaces.upright import texture_problem
 
 TOP, LOW = slice(6, 14), slice(18, 26)
 BOX = """
@@ -76,7 +76,7 @@ def test_a_box_is_taken_where_it_shows_its_patch_upright(name: str) -> None:
             RigidTransform.from_parts("world", frame, matrix.reshape(3, 3), (0, 0, 0))
             for frame, matrix in (("surface", data.site_xmat[0]), ("geom", data.geom_xmat[0]))
         ]
-        wrong = what_is_wrong(model, 0, frames[0].inverse() @ frames[1])
+        wrong = texture_problem(model, 0, frames[0].inverse() @ frames[1])
         assert is_upright == (not wrong), (axis, quat)
         taken += is_upright
     assert taken == 3, "one side of each pair, turned one way"

@@ -12,7 +12,7 @@ from gear.testing.tiny_town import TINY_TOWN
 from gear.world.roads.junctions import Junctions
 from gear.world.roads.lanes import LaneGraph
 from gear.world.roads.routes import Route
-from gear.world.traffic.simulation import Driver, Traffic, Walker, vehicle_discs
+from gear.world.traffic.simulation import MovingPedestrian, MovingVehicle, TrafficSimulation, vehicle_discs
 
 GRAPH = LaneGraph.from_model(mujoco.MjModel.from_xml_path(str(TINY_TOWN)), Path(TINY_TOWN))
 EAST = Route.along(GRAPH, ("lane.main_east_a", "lane.x_east", "lane.main_east_b"))
@@ -20,8 +20,8 @@ NORTH = Route.along(GRAPH, ("lane.cross_south_n", "lane.x_north", "lane.cross_no
 TURN = Route.along(GRAPH, ("lane.main_east_a", "lane.x_east_to_south", "lane.cross_south_s"))
 
 
-def driver(route: Route, s_m: float, speed_mps: float, cruise_mps: float | None = None) -> Driver:
-    return Driver(
+def driver(route: Route, s_m: float, speed_mps: float, cruise_mps: float | None = None) -> MovingVehicle:
+    return MovingVehicle(
         route=route,
         s_m=s_m,
         lateral_m=0.0,
@@ -33,13 +33,13 @@ def driver(route: Route, s_m: float, speed_mps: float, cruise_mps: float | None 
     )
 
 
-def drive(traffic: Traffic, seconds: float) -> None:
+def drive(traffic: TrafficSimulation, seconds: float) -> None:
     for _ in range(round(seconds * 10)):
         traffic.advance(0.1)
 
 
 def test_a_free_road_is_driven_at_cruising_speed() -> None:
-    traffic = Traffic([driver(EAST, 5.0, 8.0)], [], [], Junctions(GRAPH))
+    traffic = TrafficSimulation([driver(EAST, 5.0, 8.0)], [], [], Junctions(GRAPH))
     drive(traffic, 5)
     assert traffic.drivers[0].speed_mps == pytest.approx(8, abs=0.2)
     assert traffic.drivers[0].s_m == pytest.approx(45, abs=0.5)
@@ -47,7 +47,7 @@ def test_a_free_road_is_driven_at_cruising_speed() -> None:
 
 def test_a_driver_stops_behind_what_stands() -> None:
     parked = vehicle_discs(np.array([0.0, -1.75, 0.0]), 0.0, 2.25, 2.25, 0.9)
-    traffic = Traffic([driver(EAST, 5.0, 10.0)], [], parked, Junctions(GRAPH))
+    traffic = TrafficSimulation([driver(EAST, 5.0, 10.0)], [], parked, Junctions(GRAPH))
     drive(traffic, 25)
     gap_m = 78.0 - 2.25 - (traffic.drivers[0].s_m + 2.25)
     assert traffic.drivers[0].speed_mps < 0.05
@@ -56,13 +56,13 @@ def test_a_driver_stops_behind_what_stands() -> None:
 
 def test_what_stands_beside_the_lane_stops_nobody() -> None:
     parked = vehicle_discs(np.array([0.0, 1.75, 0.0]), 0.0, 2.25, 2.25, 0.9)
-    traffic = Traffic([driver(EAST, 5.0, 10.0)], [], parked, Junctions(GRAPH))
+    traffic = TrafficSimulation([driver(EAST, 5.0, 10.0)], [], parked, Junctions(GRAPH))
     drive(traffic, 10)
     assert traffic.drivers[0].s_m > 95
 
 
 def test_a_follower_keeps_its_distance_to_a_slower_car() -> None:
-    traffic = Traffic([driver(EAST, 30.0, 4.0), driver(EAST, 5.0, 11.0)], [], [], Junctions(GRAPH))
+    traffic = TrafficSimulation([driver(EAST, 30.0, 4.0), driver(EAST, 5.0, 11.0)], [], [], Junctions(GRAPH))
     for _ in range(200):
         traffic.advance(0.1)
         ahead, behind = traffic.drivers
@@ -71,7 +71,7 @@ def test_a_follower_keeps_its_distance_to_a_slower_car() -> None:
 
 
 def test_one_of_two_gives_way_where_lanes_cross() -> None:
-    traffic = Traffic([driver(EAST, 78.0, 9.0), driver(NORTH, 28.0, 8.0)], [], [], Junctions(GRAPH))
+    traffic = TrafficSimulation([driver(EAST, 78.0, 9.0), driver(NORTH, 28.0, 8.0)], [], [], Junctions(GRAPH))
     inside = 0
     for _ in range(150):
         traffic.advance(0.1)
@@ -84,7 +84,7 @@ def test_one_of_two_gives_way_where_lanes_cross() -> None:
 
 
 def test_a_turn_is_taken_slowly() -> None:
-    traffic = Traffic([driver(TURN, 40.0, 11.0)], [], [], Junctions(GRAPH))
+    traffic = TrafficSimulation([driver(TURN, 40.0, 11.0)], [], [], Junctions(GRAPH))
     speeds = []
     for _ in range(120):
         traffic.advance(0.1)
@@ -95,20 +95,20 @@ def test_a_turn_is_taken_slowly() -> None:
 
 
 def test_a_road_that_ends_is_not_driven_past() -> None:
-    traffic = Traffic([driver(EAST, 120.0, 11.0)], [], [], Junctions(GRAPH))
+    traffic = TrafficSimulation([driver(EAST, 120.0, 11.0)], [], [], Junctions(GRAPH))
     drive(traffic, 20)
     assert traffic.drivers[0].s_m + 2.25 < EAST.line.length_m
 
 
-def walker(name: str, s_m: float, direction: int, beyond_m: float = -1.0) -> Walker:
+def walker(name: str, s_m: float, direction: int, beyond_m: float = -1.0) -> MovingPedestrian:
     line = GRAPH.walks[name].line
-    return Walker(
+    return MovingPedestrian(
         line=line, s_m=s_m, lateral_m=0.0, direction=direction, pace_mps=1.4, speed_mps=1.4, beyond_m=beyond_m
     )
 
 
 def test_people_walk_and_stop_at_the_end() -> None:
-    traffic = Traffic([], [walker("sidewalk.south_west", 50.0, -1)], [], Junctions(GRAPH))
+    traffic = TrafficSimulation([], [walker("sidewalk.south_west", 50.0, -1)], [], Junctions(GRAPH))
     drive(traffic, 10)
     assert traffic.walkers[0].s_m == pytest.approx(36, abs=0.01)
     drive(traffic, 40)
@@ -117,7 +117,9 @@ def test_people_walk_and_stop_at_the_end() -> None:
 
 
 def test_a_driver_lets_people_cross() -> None:
-    traffic = Traffic([driver(EAST, 70.0, 9.0)], [walker("crosswalk.main", 0.5, 1, 1.2)], [], Junctions(GRAPH))
+    traffic = TrafficSimulation(
+        [driver(EAST, 70.0, 9.0)], [walker("crosswalk.main", 0.5, 1, 1.2)], [], Junctions(GRAPH)
+    )
     nearest_m = np.inf
     for _ in range(200):
         traffic.advance(0.1)
@@ -133,7 +135,7 @@ def test_a_driver_lets_people_cross() -> None:
 def test_nothing_is_random() -> None:
     ends = []
     for _ in range(2):
-        traffic = Traffic([driver(EAST, 78.0, 9.0), driver(NORTH, 28.0, 8.0)], [], [], Junctions(GRAPH))
+        traffic = TrafficSimulation([driver(EAST, 78.0, 9.0), driver(NORTH, 28.0, 8.0)], [], [], Junctions(GRAPH))
         drive(traffic, 6)
         ends.append([d.s_m for d in traffic.drivers])
     assert ends[0] == ends[1]

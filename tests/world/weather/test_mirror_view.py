@@ -7,7 +7,7 @@ import pytest
 
 from gear.render.registry import RENDERERS, open_renderer
 from gear.testing.tiny_town import SMALL_RIG, build_tiny_world
-from gear.testing.town_facts import SEEN_GROUPS, Rays
+from gear.testing.town_facts import VISIBLE_GROUPS, Rays
 from gear.values.labels import GROUND_CODES
 from gear.values.scene import ActorRecord, Pose, SceneRecord
 from gear.world.weather.air import camera_pipeline
@@ -48,7 +48,7 @@ def test_the_look_from_below_is_where_mirrored_rays_come_to(name: str) -> None:
     assert below is not None
     assert np.array_equal(above.linear_rgb, again.linear_rgb) and np.array_equal(above.geom_id, again.geom_id)
     seen, low = below
-    eye, cast = shot.cameras[0], Rays(world.model, placed.stage.data, SEEN_GROUPS)
+    eye, cast = shot.cameras[0], Rays(world.model, placed.stage.data, VISIBLE_GROUPS)
     from_m, towards = eye.world_from_camera_transform.translation_m, rays(eye)
     rotation, low_m = low.world_from_camera_transform.rotation, low.world_from_camera_transform.translation_m
     is_ground = np.append(np.isin(placed.geoms.label_code, GROUND_CODES), False)
@@ -56,7 +56,7 @@ def test_the_look_from_below_is_where_mirrored_rays_come_to(name: str) -> None:
     road = np.argwhere(above.geom_id == world.model.geom("main_road").id)
     for row, column in road[np.random.default_rng(0).permutation(len(road))[:400]]:
         at_m = from_m + towards[row, column] * above.depth_m[row, column]
-        _, geom = cast.first(at_m + np.array((0, 0, 1e-3)), towards[row, column] * (1, 1, -1))
+        _, geom = cast.first_hit(at_m + np.array((0, 0, 1e-3)), towards[row, column] * (1, 1, -1))
         if geom >= 0 and is_ground[geom]:
             continue
         across, down, ahead = rotation.T @ (at_m - low_m)

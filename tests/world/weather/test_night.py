@@ -18,11 +18,11 @@ from gear.values.labels import GROUND_CODES, LABEL_BY_NAME
 from gear.values.resources import data_dir
 from gear.values.rng import derive_rng
 from gear.values.scene import Weather
-from gear.world.assets.geom_triangles import world_corners
+from gear.world.assets.geom_triangles import world_triangles
 from gear.world.weather.lamps import GLAZINGS, find_lamps, find_windows
-from gear.world.weather.light import even_light, lighting_of
+from gear.world.weather.light import ambient_radiance, lighting_of
 from gear.world.weather.night import materials_of, night_of, panes_of_buses
-from gear.world.weather.shadow_casters import find_casters
+from gear.world.weather.shadow_casters import find_shadow_casters
 from gear.world.world import World
 
 NIGHT = Weather(name="night", sun_altitude_deg=-90)
@@ -127,16 +127,18 @@ def test_what_stands_throws_shadows_and_neither_the_ground_nor_what_drives_or_is
     model, codes = world.model, world.classes.label_code
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    corners = find_casters(model, data, codes)
+    corners = find_shadow_casters(model, data, codes)
     assert corners.dtype == np.float32 and corners.shape[1:] == (3, 3) and len(corners)
     (face,) = world.faces
     board_m = data.geom_xpos[face.geom_id]
     assert np.linalg.norm(corners.mean(axis=1) - board_m, axis=1).min() < 3.0, "the board is there"
     data.mocap_pos[:, 2] = -500.0
     mujoco.mj_kinematics(model, data)
-    np.testing.assert_array_equal(find_casters(model, data, codes), corners)
+    np.testing.assert_array_equal(find_shadow_casters(model, data, codes), corners)
     ground = np.isin(codes, GROUND_CODES) & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE)
-    flat = np.concatenate([np.zeros((0, 3, 3)), *(world_corners(model, data, geom) for geom in np.flatnonzero(ground))])
+    flat = np.concatenate(
+        [np.zeros((0, 3, 3)), *(world_triangles(model, data, geom) for geom in np.flatnonzero(ground))]
+    )
     middles = {tuple(np.round(middle, 3)) for middle in flat.mean(axis=1)}
     assert not middles & {tuple(np.round(middle, 3)) for middle in corners.astype(float).mean(axis=1)}
 
@@ -161,7 +163,7 @@ def test_a_bus_is_found_by_its_label_and_its_glass() -> None:
 
 
 def test_even_light_is_what_the_sky_and_the_houses_give() -> None:
-    above, aside, below = even_light(NIGHT)
+    above, aside, below = ambient_radiance(NIGHT)
     assert (above > aside).all() and (aside > below).all() and (below > 0).all()
     assert above.mean() == pytest.approx(lighting_of(NIGHT, sky_face_px=16).ambient.mean(), rel=0.4)
 

@@ -20,10 +20,10 @@ from gear.world.weather.air import RAIN_PER_M, air_of, camera_pipeline, fogs_of
 from gear.world.weather.light import (
     FACE_ORDER,
     WHITE_ALBEDO,
+    airlight,
     face_directions,
-    horizon_light,
     lighting_of,
-    mirrored_light,
+    mirrored_radiance,
 )
 from gear.world.weather.presets import PRESETS, apply_weather, wetness
 from gear.world.weather.sky import Sky
@@ -218,7 +218,7 @@ def test_white_walls_do_not_clip_and_shadows_keep_their_levels(name: str) -> Non
     sunlit = WHITE_ALBEDO * (light.sun / math.pi + light.ambient)
     assert 0.3 < sunlit.max() < 1.0
     assert WHITE_ALBEDO * light.ambient.min() * 255 > 10
-    ring = horizon_light(PRESETS[name])
+    ring = airlight(PRESETS[name])
     assert (ring > 0.1).all() and (ring <= 1).all()
 
 
@@ -312,13 +312,13 @@ def test_air_of_the_most_and_the_least_that_a_config_takes_is_finite(name: str, 
 
 def test_distant_air_has_the_colour_of_the_horizon_behind_it() -> None:
     weather = Weather(name="x", sun_azimuth_deg=0, sun_altitude_deg=15)
-    ring = horizon_light(weather)
+    ring = airlight(weather)
     assert ring[0].sum() > 1.3 * ring[32].sum(), "brighter towards the sun"
     assert air_of(weather, "classic").ring[32].sum() > ring[32].sum(), "classic shows display values"
 
 
 def test_water_mirrors_houses_below_and_the_sky_above() -> None:
-    light = mirrored_light(Weather(name="x", sun_azimuth_deg=90, sun_altitude_deg=40), 32, 64)
+    light = mirrored_radiance(Weather(name="x", sun_azimuth_deg=90, sun_altitude_deg=40), 32, 64)
     assert light.shape == (32, 64, 3)
     brightest = np.unravel_index(np.argmax(light.sum(axis=-1)), light.shape[:2])
     assert abs(brightest[0] / 31 - math.sin(math.radians(40))) < 0.07 and abs(brightest[1] / 64 * 360 - 90) < 10
@@ -328,7 +328,7 @@ def test_water_mirrors_houses_below_and_the_sky_above() -> None:
 def test_fog_at_dusk_has_the_colour_of_the_streets_light() -> None:
     def yellower(altitude_deg: float) -> float:
         weather = Weather(name="x", fog_density=60, sun_altitude_deg=altitude_deg)
-        ring, ambient = horizon_light(weather).mean(axis=0), lighting_of(weather, sky_face_px=32).ambient
+        ring, ambient = airlight(weather).mean(axis=0), lighting_of(weather, sky_face_px=32).ambient
         return float(ring[0] / ring[2] / (ambient[0] / ambient[2]))
 
     steps = [yellower(altitude) for altitude in (0, -2, -4, -6, -10)]
