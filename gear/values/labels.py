@@ -1,27 +1,29 @@
-"""What a thing is.
+"""The semantic labels of gear, and what Cityscapes, COCO and KITTI call them.
 
-Gear's labels and their names in Cityscapes, COCO and KITTI. `docs/reference/mjcf.md` is this table in words.
+`docs/reference/mjcf.md` is this table in words. A kind of vehicle is one row of it, a `VehicleKind`: whatever differs
+between kinds of vehicles is read from that row.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
-KittiType = Literal["Car", "Van", "Truck", "Pedestrian", "Cyclist", "Misc"]
+KittiType = Literal["Car", "Van", "Truck", "Pedestrian", "Cyclist", "Tram", "Misc"]
 
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """One kind of thing.
+    """One semantic class.
 
     Attributes:
         code: small number of the label inside gear's label maps; 0 is the sky.
-        name: what a default class in the MJCF starts with.
+        name: the word that the default class of a geom starts with in MJCF.
         cityscapes_id: Cityscapes label id (0..33).
         coco_id: COCO category id (1..90), or None where COCO has no such category.
-        kitti_type: type of an actor made of it, or None.
-        is_instance: whether Cityscapes tells single instances apart.
+        kitti_type: KITTI type of an actor of this class, or None.
+        is_instance: whether Cityscapes separates the instances of the class.
     """
 
     code: int
@@ -30,6 +32,30 @@ class Label:
     coco_id: int | None = None
     kitti_type: KittiType | None = None
     is_instance: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VehicleKind(Label):
+    """The label of a kind of vehicle, with what traffic and light need to know of the kind.
+
+    Attributes:
+        weight: how often one asset of the kind is drawn, relative to one car; the asset's own `actor.weight` multiplies
+            it.
+        mass_kg: mass of its body in the placement model. Only the shape of the inertia matters for how it settles.
+        headlamps: number of headlamps, 0 to 2; two stand apart, one stands in the middle.
+        is_two_wheeler: whether it rides at the right edge of its lane and is never parked in a bay.
+        max_speed_mps: the highest speed that is drawn for it. A kind slower than traffic on motorways keeps off them.
+        cruise_mps: the highest speed at which it drives through a sequence.
+        has_lit_interior: whether its windows show a lit interior at night.
+    """
+
+    weight: float
+    mass_kg: float = 1500.0
+    headlamps: int = 2
+    is_two_wheeler: bool = False
+    max_speed_mps: float = math.inf
+    cruise_mps: float = math.inf
+    has_lit_interior: bool = False
 
 
 LABELS: tuple[Label, ...] = (
@@ -58,17 +84,26 @@ LABELS: tuple[Label, ...] = (
     Label(22, "dynamic", 5),
     Label(23, "person", 24, coco_id=1, kitti_type="Pedestrian", is_instance=True),
     Label(24, "rider", 25, coco_id=1, kitti_type="Cyclist", is_instance=True),
-    Label(25, "car", 26, coco_id=3, kitti_type="Car", is_instance=True),
-    Label(26, "van", 26, coco_id=3, kitti_type="Van", is_instance=True),
-    Label(27, "truck", 27, coco_id=8, kitti_type="Truck", is_instance=True),
-    Label(28, "bus", 28, coco_id=6, kitti_type="Misc", is_instance=True),
-    Label(29, "motorcycle", 32, coco_id=4, kitti_type="Misc", is_instance=True),
-    Label(30, "bicycle", 33, coco_id=2, kitti_type="Cyclist", is_instance=True),
+    VehicleKind(25, "car", 26, coco_id=3, kitti_type="Car", is_instance=True, weight=1.0),
+    VehicleKind(26, "van", 26, coco_id=3, kitti_type="Van", is_instance=True, weight=0.7),
+    VehicleKind(27, "truck", 27, coco_id=8, kitti_type="Truck", is_instance=True, weight=0.4),
+    VehicleKind(28, "bus", 28, coco_id=6, kitti_type="Misc", is_instance=True, weight=0.8, has_lit_interior=True),
+    VehicleKind(
+        29, "motorcycle", 32, coco_id=4, kitti_type="Misc", is_instance=True,
+        weight=1.2, mass_kg=300.0, headlamps=1, is_two_wheeler=True,
+    ),
+    VehicleKind(
+        30, "bicycle", 33, coco_id=2, kitti_type="Cyclist", is_instance=True,
+        weight=1.5, mass_kg=95.0, headlamps=0, is_two_wheeler=True, max_speed_mps=6.0, cruise_mps=5.5,
+    ),
     Label(31, "caravan", 29, kitti_type="Misc", is_instance=True),
     Label(32, "trailer", 30, kitti_type="Misc", is_instance=True),
     Label(33, "traffic_sign_back", 4),
-)
+)  # fmt: skip
 """All labels, in the order of their codes."""
+
+VEHICLES: dict[str, VehicleKind] = {label.name: label for label in LABELS if isinstance(label, VehicleKind)}
+"""Kinds of vehicles by name, in the order of their codes."""
 
 LABEL_BY_NAME: dict[str, Label] = {label.name: label for label in LABELS}
 """Labels by the name that MJCF default classes start with."""

@@ -1,31 +1,34 @@
-"""How often kinds of vehicles come, times their usual share."""
+"""A vehicle mix: for some kinds of vehicles, the factor by which they are more frequent than usual."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 from gear.values.errors import FieldError
+from gear.values.labels import VEHICLES
 
-VEHICLE_KINDS = ("car", "van", "truck", "bus", "motorcycle", "bicycle")
-
-MOST_MIXED = 1000.0
+MAX_FACTOR = 1000.0
 
 
 def check_mix(name: str, mix: Mapping[str, float]) -> None:
-    """Whether factors are of kinds of vehicles, and leave some.
+    """Checks that a mix names kinds of vehicles and leaves at least one kind.
+
+    Args:
+        name: the field that holds the mix, for the error.
+        mix: factors by kind; 0 means never.
 
     Raises:
-        FieldError: they are not; `name` is what the mix is called.
+        FieldError: a kind is unknown, a factor is out of range, or every kind has the factor 0.
     """
     for kind, factor in mix.items():
-        if kind not in VEHICLE_KINDS:
-            raise FieldError(f"{name}.{kind}", f"is no kind of vehicle; there are {', '.join(VEHICLE_KINDS)}")
-        if not 0 <= factor <= MOST_MIXED:
-            raise FieldError(f"{name}.{kind}", f"must be 0 to {MOST_MIXED:g}, got {factor:g}")
-    if all(mix.get(kind) == 0 for kind in VEHICLE_KINDS):
+        if kind not in VEHICLES:
+            raise FieldError(f"{name}.{kind}", f"is no kind of vehicle; there are {', '.join(VEHICLES)}")
+        if not 0 <= factor <= MAX_FACTOR:
+            raise FieldError(f"{name}.{kind}", f"must be 0 to {MAX_FACTOR:g}, got {factor:g}")
+    if all(mix.get(kind) == 0 for kind in VEHICLES):
         raise FieldError(name, "leaves no vehicle; for streets without any, make their count 0")
 
 
 def product_of(first: Mapping[str, float], second: Mapping[str, float]) -> dict[str, float]:
-    """Both, one after the other."""
-    return {kind: first.get(kind, 1.0) * second.get(kind, 1.0) for kind in VEHICLE_KINDS if kind in {*first, *second}}
+    """The mix that applies both mixes: the product of their factors, for every kind that one of them names."""
+    return {kind: first.get(kind, 1.0) * second.get(kind, 1.0) for kind in VEHICLES if kind in {*first, *second}}

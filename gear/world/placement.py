@@ -93,7 +93,7 @@ class PlacementSpace:
 
         People stand upright at their middle. A vehicle's four feet are fitted to what is below them.
         """
-        if actor_type.kind == "person":
+        if actor_type.is_person:
             z_m = self.ground_m(x_m, y_m, near_z_m)
             if z_m is None:
                 return None

@@ -8,8 +8,8 @@ from gear.config.nodes import parse_file
 from gear.config.reader import read_node
 from gear.testing.tiny_town import tiny_scenes
 from gear.values.errors import ConfigError, FieldError
+from gear.values.labels import VEHICLES
 from gear.values.serial import from_json, to_json
-from gear.values.vehicle_mix import VEHICLE_KINDS
 from gear.world.scene_spec import BoardSpec, EgoLimits, NpcLimits, SceneLibrary, SceneSpec, TruckSpec, VehicleLimits
 
 
@@ -80,7 +80,7 @@ def test_a_mix_goes_on_top_of_the_scenes_own() -> None:
         ({"person": 1.0}, r"mix\.person: is no kind"),
         ({"bus": -1.0}, r"mix\.bus: must be 0 to 1000"),
         ({"bus": 1e4}, r"mix\.bus: must be 0 to 1000"),
-        (dict.fromkeys(VEHICLE_KINDS, 0.0), r"mix: leaves no vehicle"),
+        (dict.fromkeys(VEHICLES, 0.0), r"mix: leaves no vehicle"),
     ):
         with pytest.raises(FieldError, match=told):
             VehicleLimits(count=(3, 7), mix=mix)

@@ -13,16 +13,14 @@ import numpy.typing as npt
 from gear.values.errors import TownError
 from gear.values.frames import STATIC_OBJECT_BASE, SceneObject, Shape
 from gear.values.geometry import RigidTransform
-from gear.values.labels import LABELS, Label
+from gear.values.labels import LABELS, Label, VehicleKind
 from gear.world.assets.geom_classes import HIDDEN_CODE, GeomClasses
 from gear.world.assets.geom_triangles import body_shape
-from gear.world.assets.library import ActorFacts, ActorKind
+from gear.world.assets.library import ActorFacts
 from gear.world.compilation.compose import Slot
 from gear.world.compilation.model_compilation import PlacementBody
 
-MASS_KG = {"person": 75.0, "bicycle": 95.0, "motorcycle": 300.0}
-VEHICLE_MASS_KG = 1500.0
-"""Only their inertia's shape matters for how things come to rest."""
+PERSON_MASS_KG = 75.0
 
 ACTOR_SIDE_M = (0.1, 100.0)
 """Least and most of an actor's longest side: what is beyond was drawn in other units."""
@@ -47,9 +45,14 @@ class ActorType:
     half_width_m: float
 
     @property
-    def kind(self) -> ActorKind:
-        """What kind of road user it is, such as `car` or `person`."""
-        return self.facts.kind
+    def vehicle(self) -> VehicleKind | None:
+        """Its kind of vehicle; None for people."""
+        return self.facts.vehicle
+
+    @property
+    def is_person(self) -> bool:
+        """Whether it is a person on foot."""
+        return self.facts.vehicle is None
 
     @property
     def label(self) -> Label:
@@ -73,7 +76,7 @@ class ActorType:
             half_length_m=0.8 * self.half_length_m,
             half_width_m=0.8 * self.half_width_m,
             height_m=float(self.shape.box_centre_m[2] + self.shape.box_size_m[2] / 2),
-            mass_kg=MASS_KG.get(self.facts.kind, VEHICLE_MASS_KG),
+            mass_kg=PERSON_MASS_KG if self.vehicle is None else self.vehicle.mass_kg,
         )
 
 

@@ -12,23 +12,15 @@ from pathlib import Path
 from typing import Literal, cast
 
 from gear.values.errors import TownError, UnknownNameError
-from gear.values.labels import LABEL_BY_NAME, Label
+from gear.values.labels import LABEL_BY_NAME, VEHICLES, Label, VehicleKind
 from gear.values.resources import data_dir
 from gear.values.scene import Vec3
 
-ActorKind = Literal["car", "van", "truck", "bus", "motorcycle", "bicycle", "person"]
 Gait = Literal["walk", "stand", ""]
 
-KIND_WEIGHTS: dict[ActorKind, float] = {
-    "car": 1.0,
-    "van": 0.7,
-    "truck": 0.4,
-    "bus": 0.8,
-    "motorcycle": 1.2,
-    "bicycle": 1.5,
-    "person": 1.0,
-}
-"""How common one asset of a kind is, before the asset's own `actor.weight`."""
+PERSON = "person"
+"""Kind of the actors that walk; every other kind is one of `VEHICLES`."""
+
 
 MOST_WEIGHT = 1e6
 """Of an asset among others, or of a colour: sums and shares of such are finite."""
@@ -72,7 +64,7 @@ class ActorFacts:
     Attributes:
         name: of the asset: its file's stem.
         path: its MJCF.
-        kind: what it is.
+        kind: `person`, or a name in `VEHICLES`.
         gait: `walk` or `stand` for people, empty for vehicles.
         weight: how common it is among all assets of its folder.
         palette: linear albedo choices of its paint, with how common each is.
@@ -80,15 +72,20 @@ class ActorFacts:
 
     name: str
     path: Path
-    kind: ActorKind
+    kind: str
     gait: Gait
     weight: float
     palette: tuple[tuple[Vec3, float], ...]
 
     @property
     def label(self) -> Label:
-        """What it mainly is."""
+        """The label of its kind."""
         return LABEL_BY_NAME[self.kind]
+
+    @property
+    def vehicle(self) -> VehicleKind | None:
+        """Its kind of vehicle; None for people."""
+        return VEHICLES.get(self.kind)
 
 
 def read_actor_facts(path: Path) -> ActorFacts:
@@ -100,9 +97,10 @@ def read_actor_facts(path: Path) -> ActorFacts:
     sections = (custom for root in _with_included(path) for custom in root.iter("custom"))
     entries = {item.get("name", ""): item.get("data", "") for custom in sections for item in custom}
     kind = entries.get("actor.kind", "")
-    if kind not in KIND_WEIGHTS:
-        raise TownError(path, f"actor.kind must be one of {', '.join(KIND_WEIGHTS)}, got {kind!r}")
-    gait = entries.get("actor.pose", "stand" if kind == "person" else "")
+    vehicle = VEHICLES.get(kind)
+    if vehicle is None and kind != PERSON:
+        raise TownError(path, f"actor.kind must be one of {', '.join([*VEHICLES, PERSON])}, got {kind!r}")
+    gait = entries.get("actor.pose", "stand" if kind == PERSON else "")
     if gait not in ("walk", "stand", ""):
         raise TownError(path, f"actor.pose must be walk or stand, got {gait!r}")
     weight = _numbers(path, "actor.weight", entries.get("actor.weight", "1"))
@@ -124,7 +122,7 @@ def read_actor_facts(path: Path) -> ActorFacts:
         path=path,
         kind=kind,
         gait=cast(Gait, gait),
-        weight=weight[0] * KIND_WEIGHTS[kind],
+        weight=weight[0] * (1.0 if vehicle is None else vehicle.weight),
         palette=colours,
     )
 
@@ -226,7 +224,7 @@ class AssetLibrary:
         if not facts:
             raise TownError(folder, f"holds no {kind}")
         for fact in facts.values():
-            if (fact.kind == "person") != (kind == "pedestrian"):
+            if (fact.kind == PERSON) != (kind == "pedestrian"):
                 raise TownError(fact.path, f"a {fact.kind} does not belong into {folder.name}")
         return facts
 

@@ -146,7 +146,8 @@ class Crowd:
                     return added
                 body = road_users.free.bodies[actor_type.facts.name][0]
                 spawn: Spawn | None = None
-                if parks and bays and actor_type.kind not in ("bicycle", "motorcycle"):
+                may_park = actor_type.vehicle is not None and not actor_type.vehicle.is_two_wheeler
+                if parks and bays and may_park:
                     spawn = self.spawner.in_bay(actor_type, body, bays[int(rng.integers(len(bays)))], rng)
                 elif len(pieces) and not parks:
                     lane, s_m = self.spawner.lane_table.draw(pieces, rng)

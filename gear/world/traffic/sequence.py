@@ -20,7 +20,6 @@ from gear.world.traffic.spawn import Spawn
 
 ROOM_M = 80.0
 SLOWEST_MPS = 1.5
-CYCLING_MPS = 5.5
 OFF_THE_ROAD_M = 1.2
 """People leave a crossing for so far onto the sidewalk, and stop so far before the end of one."""
 
@@ -153,8 +152,8 @@ class SequenceSimulator:
         )
         if spawn.role == "ego" and road_users.drive_m > 0:
             cruise_mps = min(lane.speed_mps, max(SLOWEST_MPS, road_users.drive_m / duration_s))
-        elif spawn.actor_type.kind == "bicycle":
-            cruise_mps = min(cruise_mps, CYCLING_MPS)
+        elif spawn.actor_type.vehicle is not None:
+            cruise_mps = min(cruise_mps, spawn.actor_type.vehicle.cruise_mps)
         way = road_users.required_lanes.get(spawn.body, (spawn.lane,))
         # The ego car and its truck turn the same way at every junction, because they draw the same numbers.
         turns = derive_rng(

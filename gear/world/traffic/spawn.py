@@ -115,7 +115,7 @@ class FreeSlots:
         kinds = [
             actor_type
             for name, actor_type in types.items()
-            if self.bodies.get(name) and (actor_type.kind == "person") == people and actor_type.facts.weight > 0
+            if self.bodies.get(name) and actor_type.is_person == people and actor_type.facts.weight > 0
         ]
         if not kinds:
             return None
@@ -155,7 +155,9 @@ class Spawner:
 
     def is_allowed_on(self, actor_type: ActorType, lane: str) -> bool:
         """Whether such a vehicle is met on a lane: bicycles keep off motorways."""
-        return actor_type.kind != "bicycle" or self.lanes.lanes[lane].speed_mps < MOTORWAY_MPS
+        vehicle = actor_type.vehicle
+        is_slow = vehicle is not None and vehicle.max_speed_mps < MOTORWAY_MPS
+        return not is_slow or self.lanes.lanes[lane].speed_mps < MOTORWAY_MPS
 
     def on_lane(
         self,
@@ -170,11 +172,13 @@ class Spawner:
         road = self.lanes.lanes[lane]
         room_m = max(0.0, road.width_m / 2 - actor_type.half_width_m - 0.2)
         lateral_m = float(np.clip(rng.normal(0.0, 0.12), -room_m, room_m))
-        if actor_type.kind in ("bicycle", "motorcycle"):
+        vehicle = actor_type.vehicle
+        assert vehicle is not None  # people are drawn on walks
+        if vehicle.is_two_wheeler:
             lateral_m = -room_m * float(rng.uniform(0.3, 0.8))
         point, yaw_rad = vehicle_pose(road.line, s_m, actor_type.half_length_m, lateral_m)
         stands = rng.random() < STANDING_SHARE and not road.is_junction
-        most_mps = min(road.speed_mps, 6.0) if actor_type.kind == "bicycle" else road.speed_mps
+        most_mps = min(road.speed_mps, vehicle.max_speed_mps)
         speed_mps = most_mps * float(rng.uniform(0.35, 1.0))
         return Spawn(
             role=role,

@@ -10,7 +10,7 @@ from gear.camera.beams import Headlamps
 from gear.camera.lamp_shadows import Casters, LampShadows
 from gear.camera.night import Night
 from gear.values.errors import TownError
-from gear.values.labels import LABEL_BY_NAME
+from gear.values.labels import VEHICLES
 from gear.values.rng import derive_rng
 from gear.values.scene import Weather
 from gear.world.weather.lamps import find_lamps, find_windows
@@ -22,7 +22,6 @@ from gear.world.world import World
 LEVEL, SKY_LEVEL = 0.03, 0.14
 """Of even light, on the ground and in the sky, when the sun's is gone."""
 
-HEADLAMP_KINDS = ("car", "van", "bus", "truck", "motorcycle")
 GAUGE_SHARE = 0.72
 """Of a vehicle's width that lies between its headlamps."""
 
@@ -60,15 +59,15 @@ def night_of(world: World, weather: Weather, renderer_name: str) -> Night | None
         vehicles={
             name: Headlamps(
                 front_m=actor_type.front_m,
-                half_gauge_m=0.0 if actor_type.kind == "motorcycle" else GAUGE_SHARE * actor_type.half_width_m,
+                half_gauge_m=GAUGE_SHARE * actor_type.half_width_m if actor_type.vehicle.headlamps > 1 else 0.0,
             )
             for name, actor_type in world.types.items()
-            if actor_type.kind in HEADLAMP_KINDS
+            if actor_type.vehicle is not None and actor_type.vehicle.headlamps
         },
         wetness=wetness(weather),
         is_signal=np.array([index >= 0 and model.mat_emission[index] > 0 for index in model.geom_matid]),
         is_lens=np.array([name == "lights" for name in material]),
-        is_pane=panes_of_buses(material, world.classes.label_code),
+        is_pane=lit_panes(material, world.classes.label_code),
         is_display=renderer_name == "classic",
         shadows=LampShadows(
             casters=Casters.of(find_shadow_casters(model, data, world.classes.label_code)), shapes=world.shapes
@@ -81,6 +80,15 @@ def materials_of(model: mujoco.MjModel) -> list[str]:
     return [model.mat(index).name.rsplit("/", 1)[-1] if index >= 0 else "" for index in model.geom_matid]
 
 
-def panes_of_buses(material: list[str], label_code: npt.NDArray[np.uint8]) -> npt.NDArray[np.bool_]:
-    """(ngeom,) what of a world is the glass of a bus, by each geom's material and label."""
-    return np.asarray((np.array(material) == "glass") & (label_code == LABEL_BY_NAME["bus"].code))
+def lit_panes(material: list[str], label_code: npt.NDArray[np.uint8]) -> npt.NDArray[np.bool_]:
+    """Which geoms are the windows of vehicles with a lit interior, such as buses.
+
+    Args:
+        material: name of each geom's material, as `materials_of` gives it.
+        label_code: (ngeom,) labels of the geoms.
+
+    Returns:
+        (ngeom,) bool.
+    """
+    codes = [kind.code for kind in VEHICLES.values() if kind.has_lit_interior]
+    return np.asarray((np.array(material) == "glass") & np.isin(label_code, codes))

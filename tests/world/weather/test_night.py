@@ -21,7 +21,7 @@ from gear.values.scene import Weather
 from gear.world.assets.geom_triangles import world_triangles
 from gear.world.weather.lamps import GLAZINGS, find_lamps, find_windows
 from gear.world.weather.light import ambient_radiance, lighting_of
-from gear.world.weather.night import materials_of, night_of, panes_of_buses
+from gear.world.weather.night import lit_panes, materials_of, night_of
 from gear.world.weather.shadow_casters import find_shadow_casters
 from gear.world.world import World
 
@@ -159,7 +159,7 @@ def test_a_bus_is_found_by_its_label_and_its_glass() -> None:
     names = [model.mesh(mesh).name if mesh >= 0 else "" for mesh in model.geom_dataid]
     for label, panes in (("bus", [name == "glass" for name in names]), ("van", [False] * model.ngeom)):
         labels = np.full(model.ngeom, LABEL_BY_NAME[label].code, np.uint8)
-        np.testing.assert_array_equal(panes_of_buses(materials_of(model), labels), panes)
+        np.testing.assert_array_equal(lit_panes(materials_of(model), labels), panes)
 
 
 def test_even_light_is_what_the_sky_and_the_houses_give() -> None:
