@@ -23,11 +23,16 @@ if TYPE_CHECKING:
     from gear.verbs.bench.run import bench
     from gear.verbs.collect.run import CollectReport, collect
     from gear.verbs.defend import DefendReport, defend
+    from gear.verbs.doctor import DoctorReport, doctor
     from gear.verbs.evaluate.report import EvaluateReport
     from gear.verbs.evaluate.run import evaluate
+    from gear.verbs.export import export
     from gear.verbs.gap.report import GapReport
     from gear.verbs.gap.run import gap
     from gear.verbs.models import ModelFacts, list_models
+    from gear.verbs.sheet import sheet
+    from gear.verbs.towns.facts import Town, read_town, towns
+    from gear.verbs.towns.write import TownReport, write_town
     from gear.verbs.train.run import TrainReport, train
     from gear.verbs.weights.average import average_weights
     from gear.verbs.weights.convert import ConvertReport, convert_weights
@@ -40,10 +45,13 @@ __all__ = [
     "ConvertReport",
     "Dataset",
     "DefendReport",
+    "DoctorReport",
     "EvaluateReport",
     "GapReport",
     "GearError",
     "ModelFacts",
+    "Town",
+    "TownReport",
     "TrainReport",
     "Twins",
     "ViewReport",
@@ -53,12 +61,18 @@ __all__ = [
     "collect",
     "convert_weights",
     "defend",
+    "doctor",
     "evaluate",
+    "export",
     "gap",
     "list_models",
     "open_dataset",
     "open_twins",
+    "read_town",
+    "sheet",
+    "towns",
     "train",
+    "write_town",
     "write_view",
 ]
 
@@ -69,10 +83,13 @@ _HOME = {
     "ConvertReport": "gear.verbs.weights.convert",
     "Dataset": "gear.plugins.datasets",
     "DefendReport": "gear.verbs.defend",
+    "DoctorReport": "gear.verbs.doctor",
     "EvaluateReport": "gear.verbs.evaluate.report",
     "GapReport": "gear.verbs.gap.report",
     "GearError": "gear.values.errors",
     "ModelFacts": "gear.verbs.models",
+    "Town": "gear.verbs.towns.facts",
+    "TownReport": "gear.verbs.towns.write",
     "TrainReport": "gear.verbs.train.run",
     "Twins": "gear.plugins.datasets",
     "ViewReport": "gear.view.write",
@@ -82,12 +99,18 @@ _HOME = {
     "collect": "gear.verbs.collect.run",
     "convert_weights": "gear.verbs.weights.convert",
     "defend": "gear.verbs.defend",
+    "doctor": "gear.verbs.doctor",
     "evaluate": "gear.verbs.evaluate.run",
+    "export": "gear.verbs.export",
     "gap": "gear.verbs.gap.run",
     "list_models": "gear.verbs.models",
     "open_dataset": "gear.plugins.datasets",
     "open_twins": "gear.plugins.datasets",
+    "read_town": "gear.verbs.towns.facts",
+    "sheet": "gear.verbs.sheet",
+    "towns": "gear.verbs.towns.facts",
     "train": "gear.verbs.train.run",
+    "write_town": "gear.verbs.towns.write",
     "write_view": "gear.view.write",
 }
 

@@ -6,6 +6,7 @@ import argparse
 
 from gear.cli.collect import positive
 from gear.cli.device import add_device
+from gear.cli.streams import line_width
 
 EXAMPLE = """examples:
   gear evaluate --model ddrnet23_slim --data data/clean
@@ -100,5 +101,10 @@ def run(args: argparse.Namespace) -> int:
     for row in report.rows:
         for problem in row.damaged:
             print(f"gear: note: {problem}; the sample was predicted again", file=sys.stderr)
-    print(json.dumps(report.as_json(), indent=1, allow_nan=False) + "\n" if args.json else table(report), end="")
+    print(
+        json.dumps(report.as_json(), indent=1, allow_nan=False) + "\n"
+        if args.json
+        else table(report, width=line_width()),
+        end="",
+    )
     return 0

@@ -10,7 +10,9 @@ import sys
 from collections.abc import Sequence
 from types import FrameType
 
+from gear.cli.messages import one_line
 from gear.cli.parser import Parser
+from gear.cli.streams import prepare_streams
 from gear.cli.unread import print_no_more
 from gear.values.errors import GearError, UnknownNameError
 
@@ -32,6 +34,7 @@ COMMANDS: dict[str, str] = {
     "new": "write a complete small package for a task, model, attack or defense of your own",
     "doctor": "render a reference frame with each renderer and say who renders",
     "show-config": "print the config that flags and files make",
+    "completion": "print a script with which a shell completes gear's commands and flags",
 }
 """Command names with one line each; `gear.cli.<name>` holds the command."""
 
@@ -73,6 +76,7 @@ def main(argv: Sequence[str]) -> int:
         0, 2 for what the user can put right (one line on stderr), 130 when interrupted, 143 when terminated. Bugs keep
         their traceback.
     """
+    prepare_streams()
     try:
         code = _run(argv)
         sys.stdout.flush()  # what fails at Python's own end, nobody catches
@@ -85,7 +89,7 @@ def main(argv: Sequence[str]) -> int:
             print("gear: stopped; run the same command again to go on", file=sys.stderr)
             return 143 if isinstance(interrupt, Terminated) else 130
         if isinstance(error, OSError) and error.filename and error.errno in CIRCUMSTANCES:
-            print(f"gear: {error.filename}: {error.strerror}", file=sys.stderr)
+            print(f"gear: {one_line(error.filename)}: {error.strerror}", file=sys.stderr)
             return 2
         if isinstance(error, OSError) and error.errno in FULL:  # a stream that says no name, as that of `> file`
             print(f"gear: {error.strerror}", file=sys.stderr)
@@ -98,12 +102,17 @@ def main(argv: Sequence[str]) -> int:
             return 2
         if not isinstance(error, GearError):
             raise
-        print(f"gear: {error}", file=sys.stderr)
+        print(f"gear: {one_line(error)}", file=sys.stderr)
         return 2
     return code
 
 
-def _run(argv: Sequence[str]) -> int:
+def full_parser(wanted: str | None = None) -> Parser:
+    """The parser of the command line.
+
+    Args:
+        wanted: the only command that gets its flags, so that only its module is imported; None for all of them.
+    """
     parser = Parser(
         prog="gear",
         description="Driving datasets with physical adversarial patches in them, rendered by MuJoCo.",
@@ -112,21 +121,26 @@ def _run(argv: Sequence[str]) -> int:
     )
     parser.add_argument("--version", action="store_true", help="print the version and leave")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", dest="command")
-    wanted = next((word for word in argv if not word.startswith("-")), None)
     for name, summary in COMMANDS.items():
         command = commands.add_parser(
             name, help=summary, description=summary, formatter_class=argparse.RawDescriptionHelpFormatter
         )
-        if name == wanted:  # only the command that was asked for pays for its imports
+        if wanted in (None, name):
             module = importlib.import_module(f"gear.cli.{name.replace('-', '_')}")
             module.add_arguments(command)
             command.set_defaults(run=module.run)
+    return parser
+
+
+def _run(argv: Sequence[str]) -> int:
+    wanted = next((word for word in argv if not word.startswith("-")), None)
     if wanted is not None and wanted not in COMMANDS:
-        print(f"gear: {UnknownNameError('command', wanted, COMMANDS)}", file=sys.stderr)
+        print(f"gear: {one_line(UnknownNameError('command', wanted, COMMANDS))}", file=sys.stderr)
         return 2
+    parser = full_parser(wanted or "")
     args, unknown = parser.parse_known_args(argv)
     if unknown:
-        (commands.choices[args.command] if args.command else parser).refuse(unknown)
+        (parser.command(args.command) if args.command else parser).refuse(unknown)
     if args.version:
         from importlib.metadata import version
 

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
+
+from gear.cli.streams import line_width
+from gear.measuring.text_table import text_table
 
 if TYPE_CHECKING:
     from gear.verbs.models import ModelFacts, ShippedWeights
@@ -12,49 +16,89 @@ if TYPE_CHECKING:
 EXAMPLE = """examples:
   gear models
   gear models --task semseg
+  gear models show ddrnet23_slim           # input, published weights, shipped weights and what they were measured on
   gear models --json
 
 Nothing is downloaded: fetch published weights yourself, then `gear weights convert MODEL IN OUT`.
 """
 
+HEAD = ("network", "tasks", "size", "weights", "usable", "summary")
+"""Titles of the list's columns."""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the command's flags."""
     parser.epilog = EXAMPLE
+    parser.add_argument("action", nargs="?", choices=("list", "show"), default="list", help="list, or show one (list)")
+    parser.add_argument("name", nargs="?", help="with show: its name")
     parser.add_argument("--task", help="only networks that do this task")
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Lists the installed networks."""
+    """Lists the installed networks, or prints one."""
     from gear.networks.shipped import shipped_networks
     from gear.verbs.models import list_models
 
     models = list_models(args.task)
+    if args.action == "show":
+        models = [the_one(models, args.name)]
     if args.json:
         print(json.dumps({"models": [model.to_json() for model in models]}, indent=1))
         return 0
-    for model in models:
-        show(model)
-    if not models:
+    if args.action == "show":
+        print("\n".join(details(models[0])))
+        return 0
+    if models:
+        print("\n".join(text_table(HEAD, [row(model) for model in models], width=line_width())))
+    else:
         print(f"no installed model does {args.task}")
     if not shipped_networks():
         print("no weights are installed; mujoco-gear-weights has those of one network for every task of gear's")
     return 0
 
 
-def show(model: ModelFacts) -> None:
-    """Prints one."""
+def the_one(models: Sequence[ModelFacts], name: str | None) -> ModelFacts:
+    """The network of a name.
+
+    Raises:
+        GearError: no name was given.
+        UnknownNameError: nothing answers to it.
+    """
+    from gear.values.errors import GearError, UnknownNameError
+
+    if not name:
+        raise GearError("gear models show needs a name, such as: gear models show ddrnet23_slim")
+    for model in models:
+        if name in (model.spec.name, model.found.full_name):
+            return model
+    raise UnknownNameError("model", name, [model.spec.name for model in models])
+
+
+def row(model: ModelFacts) -> list[str]:
+    """A network's cells in the list."""
+    spec = model.spec
+    size = f"{spec.parameters / 1e6:.1f} M" if spec.parameters else "-"
+    weights = "shipped" if model.shipped else "published" if spec.published else "-"
+    if model.shipped is not None and model.shipped.stale:
+        weights = "shipped, old look"
+    usable = "yes" if not model.missing else f"needs {', '.join(model.missing)}"
+    return [spec.name, ", ".join(spec.tasks), size, weights, usable, spec.summary]
+
+
+def details(model: ModelFacts) -> list[str]:
+    """Everything that is known of one network, as lines."""
     spec = model.spec
     size = f"{spec.parameters / 1e6:.1f} M parameters" if spec.parameters else "size not stated"
-    print(f"{spec.name:20} {', '.join(spec.tasks):20} {size}  {spec.summary}")
+    facts = [("tasks", ", ".join(spec.tasks)), ("size", size)]
     if model.missing:
-        print(f"{'':20} not usable: needs {', '.join(model.missing)} (pip install 'mujoco-gear[models]')")
+        facts.append(("not usable", f"needs {', '.join(model.missing)} (pip install 'mujoco-gear[models]')"))
     if spec.normalisation:
-        print(f"{'':20} input: {spec.normalisation}")
+        facts.append(("input", spec.normalisation))
     for weights in spec.published:
-        print(f"{'':20} published: {weights.data}; {weights.size_mb:g} MB; {weights.licence}; {weights.source}")
-    print(f"{'':20} shipped: {shipped_line(model.shipped)}")
+        facts.append(("published", f"{weights.data}; {weights.size_mb:g} MB; {weights.licence}; {weights.source}"))
+    facts.append(("shipped", shipped_line(model.shipped)))
+    return [f"{spec.name}: {spec.summary}", *text_table(("", ""), facts, width=line_width(), wrap=True)[1:]]
 
 
 def shipped_line(weights: ShippedWeights | None) -> str:

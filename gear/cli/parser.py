@@ -7,13 +7,22 @@ import difflib
 from collections.abc import Sequence
 from typing import NoReturn
 
+from gear.cli.messages import one_line
+
 
 class Parser(argparse.ArgumentParser):
     """As argparse's, with errors in one line."""
 
     def error(self, message: str) -> NoReturn:
         """Leaves with 2."""
-        self.exit(2, f"{self.prog}: {message}; {self.prog} --help says more\n")
+        self.exit(2, f"{self.prog}: {one_line(message)}; {self.prog} --help says more\n")
+
+    def command(self, name: str) -> Parser:
+        """The parser of one command."""
+        chosen = next(action for action in self._actions if isinstance(action, argparse._SubParsersAction))
+        parser = chosen.choices[name]
+        assert isinstance(parser, Parser)
+        return parser
 
     def refuse(self, unknown: Sequence[str]) -> NoReturn:
         """Leaves with 2, for words that no argument takes."""

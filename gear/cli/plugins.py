@@ -6,7 +6,9 @@ import argparse
 import json
 from typing import TYPE_CHECKING
 
+from gear.cli.streams import line_width
 from gear.contracts.specs import KINDS, Kind
+from gear.measuring.text_table import text_table
 
 if TYPE_CHECKING:
     from gear.plugins.catalogue import Catalogue, PluginEntry
@@ -14,7 +16,7 @@ if TYPE_CHECKING:
 EXAMPLE = """examples:
   gear plugins
   gear plugins --kind task --json
-  gear plugins show semseg
+  gear plugins show semseg                     # capabilities and options of one
   GEAR_DISABLE_PLUGINS='*' gear plugins        # gear's own alone; or names of plugins, joined by commas
 """
 
@@ -56,9 +58,9 @@ def show_all(found: Catalogue, kinds: tuple[Kind, ...], as_json: bool) -> int:
         named = [{"kind": kind, "name": name, "choices": choices} for kind, name, choices in clashes]
         print(json.dumps({"plugins": rows, "broken": broken, "clashes": named}, indent=1))
         return 0
-    for row in rows:
-        print(f"{row['kind']:8} {row['name']:20} {row['package']} {row['version']}  {row['summary']}")
-        print(f"{'':29} {_inline(row['capabilities'])}")
+    cells = [[row["kind"], row["name"], f"{row['package']} {row['version']}", row["summary"]] for row in rows]
+    if cells:
+        print("\n".join(text_table(("kind", "name", "package", "summary"), cells, width=line_width())))
     for b in found.broken:
         remedy = f"tell its author, uninstall {b.owner.package}, or set GEAR_DISABLE_PLUGINS={b.owner.plugin}"
         print(f"broken   {b.owner.plugin:20} {b.owner.package} {b.owner.version}  at {b.stage}: {b.problem}; {remedy}")
@@ -113,11 +115,6 @@ def the_one(found: Catalogue, kinds: tuple[Kind, ...], name: str | None) -> Plug
         known = [other for kind in kinds for other in found.names(kind)]
         raise UnknownNameError(kinds[0] if len(kinds) == 1 else "plugin", name, known, found.broken_hint())
     return found.get(hits[0], name)
-
-
-def _inline(capabilities: dict[str, object]) -> str:
-    """What is worth a line: capabilities that are not empty."""
-    return "; ".join(f"{key}: {_text(value)}" for key, value in capabilities.items() if value not in ("", (), []))
 
 
 def _text(value: object) -> str:

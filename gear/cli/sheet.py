@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Writes the sheet and says where."""
-    from gear.verbs.sheet import write_sheet
+    from gear.verbs.sheet import sheet
 
-    print(write_sheet(args.dataset, args.out, split=args.split, samples=args.samples))
+    print(sheet(args.dataset, args.out, split=args.split, samples=args.samples))
     return 0

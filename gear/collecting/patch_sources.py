@@ -14,6 +14,7 @@ import numpy as np
 
 from gear.contracts.tasks import NO_PATCH, RANDOM_PATCH
 from gear.dataset.sidecar import load_json
+from gear.formats.png_chunks import check_chunks
 from gear.networks.shipped import shipped_patches
 from gear.values.errors import DatasetError, PatchError
 from gear.values.frames import UInt8Image
@@ -119,8 +120,9 @@ def read_patch(path: Path) -> UInt8Image:
     except OSError as error:
         raise PatchError(path, f"cannot be read: {error.strerror}") from error
     try:
+        check_chunks(data)
         picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
-    except cv2.error:
+    except (cv2.error, ValueError):
         picture = None
     if picture is None:
         raise PatchError(path, "is not a picture that can be read; use an 8-bit RGB PNG")

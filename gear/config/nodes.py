@@ -24,7 +24,8 @@ class Place:
     column: int = 0
 
     def error(self, key: str, problem: str) -> ConfigError:
-        """A `ConfigError` here."""
+        """A `ConfigError` here; a flag is its own key."""
+        key = "" if self.path == f"--{key}" else key
         return ConfigError(self.path, self.line, self.column, key, problem)
 
 

@@ -10,22 +10,24 @@ from gear.config.reader import spelled_out
 from gear.values.errors import ConfigError
 
 
-def with_overrides(node: Node, settings: Iterable[str], kind: Any = None) -> Node:
+def with_overrides(node: Node, settings: Iterable[str], kind: Any = None, *, flag: str = "--set") -> Node:
     """The tree with every `a.b.c=value` put in; later ones win.
 
     Args:
         node: the tree.
         settings: `KEY=VALUE` texts.
         kind: dataclass of the tree, whose bare words are kept where a setting goes below them; None for any.
+        flag: that the settings were given with; errors name it.
 
     Raises:
         ConfigError: a setting has no `=`, or goes through something that has no keys.
     """
+    hint = "such as --set weather.cloudiness=30" if kind else "with a key that `gear plugins show NAME` lists"
     for setting in settings:
         key, separator, text = setting.partition("=")
-        name = f"--set {setting}"
+        name = f"{flag} {setting}"
         if not separator or not key.strip():
-            raise ConfigError(name, 0, 0, "", "expected KEY=VALUE, such as --set weather.cloudiness=30")
+            raise ConfigError(name, 0, 0, "", f"expected KEY=VALUE, {hint}")
         text = f"'{text.strip()}'" if text.strip() == "-" else text  # to YAML a minus alone begins a list
         below = node if kind is None else spelled_out(kind, node)  # each time: a setting may be a bare word itself
         node = with_value(below, tuple(key.strip().split(".")), parse_value(text, name))

@@ -9,6 +9,7 @@ from typing import Any, Generic, TypeVar, overload
 
 from gear.contracts.tasks import Sample, SampleT, Sidecar, Task
 from gear.dataset.files import inside, read_bytes, sha256
+from gear.dataset.html_preview import preview_table
 from gear.dataset.layout import manifest_path, plan_path, sidecar_path
 from gear.dataset.plan import Plan
 from gear.dataset.sidecar import load_json, no_sidecar, read_sidecar
@@ -17,8 +18,11 @@ from gear.values.serial import Json, from_json
 
 T = TypeVar("T")
 
+SHOWN = 4
+"""Samples that a notebook shows of a dataset."""
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(frozen=True, slots=True, repr=False)
 class Dataset(Sequence[SampleT], Generic[SampleT]):
     """One finished split: a sequence of samples, each decoded when it is asked for.
 
@@ -37,6 +41,18 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
 
     def __len__(self) -> int:
         return len(self.manifest["samples"])
+
+    def __repr__(self) -> str:
+        info = self.plan.info
+        return (
+            f"Dataset({str(self.root)!r}, split={info.split!r}, task={self.plan.task['name']!r},"
+            f" patch={info.patch_label!r}, samples={len(self)})"
+        )
+
+    def _repr_html_(self) -> str:
+        """The first samples as pictures; notebooks show it."""
+        shown = ((f"{i:06d}", self.task.preview(self[i])) for i in range(min(len(self), SHOWN)))
+        return preview_table(repr(self), shown)
 
     @overload
     def __getitem__(self, index: int) -> SampleT: ...
@@ -153,7 +169,7 @@ def scenes_of(dataset: Dataset[Any]) -> tuple[str, int]:
     return f"{info.town}/{info.scene}", info.seed
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Twins(Sequence[tuple[SampleT, SampleT]], Generic[SampleT]):
     """Two splits that differ in nothing but their patch, sample by sample."""
 
@@ -162,6 +178,17 @@ class Twins(Sequence[tuple[SampleT, SampleT]], Generic[SampleT]):
 
     def __len__(self) -> int:
         return min(len(self.first), len(self.second))
+
+    def __repr__(self) -> str:
+        return f"Twins({self.first!r}, {self.second!r})"
+
+    def _repr_html_(self) -> str:
+        """The first pairs as pictures; notebooks show it."""
+        rows = []
+        for i in range(min(len(self), SHOWN)):
+            for one in (self.first, self.second):
+                rows.append((f"{i:06d} {one.plan.info.patch_label}", one.task.preview(one[i])))
+        return preview_table(repr(self), rows)
 
     @overload
     def __getitem__(self, index: int) -> tuple[SampleT, SampleT]: ...

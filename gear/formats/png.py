@@ -14,6 +14,7 @@ import fpng
 import numpy as np
 import numpy.typing as npt
 
+from gear.formats.png_chunks import check_chunks
 from gear.formats.png_rows import decode_rows
 from gear.values.frames import FloatImage, UInt8Image
 
@@ -71,6 +72,7 @@ def decode_plain(data: bytes) -> npt.NDArray[Any]:
 
 
 def _decode(data: bytes, mode: int) -> npt.NDArray[Any]:
+    check_chunks(data)
     try:
         picture = cv2.imdecode(np.frombuffer(data, np.uint8), mode) if data else None
     except cv2.error:  # of a header that promises more pixels than OpenCV takes

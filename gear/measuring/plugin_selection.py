@@ -40,13 +40,18 @@ class Chosen:
         return {**named, "options": to_plain(config)}
 
 
-def chosen_model(name: str, settings: Iterable[str]) -> Chosen:
+def chosen_model(name: str, settings: Iterable[str], flag: str = "--set") -> Chosen:
     """A model by name.
+
+    Args:
+        name: of the plugin.
+        settings: `KEY=VALUE` texts.
+        flag: that the settings were given with; errors name it.
 
     Raises:
         GearError: there is no such model, or an option does not fit.
     """
-    found, options = find("model", name), with_overrides(NO_OPTIONS, settings)
+    found, options = find("model", name), with_overrides(NO_OPTIONS, settings, flag=flag)
     read_node(found.spec.config, options, "")
     return Chosen(found=found, options=options)
 
@@ -62,7 +67,7 @@ def chosen_defense(name: str | None, settings: Iterable[str]) -> Chosen | None:
         if settings:
             raise GearError(f"{settings[0]} is a defense's option, but there is no defense: name one with --defense")
         return None
-    found, options = find("defense", name), with_overrides(NO_OPTIONS, settings)
+    found, options = find("defense", name), with_overrides(NO_OPTIONS, settings, flag="--defense-set")
     read_node(found.spec.config, options, "")
     return Chosen(found=found, options=options)
 

@@ -10,12 +10,16 @@ from gear.contracts.tasks import Sample
 from gear.dataset.reading import Dataset, Twins, pair_twins, read_manifest
 from gear.dataset.store import plan_of, splits_of
 from gear.plugins.build import build_task, name_of_task
+from gear.values.counted import counted
 from gear.values.errors import DatasetError
 
 __all__ = ["Dataset", "Twins", "open_dataset", "open_twins", "root_and_split", "roots_of"]
 
 DEEPEST = 3
 """Folders between one that is given and the roots in it."""
+
+LISTED = 5
+"""Datasets that an error names."""
 
 
 def open_dataset(path: str | Path, split: str | None = None) -> Dataset[Any]:
@@ -35,6 +39,7 @@ def open_dataset(path: str | Path, split: str | None = None) -> Dataset[Any]:
     """
     root = Path(path)
     if split is None:
+        _refuse_folder_of_datasets(root)
         names = splits_of(root)
         if len(names) > 1:
             raise DatasetError(root, f"holds several splits ({', '.join(names)}); say which")
@@ -68,6 +73,14 @@ def open_twins(first: str | Path, second: str | Path, split: str | None = None) 
         DatasetError: they differ in more than the patch, or one of them cannot be opened.
     """
     return pair_twins(open_dataset(first, split), open_dataset(second, split))
+
+
+def _refuse_folder_of_datasets(folder: Path) -> None:
+    """Names the datasets in a folder that is no dataset itself."""
+    roots = roots_of(folder) if folder.is_dir() else []
+    if roots and folder not in roots:
+        listed = ", ".join(str(root) for root in roots[:LISTED]) + ", …" * (len(roots) > LISTED)
+        raise DatasetError(folder, f"is a folder of {counted(len(roots), 'dataset')}; give one of them: {listed}")
 
 
 def _as_yaml(options: Any) -> str:

@@ -18,6 +18,7 @@ from gear.measuring.guard import Guard
 from gear.plugins.build import NO_OPTIONS, build, find
 from gear.plugins.catalogue import PluginEntry
 from gear.plugins.datasets import open_dataset
+from gear.values.counted import counted
 from gear.values.errors import DatasetError, GearError
 from gear.values.progress import Progress
 from gear.values.rng import check_seed, derive_rng
@@ -49,7 +50,7 @@ class DefendReport:
         kept = self.samples - self.made
         resumed = f" ({kept} were there already)" if kept else ""
         again = f"; {self.outdated} were cleaned again: their pictures or files had changed" if self.outdated else ""
-        return f"{self.root}: {self.samples} samples of split {self.split!r} cleaned{resumed}{again}"
+        return f"{self.root}: {counted(self.samples, 'sample')} of split {self.split!r} cleaned{resumed}{again}"
 
 
 def defend(

@@ -54,7 +54,7 @@ def caption(sample: Sample, name: str) -> str:
     return f"{record.split} {record.index:06d}  {name}  {record.scene}  {surfaces}"
 
 
-def write_sheet(path: str | Path, out: str | Path, *, split: str | None = None, samples: int = 12) -> Path:
+def sheet(path: str | Path, out: str | Path = "sheet.png", *, split: str | None = None, samples: int = 12) -> Path:
     """Writes the contact sheet of a dataset as a PNG.
 
     Raises:

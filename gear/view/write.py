@@ -12,6 +12,7 @@ from urllib.parse import quote
 from gear.dataset.files import explained, refuse_folder
 from gear.dataset.reading import Dataset
 from gear.plugins.datasets import open_dataset
+from gear.values.counted import counted
 from gear.values.progress import Progress
 from gear.values.serial import Json
 from gear.view.build import Builder, fitting_scale
@@ -45,7 +46,7 @@ class ViewReport:
         """One line for a person, and one for the first problem if there are any."""
         size = f"{self.size_bytes / MEGABYTE:.1f} MB"
         scaled = "" if self.scale == 1 else f", pictures at {self.scale:.0%} of their width"
-        text = f"{self.path}: {self.samples} samples, {size}{scaled}"
+        text = f"{self.path}: {counted(self.samples, 'sample')}, {size}{scaled}"
         if self.problems:
             index, what = self.problems[0]
             text += f"\n{len(self.problems)} not shown in full; first, sample {index}: {what}"

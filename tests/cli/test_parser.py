@@ -14,7 +14,7 @@ import pytest
 
 from gear.cli import doctor
 from gear.cli.device import add_device
-from gear.cli.main import main
+from gear.cli.main import COMMANDS, main
 from gear.values.errors import GearError
 
 
@@ -135,3 +135,10 @@ def test_a_bug_keeps_its_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(doctor, "run", broken)
     with pytest.raises(ZeroDivisionError):
         main(["doctor"])
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh"])
+def test_completion_knows_every_command_and_its_flags(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["completion", shell]) == 0
+    script = capsys.readouterr().out
+    assert all(name in script for name in COMMANDS) and "--calibration-patched" in script

@@ -20,7 +20,7 @@ def report(metrics: dict[str, Estimate]) -> EvaluateReport:
 def test_it_says_how_far_perfect_predictions_come_where_that_is_not_all_the_way() -> None:
     metrics = {"car_r11": Estimate(value=0.5), "car_r40": Estimate(value=0.05, ceiling=0.075)}
     lines = table(report(metrics)).splitlines()
-    assert lines[-1] == "perfect predictions would come to car_r40 0.075 in test-none-0123"
+    assert lines[-1] == "perfect predictions would come to car_r40 0.075 in data"
     assert not any("perfect" in line for line in table(report({"car_r11": Estimate(value=0.5)})).splitlines())
 
 
@@ -29,9 +29,7 @@ def test_metrics_of_one_beginning_without_any_value_are_named_once() -> None:
         "car_r40": Estimate(value=0.5), "car_r11": Estimate(value=NAN), "bus_r40": Estimate(value=NAN),
         "van_r11": Estimate(value=NAN), "van_r40": Estimate(value=NAN),
     }  # fmt: skip
-    assert table(report(metrics)).splitlines()[-1] == (
-        "nothing to measure for car_r11, bus_r40, van_* in test-none-0123"
-    )
+    assert table(report(metrics)).splitlines()[-1] == ("nothing to measure for car_r11, bus_r40, van_* in data")
 
 
 def test_a_ceiling_is_written_where_there_is_one() -> None:

@@ -42,8 +42,15 @@ def test_networks_are_listed_with_what_is_published(packages: Path, capsys: pyte
     assert ddrnet["shipped"] is None and ddrnet["missing"] == []
     assert all("semseg" in entry["tasks"] for entry in listed.values())
     assert main(["models", "--task", "semseg"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 100
+    (line,) = [line for line in lines if line.startswith("ddrnet23_slim")]
+    assert line.split()[:5] == ["ddrnet23_slim", "semseg", "5.7", "M", "published"]
+    assert main(["models", "show", "ddrnet23_slim"]) == 0
     text = capsys.readouterr().out
-    assert "5.7 M parameters" in text and "shipped: none" in text
+    assert "5.7 M parameters" in text and "shipped    none" in text
+    assert main(["models", "show", "ddrnet23_slin"]) == 2 and "did you mean ddrnet23_slim?" in capsys.readouterr().err
+    assert main(["models", "show"]) == 2 and "needs a name" in capsys.readouterr().err
     assert main(["models", "--task", "semsag"]) == 2
     assert "did you mean semseg?" in capsys.readouterr().err
 
@@ -70,9 +77,12 @@ def test_reference_weights_are_shown_and_marked_when_the_look_changed(
     assert fresh["look_hash"] == now.hash and fresh["look_is_current"] is True and fresh["look_changes"] == []
     assert stale["look_is_current"] is False and stale["look_changes"] == ["assets of town10"]
     assert main(["models"]) == 0
-    text = capsys.readouterr().out
-    assert "miou 0.625; look is current" in text
-    assert "trained on another look (assets of town10 changed)" in text
+    lines = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}
+    assert "shipped, old look" in lines["bisenet_x39"] and "old look" not in lines["ddrnet23_slim"]
+    assert main(["models", "show", "ddrnet23_slim"]) == 0
+    assert "miou 0.625; look is current" in capsys.readouterr().out
+    assert main(["models", "show", "bisenet_x39"]) == 0
+    assert "trained on another look (assets of town10 changed)" in " ".join(capsys.readouterr().out.split())
 
 
 def test_weights_that_do_not_state_their_look_are_not_judged(packages: Path) -> None:
@@ -89,7 +99,9 @@ def test_what_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch, capsys:
     monkeypatch.setattr(models, "catalogue", lambda: dataclasses.replace(found, found=(needy,)))
     assert list_models()[0].missing == ("no_such_module.part",)
     assert main(["models"]) == 0
-    assert "not usable: needs no_such_module.part" in capsys.readouterr().out
+    assert "needs no_such_module.part" in capsys.readouterr().out
+    assert main(["models", "show", "ddrnet23_slim"]) == 0
+    assert "not usable  needs no_such_module.part" in capsys.readouterr().out
 
 
 def test_listing_never_imports_torch() -> None:

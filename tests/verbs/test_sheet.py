@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+import gear
 from gear.config.nodes import parse_text
 from gear.plugins import manager
 from gear.plugins.build import build_task
@@ -52,3 +54,10 @@ def test_a_third_partys_preview_that_is_no_picture_is_named(
     monkeypatch.setattr(DepthTask, "preview", lambda *_: given)
     with pytest.raises(PluginError, match=r"depth \(mujoco-gear-2 1\.2\) failed at preview of sample 0: .*" + message):
         contact_sheet(tmp_path)
+
+
+def test_datasets_show_themselves_in_a_notebook(small: Callable[..., Path]) -> None:
+    dataset = gear.open_dataset(small("semseg"))
+    assert repr(dataset).startswith("Dataset(") and "task='semseg'" in repr(dataset) and len(repr(dataset)) < 300
+    page = dataset._repr_html_()
+    assert page.count("<tr>") == min(len(dataset), 4) and page.count("data:image/jpeg;base64,") >= len(dataset)

@@ -31,7 +31,7 @@ def choose_models(names: Sequence[str], settings: Iterable[str], datasets: Seque
     """
     if not names:
         raise GearError("name a model to attack: --model NAME (gear plugins --kind model lists them)")
-    chosen = [chosen_model(name, settings) for name in names]
+    chosen = [chosen_model(name, settings, FLAG.strip()) for name in names]
     if len({one.found.full_name for one in chosen}) < len(names):
         raise GearError(f"a model is named twice: {', '.join(names)}")
     for model in chosen:

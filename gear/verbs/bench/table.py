@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from gear.measuring.text_table import number_table
 from gear.verbs.bench.report import BenchReport, Result, TaskResult
 from gear.verbs.evaluate.report import Pool
-from gear.verbs.evaluate.table import aligned, number, shown
+from gear.verbs.evaluate.table import number, shown
 
 ALONE = "-"
 """What stands where there is no defense."""
@@ -14,7 +15,7 @@ ALONE = "-"
 
 def text(report: BenchReport) -> str:
     """All tasks, then what the metrics are of."""
-    parts = ["\n".join([title(task), *aligned(columns(task))]) for task in report.tasks]
+    parts = ["\n".join([title(task), *number_table(columns(task))]) for task in report.tasks]
     return "\n\n".join([*parts, "\n".join([legend(), *report.facts["notes"]])]) + "\n"
 
 

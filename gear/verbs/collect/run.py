@@ -16,6 +16,7 @@ from gear.config.dump import to_plain
 from gear.config.load import load_collection
 from gear.dataset.store import Store
 from gear.plugins.build import blamed, build, find
+from gear.values.counted import counted
 from gear.values.progress import Progress, Warn
 from gear.values.serial import Json, to_json
 
@@ -40,7 +41,7 @@ class CollectReport:
         """One line for a person."""
         kept = self.samples - self.made
         resumed = f" ({kept} were there already)" if kept else ""
-        return f"{self.root}: {self.samples} samples in split {self.split!r}{resumed}"
+        return f"{self.root}: {counted(self.samples, 'sample')} in split {self.split!r}{resumed}"
 
 
 def collect(

@@ -1,34 +1,49 @@
-"""The table that a person reads."""
+"""An evaluation as a table of plain text."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from gear.measuring.scoring import TASK
+from gear.measuring.text_table import WIDTH, number_table
 from gear.verbs.evaluate.report import Difference, Estimate, EvaluateReport, RowReport
 
 COLUMNS, FURTHER = 4, 2
 """Metrics that are shown, of the task's own and of each report; all are in results.json."""
 
+LABEL_LENGTH = 36
+"""Characters of a row's label."""
 
-def table(report: EvaluateReport) -> str:
-    """Datasets as rows, each report's first metrics as columns, twins' differences below the dataset."""
+
+def table(report: EvaluateReport, *, width: int = WIDTH) -> str:
+    """Datasets as rows, each report's first metrics as columns, twins' differences below the dataset.
+
+    Args:
+        report: what was found.
+        width: characters of a line of the table; columns that do not fit follow in further blocks.
+    """
     columns = _columns(report)
+    labels = row_labels(report.rows)
     head = ["", "samples", *(metric_title(*column) for column in columns), "model s", "defense s", "mask IoU", "AUROC"]
     lines = []
     for row in report.rows:
-        lines.append(_row(row, columns))
+        lines.append([labels[row.name], *_row(row, columns)])
         lines += [_difference(one, report, columns) for one in report.differences if one.row == row.name]
     for pooled in report.together:
         metrics = [shown(pooled.metrics.get(name, {}).get(metric)) for name, metric in columns]
         lines.append([f"all with patch {pooled.patch}", str(pooled.samples), *metrics, "", "", "", ""])
     used = [i for i, title in enumerate(head) if title in ("", "samples") or any(line[i] for line in lines)]
-    text = aligned([[line[i] for i in used] for line in [head, *lines]])
+    text = number_table([[line[i] for i in used] for line in [head, *lines]], width=width)
     guarded = report.facts["defense"]
     title = f"{report.facts['task']['name']}: {report.facts['model']['name']}"
     title += f" guarded by {guarded['name']}" if guarded else ""
-    notes = [*_paired(report), *_limited(report, columns), *_absent(report), *report.facts.get("notes", [])]
+    notes = [
+        *_paired(report, labels),
+        *_limited(report, columns, labels),
+        *_absent(report, labels),
+        *report.facts.get("notes", []),
+    ]
     return "\n".join([title, *text, *notes]) + "\n"
 
 
@@ -50,7 +65,7 @@ def _row(row: RowReport, columns: Iterable[tuple[str, str]]) -> list[str]:
     metrics = [shown(row.metrics.get(report, {}).get(name)) for report, name in columns]
     defended = f"{row.cost['defense_s']:.3f}" if row.cost["defense_s"] else ""
     mask = number(row.defense.get("mask_iou")) if "mask_iou" in row.defense else ""
-    return [row.name, str(row.samples), *metrics, f"{row.cost['model_s']:.3f}", defended, mask, ""]
+    return [str(row.samples), *metrics, f"{row.cost['model_s']:.3f}", defended, mask, ""]
 
 
 def _difference(one: Difference, report: EvaluateReport, columns: Iterable[tuple[str, str]]) -> list[str]:
@@ -59,7 +74,26 @@ def _difference(one: Difference, report: EvaluateReport, columns: Iterable[tuple
     return [f"  minus {against.patch}", "", *metrics, "", "", "", shown(one.auroc)]
 
 
-def _paired(report: EvaluateReport) -> list[str]:
+def row_labels(rows: Sequence[RowReport]) -> dict[str, str]:
+    """What each row is called in the table: the folder that the user gave, with its split where one folder has several.
+
+    Args:
+        rows: of the table.
+
+    Returns:
+        Labels by the row's name; long paths keep their last `LABEL_LENGTH` characters.
+    """
+    folders = Counter(row.dataset for row in rows)
+    labels = {}
+    for row in rows:
+        path = str(row.dataset)
+        short = path if len(path) <= LABEL_LENGTH else "…" + path[1 - LABEL_LENGTH :]
+        labels[row.name] = f"{short}:{row.facts['split']}" if folders[row.dataset] > 1 else short
+    shared = Counter(labels.values())
+    return {name: name if shared[label] > 1 else label for name, label in labels.items()}
+
+
+def _paired(report: EvaluateReport, labels: Mapping[str, str]) -> list[str]:
     """What twins change in single samples, and how often chance alone would change as much."""
     lines = []
     for one in report.differences:
@@ -70,7 +104,7 @@ def _paired(report: EvaluateReport) -> list[str]:
             for metric, test in list(metrics.items())[: COLUMNS if name == TASK else FURTHER]
             if test.pairs
         ]
-        lines += [f"  {one.row} minus {against.patch}: {', '.join(tests)}"] if tests else []
+        lines += [f"  {labels[one.row]} minus {against.patch}: {', '.join(tests)}"] if tests else []
     return ["mean change of a sample (p: how often chance alone changes as much)", *lines] if lines else []
 
 
@@ -90,9 +124,9 @@ def number(value: float | None, *, is_signed: bool = False) -> str:
     return f"{value:{sign}.3f}" if abs(value) < 100 else f"{value:{sign}.1f}"
 
 
-def _limited(report: EvaluateReport, columns: Iterable[tuple[str, str]]) -> list[str]:
+def _limited(report: EvaluateReport, columns: Iterable[tuple[str, str]], labels: Mapping[str, str]) -> list[str]:
     """Columns in which not even perfect predictions would come to 1, because a dataset has too little to be found."""
-    rows = [(row.name, row.metrics) for row in report.rows]
+    rows = [(labels[row.name], row.metrics) for row in report.rows]
     rows += [(f"all with patch {pooled.patch}", pooled.metrics) for pooled in report.together]
     lines = []
     for name, metrics in rows:
@@ -102,14 +136,16 @@ def _limited(report: EvaluateReport, columns: Iterable[tuple[str, str]]) -> list
     return lines
 
 
-def _absent(report: EvaluateReport) -> list[str]:
+def _absent(report: EvaluateReport, labels: Mapping[str, str]) -> list[str]:
     """What had nothing to be measured on; rows and reports that agree share a line."""
     where: dict[tuple[str, ...], list[str]] = {}
     for row in report.rows:
         for name, metrics in row.metrics.items():
             missing = _families([metric for metric, one in metrics.items() if one.value != one.value], metrics)
             if missing:
-                where.setdefault(missing, []).append(row.name if name == TASK else f"{row.name} ({name})")
+                where.setdefault(missing, []).append(
+                    labels[row.name] if name == TASK else f"{labels[row.name]} ({name})"
+                )
     return [f"nothing to measure for {', '.join(missing)} in {', '.join(rows)}" for missing, rows in where.items()]
 
 
@@ -123,9 +159,3 @@ def _families(missing: Sequence[str], every: Iterable[str]) -> tuple[str, ...]:
         if (head := name.partition("_")[0])
     ]
     return tuple(dict.fromkeys(short))
-
-
-def aligned(cells: Sequence[Sequence[str]]) -> list[str]:
-    """Lines whose columns stand below each other."""
-    widths = [max(len(line[i]) for line in cells) for i in range(len(cells[0]))]
-    return ["  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in cells]

@@ -69,6 +69,11 @@ def town_names() -> list[str]:
     return sorted(path.stem for path in (data_dir("mjcf") / "towns").glob("*.xml"))
 
 
+def towns() -> tuple[Town, ...]:
+    """The towns that come with gear, with their scenes; no mesh is compiled."""
+    return tuple(read_town(name) for name in town_names())
+
+
 def read_town(town: str | Path, scenes: str | Path | None = None) -> Town:
     """Reads a town's lanes and its scenes.
 

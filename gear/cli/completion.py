@@ -1,0 +1,28 @@
+"""`gear completion`."""
+
+from __future__ import annotations
+
+import argparse
+
+SHELLS = ("bash", "zsh")
+
+EXAMPLE = """examples:
+  gear completion bash > ~/.local/share/bash-completion/completions/gear
+  gear completion zsh > "${fpath[1]}/_gear"
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the command's arguments."""
+    parser.epilog = EXAMPLE
+    parser.add_argument("shell", choices=SHELLS, help="whose script is printed")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Prints a script that completes gear's commands and flags."""
+    import shtab
+
+    from gear.cli.main import full_parser
+
+    print(shtab.complete(full_parser(), shell=args.shell))
+    return 0

@@ -1,0 +1,39 @@
+"""Datasets and samples as HTML, for notebooks."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable, Mapping
+from html import escape
+
+import cv2
+
+from gear.values.frames import UInt8Image
+
+WIDTH_PX = 320
+"""Width of a picture in a notebook."""
+
+QUALITY = 85
+"""Of the JPEG files that the page holds."""
+
+
+def preview_table(title: str, rows: Iterable[tuple[str, Mapping[str, UInt8Image]]]) -> str:
+    """A table of small pictures as one HTML fragment that needs no files.
+
+    Args:
+        title: line above the table.
+        rows: caption and pictures by name, (H, W, 3) uint8 RGB, per sample.
+    """
+    lines = [f"<div><b>{escape(title)}</b><table>"]
+    for caption, pictures in rows:
+        cells = "".join(f"<td>{_image(name, rgb)}</td>" for name, rgb in pictures.items())
+        lines.append(f"<tr><td>{escape(caption)}</td>{cells}</tr>")
+    return "".join([*lines, "</table></div>"])
+
+
+def _image(name: str, rgb: UInt8Image) -> str:
+    height_px = max(round(rgb.shape[0] * WIDTH_PX / rgb.shape[1]), 1)
+    small = cv2.resize(rgb, (WIDTH_PX, height_px), interpolation=cv2.INTER_AREA)
+    data = cv2.imencode(".jpg", small[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes()
+    source = f"data:image/jpeg;base64,{base64.b64encode(data).decode()}"
+    return f'<img alt="{escape(name)}" title="{escape(name)}" src="{source}">'

@@ -1,0 +1,69 @@
+"""Tables as plain text that fit a terminal, drawn by rich."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+
+WIDTH = 100
+"""Characters a line, where the output is no terminal."""
+
+GAP = 2
+"""Spaces between columns."""
+
+SHORTEST = 20
+"""Characters that the last column of a list has at least."""
+
+
+def text_table(
+    head: Sequence[str], rows: Sequence[Sequence[str]], *, width: int = WIDTH, wrap: bool = False
+) -> list[str]:
+    """A table for lists of things with a description in the last column.
+
+    Args:
+        head: titles of the columns.
+        rows: cells, one sequence as long as `head` per row. The last column takes the room that the others leave.
+        width: most characters of a line.
+        wrap: continue a long description on the next line instead of cutting it.
+
+    Returns:
+        Lines without trailing spaces.
+    """
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, padding=(0, GAP, 0, 0), header_style="", expand=False)
+    widths = [max(len(row[i]) for row in (head, *rows)) for i in range(len(head) - 1)]
+    widths.append(max(width - sum(widths) - GAP * len(head), SHORTEST))
+    for title, column_width in zip(head, widths, strict=True):
+        table.add_column(title, width=column_width, no_wrap=not wrap, overflow="fold" if wrap else "ellipsis")
+    for row in rows:
+        table.add_row(*row)
+    out = io.StringIO()
+    Console(file=out, width=width, color_system=None, markup=False, highlight=False, emoji=False).print(table)
+    return [line.rstrip() for line in out.getvalue().splitlines()]
+
+
+def number_table(cells: Sequence[Sequence[str]], *, width: int = WIDTH) -> list[str]:
+    """A table of numbers that is never wrapped: columns that do not fit follow in further blocks.
+
+    Args:
+        cells: the titles, then the rows, all of one length. The first column names the row and begins each block.
+        width: most characters of a line; a single column may be wider.
+
+    Returns:
+        Lines without trailing spaces; blocks are separated by an empty line.
+    """
+    widths = [max(len(row[i]) for row in cells) for i in range(len(cells[0]))]
+    blocks: list[list[int]] = [[0]]
+    for i in range(1, len(widths)):
+        used = sum(widths[k] + GAP for k in blocks[-1])
+        if len(blocks[-1]) > 1 and used + widths[i] > width:
+            blocks.append([0])
+        blocks[-1].append(i)
+    lines: list[str] = []
+    for block in blocks:
+        lines += [""] * bool(lines)
+        rows = [row for row in cells if row is cells[0] or len(blocks) == 1 or any(row[i] for i in block[1:])]
+        lines += [(" " * GAP).join(row[i].ljust(widths[i]) for i in block).rstrip() for row in rows]
+    return lines

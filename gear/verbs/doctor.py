@@ -1,0 +1,94 @@
+"""`gear.doctor`: which renderers work on this machine, and on which device and driver."""
+
+from __future__ import annotations
+
+import dataclasses
+import platform
+from dataclasses import dataclass
+from importlib import metadata
+
+from gear.render.probing import probe
+from gear.render.registry import RENDERERS, describe
+from gear.values.errors import BackendError
+from gear.values.machine import cores
+from gear.values.serial import Json
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RendererCheck:
+    """What one renderer did with a small reference frame.
+
+    Attributes:
+        name: raster, filament or classic.
+        works: whether it returned the frame.
+        facts: what it is, and either its device, driver and times in seconds, or `problem` and `remedy`; JSON.
+    """
+
+    name: str
+    works: bool
+    facts: Json
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DoctorReport:
+    """What was found.
+
+    Attributes:
+        machine: Python, packages, system and the number of usable cores; JSON.
+        renderers: one check per renderer.
+    """
+
+    machine: Json
+    renderers: tuple[RendererCheck, ...]
+
+    @property
+    def works(self) -> bool:
+        """Whether at least one of the renderers works."""
+        return any(check.works for check in self.renderers)
+
+    def as_json(self) -> Json:
+        """As JSON."""
+        checks = {check.name: {"works": check.works, **check.facts} for check in self.renderers}
+        return {**self.machine, "renderers": checks}
+
+    def summary(self) -> str:
+        """Several lines of text: the machine, then every renderer with its facts."""
+        lines = [f"{key}: {value}" for key, value in self.machine.items()]
+        for check in self.renderers:
+            lines.append(f"{check.name}: {'works' if check.works else 'does not work'}")
+            lines += [f"  {key.replace('_', ' '):12} {value}" for key, value in check.facts.items()]
+        return "\n".join(lines)
+
+
+def doctor(renderer: str | None = None) -> DoctorReport:
+    """Renders a reference frame with each renderer.
+
+    Args:
+        renderer: only this one: raster, filament or classic.
+
+    Raises:
+        UnknownNameError: there is no renderer of that name.
+    """
+    machine = {
+        "gear": metadata.version("mujoco-gear"),
+        "python": platform.python_version(),
+        "mujoco": metadata.version("mujoco"),
+        "system": f"{platform.system()} {platform.machine()}",
+        "cores": cores(),
+    }
+    names = RENDERERS if renderer is None else (renderer,)
+    return DoctorReport(machine=machine, renderers=tuple(_check(name) for name in names))
+
+
+def _check(name: str) -> RendererCheck:
+    about = describe(name)
+    try:
+        result = probe(name)
+    except BackendError as error:
+        return RendererCheck(
+            name=name, works=False, facts={"about": about, "problem": error.problem, "remedy": error.remedy}
+        )
+    facts = dataclasses.asdict(result.info)
+    facts.pop("name")
+    times = {"start_s": round(result.start_s, 3), "frame_s": round(result.frame_s, 4)}
+    return RendererCheck(name=name, works=True, facts={"about": about, **facts, "sha256": result.sha256, **times})
