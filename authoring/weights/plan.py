@@ -50,14 +50,23 @@ TRAINING_OPTIONS: dict[str, tuple[str, ...]] = {
     "detect2d": (
         "options.width_px=800",
         "options.height_px=480",
+        "options.visibility.preset=carla_gear",
         "options.visibility.min_box_area_px2=324",
         "options.visibility.min_visible_px=36",
     ),
-    "stereo3d": (),
-    "depth": (),
+    "stereo3d": ("options.visibility.preset=carla_gear",),
+    "depth": ("options.width_px=1224", "options.height_px=370"),
 }
-"""Smaller pictures where labels allow it: semantic segmentation at three quarters, detection at three fifths, with
-limits of visibility to match. Stereo and depth are small as they are."""
+"""The options that the shipped networks' training data had. Segmentation has pictures of three quarters of the task's
+size, detection of three fifths, with limits of visibility to match."""
+
+HELD_OUT_OPTIONS: dict[str, tuple[str, ...]] = {
+    "semseg": (),
+    "detect2d": ("options.visibility.preset=carla_gear",),
+    "stereo3d": ("options.visibility.preset=carla_gear",),
+    "depth": ("options.width_px=1224", "options.height_px=370"),
+}
+"""The options of the data that the cards' figures were measured on."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,7 +140,7 @@ def training(task: str, samples: int) -> list[Collection]:
 
 
 def held_out(task: str, samples: int = HELD_OUT_SAMPLES, *, first_seed: int = FIRST_HELD_OUT_SEED) -> list[Collection]:
-    """What the weights are measured on, at the task's own size: both scenes, in a known weather and in the other."""
+    """The collections that weights are measured on: both held-out scenes, each in a known and in the held-out weather."""
     pairs = [(place, weather) for place in HELD_OUT_SCENES for weather in ("ClearNoon", HELD_OUT_WEATHER)]
     return [
         Collection(
@@ -143,7 +152,7 @@ def held_out(task: str, samples: int = HELD_OUT_SAMPLES, *, first_seed: int = FI
             patch="none",
             seed=first_seed + number,
             samples=max(1, round(samples / len(pairs))),
-            settings=(),
+            settings=HELD_OUT_OPTIONS[task],
         )
         for number, ((town, scene), weather) in enumerate(pairs)
     ]

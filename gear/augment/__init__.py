@@ -1,5 +1,5 @@
-"""Augmentation of training samples: pure functions from a sample and a generator to a sample. No torch.
+"""Augmentation of training samples: pure functions from a sample and a random generator to a sample. No torch.
 
-What moves pixels moves the ground truth with them, exactly; what changes colours alone works for every task. A third
-party's samples are moved if its package says how (`gear.augment.registry.register`), and otherwise only coloured.
+A task registers how its samples are mirrored and cropped (`gear.augment.registry.register`); its ground truth moves
+with the pixels. Colours change for every task. Samples of a class without a registered geometry are only recoloured.
 """

@@ -8,12 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from gear.augment.depth import cut_depth
 from gear.augment.geometry import draw_window, whole_window
 from gear.augment.pictures import Colours, recolour
 from gear.augment.registry import geometry_of
 from gear.contracts.tasks import Sample, SampleT
-from gear.plugins.tasks.depth import DepthSample
 from gear.values.errors import FieldError, GearError
 
 
@@ -78,8 +76,9 @@ def augment(sample: SampleT, how: Augmentation, framing: Framing, rng: np.random
         GearError: crops or scales are wanted of a third party's samples that nobody can move.
     """
     moved: Any = _moved(sample, how, framing, rng)
-    if isinstance(moved, DepthSample) and rng.random() < how.cut_depth:
-        moved = cut_depth(moved, rng)
+    geometry = geometry_of(sample)
+    if geometry is not None and geometry.cut_depth is not None and rng.random() < how.cut_depth:
+        moved = geometry.cut_depth(moved, rng)
     if rng.random() < how.colour:
         moved = dataclasses.replace(moved, images=recolour(moved.images, how.colours, rng))
     return moved  # type: ignore[no-any-return]

@@ -55,21 +55,23 @@ class Window:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Geometry(Generic[SampleT]):
-    """How one task's samples are moved. Neither function changes what it is given.
+    """How one task's samples are moved. No function changes the sample that it is given.
 
     Attributes:
-        flip: the sample in a mirror that stands across the road: left is right.
-        cut: what a window shows of it.
-        is_centred: whether windows must share the picture's middle, because the ground truth needs a principal point
-            that lies there.
-        shrink: what a camera with fewer pixels would have taken, from a window that is the whole picture; `cut` where
-            that is the same.
+        flip: gives the sample mirrored, left to right.
+        cut: gives the part of the sample that a window shows.
+        is_centred: whether a window must share the picture's centre, because the ground truth needs its principal point
+            there.
+        shrink: gives the sample that a camera with fewer pixels would take; its window is the whole picture. None where
+            `cut` does that.
+        cut_depth: gives the sample with its depth pasted into the picture (CutDepth); None for tasks without depth.
     """
 
     flip: Callable[[SampleT], SampleT]
     cut: Callable[[SampleT, Window], SampleT]
     is_centred: bool = False
     shrink: Callable[[SampleT, Window], SampleT] | None = None
+    cut_depth: Callable[[SampleT, np.random.Generator], SampleT] | None = None
 
 
 def whole_window(size_px: tuple[int, int], share: float) -> Window:
@@ -154,6 +156,23 @@ def flip_box(box_px: BoxPx, width_px: int) -> BoxPx:
     """A box in edge pixels, mirrored."""
     left, top, right, bottom = box_px
     return (width_px - right, top, width_px - left, bottom)
+
+
+def clipped(box_px: BoxPx, frame_px: BoxPx) -> BoxPx:
+    """The part of a box inside another one; where they do not meet, its right side lies left of its left one, or its
+    bottom above its top."""
+    return (
+        max(box_px[0], frame_px[0]),
+        max(box_px[1], frame_px[1]),
+        min(box_px[2], frame_px[2]),
+        min(box_px[3], frame_px[3]),
+    )
+
+
+def box_area(box_px: BoxPx) -> float:
+    """Square pixels of a box; 0 for one whose sides are in the wrong order."""
+    left, top, right, bottom = box_px
+    return max(0.0, right - left) * max(0.0, bottom - top)
 
 
 def _part(array: npt.NDArray[Any], window: Window, fill: float) -> npt.NDArray[Any]:

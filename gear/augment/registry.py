@@ -1,28 +1,18 @@
-"""Which samples can be moved, and how; third parties add theirs."""
+"""How samples of each class are moved; every task registers its own, in its own file."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from gear.augment import depth, detect2d, semseg, stereo3d
 from gear.augment.geometry import Geometry, SampleT
 from gear.contracts.tasks import Sample
-from gear.plugins.tasks.depth import DepthSample
-from gear.plugins.tasks.detect2d import Detect2dSample
-from gear.plugins.tasks.semseg import SemsegSample
-from gear.plugins.tasks.stereo3d import Stereo3dSample
 
-_GEOMETRIES: dict[type[Sample], Geometry[Any]] = {
-    SemsegSample: semseg.GEOMETRY,
-    DepthSample: depth.GEOMETRY,
-    Detect2dSample: detect2d.GEOMETRY,
-    Stereo3dSample: stereo3d.GEOMETRY,
-}
+_GEOMETRIES: dict[type[Sample], Geometry[Any]] = {}
 
 
 def register(kind: type[SampleT], geometry: Geometry[SampleT]) -> None:
-    """Says how samples of a class are moved. Call it where a package's task is built: it then holds whenever there are
-    such samples.
+    """Registers how samples of a class are moved. Call it in the module that defines the class, so that it holds
+    wherever there are such samples.
 
     Raises:
         ValueError: the class has another geometry already.
@@ -32,8 +22,8 @@ def register(kind: type[SampleT], geometry: Geometry[SampleT]) -> None:
 
 
 def geometry_of(sample: Sample) -> Geometry[Any] | None:
-    """How a sample is moved, or None where nobody said.
+    """How a sample is moved; None where no geometry is registered for its class.
 
-    A subclass does not inherit: it may have fields that its parent's geometry would leave where they were.
+    A subclass does not inherit the geometry of its parent: it may have fields that the parent's geometry does not move.
     """
     return _GEOMETRIES.get(type(sample))

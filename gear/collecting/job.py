@@ -27,7 +27,7 @@ from gear.render.probing import renderer_info
 from gear.values.errors import ConfigError
 from gear.values.scene import Weather
 from gear.values.serial import Json, to_json
-from gear.world.assets.asset_hash import assets_digest
+from gear.world.assets.library.asset_hash import assets_digest
 from gear.world.scene_spec import SceneSpec
 
 
@@ -43,7 +43,8 @@ class Job:
         patch: pictures of this run.
         root: folder of the dataset.
         plan: what decides the bytes.
-        renderer: who renders.
+        renderer: what renders, on which device.
+        task_notes: what the user may not have meant by the task's options.
     """
 
     config: CollectionConfig
@@ -54,14 +55,16 @@ class Job:
     root: Path
     plan: Plan
     renderer: RendererInfo
+    task_notes: tuple[str, ...] = ()
 
     @property
-    def note(self) -> str:
-        """What the user may not have meant, or nothing: a patch in a foreign scene is an experiment or a slip."""
+    def notes(self) -> tuple[str, ...]:
+        """What the user may not have meant, one line each: options of the task, and patches of another scene."""
         here = f"{self.plan.info.town}/{self.plan.info.scene}"
         if not self.patch.made_for or here in self.patch.made_for:
-            return ""
-        return f"the patches of {self.patch.source} were made for {', '.join(self.patch.made_for)}; this is {here}"
+            return self.task_notes
+        scenes = ", ".join(self.patch.made_for)
+        return (*self.task_notes, f"the patches of {self.patch.source} were made for {scenes}; this is {here}")
 
     @property
     def frames(self) -> int:
@@ -84,6 +87,8 @@ def resolve(config: CollectionConfig) -> Job:
     info = SplitInfo(
         town=library.town_name, scene=config.scene, split=config.split, seed=split.seed, patch_label=patch.label
     )
+    with blamed(named.task, "notes"):
+        task_notes = tuple(spec.notes(named.options))
     renderer = renderer_info(config.renderer)
     response = response_for(renderer.name, weather)
     content: Json = {
@@ -120,6 +125,7 @@ def resolve(config: CollectionConfig) -> Job:
         root=dataset_root(config, info, weather),
         plan=plan,
         renderer=renderer,
+        task_notes=task_notes,
     )
 
 

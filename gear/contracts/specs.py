@@ -40,6 +40,11 @@ class Spec(Generic[ConfigT, ProductT]):
     protocol: int = PROTOCOL_VERSION
 
 
+def no_notes(_options: Any) -> tuple[str, ...]:
+    """Of a task that has nothing to point out."""
+    return ()
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TaskSpec(Spec[ConfigT, Task[Any, Any]]):
     """A task: a dataset format with its ground truth.
@@ -51,6 +56,7 @@ class TaskSpec(Spec[ConfigT, Task[Any, Any]]):
         metric: the evaluator's metric by which training chooses among checkpoints, or one of a report's as
             `<report>.<metric>`; "" chooses by the loss.
         less_is_better: whether that metric is an error.
+        notes: from the options, what the user may not have meant: lines that are shown once when collecting begins.
     """
 
     views: tuple[str, ...]
@@ -58,6 +64,7 @@ class TaskSpec(Spec[ConfigT, Task[Any, Any]]):
     original_name: str = ""
     metric: str = ""
     less_is_better: bool = False
+    notes: Callable[[ConfigT], tuple[str, ...]] = no_notes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -131,6 +131,13 @@ def clip_box(box_px: BoxPx, intrinsics: Intrinsics) -> BoxPx | None:
     return (left, top, right, bottom) if right > left and bottom > top else None
 
 
+def from_edge_pixels(box_px: BoxPx, intrinsics: Intrinsics) -> BoxPx:
+    """A box in edge pixels as a label file has it: in index pixels, inside the centres of the outermost pixels."""
+    left, top, right, bottom = (side - 0.5 for side in box_px)
+    most_x, most_y = intrinsics.width_px - 1.0, intrinsics.height_px - 1.0
+    return (max(0.0, left), max(0.0, top), min(most_x, right), min(most_y, bottom))
+
+
 def truncation(box_px: BoxPx, clipped_px: BoxPx) -> float:
     """Share of a projected box that lies outside the picture, 0..1."""
     whole = (box_px[2] - box_px[0]) * (box_px[3] - box_px[1])
@@ -138,10 +145,22 @@ def truncation(box_px: BoxPx, clipped_px: BoxPx) -> float:
     return min(1.0, max(0.0, 1.0 - inside / whole)) if whole > 0 else 0.0
 
 
-def occlusion_level(occluded_fraction: float) -> int:
-    """0 for at least 80 % visible of what lies in the picture, 1 for at least 50 %, 2 for less."""
-    visible = 1.0 - occluded_fraction
-    return 0 if visible >= 0.8 else 1 if visible >= 0.5 else 2
+OCCLUSION_LEVELS = (0.8, 0.5, 0.1)
+"""Least visible share of KITTI's levels 0, 1 and 2; the benchmark gives no numbers."""
+
+
+def occlusion_level(visible_fraction: float) -> int:
+    """KITTI's level of occlusion of an object.
+
+    Args:
+        visible_fraction: visible share of the silhouette inside the picture, 0..1.
+
+    Returns:
+        0 (fully visible) for at least 80 %, 1 (partly occluded) for at least 50 %, 2 (largely occluded) for at least
+        10 %, and 3 (unknown), which no level of the evaluation counts, for less.
+    """
+    below = (level for level, least in enumerate(OCCLUSION_LEVELS) if visible_fraction >= least)
+    return next(below, len(OCCLUSION_LEVELS))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -121,8 +121,31 @@ def _measure(
         amodal_px=in_image_px + outside_px,
         amodal_in_image_px=in_image_px,
         amodal_box=(float(box[0]), float(box[1]), float(box[2]), float(box[3])),
+        pictured_box=_refined(_tight(mask, inside), triangles_px) if in_image_px else None,
         mask=part.mask,
     )
+
+
+def _refined(box: Window, triangles_px: Array) -> BoxPx:
+    """A box of whole pixels with each side where the triangles end, to a fraction of a pixel.
+
+    A side stays between two pixels where the triangles end more than half a pixel away from it: the picture's border
+    cuts them there, or they end in a sliver that covers no pixel's centre.
+
+    Args:
+        box: the silhouette's, in the picture.
+        triangles_px: (T, 3, 2) corners in index pixels.
+
+    Returns:
+        The box in edge pixels.
+    """
+    whole = np.array(box, dtype=np.float64)
+    if len(triangles_px):
+        # The centre of the first pixel is 0 in index pixels and 0.5 in edge pixels.
+        exact = np.concatenate([triangles_px.min(axis=(0, 1)), triangles_px.max(axis=(0, 1))]) + 0.5
+        whole = np.where(np.abs(exact - whole) <= 0.5, exact, whole)
+    left, top, right, bottom = (float(side) for side in whole)
+    return (left, top, right, bottom)
 
 
 def _count_outside(triangles_px: Array, whole: Window, picture: Window) -> int:

@@ -1,57 +1,118 @@
-"""When an object counts as seen."""
+"""Which objects are labelled, which are regions to ignore, and which are left out."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from typing import ClassVar, Literal
 
 from gear.values.errors import FieldError
-from gear.values.ground_truth import ObjectTruth
+from gear.values.ground_truth import BoxPx, ObjectTruth
+
+Preset = Literal["kitti", "coco", "carla_gear"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VisibilityLimits:
-    """What an object must show to be labelled. One that shows less is marked as ignored, so that finding it is no
-    mistake and missing it none either; one with fewer than `min_pixels_px` visible pixels is left out altogether.
+    """What an object must show to be labelled. An object that shows less is a region to ignore: detecting it is no
+    mistake, and missing it is none either.
 
     Attributes:
-        max_distance_m: camera to the middle of its 3D box; CARLA-GeAR's 200 m.
-        min_box_area_px2: area of the tight box of its visible pixels; CARLA-GeAR's 900 px².
-        min_visible_fraction: share of its silhouette in the picture that nothing covers. What lies outside the
-            picture is not held against it: formats say that in a field of their own.
-        min_visible_px: visible pixels that a label needs, whatever the box around them.
-        min_pixels_px: visible pixels that it needs to be mentioned at all.
+        max_distance_m: from the camera to the middle of the object's 3D box; None for any distance.
+        min_height_px: height of the box that the format writes.
+        min_box_area_px2: area of the tight box of the visible pixels.
+        min_visible_fraction: visible share of the silhouette inside the picture, 0..1. The part outside the picture
+            does not count: formats have a field of their own for it.
+        min_visible_px: visible pixels that a label needs.
+        min_pixels_px: visible pixels that a region to ignore needs; an object with fewer is left out.
     """
 
-    max_distance_m: float = 200.0
-    min_box_area_px2: float = 900.0
-    min_visible_fraction: float = 0.1
-    min_visible_px: int = 100
+    max_distance_m: float | None = None
+    min_height_px: float = 0.0
+    min_box_area_px2: float = 0.0
+    min_visible_fraction: float = 0.0
+    min_visible_px: int = 0
     min_pixels_px: int = 4
 
     def __post_init__(self) -> None:
-        if self.max_distance_m <= 0:
+        if self.max_distance_m is not None and self.max_distance_m <= 0:
             raise FieldError("max_distance_m", f"must be above 0 m, got {self.max_distance_m:g}")
-        if self.min_box_area_px2 < 0:
-            raise FieldError("min_box_area_px2", f"must not be negative, got {self.min_box_area_px2:g}")
+        for name in ("min_height_px", "min_box_area_px2", "min_visible_px"):
+            if getattr(self, name) < 0:
+                raise FieldError(name, f"must not be negative, got {getattr(self, name):g}")
         if not 0 <= self.min_visible_fraction <= 1:
-            raise FieldError("min_visible_fraction", f"is a share, 0 to 1, got {self.min_visible_fraction:g}")
-        if self.min_visible_px < 0:
-            raise FieldError("min_visible_px", f"must not be negative, got {self.min_visible_px}")
+            raise FieldError("min_visible_fraction", f"must be a share, 0 to 1, got {self.min_visible_fraction:g}")
         if self.min_pixels_px < 1:
             raise FieldError("min_pixels_px", f"must be at least 1, got {self.min_pixels_px}")
 
     def mentions(self, truth: ObjectTruth) -> bool:
-        """Whether there is enough to see to say anything of it."""
+        """Whether the object is a label or at least a region to ignore."""
         return truth.visible_px >= self.min_pixels_px
 
-    def labels(self, truth: ObjectTruth, distance_m: float) -> bool:
-        """Whether it is labelled as an object."""
+    def labels(self, truth: ObjectTruth, box_px: BoxPx, distance_m: float) -> bool:
+        """Whether the object is labelled.
+
+        Args:
+            truth: the measured object.
+            box_px: the box that the format writes: left, top, right, bottom.
+            distance_m: from the camera to the middle of its 3D box.
+        """
         if truth.visible_box is None or not self.mentions(truth):
             return False
         left, top, right, bottom = truth.visible_box
         return (
-            distance_m <= self.max_distance_m
+            (self.max_distance_m is None or distance_m <= self.max_distance_m)
+            and box_px[3] - box_px[1] >= self.min_height_px
             and (right - left) * (bottom - top) >= self.min_box_area_px2
             and truth.uncovered_fraction >= self.min_visible_fraction
             and truth.visible_px >= self.min_visible_px
         )
+
+
+PRESETS: dict[Preset, VisibilityLimits] = {
+    "kitti": VisibilityLimits(min_height_px=25.0, min_visible_fraction=0.1),
+    "coco": VisibilityLimits(min_visible_px=100),
+    "carla_gear": VisibilityLimits(
+        max_distance_m=200.0, min_box_area_px2=900.0, min_visible_fraction=0.1, min_visible_px=100
+    ),
+}
+"""`kitti`: everything that a level of KITTI's evaluation counts. `coco`: everything with 100 visible pixels.
+`carla_gear`: the limits of the CARLA-GeAR paper, 200 m and 900 px², and what gear adds to them."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Visibility:
+    """Option of a task: a preset of limits and what differs from it.
+
+    Attributes:
+        preset: `kitti` labels objects from 25 px of height with a tenth of them visible, `coco` those with 100 visible
+            pixels, `carla_gear` those of the CARLA-GeAR paper: within 200 m, with a visible box of 900 px², a tenth of
+            them and 100 pixels visible.
+        max_distance_m: from the camera to the middle of the object's 3D box.
+        min_height_px: height of the box that the format writes.
+        min_box_area_px2: area of the tight box of the visible pixels.
+        min_visible_fraction: visible share of the silhouette inside the picture, 0 to 1.
+        min_visible_px: visible pixels that a label needs.
+        min_pixels_px: visible pixels that a region to ignore needs.
+    """
+
+    SHORTHAND: ClassVar[str] = "preset"
+
+    preset: Preset
+    max_distance_m: float | None = None
+    min_height_px: float | None = None
+    min_box_area_px2: float | None = None
+    min_visible_fraction: float | None = None
+    min_visible_px: int | None = None
+    min_pixels_px: int | None = None
+
+    def __post_init__(self) -> None:
+        self.limits()
+
+    def limits(self) -> VisibilityLimits:
+        """The preset's limits with the given ones in their place.
+
+        Raises:
+            FieldError: a limit is impossible.
+        """
+        given = {field.name: getattr(self, field.name) for field in fields(VisibilityLimits)}
+        return replace(PRESETS[self.preset], **{name: value for name, value in given.items() if value is not None})

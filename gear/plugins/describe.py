@@ -14,8 +14,8 @@ from gear.plugins.catalogue import PluginEntry
 from gear.plugins.text import printable
 
 COMMON = {field.name for field in dataclasses.fields(Spec)}
-ELSEWHERE = {"recipe", "published", "convert", "parameters", "starts"}
-"""What `training` and `gear models` say of a network."""
+ELSEWHERE = {"recipe", "published", "convert", "parameters", "starts", "notes"}
+"""Fields that `training`, `gear models` and `gear collect` show."""
 
 LONGEST_MEANING = 2000
 """Characters of an option's description."""
@@ -53,14 +53,19 @@ def training(spec: AnySpec) -> dict[str, Any]:
     return {"recipe": to_plain(spec.recipe), "starts": sorted(spec.starts)}
 
 
-def options(config: type[Any], prefix: str = "") -> list[dict[str, Any]]:
+def options(config: type[Any]) -> list[dict[str, Any]]:
     """Every option with its type, default, meaning and unit; nested ones with dots; JSON."""
-    defaults, meanings = config(), meanings_of(config)
+    return _options(config(), "")
+
+
+def _options(defaults: Any, prefix: str) -> list[dict[str, Any]]:
+    config = type(defaults)
+    meanings = meanings_of(config)
     result: list[dict[str, Any]] = []
     for field in dataclasses.fields(config):
         default, name = getattr(defaults, field.name), f"{prefix}{field.name}"
         if dataclasses.is_dataclass(default) and not isinstance(default, type):
-            result += options(type(default), f"{name}.")
+            result += _options(default, f"{name}.")
             continue
         kind = field.type if isinstance(field.type, str) else getattr(field.type, "__name__", str(field.type))
         unit = UNITS.get(field.name.rsplit("_", 1)[-1], "") if "_" in field.name else ""

@@ -26,6 +26,8 @@ class ObjectTruth:
         amodal_px: pixels that it would cover alone, inside and outside the picture.
         amodal_in_image_px: those of them inside the picture.
         amodal_box: tight box of the whole silhouette, may exceed the picture.
+        pictured_box: tight box of the silhouette inside the picture, to a fraction of a pixel; None if nothing of it
+            lies there.
         mask: (h, w) bool of the visible pixels inside `visible_box`.
     """
 
@@ -36,6 +38,7 @@ class ObjectTruth:
     amodal_px: int
     amodal_in_image_px: int
     amodal_box: BoxPx
+    pictured_box: BoxPx | None
     mask: npt.NDArray[np.bool_]
 
     @property

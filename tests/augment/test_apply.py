@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from gear.augment.apply import Augmentation, Framing, augment, shrunk
-from gear.augment.depth import cut_depth
 from gear.augment.geometry import Geometry, flip_array
 from gear.augment.pictures import Colours, recolour
 from gear.augment.registry import geometry_of, register
 from gear.plugins.build import build_task
+from gear.plugins.tasks.depth import cut_depth
 from gear.plugins.tasks.semseg import SemsegSample
 from gear.testing.compare import difference
 from gear.testing.synthetic import synthetic_frame

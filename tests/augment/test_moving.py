@@ -12,8 +12,10 @@ import pytest
 from gear.augment.geometry import Window, cut_map, cut_picture, draw_window
 from gear.augment.registry import geometry_of
 from gear.formats import rle
+from gear.groundtruth.visibility import Visibility
 from gear.plugins.build import build_task
 from gear.testing.synthetic import synthetic_frame
+from gear.testing.things import CAR, PERSON, TRUCK, VAN, Thing
 from gear.values.rng import derive_rng
 
 WIDTH, HEIGHT = 192, 96
@@ -153,20 +155,36 @@ def test_what_is_shown_twice_as_large_is_half_as_far() -> None:
 
 
 def test_the_mirrored_pair_is_a_pair_of_the_mirrored_scene() -> None:
-    """Rendering the scene's mirror image gives the labels that mirroring gives: the two are made independently."""
-    sample = sample_of("stereo3d")
+    """Measuring the scene's mirror image gives what mirroring the sample gives: the two are made independently.
+
+    The right camera, 0.54 m to the right, becomes the left one: the mirror stands 0.27 m to the right.
+    """
+    spec, _ = build_task("stereo3d")
+    task = spec.build(spec.config(width_px=612, height_px=185, visibility=Visibility(preset="kitti", min_pixels_px=1)))
+    placed = [(CAR, 9.0, 1.0, 0.4), (VAN, 16.0, -4.0, 2.5), (TRUCK, 12.0, 8.0, -0.2), (PERSON, 7.0, -2.0, 1.0),
+              (CAR, 5.0, -4.2, 0.1), (CAR, 6.0, 4.9, -0.3)]  # fmt: skip
+    samples = []
+    for side in (1, -1):
+        things = [
+            Thing(parts=parts, position_m=(ahead, -0.27 + side * (left + 0.27), 0.0), yaw_rad=side * yaw,
+                  object_id=number + 2, role="npc")
+            for number, (parts, ahead, left, yaw) in enumerate(placed)
+        ]  # fmt: skip
+        samples.append(task.ground_truth(*synthetic_frame(task.rig(), things)))
+    sample, wanted = samples
     result = moved(sample)
-    baseline_m, intrinsics = sample.calibration.baseline_m, sample.calibration.intrinsics
     assert np.array_equal(result.images["left"], sample.images["right"][:, ::-1])
-    assert len(result.objects) > 0
-    by_id = {thing.object_id: thing for thing in sample.objects}
-    for thing in result.objects:
-        before = by_id[thing.object_id].box.corners_m
-        from_right = intrinsics.project(before - [baseline_m, 0, 0])
-        mirrored = np.stack([WIDTH - 1 - from_right[:, 0], from_right[:, 1]], axis=-1)
-        after = intrinsics.project(thing.box.corners_m)
-        assert np.allclose(np.sort(mirrored, axis=0), np.sort(after, axis=0), atol=1e-6)
-        assert 0 <= thing.box_px[0] < thing.box_px[2] <= WIDTH - 1
+    assert np.array_equal(result.images["right"], sample.images["left"][:, ::-1])
+    assert [thing.object_id for thing in result.objects] == [thing.object_id for thing in wanted.objects]
+    assert len(result.objects) == len(placed)
+    assert sum(thing.truncated > 0.1 for thing in wanted.objects) >= 2
+    for one, two in zip(result.objects, wanted.objects, strict=True):
+        assert one.box.bottom_m == pytest.approx(two.box.bottom_m)
+        assert math.sin(one.box.rotation_y_rad - two.box.rotation_y_rad) == pytest.approx(0, abs=1e-9)
+        assert math.cos(one.box.rotation_y_rad - two.box.rotation_y_rad) == pytest.approx(1)
+        is_cut = max(one.truncated, two.truncated) > 0
+        assert one.box_px == pytest.approx(two.box_px, abs=6 if is_cut else 0.6)
+        assert one.truncated == pytest.approx(two.truncated, abs=0.03)
 
 
 def test_a_window_of_a_pair_keeps_metres_and_has_its_own_calibration() -> None:
@@ -179,7 +197,7 @@ def test_a_window_of_a_pair_keeps_metres_and_has_its_own_calibration() -> None:
     before = sample.calibration.intrinsics.project(point) + 0.5
     after = result.calibration.intrinsics.project(point) + 0.5
     assert np.allclose(after, (before - [48, 24]) * 2)
-    with pytest.raises(ValueError, match="middle"):
+    with pytest.raises(ValueError, match="centre"):
         moved(sample, window(40, 24, 96, 48))
 
 
@@ -192,18 +210,38 @@ def test_boxes_of_a_pair_end_where_its_picture_ends() -> None:
         assert two.truncated == pytest.approx(one.truncated)
 
 
-@pytest.mark.parametrize(("x_m", "z_m"), [(0.0, 3.2), (-4.0, 4.5), (4.0, 4.5)])
-def test_boxes_of_near_objects_end_at_every_side_of_the_picture(x_m: float, z_m: float) -> None:
-    sample = sample_of("stereo3d")
-    near = dataclasses.replace(sample.objects[0].box, bottom_m=(x_m, 1.65, z_m))
-    sample = dataclasses.replace(sample, objects=(dataclasses.replace(sample.objects[0], box=near, visible_px=100),))
+@pytest.mark.parametrize(("left_m", "ahead_m"), [(0.0, 5.2), (4.0, 6.5), (-4.0, 6.5)])
+def test_boxes_of_near_objects_end_at_every_side_of_the_picture(left_m: float, ahead_m: float) -> None:
+    spec, _ = build_task("stereo3d")
+    task = spec.build(spec.config(width_px=WIDTH, height_px=HEIGHT))
+    near = Thing(parts=CAR, position_m=(ahead_m, left_m, 0.0), object_id=2, role="npc")
+    sample = task.ground_truth(*synthetic_frame(task.rig(), [near]))
+    (before,) = sample.objects
     (whole,) = moved(sample, window(0, 0, 192, 96)).objects
+    assert whole == before and 0.1 < whole.truncated < 0.9
     assert whole.box_px[3] == HEIGHT - 1 or 0.0 in whole.box_px or whole.box_px[2] == WIDTH - 1
     (padded,) = moved(sample, window(-32, -16, 256, 128)).objects
     assert np.allclose(np.add(whole.box_px, (32, 16, 32, 16)), padded.box_px)
-    assert padded.truncated == pytest.approx(whole.truncated) and 0.1 < whole.truncated < 0.9
+    assert padded.truncated == pytest.approx(whole.truncated)
     (larger,) = moved(sample, window(0, 0, 192, 96, (384, 288))).objects
-    assert (padded.visible_px, larger.visible_px) == (100, 600)
+    assert (padded.visible_px, larger.visible_px) == (before.visible_px, 6 * before.visible_px)
+    edges = np.add(before.box_px, 0.5) * (2, 3, 2, 3) - 0.5
+    assert larger.box_px == pytest.approx(edges, abs=1) and larger.truncated == pytest.approx(whole.truncated)
+
+
+def test_a_window_of_a_pair_cuts_boxes_and_says_how_much() -> None:
+    spec, _ = build_task("stereo3d")
+    task = spec.build(spec.config(width_px=WIDTH, height_px=HEIGHT))
+    things = [Thing(parts=CAR, position_m=(12.0, y, 0.0), object_id=i, role="npc") for i, y in ((2, 0.0), (3, 5.5))]
+    sample = task.ground_truth(*synthetic_frame(task.rig(), things))
+    result = moved(sample, window(72, 24, 48, 48))
+    (whole,) = (thing for thing in sample.objects if thing.object_id == 2)
+    (kept,) = result.objects
+    assert kept.box_px == pytest.approx(np.subtract(whole.box_px, (72, 24, 72, 24))) and kept.truncated == 0
+    narrow = moved(sample, window(90, 0, 12, 96))
+    (cut,) = narrow.objects
+    left, right = whole.amodal_box_px[0] + 0.5, whole.amodal_box_px[2] + 0.5
+    assert cut.box_px[::2] == (0.0, 11.0) and cut.truncated == pytest.approx(1 - 12 / (right - left))
 
 
 @pytest.mark.parametrize("scale", [0.5, 0.9, 1.0, 1.7])

@@ -86,7 +86,7 @@ def test_a_patch_in_a_foreign_scene_is_mentioned(tmp_path: Path, picture: np.nda
     (tmp_path / "attack.json").write_text(json.dumps({"data": [{"scene": "town10/billboard02"}]}))
     for scene, note in (("billboard02", ""), ("billboard01", "were made for town10/billboard02; this is town10/billb")):
         job = resolve(CollectionConfig(task="semseg", scene=scene, patch=str(tmp_path), root=str(tmp_path / "out")))
-        assert (note in job.note) if note else job.note == ""
+        assert (note in job.notes[0]) if note else job.notes == ()
 
 
 def test_the_original_tools_names_are_read(tmp_path: Path, picture: np.ndarray) -> None:

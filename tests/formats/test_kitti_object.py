@@ -15,6 +15,7 @@ from gear.formats.kitti_object import (
     format_calibration,
     format_label,
     format_labels,
+    from_edge_pixels,
     label_corners,
     occlusion_level,
     parse_calibration,
@@ -134,9 +135,18 @@ def test_truncation_is_the_share_of_the_box_outside() -> None:
     assert truncation((3.0, 4.0, 3.0, 9.0), (3.0, 4.0, 3.0, 9.0)) == 0.0, "a box without an area lies nowhere else"
 
 
-@pytest.mark.parametrize(("occluded", "level"), [(0.0, 0), (0.2, 0), (0.21, 1), (0.5, 1), (0.51, 2), (0.99, 2)])
-def test_occlusion_levels(occluded: float, level: int) -> None:
-    assert occlusion_level(occluded) == level
+@pytest.mark.parametrize(
+    ("visible", "level"), [(1.0, 0), (0.8, 0), (0.79, 1), (0.5, 1), (0.49, 2), (0.1, 2), (0.09, 3), (0.0, 3)]
+)
+def test_occlusion_levels(visible: float, level: int) -> None:
+    assert occlusion_level(visible) == level
+
+
+def test_boxes_in_edge_pixels_become_boxes_in_index_pixels_inside_the_picture() -> None:
+    """A mask of columns 3 to 7 has the edges 3 and 8, half a pixel outside the outermost centres."""
+    width, height = PINHOLE.width_px, PINHOLE.height_px
+    assert from_edge_pixels((3.0, 4.0, 8.0, 9.25), PINHOLE) == (2.5, 3.5, 7.5, 8.75)
+    assert from_edge_pixels((0.0, 0.0, width, height), PINHOLE) == (0.0, 0.0, width - 1, height - 1)
 
 
 def test_lists_end_as_their_readers_want() -> None:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from gear.groundtruth.visibility import VisibilityLimits
+from gear.groundtruth.visibility import Visibility
 from gear.plugins.tasks.detect2d import Detect2dConfig, Detect2dSample, Detect2dTask
 from gear.testing.synthetic import synthetic_frame
 
-LIMITS = VisibilityLimits(min_box_area_px2=60.0, min_visible_px=10)
+LIMITS = Visibility(preset="carla_gear", min_box_area_px2=60.0, min_visible_px=10)
 SMALL: dict[str, Any] = {"width_px": 128, "height_px": 64, "visibility": LIMITS}
 
 

@@ -110,7 +110,7 @@ def _label(
     return KittiLabel(
         type=kind,
         truncated=truncation(projected, clipped) if projected and clipped else 1.0,
-        occluded=occlusion_level(1 / (1 + math.exp(-float(said["hidden"][0])))),
+        occluded=occlusion_level(1 / (1 + math.exp(float(said["hidden"][0])))),
         alpha_rad=alpha_rad,
         box_px=box_px,
         height_m=height_m,

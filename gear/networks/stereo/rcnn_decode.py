@@ -122,7 +122,7 @@ def _label(car: FoundCar, box: Box3d, calibration: Calibration) -> KittiLabel | 
     return KittiLabel(
         type=CAR,
         truncated=truncation(whole, clipped) if whole and clipped else 1.0,
-        occluded=occlusion_level(1 - min(max(seen, 0.0), 1.0)),
+        occluded=occlusion_level(min(max(seen, 0.0), 1.0)),
         alpha_rad=box.alpha_rad,
         box_px=box_px,
         height_m=box.height_m,

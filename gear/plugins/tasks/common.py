@@ -53,6 +53,11 @@ class CameraOptions:
         if not all(math.isfinite(v) and abs(v) < 100 for v in self.position_m):
             raise FieldError("position_m", f"must lie within 100 m of the car, got {self.position_m}")
 
+    @property
+    def is_level(self) -> bool:
+        """Whether the camera's vertical axis is the world's in every sample."""
+        return self.pitch_deg == 0 and not self.follows_road
+
     def mount(self, name: str, right_m: float = 0.0) -> CameraMount:
         """The camera under a name, moved to the right."""
         x, y, z = self.position_m

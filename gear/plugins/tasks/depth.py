@@ -9,6 +9,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from gear.augment.geometry import Geometry, Window, cut_map, cut_picture, flip_array
+from gear.augment.registry import register
 from gear.contracts.evaluation import Masks
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import TaskSpec
@@ -176,6 +178,64 @@ class DepthTask:
         colours[~known] = 0
         return {"image": picture, "depth": colours}
 
+
+WHITE_FROM_M = 80.0
+"""Depth that CutDepth paints white."""
+
+
+def flip(sample: DepthSample) -> DepthSample:
+    """The sample mirrored, left to right."""
+    return replace(
+        sample,
+        images={name: flip_array(picture) for name, picture in sample.images.items()},
+        surfaces=(),
+        depth_m=flip_array(sample.depth_m),
+    )
+
+
+def cut(sample: DepthSample, window: Window) -> DepthSample:
+    """The part of the sample that a window shows; depth is unknown beyond the picture.
+
+    Depth is divided by the window's scale: for a camera of the same focal length an object that looks `s` times as
+    large is `s` times as near.
+    """
+    small = shrink(sample, window)
+    return replace(small, depth_m=(small.depth_m / np.float32(window.scale)).astype(np.float32))
+
+
+def shrink(sample: DepthSample, window: Window) -> DepthSample:
+    """The part of the sample that a window shows, at its own depth: the same lens with fewer pixels."""
+    return replace(
+        sample,
+        images={name: cut_picture(picture, window) for name, picture in sample.images.items()},
+        surfaces=(),
+        depth_m=cut_map(sample.depth_m, window, np.nan),
+    )
+
+
+def cut_depth(sample: DepthSample, rng: np.random.Generator) -> DepthSample:
+    """Vertical CutDepth: a band of columns of the picture is replaced by its true depth, as grey.
+
+    Kim et al., "Global-Local Path Networks for Monocular Depth Estimation with Vertical CutDepth", 2022, section 3.3:
+    the band reaches from top to bottom, because depth changes most along columns. It takes at most three quarters of
+    the width.
+    """
+    width = sample.depth_m.shape[1]
+    left = int(rng.integers(0, width))
+    right = left + max(1, int((width - left) * 0.75 * rng.random()))
+    images = {name: _with_band(picture, sample.depth_m, left, right) for name, picture in sample.images.items()}
+    return replace(sample, images=images)
+
+
+def _with_band(picture: UInt8Image, depth_m: FloatImage, left: int, right: int) -> UInt8Image:
+    band_m = depth_m[:, left:right]
+    grey = np.clip(np.where(np.isfinite(band_m), band_m, WHITE_FROM_M) / WHITE_FROM_M, 0, 1) * 255
+    painted = picture.copy()
+    painted[:, left:right] = np.rint(grey).astype(np.uint8)[..., None]
+    return painted
+
+
+register(DepthSample, Geometry(flip=flip, cut=cut, shrink=shrink, cut_depth=cut_depth))
 
 depth: TaskSpec[DepthConfig] = TaskSpec(
     name="depth",

@@ -9,6 +9,18 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from gear.augment.geometry import (
+    Geometry,
+    Window,
+    box_area,
+    clipped,
+    cut_box,
+    cut_map,
+    cut_picture,
+    flip_array,
+    flip_box,
+)
+from gear.augment.registry import register
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Encoded, Evaluator, Sample, Sidecar, SplitInfo
@@ -18,7 +30,7 @@ from gear.formats.jsontext import dump
 from gear.formats.png import encode_rgb
 from gear.groundtruth.boxes import box_in_camera
 from gear.groundtruth.objects import observe_objects
-from gear.groundtruth.visibility import VisibilityLimits
+from gear.groundtruth.visibility import Visibility
 from gear.metrics.coco_ap import CocoEvaluator
 from gear.metrics.coco_reference import TallObjects
 from gear.plugins.tasks.common import (
@@ -47,13 +59,13 @@ class Detect2dConfig(CameraOptions):
     """Options of 2D detection.
 
     Attributes:
-        visibility: what an object must show to be labelled; what shows less is annotated as a crowd, which
-            evaluations ignore.
+        visibility: what an object must show to be labelled; an object that shows less is annotated with `iscrowd` 1,
+            which evaluations ignore.
     """
 
     width_px: int = 1333
     height_px: int = 800
-    visibility: VisibilityLimits = field(default_factory=VisibilityLimits)
+    visibility: Visibility = field(default_factory=lambda: Visibility(preset="coco"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,7 +123,7 @@ class Detect2dTask:
 
     def ground_truth(self, frame: Frame, record: SceneRecord) -> Detect2dSample:
         """Measures every object that COCO has a category for."""
-        view, limits = frame.views[VIEW], self.config.visibility
+        view, limits = frame.views[VIEW], self.config.visibility.limits()
         height, width = view.geom_id.shape
         found = []
         for truth in observe_objects(view, frame.geoms, frame.objects):
@@ -125,7 +137,7 @@ class Detect2dTask:
                     object_id=truth.object_id,
                     label=label.name,
                     category_id=label.coco_id,
-                    is_ignored=not limits.labels(truth, distance_m),
+                    is_ignored=not limits.labels(truth, truth.visible_box, distance_m),
                     box_px=truth.visible_box,
                     amodal_box_px=truth.amodal_box,
                     area_px=truth.visible_px,
@@ -298,6 +310,89 @@ def _colour(thing: Object2d) -> tuple[int, int, int]:
     red, green, blue = (int(v) for v in cv2.cvtColor(hue, cv2.COLOR_HSV2RGB)[0, 0])
     return (red, green, blue)
 
+
+LEAST_KEPT = 0.3
+"""An object with a smaller share of its visible pixels in a window is ignored there."""
+
+LEAST_SIDE_PX = 4.0
+"""An object whose box in a window is narrower or lower is ignored there."""
+
+
+def flip(sample: Detect2dSample) -> Detect2dSample:
+    """The sample mirrored, left to right."""
+    height, width = sample.images[VIEW].shape[:2]
+    return replace(
+        sample,
+        images={name: flip_array(picture) for name, picture in sample.images.items()},
+        surfaces=(),
+        objects=tuple(_flipped(thing, height, width) for thing in sample.objects),
+    )
+
+
+def _flipped(thing: Object2d, height: int, width: int) -> Object2d:
+    left, top, right, bottom = (round(v) for v in thing.box_px)
+    mask = rle.decode(thing.rle, height, width)[top:bottom, left:right]
+    return replace(
+        thing,
+        box_px=flip_box(thing.box_px, width),
+        amodal_box_px=flip_box(thing.amodal_box_px, width),
+        rle=rle.encode_crop(flip_array(mask), width - right, top, height, width),
+    )
+
+
+def cut(sample: Detect2dSample, window: Window) -> Detect2dSample:
+    """The part of the sample that a window shows. Objects outside are left out; objects with a small part inside are
+    ignored.
+
+    Masks are cut and boxes are measured on them again. The share of a silhouette outside the window is estimated by its
+    box, because silhouettes are not stored. Distances remain those of the scene.
+    """
+    height, width = sample.images[VIEW].shape[:2]
+    moved = (_cut(thing, window, height, width) for thing in sample.objects)
+    return replace(
+        sample,
+        images={name: cut_picture(picture, window) for name, picture in sample.images.items()},
+        surfaces=(),
+        objects=tuple(thing for thing in moved if thing is not None),
+    )
+
+
+def _cut(thing: Object2d, window: Window, height: int, width: int) -> Object2d | None:
+    out_height, out_width = window.out_height_px, window.out_width_px
+    if box_area(_inside(cut_box(thing.box_px, window), out_height, out_width)) <= 0:
+        return None
+    mask = cut_map(rle.decode(thing.rle, height, width).astype(np.uint8), window, 0).astype(np.bool_)
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    if not rows.size:
+        return None
+    left, top, right, bottom = int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
+    area = int(mask.sum())
+    # A window beyond the picture shows padding there, and nothing of the object's part outside the picture.
+    in_picture = _inside(thing.amodal_box_px, height, width)
+    pictured = box_area(in_picture) * window.scale_x * window.scale_y
+    in_window = box_area(_inside(cut_box(in_picture, window), out_height, out_width))
+    shown = min(1.0, in_window / pictured) if pictured > 0 else 0.0
+    kept = min(1.0, area / (thing.area_px * window.scale_x * window.scale_y))
+    visible, inside = thing.visible_fraction * kept, (1 - thing.truncated_fraction) * shown
+    return replace(
+        thing,
+        is_ignored=thing.is_ignored or kept < LEAST_KEPT or min(right - left, bottom - top) < LEAST_SIDE_PX,
+        box_px=(float(left), float(top), float(right), float(bottom)),
+        amodal_box_px=cut_box(thing.amodal_box_px, window),
+        area_px=area,
+        rle=rle.encode_crop(mask[top:bottom, left:right], left, top, out_height, out_width),
+        visible_fraction=visible,
+        occluded_fraction=min(1.0, max(0.0, 1 - visible / inside)) if inside > 0 else 1.0,
+        truncated_fraction=1 - inside,
+    )
+
+
+def _inside(box_px: BoxPx, height: int, width: int) -> BoxPx:
+    """The part of a box in edge pixels that lies in a picture."""
+    return clipped(box_px, (0.0, 0.0, float(width), float(height)))
+
+
+register(Detect2dSample, Geometry(flip=flip, cut=cut))
 
 detect2d: TaskSpec[Detect2dConfig] = TaskSpec(
     name="detect2d",

@@ -11,6 +11,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from gear.augment.geometry import Geometry, Window, cut_map, cut_picture, flip_array
+from gear.augment.registry import register
 from gear.contracts.evaluation import Masks
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import TaskSpec
@@ -197,6 +199,34 @@ class SemsegTask:
         draw_surfaces(picture, sample, VIEW)
         return {"labels": picture}
 
+
+UNLABELLED = 0
+"""Cityscapes' id of pixels without a label, such as those beyond the picture."""
+
+
+def flip(sample: SemsegSample) -> SemsegSample:
+    """The sample mirrored, left to right."""
+    return replace(
+        sample,
+        images={name: flip_array(picture) for name, picture in sample.images.items()},
+        surfaces=(),
+        label_ids=flip_array(sample.label_ids),
+        instance_ids=flip_array(sample.instance_ids),
+    )
+
+
+def cut(sample: SemsegSample, window: Window) -> SemsegSample:
+    """The part of the sample that a window shows; each label is that of the nearest pixel."""
+    return replace(
+        sample,
+        images={name: cut_picture(picture, window) for name, picture in sample.images.items()},
+        surfaces=(),
+        label_ids=cut_map(sample.label_ids, window, UNLABELLED),
+        instance_ids=cut_map(sample.instance_ids, window, UNLABELLED),
+    )
+
+
+register(SemsegSample, Geometry(flip=flip, cut=cut))
 
 semseg: TaskSpec[SemsegConfig] = TaskSpec(
     name="semseg",

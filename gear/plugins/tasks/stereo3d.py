@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
+from gear.augment.geometry import Geometry, Window, box_area, clipped, cut_box, cut_picture, flip_array
+from gear.augment.registry import register
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Encoded, Evaluator, Sample, Sidecar, SplitInfo
@@ -16,21 +21,20 @@ from gear.formats.jsontext import dump
 from gear.formats.kitti_object import (
     Calibration,
     KittiLabel,
-    clip_box,
     dont_care,
     format_calibration,
     format_labels,
+    from_edge_pixels,
     label_corners,
     occlusion_level,
     parse_labels,
     split_lists,
-    truncation,
 )
 from gear.formats.png import encode_rgb
 from gear.groundtruth.boxes import Box3d, box_in_camera, project_box
 from gear.groundtruth.objects import observe_objects
 from gear.groundtruth.raster import NEAR_M
-from gear.groundtruth.visibility import VisibilityLimits
+from gear.groundtruth.visibility import Visibility, VisibilityLimits
 from gear.metrics.kitti_ap import KittiEvaluator
 from gear.metrics.kitti_reference import NearCars
 from gear.plugins.tasks.common import (
@@ -46,6 +50,7 @@ from gear.plugins.tasks.common import (
 )
 from gear.values.errors import FieldError
 from gear.values.frames import Frame, SceneObject, UInt8Image, View
+from gear.values.geometry import Array, Intrinsics, wrap_angle_rad
 from gear.values.ground_truth import BoxPx, ObjectTruth
 from gear.values.labels import KittiType
 from gear.values.rig import Rig
@@ -65,13 +70,13 @@ class Stereo3dConfig(CameraOptions):
 
     Attributes:
         baseline_m: left camera to right camera.
-        visibility: what an object must show to be labelled; where one shows less there is a `DontCare` region.
+        visibility: what an object must show to be labelled; an object that shows less is a `DontCare` region.
     """
 
     width_px: int = 1224
     height_px: int = 370
     baseline_m: float = 0.54
-    visibility: VisibilityLimits = field(default_factory=VisibilityLimits)
+    visibility: Visibility = field(default_factory=lambda: Visibility(preset="kitti"))
 
     def __post_init__(self) -> None:
         CameraOptions.__post_init__(self)
@@ -87,11 +92,13 @@ class Object3d:
     Attributes:
         object_id: the same in every sample of a sequence.
         kitti_type: KITTI's type of the whole; a cyclist is one object.
-        is_ignored: seen too little of to be looked for: a `DontCare` region.
+        is_ignored: whether it is a `DontCare` region, because too little of it is visible.
         box: in the frame of the left camera.
-        box_px: its projection, clipped to the picture; index pixels.
-        truncated: share of the projection outside the picture.
-        occluded: 0 for at least 80 % of the silhouette in the picture seen, 1 for at least 50 %, 2 for less.
+        box_px: tight box of the silhouette inside the picture, hidden parts included; index pixels.
+        amodal_box_px: tight box of the whole silhouette, which may exceed the picture; index pixels.
+        truncated: share of the silhouette outside the picture, 0..1.
+        occluded: how much of the silhouette in the picture is visible: 0 for at least 80 %, 1 for at least 50 %, 2 for
+            at least 10 %, 3 for less.
         visible_px: pixels in the id buffer.
         occluded_fraction: covered share of the silhouette in the picture.
     """
@@ -101,6 +108,7 @@ class Object3d:
     is_ignored: bool
     box: Box3d
     box_px: BoxPx
+    amodal_box_px: BoxPx
     truncated: float
     occluded: int
     visible_px: int
@@ -150,38 +158,18 @@ class Stereo3dTask:
 
     def ground_truth(self, frame: Frame, record: SceneRecord) -> Stereo3dSample:
         """Measures every object that KITTI has a type for, in the left view."""
-        view = frame.views[LEFT]
+        view, limits = frame.views[LEFT], self.config.visibility.limits()
         found = []
         for truth in observe_objects(view, frame.geoms, frame.objects, by_label=False):
             thing = frame.objects[truth.object_id]
-            if thing.kitti_type is not None and self.config.visibility.mentions(truth):
-                measured = self._measure(truth, thing, thing.kitti_type, view)
-                if measured is not None:
-                    found.append(measured)
+            if thing.kitti_type is not None and limits.mentions(truth):
+                found.append(_measured(truth, thing, thing.kitti_type, view, limits))
         return Stereo3dSample(
             record=record,
             images=images_of(frame),
             surfaces=surfaces_of(frame, record),
             calibration=self._calibration(record),
             objects=tuple(found),
-        )
-
-    def _measure(self, truth: ObjectTruth, thing: SceneObject, kind: KittiType, view: View) -> Object3d | None:
-        box = box_in_camera(thing, view.camera)
-        projected = project_box(box.corners_m, view.camera.intrinsics)
-        clipped = clip_box(projected, view.camera.intrinsics) if projected else None
-        if projected is None or clipped is None:
-            return None
-        return Object3d(
-            object_id=truth.object_id,
-            kitti_type=kind,
-            is_ignored=not self.config.visibility.labels(truth, box.distance_m),
-            box=box,
-            box_px=clipped,
-            truncated=truncation(projected, clipped),
-            occluded=occlusion_level(truth.occluded_fraction),
-            visible_px=truth.visible_px,
-            occluded_fraction=truth.occluded_fraction,
         )
 
     def _calibration(self, record: SceneRecord) -> Calibration:
@@ -280,6 +268,38 @@ WIRES = tuple((i, (i + 1) % 4) for i in range(4)) + tuple((i + 4, (i + 1) % 4 + 
 """Edges of a box in the order of `label_corners`; its front is the face of corners 0, 1, 4, 5."""
 
 
+def _measured(
+    truth: ObjectTruth, thing: SceneObject, kind: KittiType, view: View, limits: VisibilityLimits
+) -> Object3d:
+    """One object with at least one visible pixel, as KITTI describes it."""
+    box = box_in_camera(thing, view.camera)
+    box_px = from_edge_pixels(truth.pictured_box or truth.amodal_box, view.camera.intrinsics)
+    left, top, right, bottom = truth.amodal_box
+    return Object3d(
+        object_id=truth.object_id,
+        kitti_type=kind,
+        is_ignored=not limits.labels(truth, box_px, box.distance_m),
+        box=box,
+        box_px=box_px,
+        amodal_box_px=(left - 0.5, top - 0.5, right - 0.5, bottom - 0.5),
+        truncated=truth.truncated_fraction,
+        occluded=occlusion_level(truth.uncovered_fraction),
+        visible_px=truth.visible_px,
+        occluded_fraction=truth.occluded_fraction,
+    )
+
+
+def _notes(config: Stereo3dConfig) -> tuple[str, ...]:
+    """That 3D boxes of a tilted camera are approximate."""
+    if config.is_level:
+        return ()
+    return (
+        "the camera is tilted (options.pitch_deg, options.follows_road), and KITTI describes a 3D box by one angle "
+        "about the camera's vertical axis: 3D boxes stand upright in the camera's frame and not on the road, while 2D "
+        "boxes, truncation and occlusion are exact",
+    )
+
+
 def _lines(sample: Stereo3dSample) -> tuple[KittiLabel, ...]:
     """Its label file as the devkit reads it: two decimals decide which level a label at the border of one is of."""
     return parse_labels(format_labels(thing.label() for thing in sample.objects).decode())
@@ -288,6 +308,123 @@ def _lines(sample: Stereo3dSample) -> tuple[KittiLabel, ...]:
 def _name(index: int) -> str:
     return f"{index:06d}"
 
+
+def flip(sample: Stereo3dSample) -> Stereo3dSample:
+    """The pair mirrored, left to right: the right camera becomes the left one.
+
+    Occlusion was measured by the left camera, and is taken over for the right one. The silhouette in the right picture
+    is not stored: each side of its box lies as far from the side in the left picture as the same side of the projected
+    3D box does. Where the border cuts an object, the other sides of its box are those of the left picture's part.
+    """
+    baseline_m, intrinsics = sample.calibration.baseline_m, sample.calibration.intrinsics
+    moved = (_mirrored(thing, baseline_m, intrinsics) for thing in sample.objects)
+    return replace(
+        sample,
+        images={LEFT: flip_array(sample.images[RIGHT]), RIGHT: flip_array(sample.images[LEFT])},
+        surfaces=(),
+        objects=tuple(thing for thing in moved if thing is not None),
+    )
+
+
+def _mirrored(thing: Object3d, baseline_m: float, intrinsics: Intrinsics) -> Object3d | None:
+    """An object as the mirrored right camera sees it; None outside its picture."""
+    x, y, z = thing.box.bottom_m
+    turned = wrap_angle_rad(math.pi - thing.box.rotation_y_rad)
+    box = replace(thing.box, bottom_m=(baseline_m - x, y, z), rotation_y_rad=turned)
+    before, after = project_box(thing.box.corners_m, intrinsics), project_box(box.corners_m, intrinsics)
+    if before is None or after is None:
+        return None
+    last = intrinsics.width_px - 1.0
+    mirrored = [(last - b[2], b[1], last - b[0], b[3]) for b in (before, thing.box_px, thing.amodal_box_px)]
+    shift = np.subtract(after, mirrored[0])
+    tight, whole = np.add(mirrored[1], shift), np.add(mirrored[2], shift)
+    # Where the border cut the box, more of the silhouette may lie in the other picture.
+    was_cut = np.equal(mirrored[1], (0.0, 0.0, last, intrinsics.height_px - 1.0))
+    frame = _frame(intrinsics.width_px, intrinsics.height_px)
+    return _placed(thing, box, _box(np.where(was_cut, whole, tight)), _box(whole), frame, frame)
+
+
+def cut(sample: Stereo3dSample, window: Window) -> Stereo3dSample:
+    """The part of both pictures that a window about their centre shows, with the calibration that belongs to it.
+
+    Metres stay as they are; the focal length changes. The share of a silhouette outside is estimated by its box.
+
+    Raises:
+        ValueError: the window does not share the picture's centre, where the principal point must lie.
+    """
+    height, width = sample.images[LEFT].shape[:2]
+    if 2 * window.left_px + window.width_px != width or 2 * window.top_px + window.height_px != height:
+        raise ValueError(f"a window of a stereo pair must share the picture's centre, got {window}")
+    before = sample.calibration.intrinsics
+    intrinsics = Intrinsics(window.out_width_px, window.out_height_px, before.focal_px * window.scale_x)
+    # The rest of the window is padding.
+    frame = _frame(width, height)
+    shown = clipped(_in_window(frame, window), _frame(window.out_width_px, window.out_height_px))
+    area = window.scale_x * window.scale_y
+    moved = (
+        _placed(
+            replace(thing, visible_px=round(thing.visible_px * area)),
+            thing.box,
+            _in_window(thing.box_px, window),
+            _in_window(thing.amodal_box_px, window),
+            frame,
+            shown,
+        )
+        for thing in sample.objects
+    )
+    return replace(
+        sample,
+        images={name: cut_picture(picture, window) for name, picture in sample.images.items()},
+        surfaces=(),
+        calibration=Calibration(intrinsics=intrinsics, baseline_m=sample.calibration.baseline_m),
+        objects=tuple(thing for thing in moved if thing is not None),
+    )
+
+
+def _in_window(box_px: BoxPx, window: Window) -> BoxPx:
+    """A box in index pixels of the picture, in index pixels of the window's picture; not clipped."""
+    left, top, right, bottom = box_px
+    edges = cut_box((left + 0.5, top + 0.5, right + 0.5, bottom + 0.5), window)
+    return (edges[0] - 0.5, edges[1] - 0.5, edges[2] - 0.5, edges[3] - 0.5)
+
+
+def _frame(width_px: int, height_px: int) -> BoxPx:
+    """The outer borders of a picture in index pixels."""
+    return (-0.5, -0.5, width_px - 0.5, height_px - 0.5)
+
+
+def _box(sides: Array) -> BoxPx:
+    left, top, right, bottom = (float(side) for side in sides)
+    return (left, top, right, bottom)
+
+
+def _placed(
+    thing: Object3d, box: Box3d, box_px: BoxPx, amodal_box_px: BoxPx, frame_px: BoxPx, shown_px: BoxPx
+) -> Object3d | None:
+    """An object at its place in a new picture; None where nothing of its box lies there.
+
+    Args:
+        thing: the object in the picture that it was measured in.
+        box: its place in space, from the new camera.
+        box_px, amodal_box_px: its boxes in the new picture, not clipped; index pixels.
+        frame_px, shown_px: what shows the scene of the old and of the new picture, up to the outer borders.
+    """
+    left, top, right, bottom = shown_px
+    inside_px = clipped(box_px, (left + 0.5, top + 0.5, right - 0.5, bottom - 0.5))
+    if inside_px[2] <= inside_px[0] or inside_px[3] <= inside_px[1]:
+        return None
+    before, after = _share(thing.amodal_box_px, frame_px), _share(amodal_box_px, shown_px)
+    inside = min(1.0, (1.0 - thing.truncated) * after / before) if before > 0 else 1.0 - thing.truncated
+    return replace(thing, box=box, box_px=inside_px, amodal_box_px=amodal_box_px, truncated=1.0 - inside)
+
+
+def _share(box_px: BoxPx, frame_px: BoxPx) -> float:
+    """Share of a box that lies in a frame, 0..1."""
+    whole = box_area(box_px)
+    return box_area(clipped(box_px, frame_px)) / whole if whole > 0 else 0.0
+
+
+register(Stereo3dSample, Geometry(flip=flip, cut=cut, is_centred=True))
 
 stereo3d: TaskSpec[Stereo3dConfig] = TaskSpec(
     name="stereo3d",
@@ -298,6 +435,7 @@ stereo3d: TaskSpec[Stereo3dConfig] = TaskSpec(
     layout="<split>/{image_2,image_3,calib,label_2}/%06d.{png,txt}, splits/<split>.txt, ImageSets/<split>.txt",
     original_name="3dod",
     metric="reference.car_bev_moderate_r40",
+    notes=_notes,
 )
 
 

@@ -79,7 +79,8 @@ def collect(
         apart: whether a single worker is a process of its own, too, which gives all its memory back.
         force: replaces a split that was made with another configuration.
         progress: told after every sample.
-        noted: told of patches that were made for another scene.
+        noted: called, before anything is rendered, with each note on what the user may not have meant: patches of
+            another scene, options of the task.
 
     Raises:
         GearError: anything that the user can put right; its text is one line.
@@ -122,8 +123,9 @@ def collect_config(
     if workers < 1:
         raise ValueError(f"workers must be at least 1, got {workers}")
     job = resolve(config)
-    if on_warning is not None and job.note:
-        on_warning(job.note)
+    if on_warning is not None:
+        for note in job.notes:
+            on_warning(note)
     return run_job(job, workers=workers, apart=apart, force=force, on_progress=on_progress)
 
 

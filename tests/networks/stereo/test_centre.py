@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from gear.contracts.specs import ModelSpec
-from gear.groundtruth.visibility import VisibilityLimits
+from gear.groundtruth.visibility import Visibility
 from gear.networks.network import as_batch
 from gear.networks.stereo.centre import (
     HEADINGS,
@@ -46,7 +46,7 @@ def tiny(build: Build = build_resnet, input_scale: float = 1.0) -> StereoCentreN
 
 
 def street() -> Stereo3dSample:
-    limits = VisibilityLimits(min_box_area_px2=60, min_visible_px=40)
+    limits = Visibility(preset="carla_gear", min_box_area_px2=60, min_visible_px=40)
     task = Stereo3dTask(Stereo3dConfig(width_px=256, height_px=96, visibility=limits))
     return task.ground_truth(*synthetic_frame(task.rig(), index=0, seed=5))
 

@@ -13,7 +13,7 @@ from pycocotools.cocoeval import COCOeval
 
 from gear.augment.apply import shrunk
 from gear.formats import rle
-from gear.groundtruth.visibility import VisibilityLimits
+from gear.groundtruth.visibility import Visibility
 from gear.plugins.tasks.detect2d import Detect2dConfig, Detect2dTask, detect2d
 from gear.testing.synthetic import synthetic_frame
 from gear.testing.task_contract import TaskContract
@@ -90,7 +90,9 @@ class TestDetect2d(TaskContract):
 
 
 def observe(things: list[Thing], **limits: Any) -> list[Any]:
-    task = Detect2dTask(Detect2dConfig(width_px=667, height_px=400, visibility=VisibilityLimits(**limits)))
+    task = Detect2dTask(
+        Detect2dConfig(width_px=667, height_px=400, visibility=Visibility(**({"preset": "coco"} | limits)))
+    )
     sample = task.ground_truth(*synthetic_frame(task.rig(), things))
     return list(sample.objects)
 
@@ -140,7 +142,7 @@ def test_three_pixels_are_not_mentioned() -> None:
 
 def test_what_is_tall_enough_is_so_in_a_smaller_picture_too() -> None:
     """24 of 400 rows are 48 of 800, where 32 are enough; so are 12 of 200."""
-    task = Detect2dTask(Detect2dConfig(width_px=667, height_px=400, visibility=VisibilityLimits(min_box_area_px2=0)))
+    task = Detect2dTask(Detect2dConfig(width_px=667, height_px=400, visibility=Visibility(preset="coco")))
     sample = task.ground_truth(*synthetic_frame(task.rig(), [car(25.0)]))
     for share, height_px in ((1.0, 24), (0.5, 12)):
         small = shrunk(sample, share)

@@ -7,12 +7,15 @@ import cv2
 import numpy as np
 import pytest
 
-from gear.formats.kitti_object import parse_calibration, parse_labels, read_baseline_m
+from gear.formats.kitti_object import format_labels, parse_calibration, parse_labels, read_baseline_m
+from gear.groundtruth.visibility import Visibility
 from gear.plugins.tasks.stereo3d import Stereo3dConfig, Stereo3dTask, stereo3d
-from gear.testing.synthetic import synthetic_frame
+from gear.testing.synthetic import behind_lens, synthetic_frame
 from gear.testing.task_contract import TaskContract
-from gear.testing.things import CAR, CYCLIST, VAN, Thing
+from gear.testing.things import CAR, CYCLIST, VAN, Thing, street
 from gear.values.errors import FieldError
+from gear.values.optics import Lens
+from gear.values.rig import Rig
 
 
 class TestStereo3d(TaskContract):
@@ -80,8 +83,8 @@ def label(thing: Thing, **options: Any) -> Any:
     return found
 
 
-def car(ahead_m: float, left_m: float, yaw_rad: float, parts: Any = CAR) -> Thing:
-    return Thing(parts=parts, position_m=(ahead_m, left_m, 0.0), yaw_rad=yaw_rad, object_id=2, role="npc")
+def car(ahead_m: float, left_m: float, yaw_rad: float, parts: Any = CAR, part_id: int = 2) -> Thing:
+    return Thing(parts=parts, position_m=(ahead_m, left_m, 0.0), yaw_rad=yaw_rad, object_id=part_id, role="npc")
 
 
 def test_the_published_test_vector() -> None:
@@ -148,11 +151,88 @@ def test_a_van_is_no_car() -> None:
 
 
 def test_what_is_too_far_becomes_dont_care() -> None:
-    from gear.groundtruth.visibility import VisibilityLimits
-
-    found = label(car(30.0, 0.0, 0.0), visibility=VisibilityLimits(max_distance_m=20.0))
+    found = label(car(30.0, 0.0, 0.0), visibility=Visibility(preset="kitti", max_distance_m=20.0))
     assert found.label().type == "DontCare"
     assert found.label().box_px == found.box_px
+
+
+TILTS = [{}, {"pitch_deg": 8.0}, {"pitch_deg": -12.0, "position_m": (1.5, 0.5, 2.4)}]
+LENSES = [None, Lens(k1=-0.12, k2=0.01)]
+
+
+@pytest.mark.parametrize("options", TILTS)
+@pytest.mark.parametrize("lens", LENSES)
+@pytest.mark.parametrize("index", range(2))
+def test_boxes_are_those_of_the_silhouettes(options: dict[str, Any], lens: Lens | None, index: int) -> None:
+    """Of each thing rendered alone, whatever the camera's tilt and lens."""
+    task = Stereo3dTask(Stereo3dConfig(width_px=300, height_px=167, hfov_deg=70, **options))
+    (left, _), things, several = task.rig().cameras, [*street(5, index), car(5.0, -2.6, 0.3, part_id=40)], 0
+    cameras = (left, replace(left, name="right"))
+
+    def shown(some: list[Thing]) -> Any:
+        frame, record = synthetic_frame(Rig(cameras=cameras), some)
+        frame = frame if lens is None else behind_lens(frame, lens)
+        return frame, task.ground_truth(frame, replace(record, cameras=tuple(v.camera for v in frame.views.values())))
+
+    _, sample = shown(things)
+    for thing in sample.objects:
+        frame, _ = shown([one for one in things if one.object_id == thing.object_id])
+        view = frame.views["left"]
+        rows, columns = np.nonzero((frame.geoms.object_id[view.geom_id] == thing.object_id) & (view.geom_id >= 0))
+        edges = np.array([columns.min(), rows.min(), columns.max() + 1, rows.max() + 1])
+        wanted = np.clip(edges - 0.5, 0, (299, 166, 299, 166))
+        assert np.abs(np.subtract(thing.box_px, wanted)).max() <= 0.51, thing
+        several += 1
+    assert several > 6
+
+
+def test_a_car_at_63_m_has_its_true_rows_under_a_pitched_camera() -> None:
+    """The corners of the car itself, projected; a box upright in the camera's frame reaches 2 to 3 rows further."""
+    options = {"width_px": 900, "height_px": 501, "hfov_deg": 70.0, "baseline_m": 0.3, "pitch_deg": 8.0}
+    task = Stereo3dTask(Stereo3dConfig(**options))
+    frame, record = synthetic_frame(task.rig(), [car(64.5, 6.0, 0.4)])
+    (found,) = task.ground_truth(frame, record).objects
+    camera = record.camera("left")
+    corners = frame.objects[2].world_from_object.apply(
+        [[x, y, z] for x in (-2.1, 2.1) for y in (-0.9, 0.9) for z in (0.0, 1.5)]
+    )
+    pixels = camera.intrinsics.project(camera.world_from_camera_transform.inverse().apply(corners))
+    exact = (*pixels.min(axis=0), *pixels.max(axis=0))
+    assert found.box_px == pytest.approx(exact, abs=0.5)
+    assert found.truncated == 0
+
+
+def test_ground_truth_of_a_pitched_camera_scores_a_hundred() -> None:
+    task = Stereo3dTask(Stereo3dConfig(width_px=450, height_px=250, hfov_deg=70, pitch_deg=8))
+    evaluator = task.evaluator()
+    sample = task.ground_truth(*synthetic_frame(task.rig(), seed=4))
+    for _ in range(60):
+        evaluator.update(sample, task.as_prediction(sample))
+    known = {name: value for name, value in evaluator.result().items() if not math.isnan(value)}
+    assert known.keys() >= {"car_3d_moderate_r40", "car_aos_moderate_r40", "pedestrian_2d_hard_r40"}
+    assert list(known.values()) == pytest.approx([1.0] * len(known), abs=1e-4)
+
+
+def test_all_that_a_level_of_the_evaluation_counts_is_labelled() -> None:
+    """Small and half hidden things too; and what is hidden but for a tenth, or lower than 25 px, is a region."""
+    task = Stereo3dTask(Stereo3dConfig(width_px=612, height_px=185))
+    counted = ignored = 0
+    for index in range(6):
+        for thing in task.ground_truth(*synthetic_frame(task.rig(), index=index, seed=9)).objects:
+            line = parse_labels(format_labels([replace(thing, is_ignored=False).label()]).decode())[0]
+            is_counted = line.box_px[3] - line.box_px[1] > 25 and line.occluded <= 2 and line.truncated <= 0.5
+            counted, ignored = counted + is_counted, ignored + thing.is_ignored
+            assert not (is_counted and thing.is_ignored), thing
+            assert not thing.is_ignored or thing.occluded == 3 or line.box_px[3] - line.box_px[1] < 25.01
+    assert counted > 20 and ignored > 5
+
+
+@pytest.mark.parametrize(
+    ("options", "is_noted"), [({}, False), ({"pitch_deg": 8.0}, True), ({"follows_road": True}, True)]
+)
+def test_a_tilted_camera_is_noted(options: dict[str, Any], is_noted: bool) -> None:
+    notes = stereo3d.notes(Stereo3dConfig(**options))
+    assert len(notes) == is_noted and all("3D boxes stand upright in the camera's frame" in note for note in notes)
 
 
 def test_an_empty_road_has_an_empty_label_file() -> None:
