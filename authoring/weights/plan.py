@@ -140,7 +140,7 @@ def training(task: str, samples: int) -> list[Collection]:
 
 
 def held_out(task: str, samples: int = HELD_OUT_SAMPLES, *, first_seed: int = FIRST_HELD_OUT_SEED) -> list[Collection]:
-    """The collections that weights are measured on: both held-out scenes, each in a known and in the held-out weather."""
+    """The collections that weights are measured on: both held-out scenes in a known and in the held-out weather."""
     pairs = [(place, weather) for place in HELD_OUT_SCENES for weather in ("ClearNoon", HELD_OUT_WEATHER)]
     return [
         Collection(

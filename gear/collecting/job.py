@@ -19,6 +19,7 @@ from gear.collecting.patch_sources import PatchSet
 from gear.config.collection import CollectionConfig, SplitConfig
 from gear.config.dump import to_plain
 from gear.contracts.rendering import RendererInfo
+from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import SplitInfo
 from gear.dataset.plan import Plan
 from gear.plugins.build import blamed, build
@@ -88,7 +89,7 @@ def resolve(config: CollectionConfig) -> Job:
         town=library.town_name, scene=config.scene, split=config.split, seed=split.seed, patch_label=patch.label
     )
     with blamed(named.task, "notes"):
-        task_notes = tuple(spec.notes(named.options))
+        task_notes = tuple(spec.notes(named.options)) if isinstance(spec, TaskSpec) else ()
     renderer = renderer_info(config.renderer)
     response = response_for(renderer.name, weather)
     content: Json = {
