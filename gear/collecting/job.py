@@ -28,7 +28,7 @@ from gear.render.probing import renderer_info
 from gear.values.errors import ConfigError
 from gear.values.scene import Weather
 from gear.values.serial import Json, to_json
-from gear.world.assets.library.asset_hash import assets_digest
+from gear.world.assets.asset_hash import assets_digest
 from gear.world.scene_spec import SceneSpec
 
 
