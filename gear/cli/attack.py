@@ -33,38 +33,52 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--out", required=True, metavar="DIR", help="the patch folder")
     parser.add_argument("--attack", default="scene_specific", metavar="NAME", help="attack plugin (scene_specific)")
+    parser.add_argument("--steps", type=int, metavar="N", help="most optimisation steps (300; with --queries no limit)")
     parser.add_argument(
-        "--steps", type=int, metavar="N", help="of optimisation, at most (300; no end where queries are counted)"
+        "--queries", type=int, metavar="N", help="most forward passes of the model, for attacks without gradients"
     )
-    parser.add_argument("--queries", type=int, metavar="N", help="forward passes, for attacks without gradients")
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings", help="an option of the attack"
     )
     parser.add_argument("--model-set", metavar="KEY=VALUE", action="append", default=[], help="an option of the models")
     add_device(parser, "model_set")
-    parser.add_argument("--defense", metavar="NAME", help="a defense that the attack knows of and looks through")
-    parser.add_argument("--defense-set", metavar="KEY=VALUE", action="append", default=[], help="an option of it")
+    parser.add_argument(
+        "--defense", metavar="NAME", help="defense that guards the models; the attack is adaptive to it"
+    )
+    parser.add_argument(
+        "--defense-set", metavar="KEY=VALUE", action="append", default=[], help="an option of the defense"
+    )
     add_calibration(parser)
     parser.add_argument(
-        "--val", action="append", default=[], metavar="DIR", help="dataset to judge patches on; the best are kept"
+        "--val",
+        action="append",
+        default=[],
+        metavar="DIR",
+        help="dataset on which patches are validated; the best patches are kept",
     )
-    parser.add_argument("--every", type=int, default=25, metavar="N", help="steps between two looks at it (25)")
-    parser.add_argument("--patience", type=int, default=0, metavar="N", help="looks without a better one until it ends")
+    parser.add_argument("--every", type=int, default=25, metavar="N", help="steps between two validations (25)")
+    parser.add_argument(
+        "--patience",
+        type=int,
+        default=0,
+        metavar="N",
+        help="validations without improvement until the attack stops early (0: never)",
+    )
     parser.add_argument(
         "--verify", metavar="DIR", help="dataset with probes on which the patches are rendered and compared afterwards"
     )
     add_places(parser)
     parser.add_argument("--compositor", default="transport", metavar="NAME", help="transport, or homography")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of everything that is drawn (0)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all random draws (0)")
     parser.add_argument("--allow-test-data", action="store_true", help="optimise on test splits too")
-    parser.add_argument("--force", action="store_true", help="start afresh where something else is")
+    parser.add_argument("--force", action="store_true", help="replace what another attack left in --out")
     parser.add_argument(
         "--json", action="store_true", help="print attack.json; with --verify, both as attack and verify"
     )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Attacks and says where the patches are."""
+    """Runs the attack and prints where the patches are."""
     import json
 
     from gear.cli.progress import ProgressBar

@@ -26,18 +26,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the command's flags."""
     parser.epilog = EXAMPLE
     parser.add_argument("config", metavar="CONFIG", help="name (quick, paper) or path of a bench config")
-    parser.add_argument("--out", required=True, metavar="DIR", help="folder of everything")
+    parser.add_argument("--out", required=True, metavar="DIR", help="folder for data, patches, results and the report")
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings", help="a key of the config"
     )
     parser.add_argument("--device", choices=("auto", "cpu", "cuda"), help="where networks run (as the config says)")
     parser.add_argument("--workers", type=positive, default=1, metavar="N", help="processes of each collection (1)")
-    parser.add_argument("--list", action="store_true", help="print the commands that it comes to and do nothing")
+    parser.add_argument(
+        "--list", action="store_true", help="print the commands that the bench consists of, and run none"
+    )
     parser.add_argument("--json", action="store_true", help="print bench.json, or the steps, in place of the tables")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Benches and prints the tables."""
+    """Runs the bench and prints its tables."""
     import json
 
     from gear.verbs.bench.command import command
@@ -65,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 class _Bars:
-    """Says which step it is, and shows a bar of its own for each; silent when stderr is no terminal, but for notes."""
+    """Prints the title of each step, with a progress bar of its own."""
 
     def __init__(self) -> None:
         self._bar: ProgressBar | None = None

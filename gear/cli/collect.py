@@ -53,19 +53,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = EXAMPLE
     add_collection_arguments(parser)
     parser.add_argument(
-        "--workers", type=positive, default=1, metavar="N", help="processes; change nothing but time (1)"
+        "--workers", type=positive, default=1, metavar="N", help="processes; the result does not depend on them (1)"
     )
     parser.add_argument(
         "--probes",
         action="store_const",
         const=True,
-        help="also keep what patches need to be put in afterwards; for `gear attack` and `gear gap`",
+        help="also keep probes, with which patches are composed into the pictures; for `gear attack` and `gear gap`",
     )
     parser.add_argument("--force", action="store_true", help="replace a split that was made with another configuration")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Collects and says where."""
+    """Collects and prints where the dataset is."""
     from gear.cli.progress import ProgressBar
     from gear.verbs.collect.run import collect
 

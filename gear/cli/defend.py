@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--defense", required=True, metavar="NAME", help="defense plugin; gear plugins --kind defense")
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for the cleaned pictures")
     parser.add_argument("--split", help="its split, where it has several")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the defense's own draws (0)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the defense's random draws (0)")
     parser.add_argument(
         "--set",
         metavar="KEY=VALUE",
@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Cleans and says where."""
+    """Cleans the pictures and prints where they are."""
     from gear.cli.progress import ProgressBar
     from gear.verbs.defend import defend
 

@@ -8,7 +8,7 @@ from typing import Any
 
 
 def add_device(parser: argparse.ArgumentParser, settings: str) -> None:
-    """Adds the flag; what it says joins the settings of the model, under that name in the arguments."""
+    """Adds the flag; its value becomes a setting of the model, in the argument named `settings`."""
     parser.add_argument(
         "--device",
         choices=("auto", "cpu", "cuda"),

@@ -51,23 +51,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         dest="reports",
-        help="further metrics: reference (what a shipped network is held to), outside_patch; repeatable",
+        help="further metrics: reference (those of the weights' cards), outside_patch, or a plugin's; repeatable",
     )
     parser.add_argument("--out", metavar="DIR", help="folder for the results (evaluations/<task>/<model>[+<defense>])")
     parser.add_argument(
-        "--batch", type=positive, metavar="N", help="samples through the model together (1 to 4, by size)"
+        "--batch", type=positive, metavar="N", help="samples per forward pass (1 to 4, by picture size)"
     )
     parser.add_argument("--workers", type=positive, default=2, metavar="N", help="threads that read and measure (2)")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the defense's draws and the bootstrap (0)")
-    parser.add_argument("--resamples", type=int, default=1000, metavar="N", help="of the bootstrap; 0 for none (1000)")
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="seed of the defense's random draws and of the bootstrap (0)"
+    )
+    parser.add_argument(
+        "--resamples",
+        type=int,
+        default=1000,
+        metavar="N",
+        help="bootstrap resamples for the intervals; 0 for no intervals (1000)",
+    )
     add_device(parser, "model_set")
     parser.add_argument("--json", action="store_true", help="print results.json instead of the table")
 
 
 def add_calibration(parser: argparse.ArgumentParser) -> None:
-    """Adds the flags that say what a defense learns from."""
-    parser.add_argument("--calibration", metavar="DIR", help="dataset that the defense learns from")
-    parser.add_argument("--calibration-patched", metavar="DIR", help="the same with patches")
+    """Adds the flags that name the calibration data of a defense."""
+    parser.add_argument("--calibration", metavar="DIR", help="clean dataset that the defense is calibrated on")
+    parser.add_argument("--calibration-patched", metavar="DIR", help="its twin with patches")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Exports and says where."""
+    """Exports the dataset and prints where it is."""
     from gear.cli.progress import ProgressBar
     from gear.verbs.export import export
 

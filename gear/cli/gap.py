@@ -26,10 +26,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = EXAMPLE
     parser.add_argument("dataset", help="root of a dataset with probes")
     parser.add_argument("--twin", metavar="DIR", help="its twin with patches, rendered")
-    parser.add_argument("--patch", help="a patch folder or picture, or random: its twin is rendered")
+    parser.add_argument("--patch", help="a patch folder or picture, or random; the twin with it is rendered")
     add_places(parser)
     parser.add_argument("--split", help="its split, where it has several")
-    parser.add_argument("--model", metavar="NAME", help="also what the patches do to a model, digitally and rendered")
+    parser.add_argument(
+        "--model", metavar="NAME", help="also compare the effect of composed and rendered patches on this model"
+    )
     parser.add_argument(
         "--set",
         "--model-set",
@@ -39,25 +41,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest="model_set",
         help="an option of the model",
     )
-    parser.add_argument("--defense", metavar="NAME", help="a defense plugin that the model stands behind")
-    parser.add_argument("--defense-set", metavar="KEY=VALUE", action="append", default=[], help="an option of it")
+    parser.add_argument("--defense", metavar="NAME", help="defense plugin that guards the model")
+    parser.add_argument(
+        "--defense-set", metavar="KEY=VALUE", action="append", default=[], help="an option of the defense"
+    )
     add_calibration(parser)
     parser.add_argument("--compositor", action="append", dest="compositors", help="transport, homography (both)")
     parser.add_argument("--samples", type=positive, metavar="N", help="the first N samples only")
     parser.add_argument("--out", metavar="DIR", help="folder for gap.json and gap.txt")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the defense's draws (0)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the defense's random draws (0)")
     add_device(parser, "model_set")
     parser.add_argument("--json", action="store_true", help="print the report as JSON")
 
 
 def add_places(parser: argparse.ArgumentParser) -> None:
-    """Adds the flags that say where a dataset's town lies."""
-    parser.add_argument("--town", metavar="FILE", help="of the dataset, if it is not gear's own: its twin is rendered")
+    """Adds the flags for a town that does not come with gear."""
+    parser.add_argument(
+        "--town",
+        metavar="FILE",
+        help="MJCF of the dataset's town, where it is not one of gear's: the twin is rendered in it",
+    )
     parser.add_argument("--scenes", metavar="FILE", help="scene library of that town")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Compares and prints."""
+    """Compares the pictures and prints the table."""
     from gear.cli.progress import ProgressBar
     from gear.dataset.sidecar import dump_json
     from gear.verbs.gap.run import gap

@@ -1,4 +1,4 @@
-"""`gear`: finds the command, runs it, and is the only place that catches."""
+"""The `gear` command: finds the subcommand, runs it, and turns errors of the user into one line."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import sys
 from collections.abc import Sequence
 from types import FrameType
 
+from gear.cli.closed_output import discard_output
 from gear.cli.messages import one_line
 from gear.cli.parser import Parser
 from gear.cli.streams import prepare_streams
-from gear.cli.unread import print_no_more
 from gear.values.errors import GearError, UnknownNameError
 
 COMMANDS: dict[str, str] = {
@@ -22,18 +22,18 @@ COMMANDS: dict[str, str] = {
     "view": "one self-contained HTML page of a dataset",
     "train": "train a network on collected data",
     "attack": "make adversarial patches for a scene's surfaces and a model",
-    "gap": "hold digital patches against the same patches rendered",
-    "defend": "write a dataset's pictures as a defense cleans them",
+    "gap": "compare patches that are composed into pictures with the same patches rendered",
+    "defend": "write a dataset's pictures after a defense has cleaned them",
     "evaluate": "run a model, with or without a defense, over datasets: metrics, predictions, twins compared",
-    "bench": "networks and defenses over scenes and patches, the whole way, with a report",
+    "bench": "run a whole benchmark, networks x defenses x scenes x patches, with a report",
     "export": "write a dataset in another layout",
     "towns": "list towns and their scenes, or draw a map and a picture of every scene",
     "models": "list the installed networks: size, input, published weights, shipped weights and what is missing",
-    "weights": "make safetensors of a published weights file, or show what a file says of itself",
+    "weights": "convert, average or show weights files",
     "plugins": "list the installed tasks, models, attacks and defenses",
-    "new": "write a complete small package for a task, model, attack or defense of your own",
-    "doctor": "render a reference frame with each renderer and say who renders",
-    "show-config": "print the config that flags and files make",
+    "new": "write a small complete package for a new plugin",
+    "doctor": "check the renderers of this machine: device, driver and time of a reference frame",
+    "show-config": "print the collection config that flags and files result in",
     "completion": "print a script with which a shell completes gear's commands and flags",
 }
 """Command names with one line each; `gear.cli.<name>` holds the command."""
@@ -51,16 +51,16 @@ CIRCUMSTANCES = {
     errno.EACCES, errno.EPERM, errno.ENAMETOOLONG, errno.ELOOP, errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO,
     errno.ESTALE,
 }  # fmt: skip
-"""What disks and permissions refuse is nobody's bug, wherever it comes up."""
+"""Errors of disks and permissions: one line, wherever they are raised."""
 
 FULL = {errno.ENOSPC, errno.EDQUOT}
 
 NO_TEMPORARY = "No usable temporary directory"
-"""How Python says, without a file's name, that every disk on which it looks for one is full or takes no files."""
+"""Beginning of Python's message, which names no file, when no disk takes its temporary files."""
 
 
 class Terminated(KeyboardInterrupt):
-    """Somebody, a batch system perhaps, asks the process to end: it does as after Ctrl-C."""
+    """A request to end the process (SIGTERM), such as a batch system's: handled as Ctrl-C is."""
 
 
 def entry() -> None:
@@ -79,9 +79,9 @@ def main(argv: Sequence[str]) -> int:
     prepare_streams()
     try:
         code = _run(argv)
-        sys.stdout.flush()  # what fails at Python's own end, nobody catches
+        sys.stdout.flush()  # a failing flush at the interpreter's exit could not be caught
     except BrokenPipeError:
-        print_no_more()
+        discard_output()
         return 0
     except (KeyboardInterrupt, Exception) as error:
         interrupt = _interrupt_behind(error)
@@ -91,9 +91,9 @@ def main(argv: Sequence[str]) -> int:
         if isinstance(error, OSError) and error.filename and error.errno in CIRCUMSTANCES:
             print(f"gear: {one_line(error.filename)}: {error.strerror}", file=sys.stderr)
             return 2
-        if isinstance(error, OSError) and error.errno in FULL:  # a stream that says no name, as that of `> file`
+        if isinstance(error, OSError) and error.errno in FULL:  # a stream without a name, such as stdout in `> file`
             print(f"gear: {error.strerror}", file=sys.stderr)
-            print_no_more()
+            discard_output()
             return 2
         if isinstance(error, FileNotFoundError) and str(error.strerror).startswith(NO_TEMPORARY):
             print(
@@ -157,7 +157,7 @@ def _terminate(number: int, frame: FrameType | None) -> None:
 
 
 def _interrupt_behind(error: BaseException | None) -> KeyboardInterrupt | None:
-    """The Ctrl-C that made an error: compiled modules that it stops in their import raise an ImportError from it."""
+    """The Ctrl-C that caused an error: a compiled module interrupted in its import raises an ImportError from it."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
     return error

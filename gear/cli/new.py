@@ -15,13 +15,13 @@ EXAMPLE = """examples:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the command's flags."""
     parser.epilog = EXAMPLE
-    parser.add_argument("kind", choices=KINDS, help="what to write")
+    parser.add_argument("kind", choices=KINDS, help="kind of plugin")
     parser.add_argument("name", help="the plugin's name: lower case letters, digits and underscores")
     parser.add_argument("--out", default=".", metavar="DIR", help="folder to make the package's folder in (.)")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Writes the package and says what to do next."""
+    """Writes the package and prints the next steps."""
     from gear.verbs.scaffold.write import new_package
 
     folder = new_package(args.kind, args.name, out=args.out)

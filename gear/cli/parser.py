@@ -1,4 +1,4 @@
-"""The parser of the command line: whoever mistypes gets one line, with what they may have meant."""
+"""The parser of the command line: a mistyped flag gives one line with the closest known flag."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from gear.cli.messages import one_line
 
 
 class Parser(argparse.ArgumentParser):
-    """As argparse's, with errors in one line."""
+    """An argparse parser whose errors are one line."""
 
     def error(self, message: str) -> NoReturn:
-        """Leaves with 2."""
+        """Exits with 2 and one line."""
         self.exit(2, f"{self.prog}: {one_line(message)}; {self.prog} --help says more\n")
 
     def command(self, name: str) -> Parser:
@@ -25,11 +25,11 @@ class Parser(argparse.ArgumentParser):
         return parser
 
     def refuse(self, unknown: Sequence[str]) -> NoReturn:
-        """Leaves with 2, for words that no argument takes."""
+        """Exits with 2, for words that no argument takes."""
         flag = next((word.partition("=")[0] for word in unknown if word.startswith("-")), None)
         if flag is None:
             self.error(f"does not know what to do with {' '.join(unknown)!r}")
-        # Two dashes are half of a short flag: with them --resume is like --set.
+        # Compared without the dashes: they are half of a short flag, so that --resume would resemble --set.
         flags = {known.lstrip("-"): known for known in self._option_string_actions}
         close = difflib.get_close_matches(flag.lstrip("-"), flags, n=1)
         self.error(f"no flag {flag}" + (f"; did you mean {flags[close[0]]}?" if close else ""))

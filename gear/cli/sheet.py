@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Writes the sheet and says where."""
+    """Writes the sheet and prints its path."""
     from gear.verbs.sheet import sheet
 
     print(sheet(args.dataset, args.out, split=args.split, samples=args.samples))

@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Prints the collection config that these flags and files make, once all that it names is there."""
+    """Prints the collection config that the flags and files result in, after checking that all names in it exist."""
     from gear.collecting.lookup import look_up
     from gear.config.dump import to_yaml
     from gear.config.load import load_collection

@@ -24,10 +24,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scenes", metavar="FILE", help="scene library of the town, instead of gear's own")
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument("--out", metavar="DIR", help="write a map and a sheet of thumbnails there")
-    parser.add_argument("--renderer", default="raster", help="of the thumbnails: raster, filament, classic (raster)")
-    parser.add_argument("--quality", default="fast", help="of the thumbnails: film or fast (fast)")
-    parser.add_argument("--weather", default="ClearNoon", help="of the thumbnails: a weather preset (ClearNoon)")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the places they look from (0)")
+    parser.add_argument(
+        "--renderer", default="raster", help="renderer of the thumbnails: raster, filament, classic (raster)"
+    )
+    parser.add_argument("--quality", default="fast", help="quality of the thumbnails: film or fast (fast)")
+    parser.add_argument("--weather", default="ClearNoon", help="weather preset of the thumbnails (ClearNoon)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the thumbnails' viewpoints (0)")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -52,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def draw(args: argparse.Namespace) -> int:
-    """Writes the map and the sheet and says where."""
+    """Writes the map and the sheet and prints their paths."""
     from gear.cli.progress import ProgressBar
     from gear.verbs.towns.write import write_town
 

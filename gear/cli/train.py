@@ -43,11 +43,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--val", nargs="+", default=[], metavar="DIR", help="what to validate on (a share of --data)")
     parser.add_argument("--out", required=True, metavar="DIR", help="folder of the results")
     length = parser.add_mutually_exclusive_group()
-    length.add_argument("--epochs", type=positive, metavar="N", help="passes over the data (the network's recipe)")
-    length.add_argument("--time-budget", type=budget, metavar="TIME", help="time instead of passes: 90s, 10m, 1.5h")
-    parser.add_argument("--batch", type=positive, metavar="N", help="samples a step (recipe)")
-    parser.add_argument("--lr", type=float, metavar="X", help="highest learning rate (recipe)")
-    parser.add_argument("--seed", type=int, metavar="N", help="of weights, order and augmentation (0)")
+    length.add_argument("--epochs", type=positive, metavar="N", help="passes over the data (as the network's recipe)")
+    length.add_argument(
+        "--time-budget", type=budget, metavar="TIME", help="training time instead of epochs: 90s, 10m, 1.5h"
+    )
+    parser.add_argument("--batch", type=positive, metavar="N", help="samples per step (as the recipe)")
+    parser.add_argument("--lr", type=float, metavar="X", help="peak learning rate (as the recipe)")
+    parser.add_argument(
+        "--seed", type=int, metavar="N", help="seed of the initial weights, the sample order and the augmentation (0)"
+    )
     parser.add_argument(
         "--init",
         metavar="FILE|NAME",
@@ -60,23 +64,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of the training steps: auto is bfloat16 with --time-budget where it is quicker, else float32 (auto)",
     )
     parser.add_argument("--device", choices=("auto", "cpu", "cuda"), help="where it runs (auto)")
-    parser.add_argument("--workers", type=positive, metavar="N", help="threads that read; change nothing but time (2)")
     parser.add_argument(
-        "--adversarial", metavar="ATTACK", help="show patches that this attack makes against the network on the way"
+        "--workers", type=positive, metavar="N", help="reading threads; the result does not depend on them (2)"
     )
-    parser.add_argument("--allow-test-data", action="store_true", help="learn from test splits, too")
+    parser.add_argument(
+        "--adversarial",
+        metavar="ATTACK",
+        help="adversarial patch training: show patches that this attack makes during the training",
+    )
+    parser.add_argument("--allow-test-data", action="store_true", help="train on test splits, too")
     parser.add_argument(
         "--set",
         metavar="KEY=VALUE",
         action="append",
         default=[],
         dest="settings",
-        help="any key of the training's config, options.KEY for the network's own; repeatable",
+        help="any key of the training config; options.KEY for options of the network; repeatable",
     )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Trains and says what it came to."""
+    """Trains and prints the result."""
     from gear.verbs.train.run import train
 
     with TrainingBar() as bar:
@@ -106,7 +114,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 class TrainingBar:
-    """Per cent, loss and the last validation on stderr; every validation leaves a line."""
+    """Progress, loss and the last validation on stderr; each validation prints a line."""
 
     SHOWN = 3
 

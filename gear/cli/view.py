@@ -35,12 +35,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=megabytes,
         default=48.0,
         metavar="MB",
-        help="about how large the page may get; pictures are scaled down until they fit (48)",
+        help="approximate size limit of the page; pictures are scaled down until they fit (48)",
     )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Writes the page and says where."""
+    """Writes the page and prints its path."""
     from gear.cli.progress import ProgressBar
     from gear.view.write import write_view
 

@@ -25,7 +25,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the command's flags."""
     parser.epilog = EXAMPLE
     actions = parser.add_subparsers(title="actions", metavar="ACTION", dest="action", required=True)
-    converting = actions.add_parser("convert", help="make a safetensors file of a published one, strictly checked")
+    converting = actions.add_parser(
+        "convert", help="convert a published weights file to safetensors, with all keys checked"
+    )
     converting.add_argument("model", metavar="MODEL", help="model plugin; gear models")
     converting.add_argument("source", metavar="IN", help="the published file: .pth, .pt, .pkl, .safetensors")
     converting.add_argument("out", metavar="OUT", help="the file to write; ends in .safetensors")
@@ -36,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     converting.add_argument("--json", action="store_true", help="print JSON")
     averaging = actions.add_parser(
-        "average", help="make the mean of two states of one network, such as before and after fine-tuning"
+        "average", help="average two states of one network, such as before and after fine-tuning"
     )
     averaging.add_argument(
         "first", metavar="FIRST", help="a safetensors file, or a model whose shipped weights are meant"
@@ -46,13 +48,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     averaging.add_argument("--share", type=float, default=0.5, metavar="X", help="of the second, between 0 and 1 (0.5)")
     averaging.add_argument("--half", action="store_true", help="store matrices in float16, half the size")
     averaging.add_argument("--json", action="store_true", help="print JSON")
-    showing = actions.add_parser("show", help="print what a weights file says of itself")
+    showing = actions.add_parser("show", help="print the metadata of a weights file")
     showing.add_argument("file", metavar="FILE", help="a safetensors file, or a model whose shipped weights are meant")
     showing.add_argument("--json", action="store_true", help="print JSON")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Converts, averages or shows."""
+    """Runs the chosen action: convert, average or show."""
     return {"convert": convert, "average": average, "show": show}[args.action](args)
 
 
@@ -81,7 +83,7 @@ def _say(report: ConvertReport, args: argparse.Namespace) -> int:
 
 
 def show(args: argparse.Namespace) -> int:
-    """Prints the header."""
+    """Prints the metadata in the file's header."""
     from gear.verbs.weights.show import show_weights
 
     facts = show_weights(args.file).to_json()
