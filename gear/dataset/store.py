@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from gear.contracts.tasks import Auxiliary, Encoded, Sample, Sidecar, Task
-from gear.dataset.files import clear_scratch, explained, inside, read_bytes, sha256, sync_folder, write_whole
+from gear.dataset.files import clear_scratch, inside, read_bytes, sha256, sync_folder, write_whole
+from gear.dataset.guarded_paths import owned, refuse_links, remove_empty_folders, remove_file, remove_files
 from gear.dataset.layout import GEAR, begun_path, manifest_path, patch_path, plan_path, sidecar_path, split_folder
 from gear.dataset.locks import at_work, is_at_work, turn
 from gear.dataset.plan import Plan, begin, read_plan, refuse_copy, refuse_other_tasks
@@ -18,18 +19,19 @@ from gear.values.errors import DatasetError, FieldError, ReplaceableError
 from gear.values.serial import Json
 
 
-def refuse_dataset(root: Path, instead: str) -> None:
-    """Keeps results out of a dataset.
+def check_output(root: Path, instead: str) -> None:
+    """Checks the folder that a command is to write results into, before anything in it changes.
 
     Args:
-        root: where they are to be written.
-        instead: what to do, for the message.
+        root: the folder; it may be missing.
+        instead: what to do when it is a dataset, for the message.
 
     Raises:
-        DatasetError: a dataset is there.
+        DatasetError: the folder is a dataset, or there is a link in it.
     """
     if any(root.glob(f"{GEAR}/*/plan.json")):
         raise DatasetError(root, f"is a dataset; {instead}")
+    refuse_links(root)
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,9 +50,10 @@ class Store:
         """Begins the split or takes it up again; one that was killed before its first sample was not begun.
 
         Raises:
-            DatasetError: it cannot be written, was made with another configuration, or has a sidecar that is no longer
-                the one that was collected.
+            DatasetError: it cannot be written, was made with another configuration, has a sidecar that is no longer
+                the one that was collected, or holds a link.
         """
+        refuse_links(self.root)
         clear_scratch(self.root)
         _forget_empty(self.root, self.plan)
         self._refuse_changed()
@@ -116,6 +119,7 @@ class Store:
             try:
                 with turn(self.root):
                     if force:
+                        refuse_links(self.root)
                         self._replace(patch_files)
                     is_new = not self._is_begun()  # others may have begun it, or taken it back, while this one waited
                     self.open(patch_files)
@@ -139,10 +143,11 @@ class Store:
             if self.root.is_dir():
                 with turn(self.root):
                     _remove_idle(self.root, self.split)
-            gear = self.root / GEAR
-            for folder in [*sorted(gear.rglob("*"), reverse=True), gear, *self._folders()]:
-                if folder not in was_there and folder.is_dir() and not any(folder.iterdir()):
-                    folder.rmdir()
+            remove_empty_folders(self.root, GEAR)
+            for folder in self._folders():
+                if folder not in was_there:
+                    with contextlib.suppress(FileNotFoundError):
+                        folder.rmdir()
 
     def missing(self) -> list[int]:
         """Indices of samples that have no sidecar yet; a sample with one is whole and is never made again."""
@@ -176,7 +181,7 @@ class Store:
             auxiliary={name: file for name, (file, _) in further.items()},
         )
         write_whole(self.root, sidecar_path(self.split, sample.record.index), sidecar_bytes(sidecar))
-        inside(self.root, begun).unlink(missing_ok=True)
+        remove_file(self.root, begun)
 
     def sidecars(self) -> list[Sidecar]:
         """All of them, in order of index.
@@ -205,9 +210,9 @@ class Store:
         sidecars = self.sidecars()
         indexes: dict[str, str] = {}
         files = sorted(self._indexes(task, sidecars).items())
-        begun = inside(self.root, begun_path(self.split, "indexes"))
+        begun = begun_path(self.split, "indexes")
         if not inside(self.root, manifest_path(self.split)).exists():
-            write_whole(self.root, begun_path(self.split, "indexes"), dump_json([relative for relative, _ in files]))
+            write_whole(self.root, begun, dump_json([relative for relative, _ in files]))
         for relative, data in files:
             target = inside(self.root, relative)
             if not (target.exists() and target.read_bytes() == data):
@@ -235,10 +240,9 @@ class Store:
         target = inside(self.root, manifest_path(self.split))
         if not (target.exists() and target.read_bytes() == data):
             write_whole(self.root, manifest_path(self.split), data)
-        for left in begun.parent.glob("*.json"):  # of samples that were whole when they were killed, too
-            left.unlink(missing_ok=True)
-        with contextlib.suppress(OSError):
-            begun.parent.rmdir()
+        notes = owned(self.root, begun).parent
+        remove_files(self.root, [_relative(self.root, left) for left in notes.glob("*.json")])
+        remove_empty_folders(self.root, _relative(self.root, notes))
         clear_scratch(self.root)
         sync_folder(target.parent)
 
@@ -301,68 +305,52 @@ def remove_split(root: Path, split: str) -> None:
     """Deletes what gear wrote for a split, and nothing else: the files that its sidecars, its manifest and the notes of
     what was being written name, and the copy of its patches, unless another split shows them.
 
-    A sample's sidecar goes before its files: where this is cut short, no sample without them is taken for whole. Of one
-    whose sidecar is gone or damaged, the manifest knows the files.
+    All paths are checked before the first file is deleted. A sample's sidecar is deleted before its files, so that no
+    sample without its files is taken for whole when the deletion is interrupted. The files of a sample whose sidecar is
+    missing or damaged are those that the manifest names.
 
     Raises:
-        DatasetError: a file cannot be deleted, or names a path outside the root; or it is a copy of another split and
-            names that one's files.
+        DatasetError: a file cannot be deleted, its path leaves the root or leads through a link; or the split is a copy
+            of another one, whose files it names.
     """
-    folder = inside(root, split_folder(split))
+    folder = owned(root, split_folder(split))
     if not folder.is_dir():
         return
     refuse_copy(root, split)
-    sidecars = sorted((folder / "samples").glob("*.json"))
-    begun = sorted(inside(root, begun_path(split, "x")).parent.glob("*.json"))
-    manifest = inside(root, manifest_path(split))
+    samples = sorted(owned(root, f"{split_folder(split)}/samples").glob("*.json"))
+    notes = sorted(owned(root, begun_path(split, "x")).parent.glob("*.json"))
+    manifest = folder / "manifest.json"
     listed = _load_if_whole(manifest)
-    doomed = [(manifest, _files_named(root, listed))]
-    doomed += [(path, _files_named(root, _load_if_whole(path))) for path in sidecars]
-    unfinished = [(path, _files_named(root, _load_if_whole(path))) for path in begun]
-    without_sidecar = _files_of_samples(root, listed)
+    doomed = [_relative(root, manifest), *_files_named(listed)]
+    for path in samples:
+        doomed += [_relative(root, path), *_files_named(_load_if_whole(path))]
+    doomed += _files_of_samples(listed)
+    for path in notes:
+        doomed += [*_files_named(_load_if_whole(path)), _relative(root, path)]
     label = _patch_label(root, split)
-    with explained(root):
-        for path, files in doomed:
-            path.unlink(missing_ok=True)
-            for file in files:
-                file.unlink(missing_ok=True)
-        for file in without_sidecar:
-            file.unlink(missing_ok=True)
-        for path, files in unfinished:
-            for file in (*files, path):
-                file.unlink(missing_ok=True)
-        inside(root, plan_path(split)).unlink(missing_ok=True)
-        for path in [*sorted((p for p in folder.rglob("*") if p.is_dir()), reverse=True), folder]:
-            with contextlib.suppress(OSError):  # somebody else's file is in it, or one that a damaged sidecar named
-                path.rmdir()
-        others = {_patch_label(root, path.parent.name) for path in (root / GEAR).glob("*/plan.json")}
-        if label and label not in others and (copies := inside(root, patch_path(label, "patch_0.png")).parent).is_dir():
-            for path in copies.glob("patch_*.png"):
-                path.unlink()
-            if not any(copies.iterdir()):
-                copies.rmdir()
+    copies = owned(root, patch_path(label or "none", "patch_0.png")).parent
+    remove_files(root, [*doomed, plan_path(split)])
+    remove_empty_folders(root, split_folder(split))
+    others = {_patch_label(root, path.parent.name) for path in (root / GEAR).glob("*/plan.json")}
+    if label and label not in others:
+        remove_files(root, [_relative(root, path) for path in copies.glob("patch_*.png")])
+        remove_empty_folders(root, _relative(root, copies))
 
 
-def _files_named(root: Path, there: Json) -> list[Path]:
-    """What a sidecar, a manifest or a note of what was being written names; nothing where it is none.
+def _relative(root: Path, path: Path) -> str:
+    return path.relative_to(root).as_posix()
 
-    Raises:
-        DatasetError: a path outside the root.
-    """
+
+def _files_named(there: Json) -> list[str]:
+    """The files that a sidecar, a manifest or a note of what was being written names; none where it is damaged."""
     named = there if isinstance(there, list) else _names(there, "files") + _names(there, "indexes")
-    return [inside(root, name) for name in named if isinstance(name, str)]
+    return [name for name in named if isinstance(name, str)]
 
 
-def _files_of_samples(root: Path, there: Json) -> list[Path]:
-    """What a manifest says that samples own; nothing where it is none.
-
-    Raises:
-        DatasetError: a path outside the root.
-    """
+def _files_of_samples(there: Json) -> list[str]:
+    """The files that a manifest lists of its samples; none where it is damaged."""
     samples = there.get("samples") if isinstance(there, dict) else None
-    return [
-        inside(root, name) for one in (samples if isinstance(samples, list) else ()) for name in _names(one, "files")
-    ]
+    return [name for one in (samples if isinstance(samples, list) else ()) for name in _names(one, "files")]
 
 
 def _load_if_whole(path: Path) -> Json:

@@ -13,7 +13,7 @@ from gear.config.reader import read_node
 from gear.contracts.specs import DefenseSpec
 from gear.dataset.files import clear_scratch, explained, inside, write_whole
 from gear.dataset.sidecar import dump_json, load_json
-from gear.dataset.store import refuse_dataset
+from gear.dataset.store import check_output
 from gear.measuring.guard import Guard
 from gear.plugins.build import NO_OPTIONS, build, find
 from gear.plugins.catalogue import PluginEntry
@@ -89,7 +89,7 @@ def defend(
     opened = open_dataset(dataset, split)
     spec = suitable(found, opened.plan.task["name"])
     root, name = Path(out), opened.plan.info.split
-    refuse_dataset(root, "write the cleaned pictures into a folder of their own")
+    check_output(root, "write the cleaned pictures into a folder of their own")
     plan: Json = {
         "defense": {"name": spec.name, "package": found.owner.package, "version": found.owner.version},
         "options": to_plain(config),

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Iterable
 from pathlib import Path
 
-from gear.dataset.files import clear_scratch, explained, inside, read_bytes, write_whole
-from gear.dataset.store import plan_of, splits_of
+from gear.dataset.files import explained, inside, read_bytes, sync_folder, write_whole
+from gear.dataset.guarded_paths import owned, remove_empty_folders, remove_files, remove_tree
+from gear.dataset.locks import alone_at_work
+from gear.dataset.store import check_output, plan_of, splits_of
 from gear.formats.exports import SplitRecords, layouts
 from gear.plugins.datasets import open_dataset
 from gear.values.errors import DatasetError, UnknownNameError
 from gear.values.progress import Progress
+
+UNFINISHED = ".gear-export"
+"""Ends the name of the hidden folder, beside the new tree's place, in which the tree is written."""
 
 
 def export(
@@ -23,24 +28,26 @@ def export(
 ) -> int:
     """Writes all splits of a dataset as another layout's tree.
 
+    The tree is written into a hidden folder beside its place and renamed when it is whole. An export that fails deletes
+    that folder; after one that was killed, the same command takes up what is there.
+
     Args:
         dataset: root of a dataset whose splits are finished.
         layout: one of `gear.formats.exports.layouts()`.
         out: folder of the new tree; must be empty or new.
-        progress: told after every file, with (files so far, 0): their number is not known before.
+        on_progress: called after every file with (files so far, 0): their number is not known before.
 
     Returns:
         How many samples the tree holds.
 
     Raises:
         UnknownNameError: there is no such layout.
-        DatasetError: the layout is another task's, a split is not finished, or `out` holds something. An export that
-            is stopped takes back what it wrote: half a tree looks like a whole one, and the next try needs the room.
+        DatasetError: the layout is another task's, a split is not finished, `out` holds something, or the disk refuses.
     """
     known = layouts()
     if layout not in known:
         raise UnknownNameError("layout", layout, known)
-    source, target = Path(dataset), Path(out)
+    source, target = Path(dataset), Path(out).resolve()
     splits: list[SplitRecords] = []
     for name in splits_of(source):
         plan = plan_of(source, name)
@@ -51,31 +58,50 @@ def export(
         opened = open_dataset(source, name)
         records = tuple(opened.sidecar(i).record for i in range(len(opened)))
         splits.append(SplitRecords(info=plan.info, records=records))
-    with explained(target):
-        if target.exists() and any(target.iterdir()):
-            raise DatasetError(target, "is not empty; export into a new folder")
-        target.mkdir(parents=True, exist_ok=True)
+    _check_target(target)
     tree = known[layout].tree(splits, lambda path: read_bytes(inside(source, path)))
-    written: list[str] = []
-    try:
-        for relative, data in tree:
-            written.append(relative)
-            write_whole(target, relative, data)
-            if on_progress is not None:
-                on_progress(len(written), 0)
-    except BaseException:  # Ctrl-C, too
-        _take_back(target, written)
-        raise
-    clear_scratch(target)
+    unfinished = owned(target.parent, f".{target.name}{UNFINISHED}")
+    check_output(unfinished, "delete it, or use another --out")
+    with alone_at_work(unfinished):
+        try:
+            _write_tree(unfinished, tree, on_progress)
+            with explained(target):
+                _check_target(target)  # another command may have written there
+                unfinished.replace(target)
+                sync_folder(target.parent)
+        except BaseException:  # Ctrl-C, too
+            with contextlib.suppress(DatasetError):
+                remove_tree(unfinished.parent, unfinished.name)
+            raise
     return sum(len(split.records) for split in splits)
 
 
-def _take_back(target: Path, written: Sequence[str]) -> None:
-    """Removes the files of a tree, and all folders in it that are empty then."""
-    with contextlib.suppress(OSError, DatasetError):
-        for relative in written:
-            inside(target, relative).unlink(missing_ok=True)
-        clear_scratch(target)
-        for folder in sorted((path for path in target.rglob("*") if path.is_dir()), reverse=True):
-            if not any(folder.iterdir()):
-                folder.rmdir()
+def _check_target(target: Path) -> None:
+    """Checks that the new tree can take its place.
+
+    Raises:
+        DatasetError: something is in the folder, or it is one that cannot be replaced by another.
+    """
+    with explained(target):
+        if target.exists() and any(target.iterdir()):
+            raise DatasetError(target, "is not empty; export into a new folder")
+    if target.is_mount() or target == Path.cwd():
+        kind = "a mounted file system" if target.is_mount() else "the current folder"
+        raise DatasetError(target, f"is {kind}; export into a new folder in it")
+
+
+def _write_tree(root: Path, tree: Iterable[tuple[str, bytes]], on_progress: Progress | None) -> None:
+    """Writes what is missing of a tree, and deletes what an earlier export, that was killed, left of another one."""
+    written: set[str] = set()
+    for relative, data in tree:
+        path = owned(root, relative)
+        if not (path.is_file() and read_bytes(path) == data):
+            write_whole(root, relative, data)
+        written.add(relative)
+        if on_progress is not None:
+            on_progress(len(written), 0)
+    there = [path.relative_to(root).as_posix() for path in root.rglob("*") if not path.is_dir()]
+    remove_files(root, [relative for relative in there if relative not in written])
+    for folder in root.iterdir():
+        if folder.is_dir():
+            remove_empty_folders(root, folder.name)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from gear.dataset.files import explained, refuse_folder
+from gear.dataset.files import explained, refuse_folder, streamed_alone
 from gear.dataset.reading import Dataset
 from gear.plugins.datasets import open_dataset
 from gear.values.counted import counted
@@ -135,15 +135,5 @@ def base_url(root: Path, page: Path) -> str:
 
 def _write(target: Path, pieces: Iterable[str]) -> int:
     """Writes the file whole or not at all; returns its size."""
-    with explained(target):
-        temporary = target.with_name(f".{target.name}.part")
-        try:
-            with temporary.open("w", encoding="utf-8", errors="replace", newline="\n") as stream:
-                for piece in pieces:
-                    stream.write(piece)
-            size = temporary.stat().st_size
-            temporary.replace(target)
-        except BaseException:
-            temporary.unlink(missing_ok=True)
-            raise
-    return size
+    with streamed_alone(target) as stream:
+        return sum(stream.write(piece.encode("utf-8", errors="replace")) for piece in pieces)

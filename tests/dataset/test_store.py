@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
 import pickle
 import subprocess
 import sys
@@ -159,8 +160,46 @@ def test_an_export_that_is_stopped_leaves_nothing_and_can_be_given_again(tmp_pat
 
     with pytest.raises(KeyboardInterrupt):
         export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b", on_progress=stop)
-    assert list((tmp_path / "b").iterdir()) == []
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]
     assert export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b") == 3
+
+
+def test_an_export_that_is_killed_shows_nothing_and_the_same_command_goes_on(tmp_path: Path) -> None:
+    fill(tmp_path / "a", plan())
+    export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "whole")
+    script = (
+        "import os, sys\nfrom gear.verbs.export import export\n"
+        "export(sys.argv[1], layout='kitti-depth', out=sys.argv[2],"
+        " on_progress=lambda written, _: written == 4 and os._exit(9))"
+    )
+    killed = subprocess.run([sys.executable, "-c", script, str(tmp_path / "a"), str(tmp_path / "b")], check=False)
+    assert killed.returncode == 9 and not (tmp_path / "b").exists()
+    unfinished = tmp_path / ".b.gear-export"
+    stray, first = unfinished / "stray/of_another.png", next(path for path in unfinished.rglob("*.*") if path.is_file())
+    stray.parent.mkdir()
+    stray.write_bytes(b"stray")
+    before = first.stat().st_ino
+    assert export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b") == 3
+    assert tree(tmp_path / "b") == tree(tmp_path / "whole") and not unfinished.exists()
+    assert (tmp_path / "b" / first.relative_to(unfinished)).stat().st_ino == before, "what was there was not rewritten"
+
+
+def test_an_export_writes_through_no_link(tmp_path: Path) -> None:
+    fill(tmp_path / "a", plan())
+    victim, unfinished = tmp_path / "victim", tmp_path / ".b.gear-export"
+    victim.mkdir()
+    (victim / "mine.txt").write_text("mine")
+    unfinished.mkdir()
+    (unfinished / "train").symlink_to(victim)
+    with pytest.raises(DatasetError, match="train: is a link"):
+        export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b")
+    unlinked = unfinished / "train"
+    unlinked.unlink()
+    unfinished.rmdir()
+    unfinished.symlink_to(victim)
+    with pytest.raises(DatasetError, match=r"\.b\.gear-export: is a link"):
+        export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b")
+    assert tree(victim) == {"mine.txt": b"mine"} and not (tmp_path / "b").exists()
 
 
 def test_a_split_that_was_killed_before_its_first_sample_is_nothing(tmp_path: Path) -> None:
@@ -204,15 +243,15 @@ def test_replacing_that_is_cut_short_leaves_no_sample_without_its_files(
 ) -> None:
     fill(tmp_path, plan())
     count = iter(range(5))
-    unlink = Path.unlink
+    unlink = os.unlink
 
-    def cut_short(path: Path, missing_ok: bool = False) -> None:
+    def cut_short(name: str, *, dir_fd: int | None = None) -> None:
         if next(count, None) is None:
             raise KeyboardInterrupt
-        unlink(path, missing_ok=missing_ok)
+        unlink(name, dir_fd=dir_fd)
 
     with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
-        patched.setattr(Path, "unlink", cut_short)
+        patched.setattr(os, "unlink", cut_short)
         remove_split(tmp_path, "test")
     left = Store(tmp_path, plan())
     assert 0 in left.missing() and left.missing() != [0, 1, 2]

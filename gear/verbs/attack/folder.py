@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import re
-import shutil
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +12,13 @@ from safetensors.numpy import load as from_bytes
 
 from gear.collecting.patch_sources import read_patch
 from gear.contracts.attacks import Patch, surface_of
-from gear.dataset.files import clear_scratch, explained, read_bytes, sha256, write_whole
+from gear.dataset.files import clear_scratch, read_bytes, sha256, write_whole
+from gear.dataset.guarded_paths import remove_files, remove_tree
 from gear.dataset.plan import differences
 from gear.dataset.sidecar import dump_json
-from gear.dataset.store import refuse_dataset
+from gear.dataset.store import check_output
 from gear.values.errors import DatasetError, FieldError, OutdatedError, ReplaceableError
+from gear.values.regular_file import read_regular
 from gear.values.serial import Json, from_json
 from gear.verbs.attack.monitor import CHECKPOINT, is_picture
 
@@ -54,13 +54,11 @@ def begin(root: Path, plan: Json, *, force: bool) -> Json | None:
         ReplaceableError: something else is there, or what is there is broken.
         DatasetError: the disk refuses.
     """
-    refuse_dataset(root, "make patches in a folder of their own")
+    check_output(root, "make patches in a folder of their own")
     finished, wanted = root / NOTES, json.loads(json.dumps(plan))
     if force:
-        with explained(root):
-            for path in (finished, root / CHECKPOINT, *root.glob("patch_*.png")):
-                path.unlink(missing_ok=True)
-        shutil.rmtree(root / VERIFY, ignore_errors=True)  # what the patches that go did in the world
+        remove_files(root, [NOTES, CHECKPOINT, *(path.name for path in root.glob("patch_*.png"))])
+        remove_tree(root, VERIFY)  # the rendered check of the patches that were deleted
     if finished.exists():
         there = _read_notes(finished)
         what = ", ".join(differences({key: there.get(key) for key in wanted}, wanted)[:3])
@@ -86,7 +84,7 @@ def read_patches(root: Path) -> tuple[Patch, ...]:
     """
     path = root / EXACT
     try:
-        arrays = from_bytes(path.read_bytes())
+        arrays = from_bytes(read_regular(path))
     except (OSError, SafetensorError) as error:
         raise ReplaceableError(path, BROKEN) from error
     if not all(map(is_picture, arrays.values())):
@@ -95,10 +93,8 @@ def read_patches(root: Path) -> tuple[Patch, ...]:
 
 
 def tidy(root: Path) -> None:
-    """Takes away what only an unfinished attack needs."""
-    for name in (CHECKPOINT, BEGUN):
-        with contextlib.suppress(FileNotFoundError):
-            (root / name).unlink()
+    """Deletes the files that only an unfinished attack needs."""
+    remove_files(root, [CHECKPOINT, BEGUN])
     clear_scratch(root)
 
 

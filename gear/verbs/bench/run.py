@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import shutil
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -18,8 +17,9 @@ from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
 from gear.contracts.specs import AttackSpec
 from gear.dataset.files import clear_scratch, explained, write_whole
+from gear.dataset.guarded_paths import remove_tree
 from gear.dataset.sidecar import dump_json
-from gear.dataset.store import refuse_dataset
+from gear.dataset.store import check_output
 from gear.measuring.plugin_selection import check_optics
 from gear.values.errors import GearError, OutdatedError, ReplaceableError
 from gear.values.progress import Progress, Warn
@@ -101,7 +101,7 @@ def bench(
         if step.verb != "evaluate":
             callbacks["on_warning"] = warn
         try:
-            done = _done(step, callbacks, warn)
+            done = _done(step, root, callbacks, warn)
         except ReplaceableError as error:
             raise GearError(f"{step.title}: {error.path}: {error.problem}; use another --out, or remove it") from error
         except GearError as error:
@@ -130,7 +130,7 @@ def bench(
 def _ignore(line: str) -> None: ...
 
 
-def _done(step: Step, callbacks: dict[str, Any], warn: Warn) -> Any:
+def _done(step: Step, root: Path, callbacks: dict[str, Any], warn: Warn) -> Any:
     """Carries a step out; what the bench made from pictures or patches that are others now, it makes again."""
     verb, again = VERBS[step.verb], f"{step.title}: is made again, for what is there"
     try:
@@ -140,8 +140,7 @@ def _done(step: Step, callbacks: dict[str, Any], warn: Warn) -> Any:
         return verb(**step.arguments, **callbacks, force=True)
     except OtherLessonsError as error:
         warn(f"{again} {error.problem.partition(';')[0]}")
-        with explained(Path(error.path)):
-            shutil.rmtree(error.path)
+        remove_tree(root, Path(error.path).relative_to(root).as_posix())
         return verb(**step.arguments, **callbacks)
 
 
@@ -163,7 +162,7 @@ def prepared(
     if workers < 1:
         raise GearError(f"workers must be at least 1, got {workers}")
     root = Path(out)
-    refuse_dataset(root, "write the bench into a folder of its own")
+    check_output(root, "write the bench into a folder of its own")
     node = with_overrides(parse_file(find_config("bench", str(config))), settings, BenchConfig)
     read = read_node(BenchConfig, node)
     scenes = measured_scenes(read, node)

@@ -13,7 +13,7 @@ from gear.dataset.files import clear_scratch, inside, write_whole
 from gear.dataset.locks import alone_at_work
 from gear.dataset.plan import differences
 from gear.dataset.sidecar import dump_json, load_json
-from gear.dataset.store import refuse_dataset
+from gear.dataset.store import check_output
 from gear.measuring.calibration import opened_calibration
 from gear.measuring.dataset_run import evaluate_row
 from gear.measuring.guarded_model import Player
@@ -108,7 +108,7 @@ def evaluate(
         check_defense(guard, chosen, task, is_calibrated=learnt.clean is not None)
     usual = Path("evaluations", task, model.replace("/", "-") + f"+{defense}" * bool(defense))
     root = usual if out is None else Path(out)
-    refuse_dataset(root, "write the evaluation into a folder of its own")
+    check_output(root, "write the evaluation into a folder of its own")
     player = Player(chosen, guard, calibration=learnt, seed=seed)
     facts = {
         "task": datasets[0].plan.task,

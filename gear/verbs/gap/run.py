@@ -18,7 +18,7 @@ from gear.dataset.files import clear_scratch, explained, inside, write_whole
 from gear.dataset.layout import patch_path
 from gear.dataset.reading import Dataset, Twins, pair_twins
 from gear.dataset.sidecar import dump_json
-from gear.dataset.store import refuse_dataset
+from gear.dataset.store import check_output
 from gear.plugins.datasets import open_dataset
 from gear.values.errors import DatasetError
 from gear.values.frames import UInt8Image
@@ -104,7 +104,7 @@ def gap(
     if model is None and model_settings:
         raise DatasetError(clean.root, "options are given for a model: name it with --model")
     if out is not None:
-        refuse_dataset(Path(out), "write the gap into a folder of its own")
+        check_output(Path(out), "write the gap into a folder of its own")
     check_clean(clean)
     root = Path(twin) if twin is not None else Path(out or "") / "twin"
     if patch is None:

@@ -17,7 +17,8 @@ from torch import Tensor
 from gear.config.dump import to_plain
 from gear.config.nodes import Mapping
 from gear.config.reader import read_node
-from gear.dataset.files import explained, read_bytes, sha256, write_whole
+from gear.dataset.files import read_bytes, sha256, write_whole
+from gear.dataset.guarded_paths import remove_files
 from gear.measuring.appearance_hash import Look
 from gear.networks.options import CIRCUMSTANCES
 from gear.networks.weights import serialised
@@ -116,10 +117,8 @@ def packed(origin: Origin, state: AnyMapping[str, Tensor], progress: TrainingSta
 
 
 def write_weights(root: Path, weights: bytes) -> None:
-    """Writes the file of the weights; what describes others goes first, and is written again in the end."""
-    with explained(root):
-        for name in (CARD, HISTORY, CURVES):
-            (root / name).unlink(missing_ok=True)
+    """Writes the weights. Files that describe the previous weights are deleted first, and written anew at the end."""
+    remove_files(root, [CARD, HISTORY, CURVES])
     write_whole(root, WEIGHTS, weights)
 
 

@@ -15,7 +15,7 @@ from gear.contracts.specs import ModelSpec, TaskSpec
 from gear.dataset.files import clear_scratch
 from gear.dataset.locks import alone_at_work
 from gear.dataset.reading import scenes_of
-from gear.dataset.store import refuse_dataset
+from gear.dataset.store import check_output
 from gear.measuring.appearance_hash import PLANNED, look_of
 from gear.measuring.plugin_selection import Chosen, check_camera
 from gear.networks.runtime import device_of, prepare
@@ -164,7 +164,7 @@ def train(
     root = Path(out)
     begun = begun_config(root)
     config = with_scale(found, without_empty_margins(config, training), share, begun)
-    refuse_dataset(root, "train into a folder of its own")
+    check_output(root, "train into a folder of its own")
     flags = {"epochs": epochs, "time_budget": _budget(time_budget_s), "batch": batch, "lr": lr, "seed": seed,
              "init": init, "precision": precision, "allow_test_data": allow_test_data}  # fmt: skip
     origin = Origin(

@@ -1,0 +1,192 @@
+"""The only place in gear that deletes or renames inside a user's folder, and that opens files there for writing.
+
+A folder may come from a stranger, with links in it that lead elsewhere. Two guards keep what lies elsewhere untouched:
+
+1. `refuse_links` searches an output folder for links before a command changes anything in it.
+2. Every change walks from the folder's root to the file through folder descriptors, and none of these steps follows a
+   link (`O_NOFOLLOW`): a link that is made after the search is refused, too.
+
+The root itself, and the folders above it, are the user's choice and may be links. Needs a POSIX system.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import stat
+from collections.abc import Iterable, Iterator
+from pathlib import Path, PurePosixPath
+
+from gear.dataset.disk_errors import explained
+from gear.values.errors import DatasetError
+
+FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
+REMEDY = "gear writes and deletes nothing through links; put the folder or file itself there, or use another --out"
+
+
+def parts_of(root: Path, relative: str) -> tuple[str, ...]:
+    """The components of a relative path, checked as text alone.
+
+    Raises:
+        DatasetError: the path is empty or absolute, goes up, or holds characters that other systems take for
+            separators.
+    """
+    pure = PurePosixPath(relative)
+    if pure.is_absolute() or ".." in pure.parts or not pure.parts or "\\" in relative or "\0" in relative:
+        raise DatasetError(root, f"{relative!r} is not a path inside a dataset")
+    return pure.parts
+
+
+def inside(root: Path, relative: str) -> Path:
+    """`root/relative`, for reading: links are followed as long as they stay below the root.
+
+    Raises:
+        DatasetError: the path leaves the root, as text or through a link.
+    """
+    path = root.joinpath(*parts_of(root, relative))
+    try:
+        leads_out = not path.resolve().is_relative_to(root.resolve())
+    except (OSError, RuntimeError) as error:  # a loop of links
+        raise DatasetError(path, "is a link that leads nowhere") from error
+    if leads_out:
+        raise DatasetError(root, f"{relative!r} leads outside the dataset through a link")
+    return path
+
+
+def owned(root: Path, relative: str) -> Path:
+    """`root/relative`, for writing and deleting: no component below the root may be a link.
+
+    Raises:
+        DatasetError: a component is a link, or the path leaves the root as text.
+    """
+    path = root
+    for part in parts_of(root, relative):
+        path = path / part
+        if path.is_symlink():
+            raise _link_error(path)
+    return path
+
+
+def refuse_links(root: Path) -> None:
+    """Searches a folder for links, before a command writes or deletes anything in it.
+
+    Hidden files and folders (`.git`, `.venv`) are not searched: gear writes none.
+
+    Raises:
+        DatasetError: there is a link, or a file where the folder should be.
+    """
+    with explained(root):
+        if not root.exists():
+            return
+        pending = [root]
+        while pending:
+            # A folder that another run has just removed holds no link; one that cannot be read is no place of gear's.
+            with contextlib.suppress(FileNotFoundError, PermissionError), os.scandir(pending.pop()) as entries:
+                for entry in entries:
+                    if entry.is_symlink():
+                        if not entry.name.startswith("."):
+                            raise _link_error(Path(entry.path))
+                    elif entry.is_dir(follow_symlinks=False) and not entry.name.startswith("."):
+                        pending.append(Path(entry.path))
+
+
+@contextlib.contextmanager
+def opened_parent(root: Path, relative: str, *, make: bool = False) -> Iterator[tuple[int, str]]:
+    """The folder of `root/relative` as an open descriptor, and the name of the file in it.
+
+    Args:
+        root: is opened as it is, even through a link.
+        relative: walked component by component, without following links.
+        make: creates the folders that are missing below the root.
+
+    Raises:
+        DatasetError: a component is a link, or the path leaves the root as text.
+        OSError: a folder is missing, is a file or cannot be opened.
+    """
+    *folders, name = parts_of(root, relative)
+    with contextlib.ExitStack() as stack:
+        descriptor = os.open(root, FOLDER)
+        stack.callback(os.close, descriptor)
+        path = root
+        for part in folders:
+            path = path / part
+            if make:
+                with contextlib.suppress(FileExistsError):
+                    os.mkdir(part, dir_fd=descriptor)
+            try:
+                inner = os.open(part, FOLDER | os.O_NOFOLLOW, dir_fd=descriptor)
+            except OSError:
+                if _is_link(part, descriptor):
+                    raise _link_error(path) from None
+                raise
+            stack.callback(os.close, inner)
+            descriptor = inner
+        if _is_link(name, descriptor):
+            raise _link_error(path / name)
+        yield descriptor, name
+
+
+def remove_file(root: Path, relative: str) -> None:
+    """Deletes a file below the root; a file that is not there is no error.
+
+    Raises:
+        DatasetError: a component of the path is a link, or the disk refuses.
+    """
+    with (
+        explained(root / relative),
+        contextlib.suppress(FileNotFoundError),
+        opened_parent(root, relative) as (folder, name),
+    ):
+        os.unlink(name, dir_fd=folder)
+
+
+def remove_files(root: Path, relatives: Iterable[str]) -> None:
+    """Deletes files below the root, all of whose paths are checked before the first of them is deleted.
+
+    Raises:
+        DatasetError: a component of a path is a link, or the disk refuses.
+    """
+    checked = list(relatives)
+    for relative in checked:
+        owned(root, relative)
+    for relative in checked:
+        remove_file(root, relative)
+
+
+def remove_tree(root: Path, relative: str) -> None:
+    """Deletes a folder below the root with all that is in it; links in it are deleted and not followed.
+
+    Raises:
+        DatasetError: a component of the path is a link, or the disk refuses.
+    """
+    with (
+        explained(root / relative),
+        contextlib.suppress(FileNotFoundError),
+        opened_parent(root, relative) as (folder, name),
+    ):
+        shutil.rmtree(name, dir_fd=folder)
+
+
+def remove_empty_folders(root: Path, relative: str) -> None:
+    """Deletes all empty folders at and below `root/relative`, those inside first; others stay as they are.
+
+    Raises:
+        DatasetError: a component of the path is a link.
+    """
+    top = owned(root, relative)
+    for path, _, _ in os.walk(top, topdown=False, followlinks=False):
+        inner = Path(path).relative_to(root).as_posix()
+        with contextlib.suppress(OSError), opened_parent(root, inner) as (folder, name):
+            os.rmdir(name, dir_fd=folder)
+
+
+def _is_link(name: str, folder: int) -> bool:
+    try:
+        return stat.S_ISLNK(os.stat(name, dir_fd=folder, follow_symlinks=False).st_mode)
+    except OSError:
+        return False
+
+
+def _link_error(path: Path) -> DatasetError:
+    return DatasetError(path, f"is a link; {REMEDY}")

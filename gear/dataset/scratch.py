@@ -1,0 +1,132 @@
+"""Half-written files: where they lie, how their writers hold them, and how those of killed runs are cleared.
+
+A file is written in `gear/scratch` under a name that nobody else uses, and renamed into its place. Meanwhile its
+writer holds a lock on it. The system releases the lock when a process is killed, also in another container and, on most
+network file systems, on another machine. If a file is cleared by mistake while it is written, its writer fails to
+rename it and writes it again: clearing costs time at worst, and never data.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import platform
+import secrets
+import stat
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from gear.dataset.guarded_paths import opened_parent
+
+if sys.platform != "win32":
+    import fcntl
+
+SCRATCH = "gear/scratch"
+"""Half-written files lie here, away from the folders that loaders of a format list."""
+
+SUFFIX = ".part"
+"""Ends the names of files whose writers hold a lock; earlier versions of gear held none."""
+
+OLD_S = 3600.0
+"""Where neither a lock nor a process number tells, a file that nobody has written to for so long is abandoned."""
+
+NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
+
+
+@contextlib.contextmanager
+def half_written(folder: int, data: bytes) -> Iterator[str]:
+    """Writes and syncs a new file in an open folder, and yields its name; removes it unless it is renamed.
+
+    Raises:
+        OSError: the disk refuses.
+    """
+    name = f"{_host()}-{os.getpid()}-{secrets.token_hex(8)}{SUFFIX}"
+    descriptor = os.open(name, NEW, 0o666, dir_fd=folder)
+    try:
+        with os.fdopen(descriptor, "wb") as stream:
+            _lock(descriptor)
+            stream.write(data)
+            stream.flush()
+            os.fsync(descriptor)
+            yield name
+    except BaseException:  # Ctrl-C, too
+        with contextlib.suppress(OSError):
+            os.unlink(name, dir_fd=folder)
+        raise
+
+
+def clear_scratch(root: Path) -> None:
+    """Removes what killed runs left half-written, and the folder `gear` where nothing else is in it.
+
+    Files that other runs, or other threads, are writing stay.
+
+    Raises:
+        DatasetError: the folder of half-written files, or `gear`, is a link.
+    """
+    with contextlib.suppress(OSError), opened_parent(root, f"{SCRATCH}/x") as (folder, _):
+        for name in os.listdir(folder):  # noqa: PTH208 (a folder descriptor)
+            with contextlib.suppress(OSError):  # another run clears, too
+                if _is_abandoned(folder, name):
+                    os.unlink(name, dir_fd=folder)
+    for relative in (SCRATCH, "gear"):
+        with contextlib.suppress(OSError), opened_parent(root, relative) as (folder, name):
+            os.rmdir(name, dir_fd=folder)
+
+
+def _is_abandoned(folder: int, name: str) -> bool:
+    """Whether nobody is writing a file any more.
+
+    Raises:
+        OSError: it is gone, or cannot be opened.
+    """
+    status = os.stat(name, dir_fd=folder, follow_symlinks=False)
+    if not stat.S_ISREG(status.st_mode):
+        return False
+    descriptor = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, dir_fd=folder)
+    try:
+        is_free = _lock(descriptor)
+    finally:
+        os.close(descriptor)
+    if is_free is False:
+        return False
+    if is_free and name.endswith(SUFFIX):
+        return True
+    is_alive = _is_alive(name)
+    return time.time() - status.st_mtime > OLD_S if is_alive is None else not is_alive
+
+
+def _lock(descriptor: int) -> bool | None:
+    """Takes the lock of an open file: False where another process or thread has it, None where there are no locks."""
+    if sys.platform == "win32":
+        return None
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:  # a file system without locks
+        return None
+    return True
+
+
+def _is_alive(name: str) -> bool | None:
+    """Whether the process that a file is named after is another one that runs; None where this machine cannot know."""
+    host, _, number = name.rpartition("-")[0].rpartition("-")
+    if not number.isdecimal():
+        return None
+    if host != _host():
+        return None if host else False
+    if int(number) == os.getpid():
+        return False
+    try:
+        os.kill(int(number), 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
+
+
+def _host() -> str:
+    return platform.node().replace("/", "_")

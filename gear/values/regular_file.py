@@ -1,0 +1,63 @@
+"""Reading files that a user or a stranger names: regular files only.
+
+A device, a FIFO or a socket in the place of a file makes `open` or `read` wait for ever or fill the memory.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from pathlib import Path
+
+KINDS = (
+    (stat.S_ISDIR, "folder"),
+    (stat.S_ISFIFO, "FIFO"),
+    (stat.S_ISCHR, "character device"),
+    (stat.S_ISBLK, "block device"),
+    (stat.S_ISSOCK, "socket"),
+)
+
+
+class NotAFileError(OSError):
+    """The path exists and is no regular file. An `OSError`, so that callers that expect those report it as one line."""
+
+    def __init__(self, path: Path, kind: str) -> None:
+        number = errno.EISDIR if kind == "folder" else errno.EINVAL
+        super().__init__(number, f"is a {kind}; a file was asked for", str(path))
+
+
+def check_regular(path: str | Path) -> Path:
+    """Checks that a path is a regular file, or a link to one, and returns it.
+
+    Raises:
+        NotAFileError: it is a folder, a device, a FIFO or a socket.
+        OSError: it does not exist or cannot be reached.
+    """
+    checked = Path(path)
+    _refuse_other_kinds(checked, checked.stat().st_mode)
+    return checked
+
+
+def read_regular(path: str | Path, *, most_bytes: int | None = None) -> bytes:
+    """The bytes of a regular file.
+
+    Args:
+        path: the file, or a link to one.
+        most_bytes: at most so many bytes are read, when given.
+
+    Raises:
+        NotAFileError: it is a folder, a device, a FIFO or a socket.
+        OSError: it does not exist or cannot be read.
+    """
+    checked = check_regular(path)  # before it is opened: opening some devices has effects
+    descriptor = os.open(checked, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    with os.fdopen(descriptor, "rb") as stream:
+        _refuse_other_kinds(checked, os.fstat(descriptor).st_mode)  # another file may have taken its place
+        return stream.read() if most_bytes is None else stream.read(most_bytes)
+
+
+def _refuse_other_kinds(path: Path, mode: int) -> None:
+    for is_kind, name in KINDS:
+        if is_kind(mode):
+            raise NotAFileError(path, name)
