@@ -113,13 +113,13 @@ class Store:
         Raises:
             DatasetError: as `open`, or another run is at work on what would have to be removed.
         """
+        refuse_links(self.root)
         was_there = {folder for folder in self._folders() if folder.exists()}
         is_new = not self._is_begun()
         with contextlib.ExitStack() as work:
             try:
                 with turn(self.root):
                     if force:
-                        refuse_links(self.root)
                         self._replace(patch_files)
                     is_new = not self._is_begun()  # others may have begun it, or taken it back, while this one waited
                     self.open(patch_files)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -39,15 +40,15 @@ def metrics_in(weights: Path) -> dict[str, float]:
 
 def cut_at(monkeypatch: pytest.MonkeyPatch, cut: int) -> None:
     """The `cut`th file that a training writes is never there, nor is anything after it."""
-    real, count = files._write_and_rename, [0]
+    real, count = files.half_written, [0]
 
-    def write(temporary: Path, target: Path, data: bytes) -> None:
+    def write(folder: int, data: bytes) -> AbstractContextManager[str]:
         count[0] += 1
         if count[0] >= cut:
             raise PowerCutError
-        real(temporary, target, data)
+        return real(folder, data)
 
-    monkeypatch.setattr(files, "_write_and_rename", write)
+    monkeypatch.setattr(files, "half_written", write)
 
 
 def ranked(monkeypatch: pytest.MonkeyPatch, *metrics: float) -> None:
