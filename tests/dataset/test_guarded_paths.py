@@ -27,6 +27,8 @@ ALLOWED = {
     "dataset/guarded_paths.py": {"unlink", "rmdir", "rmtree"},
     "dataset/scratch.py": {"unlink", "rmdir"},
     "dataset/store.py": {"rmdir"},  # of empty folders at and above the root, that this run has made
+    "plugins/probe.py": {"replace"},  # gear's own cache
+    "plugins/probe_process.py": {"open"},  # a temporary file of the parent process
     "verbs/export.py": {"replace"},  # of the whole tree into its place
     "verbs/scaffold/write.py": {"rename", "rmtree", "write_text"},  # of a folder that it has just made
     "world/compilation/world_cache.py": {"rename", "rmtree", "unlink", "open"},  # gear's own cache
