@@ -6,8 +6,8 @@
 The first prints every task with every renderer and quality, with one process and with two.
 
 The bare loop places a scene, renders colour, depth and ids, and lets the camera pipeline turn them into a picture: air,
-water and response are part of what is seen, and a renderer's linear frame is nothing that anybody would look at. The whole
-loop also plans the scenes, measures, encodes and writes. Both are measured in alternation in one run; compiling and the
+water and response are part of the picture. The whole loop also plans the scenes, measures, encodes and writes. Both are
+measured in alternation in one run; compiling and the
 first sample are left out.
 
 Printed are seconds a sample of both, how much of the bare loop's is the camera's, their ratio (the target is at least

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gear.camera.air import Air
+from gear.camera.effects import CameraEffects, Exposure
 from gear.camera.ground_shade import GroundShade
 from gear.camera.night import Night, NightLight
-from gear.camera.optics import lens_map, motion_blurred, noisy, through_lens, vignetted
 from gear.camera.rain import Rain
 from gear.camera.reflection import MirrorView, Reflection, beyond_mirror, mirror_camera
 from gear.camera.response import Response
@@ -17,7 +17,6 @@ from gear.camera.water import Water
 from gear.contracts.rendering import RawView
 from gear.values.frames import GeomTable, UInt16Image, View
 from gear.values.labels import GROUND_CODES, OPEN_GROUND_CODES
-from gear.values.optics import CameraEffects, LensRecord
 from gear.values.rng import derive_rng
 from gear.values.scene import CameraRecord, SceneRecord
 
@@ -46,16 +45,12 @@ class CameraPipeline:
     rain: Rain
     effects: CameraEffects
 
-    def with_lens(self, record: SceneRecord) -> SceneRecord:
-        """The record with the lens in it."""
-        lens = self.effects.lens
-        if not lens.bends:
-            return record
-        cameras = []
-        for camera in record.cameras:
-            found = lens_map(lens, camera.width_px, camera.height_px, camera.focal_px)
-            cameras.append(replace(camera, lens=LensRecord(k1=lens.k1, k2=lens.k2, focal_px=found.focal_px)))
-        return replace(record, cameras=tuple(cameras))
+    def with_effects(self, record: SceneRecord) -> SceneRecord:
+        """The record with all that ground truth has to know of the camera's effects, such as the lens."""
+        cameras = record.cameras
+        for effect in self.effects.active():
+            cameras = tuple(effect.recorded(camera) for camera in cameras)
+        return record if cameras == record.cameras else replace(record, cameras=cameras)
 
     def night_light(
         self, truth: RawView, camera: CameraRecord, record: SceneRecord, geoms: GeomTable
@@ -103,27 +98,14 @@ class CameraPipeline:
             reflection: what wet ground mirrors; without it puddles mirror the sky alone.
         """
         seen = replace(raw, linear_rgb=self._weathered(raw, camera, record, geoms, night_light, reflection))
+        exposure = Exposure(camera=camera, scene=record, geoms=geoms)
+        for effect in self.effects.active():
+            seen = effect.apply(seen, exposure)
         assert seen.linear_rgb is not None
-        if self.effects.shutter_s > 0:
-            speed = record.ego.velocity_world_mps
-            # What rides along, the ego car's own bonnet, stays as sharp as what is far away.
-            rides_along = np.append(geoms.object_id == record.ego.id, False)[seen.geom_id]
-            passed_m = np.where(rides_along, np.float32(np.inf), seen.depth_m)
-            blurred = motion_blurred(seen.linear_rgb, passed_m, camera, speed, self.effects.shutter_s)
-            seen = replace(seen, linear_rgb=blurred)
-        if self.effects.lens.bends:
-            seen = through_lens(seen, camera, self.effects.lens)
-        assert seen.linear_rgb is not None
-        linear_rgb = seen.linear_rgb
-        if self.effects.vignette > 0:
-            linear_rgb = vignetted(linear_rgb, self.effects.vignette)
-        if self.effects.shot_noise > 0 or self.effects.read_noise > 0:
-            rng = derive_rng(record.seed, "camera", record.index, camera.name)
-            linear_rgb = noisy(linear_rgb, self.effects.shot_noise, self.effects.read_noise, rng)
         return View(
             camera=camera,
-            linear_rgb=linear_rgb,
-            rgb=self.response.apply(linear_rgb),
+            linear_rgb=seen.linear_rgb,
+            rgb=self.response.apply(seen.linear_rgb),
             depth_m=seen.depth_m,
             geom_id=seen.geom_id,
         )

@@ -1,4 +1,4 @@
-"""The camera's response and its fixed linear effects in torch, for gradients. Only what trains imports it."""
+"""The camera's response in torch, for gradients. Rooms that collect never import it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from typing import Any
 import torch
 from torch.autograd.function import once_differentiable
 
-from gear.camera.optics import LensMap
 from gear.camera.response import Response
 
 
@@ -52,20 +51,6 @@ def decode_srgb(values: torch.Tensor) -> torch.Tensor:
         light = torch.where(is_dark, values / 12.92, bent)
         slope = torch.where(is_dark, 1 / 12.92, bent / base * (2.4 / 1.055))
     return _curve(values, light, slope)
-
-
-def vignetted(light: torch.Tensor, share: torch.Tensor) -> torch.Tensor:
-    """`gear.camera.optics.vignetted` without rounding: (..., C, H, W) light times the (H, W) of `vignette_map`."""
-    return light * share
-
-
-def through_lens(light: torch.Tensor, lens: LensMap) -> torch.Tensor:
-    """`gear.camera.optics.through_lens` for colour, without rounding: (N, C, H, W) light, bilinear."""
-    height, width = light.shape[-2:]
-    x = torch.as_tensor(lens.x.copy(), dtype=light.dtype, device=light.device) * (2 / (width - 1)) - 1
-    y = torch.as_tensor(lens.y.copy(), dtype=light.dtype, device=light.device) * (2 / (height - 1)) - 1
-    grid = torch.stack([x, y], dim=-1).expand(light.shape[0], -1, -1, -1)
-    return torch.nn.functional.grid_sample(light, grid, mode="bilinear", padding_mode="border", align_corners=True)
 
 
 def _encoded(light: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:

@@ -12,7 +12,6 @@ import cv2
 import mujoco
 import numpy as np
 
-from gear.camera.optics import lens_map
 from gear.camera.response import response_for
 from gear.collecting.lookup import look_up
 from gear.collecting.patch_sources import PatchSet
@@ -25,7 +24,8 @@ from gear.dataset.plan import Plan
 from gear.plugins.build import blamed, build
 from gear.plugins.catalogue import PluginEntry
 from gear.render.probing import renderer_info
-from gear.values.errors import ConfigError
+from gear.values.errors import ConfigError, FieldError
+from gear.values.geometry import RigidTransform
 from gear.values.scene import Weather
 from gear.values.serial import Json, to_json
 from gear.world.assets.asset_hash import assets_digest
@@ -84,7 +84,7 @@ def resolve(config: CollectionConfig) -> Job:
     named = look_up(config)
     spec, owner = named.task.spec, named.task.owner
     config, library, split, weather, patch = named.config, named.library, named.split, named.weather, named.patch
-    _check_lens(config, named.task)
+    _check_effects(config, named.task)
     info = SplitInfo(
         town=library.town_name, scene=config.scene, split=config.split, seed=split.seed, patch_label=patch.label
     )
@@ -138,22 +138,27 @@ def _scene_content(scene: SceneSpec) -> Json:
     return content
 
 
-def _check_lens(config: CollectionConfig, task: PluginEntry) -> None:
-    lens = config.camera.lens
-    if not lens.bends:
+def _check_effects(config: CollectionConfig, task: PluginEntry) -> None:
+    """Refuses camera effects that do not fit the task's cameras.
+
+    Raises:
+        ConfigError: names the effect's parameter, with its line where a file gives it.
+    """
+    effects = config.camera.active()
+    if not effects:
         return
     product = build(task, config.options)
     with blamed(task, "rig"):
         rig = product.rig()
-    for camera in rig.cameras:
-        try:
-            lens_map(lens, camera.width_px, camera.height_px, camera.intrinsics.focal_px)
-        except ValueError as error:
-            problem = f"{error}; take k1 and k2 nearer to 0, or a narrower field of view"
-            place = config.places.get("camera")
-            if place is not None and place.line:
-                raise place.error("camera.lens", problem) from error
-            raise ConfigError("camera", 0, 0, "lens", problem) from error
+    for camera in rig.place(RigidTransform.from_yaw("world", "ego", (0.0, 0.0, 0.0), 0.0)):
+        for effect in effects:
+            try:
+                effect.check(camera)
+            except FieldError as error:
+                place = config.places.get("camera")
+                if place is not None and place.line:
+                    raise place.error(f"camera.{error.field}", error.problem) from error
+                raise ConfigError("camera", 0, 0, error.field, error.problem) from error
 
 
 def dataset_root(config: CollectionConfig, info: SplitInfo, weather: Weather) -> Path:

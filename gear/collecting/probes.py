@@ -95,7 +95,7 @@ def compute_probes(
         geoms: what each geom is.
         reflections: what wet ground mirrors in the sample itself, one per camera.
     """
-    quiet = replace(pipeline, effects=replace(pipeline.effects, shot_noise=0.0, read_noise=0.0))
+    quiet = replace(pipeline, effects=pipeline.effects.linear())
     probes = []
     for number, camera in enumerate(record.cameras if shot.white else ()):
         mirrored = reflections[number]

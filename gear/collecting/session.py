@@ -63,7 +63,7 @@ class Session:
 
     def record(self, index: int) -> SceneRecord:
         """The scene of one sample: a pure function of the job and the index."""
-        return self.pipeline.with_lens(self.planner.plan(index))
+        return self.pipeline.with_effects(self.planner.plan(index))
 
     def shoot(self, record: SceneRecord) -> Shot:
         """Places the scene with the run's patch in it and renders it."""

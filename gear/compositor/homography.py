@@ -19,18 +19,17 @@ import numpy.typing as npt
 import torch
 from torch import Tensor
 
+from gear.camera.effects import Exposure, recorded_effects
 from gear.compositor.pasting import Pasting, Prepared, Sizes, picture_of, products
 from gear.compositor.pyramid import pyramid_of
 from gear.compositor.sampling import Samples, Scan, take_samples, unit_from_image
 from gear.compositor.sparse import SparseMatrix
 from gear.compositor.warp import warp_matrix
 from gear.values.geometry import Array
-from gear.values.optics import CameraEffects, Lens
-from gear.values.scene import CameraRecord
 
 Ints = npt.NDArray[np.intp]
 
-_SCAN = Scan(supersampled=True, extrapolates=False, smooths=False, effects=CameraEffects())
+_SCAN = Scan(supersampled=True, extrapolates=False, smooths=False)
 _NOWHERE = np.zeros((1, 1), np.bool_)
 
 PIXELS_AT_ONCE = 1 << 17
@@ -75,10 +74,12 @@ class HomographyCompositor(Pasting):
         truths = [self._truth(sample, s.name, view) for s in record.surfaces]
         units = [unit_from_image(t, s, camera) for t, s in zip(truths, record.surfaces, strict=True)]
 
-        scan = _scan(camera)
+        # Four samples per pixel; with a lens, four of each of the pinhole's pixels that it mixes.
+        scan = replace(_SCAN, effects=recorded_effects(camera))
+        exposure = Exposure(camera=camera, scene=record)
 
         def samples_at(unit: Array, where: Ints) -> Samples:
-            return take_samples(scan, unit, (where % width, where // width), _NOWHERE, camera, (0.0, 0.0, 0.0))
+            return take_samples(scan, unit, (where % width, where // width), _NOWHERE, exposure)
 
         covered = np.zeros(height * width, np.bool_)
         parts = np.array_split(np.arange(covered.size), math.ceil(covered.size / PIXELS_AT_ONCE))
@@ -104,10 +105,3 @@ class HomographyCompositor(Pasting):
 
     def _moved(self, values: Array) -> Tensor:
         return torch.from_numpy(values.astype(np.float32)).to(self.device)
-
-
-def _scan(camera: CameraRecord) -> Scan:
-    """Four samples a pixel; behind a lens, four of each of the pinhole's pixels that it mixes."""
-    if camera.lens is None:
-        return _SCAN
-    return replace(_SCAN, effects=CameraEffects(lens=Lens(k1=camera.lens.k1, k2=camera.lens.k2)))

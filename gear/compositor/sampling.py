@@ -13,12 +13,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from gear.camera.optics import BLUR_STEPS, lens_map
+from gear.camera.effects import Effect, Exposure, PixelSamples
 from gear.contracts.rendering import Quality
 from gear.values.geometry import Array, RigidTransform
 from gear.values.ground_truth import SurfaceTruth
-from gear.values.optics import CameraEffects
-from gear.values.scene import CameraRecord, SurfaceRecord, Vec3
+from gear.values.scene import CameraRecord, SurfaceRecord
 from gear.world.surfaces.face_texture import FACE_SIZE_PX
 
 Mask = npt.NDArray[np.bool_]
@@ -48,19 +47,20 @@ class Scan:
     """How a renderer and a camera take samples.
 
     Attributes:
-        supersampled: 2 x 2 samples a pixel (`film` of all but `classic`).
-        extrapolates: what only touches a pixel is still sampled at the pixel's middle (OpenGL's multi-sampling).
-        smooths: edges were smoothed by the filter of `fast`.
-        effects: of the camera.
+        supersampled: whether a pixel has 2 x 2 samples (`film` of all renderers but `classic`).
+        extrapolates: whether a face that only touches a pixel is still sampled at the pixel's centre, as OpenGL's
+            multi-sampling does.
+        smooths: whether edges were smoothed by the filter of `fast`.
+        effects: active effects of the camera, in the order in which they are applied.
     """
 
     supersampled: bool
     extrapolates: bool
     smooths: bool
-    effects: CameraEffects
+    effects: tuple[Effect, ...] = ()
 
     @staticmethod
-    def of(renderer_name: str, quality: Quality, effects: CameraEffects) -> Scan:
+    def of(renderer_name: str, quality: Quality, effects: tuple[Effect, ...]) -> Scan:
         """For a renderer in a quality."""
         is_film = quality == "film"
         return Scan(
@@ -84,9 +84,7 @@ def unit_from_image(truth: SurfaceTruth, surface: SurfaceRecord, camera: CameraR
     return np.asarray(np.linalg.inv(homography))
 
 
-def take_samples(
-    scan: Scan, unit: Array, pixels: tuple[Array, Array], mask: Mask, camera: CameraRecord, velocity_mps: Vec3
-) -> Samples:
+def take_samples(scan: Scan, unit: Array, pixels: tuple[Array, Array], mask: Mask, exposure: Exposure) -> Samples:
     """The samples of some pixels.
 
     Args:
@@ -94,17 +92,21 @@ def take_samples(
         unit: of `unit_from_image`.
         pixels: (N,) columns and (N,) rows, index pixels.
         mask: (H, W) where the face is seen, by ids at pixel centres.
-        camera: who looks.
-        velocity_mps: of the camera, in the world.
+        exposure: camera and scene.
     """
     x, y = (np.asarray(axis, dtype=np.float64)[:, None] for axis in pixels)
     weight = np.ones_like(x)
-    if scan.effects.lens.bends:
-        x, y, weight = _through_lens(x, y, scan, camera)
-    elif scan.smooths:
+    if scan.smooths and not any(effect.MOVES_PIXELS for effect in scan.effects):
         x, y, weight = _smoothed(x, y, mask)
-    if scan.effects.shutter_s > 0:
-        x, y, weight = _blurred(x, y, weight, unit, scan, camera, velocity_mps)
+
+    def inverse_depth(x: Array, y: Array) -> Array:
+        """The third row of the homography is the inverse of depth."""
+        return np.asarray(unit[2, 0] * x + unit[2, 1] * y + unit[2, 2])
+
+    traced = PixelSamples(x=x, y=y, weight=weight, inverse_depth=inverse_depth)
+    for effect in reversed(scan.effects):
+        traced = effect.trace(traced, exposure)
+    x, y, weight = traced.x, traced.y, traced.weight
     step_px = 1.0
     if scan.supersampled:
         step_px = 0.5
@@ -167,34 +169,3 @@ def _smoothed(x: Array, y: Array, mask: Mask) -> tuple[Array, Array, Array]:
     lost = weight.sum(axis=1) <= 0
     weight[lost, 4] = 1.0  # the middle
     return np.stack(xs, axis=1), np.stack(ys, axis=1), weight
-
-
-def _through_lens(x: Array, y: Array, scan: Scan, camera: CameraRecord) -> tuple[Array, Array, Array]:
-    """The four pinhole pixels that a pixel behind the lens mixes."""
-    found = lens_map(scan.effects.lens, camera.width_px, camera.height_px, camera.focal_px)
-    at = (y[:, 0].astype(int), x[:, 0].astype(int))
-    from_x, from_y = found.x[at].astype(np.float64), found.y[at].astype(np.float64)
-    low_x, low_y = np.floor(from_x), np.floor(from_y)
-    part_x, part_y = from_x - low_x, from_y - low_y
-    corners = [(dx, dy) for dy in (0, 1) for dx in (0, 1)]
-    xs = np.stack([low_x + dx for dx, _ in corners], axis=1)
-    ys = np.stack([low_y + dy for _, dy in corners], axis=1)
-    shares = [(part_x if dx else 1 - part_x) * (part_y if dy else 1 - part_y) for dx, dy in corners]
-    return xs, ys, np.stack(shares, axis=1)
-
-
-def _blurred(
-    x: Array, y: Array, weight: Array, unit: Array, scan: Scan, camera: CameraRecord, velocity_mps: Vec3
-) -> tuple[Array, Array, Array]:
-    """Where a pixel's light comes from while the shutter is open; as `gear.camera.optics.motion_blurred`."""
-    velocity = camera.world_from_camera_transform.rotation.T @ np.asarray(velocity_mps)
-    centre_x, centre_y = (camera.width_px - 1) / 2, (camera.height_px - 1) / 2
-    # The third row of the homography is the inverse of depth.
-    inverse = np.maximum(unit[2, 0] * x + unit[2, 1] * y + unit[2, 2], 0.0)
-    xs, ys = [], []
-    for moment in np.linspace(-0.5, 0.5, BLUR_STEPS):
-        shift = velocity * moment * scan.effects.shutter_s
-        scale = 1 / np.maximum(1 - shift[2] * inverse, 0.1)
-        xs.append((x - centre_x - camera.focal_px * shift[0] * inverse) * scale + centre_x)
-        ys.append((y - centre_y - camera.focal_px * shift[1] * inverse) * scale + centre_y)
-    return np.concatenate(xs, axis=1), np.concatenate(ys, axis=1), np.tile(weight / BLUR_STEPS, (1, BLUR_STEPS))

@@ -8,7 +8,7 @@ matrix that samples it as the renderer samples its texture. Noise, if the datase
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,8 +18,8 @@ from scipy import sparse
 from torch import Tensor
 
 from gear.camera import torch_response
+from gear.camera.effects import CameraEffects, Exposure
 from gear.camera.response import IDENTITY, Response
-from gear.compositor.grain import Grain, grain_of
 from gear.compositor.pasting import Pasting, Prepared, Sizes, picture_of, products
 from gear.compositor.pyramid import Pyramid, halving_of, pyramid_of
 from gear.compositor.sampling import Scan, take_samples, unit_from_image
@@ -29,30 +29,31 @@ from gear.contracts.rendering import Quality
 from gear.formats import rle
 from gear.formats.probes import Probe, probes_of
 from gear.values.frames import LINEAR_FULL_SCALE
-from gear.values.optics import CameraEffects
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Light:
-    """What a view's composed pixels are made of.
+    """What the N composed pixels of a view are computed from.
 
     Attributes:
-        black: (N, 3) float32 light 0..1.
-        matrices: one a surface, (N, columns).
-        gains: one a surface, (N, 3) float32 of white minus black.
-        response: of the camera.
-        grain: of the sample, or None.
+        black: (N, 3) float32 linear light with all surfaces black, 1.0 is full scale.
+        matrices: one per surface, (N, columns of the patch's pyramid).
+        gains: one per surface, (N, 3) float32: light with that surface white minus `black`.
+        response: tone curve of the camera.
+        effects: effects of the camera that are not linear, such as noise, as functions of (N, 3) light, in order.
     """
 
     black: Tensor
     matrices: tuple[SparseMatrix, ...]
     gains: tuple[Tensor, ...]
     response: Response
-    grain: Grain | None
+    effects: tuple[Callable[[Tensor], Tensor], ...]
 
     def shown(self, light: Tensor) -> Tensor:
-        """(N, 3) light as the camera shows it, 0..1."""
-        return torch_response.apply(self.response, light if self.grain is None else self.grain.on(light))
+        """(N, 3) linear light to (N, 3) picture values 0..1."""
+        for effect in self.effects:
+            light = effect(light)
+        return torch_response.apply(self.response, light)
 
     @property
     def nbytes(self) -> int:
@@ -103,15 +104,21 @@ class TransportCompositor(Pasting):
             black[_crop(probe)] = probe.black
             gains[probe.surface][_crop(probe)] = probe.white.astype(np.float32) - probe.black
         lit = [gain[rows, columns] for gain in gains.values()]
+        dark = self._light(black[rows, columns])
+        exposure = Exposure(camera=sample.record.camera(view), scene=sample.record)
         light = _Light(
-            black=self._light(black[rows, columns]),
+            black=dark,
             matrices=tuple(
                 self._matrix(sample, number, view, (columns, rows), gain, sizes[number])
                 for number, gain in enumerate(lit)
             ),
             gains=tuple(self._light(gain) for gain in lit),
             response=probes[0].response if probes else IDENTITY,
-            grain=grain_of(self._effects, sample.record, view, rows, columns, self.device),
+            effects=tuple(
+                effect.torch_at((rows, columns), exposure, dark)
+                for effect in self._effects.active()
+                if not effect.IS_LINEAR
+            ),
         )
         return self._prepare(picture, rows * width + columns, light, light.nbytes)
 
@@ -127,12 +134,11 @@ class TransportCompositor(Pasting):
             return SparseMatrix.of(sparse.csr_matrix((len(gain), pyramid.size), dtype=np.float32), self.device)
         truth = self._truth(sample, surface.name, view)
         samples = take_samples(
-            Scan.of(self._renderer, self._quality, self._effects),
+            Scan.of(self._renderer, self._quality, self._effects.active()),
             unit_from_image(truth, surface, camera),
             (pixels[0][lit], pixels[1][lit]),
             rle.decode(truth.mask_rle, camera.height_px, camera.width_px),
-            camera,
-            record.ego.velocity_world_mps,
+            Exposure(camera=camera, scene=record),
         )
         return SparseMatrix.of((spread @ warp_matrix(samples, pyramid)).tocsr(), self.device)
 

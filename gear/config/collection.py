@@ -6,10 +6,10 @@ import re
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
+from gear.camera.effects import CameraEffects
 from gear.config.nodes import Mapping, Node, Place
 from gear.contracts.rendering import Quality
 from gear.values.errors import FieldError
-from gear.values.optics import CameraEffects
 from gear.values.serial import PLACES
 from gear.values.vehicle_mix import check_mix
 

@@ -6,50 +6,34 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gear.camera.optics import LensMap, lens_map
+from gear.camera.effects import PixelMap, recorded_effects
 from gear.groundtruth.raster import Mask, Window
 from gear.values.geometry import Array
-from gear.values.optics import Lens
 from gear.values.scene import CameraRecord
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bend:
-    """The lens before one camera.
+    """How a camera's effects move pixels, for the silhouettes of the ground truth.
 
     Attributes:
-        lens: its distortion.
-        found: where each pixel of the distorted picture comes from.
-        middle_px: (2,) of both pictures, index pixels.
-        focal_px: the pinhole's.
-        reach: how far from the middle the distorted picture's corners see, in focal lengths of the pinhole.
+        map: where each pixel of the picture comes from in the pinhole's picture, and the opposite way.
     """
 
-    lens: Lens
-    found: LensMap
-    middle_px: Array
-    focal_px: float
-    reach: float
+    map: PixelMap
 
     @staticmethod
     def of(camera: CameraRecord) -> Bend | None:
-        """The camera's; None for a pinhole.
+        """The map that a camera's record holds; None for a pinhole.
 
         Raises:
             ValueError: the distortion folds the picture over.
         """
-        if camera.lens is None:
-            return None
-        lens = Lens(k1=camera.lens.k1, k2=camera.lens.k2)
-        found = lens_map(lens, camera.width_px, camera.height_px, camera.focal_px)
-        middle = np.array([camera.intrinsics.cx_px, camera.intrinsics.cy_px])
-        corner = np.array([found.x[0, 0], found.y[0, 0]]) - middle
-        return Bend(lens, found, middle, camera.focal_px, float(np.linalg.norm(corner)) / camera.focal_px)
+        moving = recorded_effects(camera)
+        return Bend(moving[0].pixel_map(camera)) if moving else None
 
     def points(self, pinhole_px: Array) -> Array:
-        """Where points of the pinhole's picture appear.
-
-        Beyond the picture's corners the lens goes on straight: its polynomial would fold over there, or run away.
+        """Where points of the pinhole's picture appear; also for points outside of the picture.
 
         Args:
             pinhole_px: (..., 2) index pixels.
@@ -57,13 +41,7 @@ class Bend:
         Returns:
             (..., 2) index pixels of the distorted picture.
         """
-        offset = (np.asarray(pinhole_px) - self.middle_px) / self.focal_px
-        radius = np.linalg.norm(offset, axis=-1, keepdims=True)
-        inner = np.minimum(radius, self.reach)
-        square = inner**2
-        slope = 1 + 3 * self.lens.k1 * square + 5 * self.lens.k2 * square**2
-        bent = inner * (1 + self.lens.k1 * square + self.lens.k2 * square**2) + slope * (radius - inner)
-        return np.asarray(offset * (bent / np.maximum(radius, 1e-12)) * self.found.focal_px + self.middle_px)
+        return self.map.forward(pinhole_px)
 
     def window(self, window: Window) -> Window:
         """Where a window of the pinhole's picture appears in the distorted one, a pixel wider; empty if it is."""
@@ -71,7 +49,7 @@ class Bend:
         if x0 >= x1 or y0 >= y1:
             return window
         border = self.points(_border(window))
-        size = self.found.x.shape[::-1]
+        size = self.map.x.shape[::-1]
         low = np.clip(np.floor(border.min(axis=0)) - 1, 0, size)
         high = np.clip(np.ceil(border.max(axis=0)) + 2, 0, size)
         return (int(low[0]), int(low[1]), int(high[0]), int(high[1]))
@@ -88,7 +66,7 @@ class Bend:
             (rows, columns) of `wanted`.
         """
         (x0, y0, x1, y1), part = window, np.s_[wanted[1] : wanted[3], wanted[0] : wanted[2]]
-        column, row = (np.rint(one[part]).astype(np.intp) for one in (self.found.x, self.found.y))
+        column, row = (np.rint(one[part]).astype(np.intp) for one in (self.map.x, self.map.y))
         held = (column >= x0) & (column < x1) & (row >= y0) & (row < y1)
         bent = np.zeros(held.shape, dtype=np.bool_)
         bent[held] = mask[row[held] - y0, column[held] - x0]

@@ -12,13 +12,12 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from gear.camera.optics import lens_map, through_lens
+from gear.camera.effects.lens import Lens, LensDistortion, distort, lens_map
 from gear.contracts.rendering import RawView
 from gear.testing.things import Part, Thing, street
 from gear.values.frames import LINEAR_FULL_SCALE, Frame, GeomTable, SceneObject, Shape, View
 from gear.values.geometry import Array, RigidTransform
 from gear.values.labels import LABEL_BY_NAME, LABELS
-from gear.values.optics import Lens, LensRecord
 from gear.values.rig import Rig
 from gear.values.scene import ActorRecord, CameraRecord, Pose, SceneRecord, SurfaceRecord, Weather
 
@@ -70,20 +69,19 @@ def synthetic_frame(
 
 
 def behind_lens(frame: Frame, lens: Lens) -> Frame:
-    """The frame as cameras with a lens show it: everything is bent, and every camera says by what.
+    """A frame of pinholes as cameras with a lens show it. The cameras of the result hold the lens.
 
     Raises:
         ValueError: the distortion folds a picture over.
     """
     views = {}
     for name, view in frame.views.items():
-        found = lens_map(lens, view.camera.width_px, view.camera.height_px, view.camera.focal_px)
-        seen = through_lens(
-            RawView(linear_rgb=view.linear_rgb, depth_m=view.depth_m, geom_id=view.geom_id), view.camera, lens
-        )
+        found = lens_map(lens, view.camera.intrinsics)
+        raw = RawView(linear_rgb=view.linear_rgb, depth_m=view.depth_m, geom_id=view.geom_id)
+        seen = distort(raw, lens, view.camera.intrinsics)
         assert seen.linear_rgb is not None
         views[name] = View(
-            camera=replace(view.camera, lens=LensRecord(k1=lens.k1, k2=lens.k2, focal_px=found.focal_px)),
+            camera=LensDistortion(lens=lens).recorded(view.camera),
             linear_rgb=seen.linear_rgb,
             rgb=view.rgb[np.rint(found.y).astype(np.intp), np.rint(found.x).astype(np.intp)],
             depth_m=seen.depth_m,

@@ -108,55 +108,81 @@ CAMERA_FROM_ACTOR_AXES = frozen([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 
 
 @dataclass(frozen=True, slots=True)
 class Intrinsics:
-    """A symmetric pinhole in index pixels.
+    """A pinhole without skew, in index pixels.
 
     Attributes:
         width_px, height_px: size of the picture.
-        focal_px: fx = fy.
+        focal_px: horizontal focal length fx.
+        focal_y_px: vertical focal length fy; None for the same as `focal_px`.
+        principal_px: principal point (cx, cy); None for the middle of the picture, ((W - 1) / 2, (H - 1) / 2).
     """
 
     width_px: int
     height_px: int
     focal_px: float
+    focal_y_px: float | None = None
+    principal_px: tuple[float, float] | None = None
 
     @staticmethod
     def from_hfov(width_px: int, height_px: int, hfov_rad: float) -> Intrinsics:
-        """From the horizontal field of view."""
+        """A symmetric pinhole with this horizontal field of view in radians."""
         return Intrinsics(width_px, height_px, width_px / (2 * math.tan(hfov_rad / 2)))
 
     @property
+    def fx_px(self) -> float:
+        """Horizontal focal length."""
+        return self.focal_px
+
+    @property
+    def fy_px(self) -> float:
+        """Vertical focal length."""
+        return self.focal_px if self.focal_y_px is None else self.focal_y_px
+
+    @property
     def cx_px(self) -> float:
-        """Principal point, index pixels."""
-        return (self.width_px - 1) / 2
+        """Column of the principal point, index pixels."""
+        return (self.width_px - 1) / 2 if self.principal_px is None else self.principal_px[0]
 
     @property
     def cy_px(self) -> float:
-        """Principal point, index pixels."""
-        return (self.height_px - 1) / 2
+        """Row of the principal point, index pixels."""
+        return (self.height_px - 1) / 2 if self.principal_px is None else self.principal_px[1]
+
+    @property
+    def is_symmetric(self) -> bool:
+        """Whether both focal lengths are equal and the principal point is the middle of the picture."""
+        middle = ((self.width_px - 1) / 2, (self.height_px - 1) / 2)
+        return self.fx_px == self.fy_px and (self.cx_px, self.cy_px) == middle
 
     @property
     def hfov_rad(self) -> float:
-        """Horizontal field of view."""
-        return 2 * math.atan(self.width_px / (2 * self.focal_px))
+        """Horizontal field of view in radians, between the outer edges of the first and the last column."""
+        right, left = self.width_px - 0.5 - self.cx_px, self.cx_px + 0.5
+        if right == left:
+            return 2 * math.atan(self.width_px / (2 * self.fx_px))
+        return math.atan(right / self.fx_px) + math.atan(left / self.fx_px)
 
     @property
     def vfov_rad(self) -> float:
-        """Vertical field of view (MuJoCo's fovy)."""
-        return 2 * math.atan(self.height_px / (2 * self.focal_px))
+        """Vertical field of view in radians, between the outer edges of the first and the last row."""
+        below, above = self.height_px - 0.5 - self.cy_px, self.cy_px + 0.5
+        if below == above:
+            return 2 * math.atan(self.height_px / (2 * self.fy_px))
+        return math.atan(below / self.fy_px) + math.atan(above / self.fy_px)
 
     @property
     def matrix(self) -> Array:
         """(3, 3) K in index pixels."""
-        return frozen([[self.focal_px, 0.0, self.cx_px], [0.0, self.focal_px, self.cy_px], [0.0, 0.0, 1.0]])
+        return frozen([[self.fx_px, 0.0, self.cx_px], [0.0, self.fy_px, self.cy_px], [0.0, 0.0, 1.0]])
 
     def project(self, points_camera_m: npt.ArrayLike) -> Array:
         """(..., 3) camera points with z > 0 to (..., 2) index pixels."""
         points = np.asarray(points_camera_m, dtype=np.float64)
-        scaled = points[..., :2] / points[..., 2:3] * self.focal_px
+        scaled = points[..., :2] / points[..., 2:3] * (self.fx_px, self.fy_px)
         return np.asarray(scaled + np.array([self.cx_px, self.cy_px]))
 
     def unproject(self, pixels: npt.ArrayLike, depth_m: npt.ArrayLike) -> Array:
         """(..., 2) index pixels and (...) planar depths to (..., 3) camera points."""
         uv = np.asarray(pixels, dtype=np.float64)
         z = np.asarray(depth_m, dtype=np.float64)[..., None]
-        return np.concatenate([(uv - (self.cx_px, self.cy_px)) / self.focal_px * z, z], axis=-1)
+        return np.concatenate([(uv - (self.cx_px, self.cy_px)) / (self.fx_px, self.fy_px) * z, z], axis=-1)

@@ -11,7 +11,6 @@ from typing import Literal
 import numpy as np
 
 from gear.values.geometry import Intrinsics, RigidTransform
-from gear.values.optics import LensRecord
 
 Vec3 = tuple[float, float, float]
 Quat = tuple[float, float, float, float]
@@ -153,10 +152,32 @@ class SurfaceRecord:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CameraRecord:
-    """One pinhole camera of one sample. World-from-camera axes: x right, y down, z forward.
+class LensRecord:
+    """Radial distortion of one camera. With the camera's size and pinhole it determines how pixels move.
 
-    With a `lens`, pictures, depth and ids are bent by it; whatever is projected with `intrinsics` is the pinhole's.
+    Attributes:
+        k1, k2: a pinhole's (x, y), in focal lengths, appears at (x, y) (1 + k1 r² + k2 r⁴).
+        focal_px: horizontal focal length of the distorted picture; longer than the pinhole's where the corners would
+            otherwise be empty.
+    """
+
+    k1: float
+    k2: float
+    focal_px: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraRecord:
+    """One camera of one sample: a pinhole without skew, perhaps with a lens before it.
+
+    Attributes:
+        name: key of its view: `left`, `right`, ….
+        width_px, height_px: size of the picture.
+        focal_px: horizontal focal length fx of the pinhole.
+        world_from_camera: pose; camera axes are x right, y down, z forward.
+        lens: distortion of colour, depth and ids; None for none. Projections with `intrinsics` are the pinhole's.
+        focal_y_px: vertical focal length fy; None for the same as `focal_px`.
+        principal_px: principal point (cx, cy) in index pixels; None for the middle of the picture.
     """
 
     name: str
@@ -165,11 +186,13 @@ class CameraRecord:
     focal_px: float
     world_from_camera: Pose
     lens: LensRecord | None = None
+    focal_y_px: float | None = None
+    principal_px: tuple[float, float] | None = None
 
     @property
     def intrinsics(self) -> Intrinsics:
         """The pinhole in index pixels."""
-        return Intrinsics(self.width_px, self.height_px, self.focal_px)
+        return Intrinsics(self.width_px, self.height_px, self.focal_px, self.focal_y_px, self.principal_px)
 
     @property
     def world_from_camera_transform(self) -> RigidTransform:

@@ -9,12 +9,12 @@ import pytest
 import torch
 from torch import Tensor
 
+from gear.camera.effects import Exposure
 from gear.compositor.homography import HomographyCompositor
 from gear.compositor.sampling import Scan, take_samples, unit_from_image
 from gear.plugins.build import build_task
 from gear.testing.synthetic import synthetic_frame
 from gear.testing.things import CAR, Thing, board
-from gear.values.optics import CameraEffects
 from gear.verbs.gap.picture_gap import visible_mask
 
 from .conftest import MakeTwins
@@ -107,10 +107,10 @@ def test_a_mip_level_is_the_logarithm_of_a_samples_longer_edge_in_texels(distanc
     sample = sample_of(board(distance_m))
     record, (truth,) = sample.record, sample.surfaces
     camera = record.camera("left")
-    scan = Scan(supersampled=False, extrapolates=False, smooths=False, effects=CameraEffects())
+    scan = Scan(supersampled=False, extrapolates=False, smooths=False)
     unit = unit_from_image(truth, record.surfaces[0], camera)
     middle = np.array([159.5]), np.array([79.5])
-    found = take_samples(scan, unit, middle, np.ones((HEIGHT, WIDTH), np.bool_), camera, (0.0, 0.0, 0.0))
+    found = take_samples(scan, unit, middle, np.ones((HEIGHT, WIDTH), np.bool_), Exposure(camera=camera, scene=record))
     texels = (distance_m - 1.5) / camera.focal_px * 1200 / 7.4
     assert found.level[0, 0] == pytest.approx(np.log2(texels), abs=1e-6)
 

@@ -4,6 +4,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gear.camera.effects import Lens
 from gear.groundtruth import objects
 from gear.groundtruth.objects import in_camera, observe_objects
 from gear.groundtruth.raster import bounds, fill, project_mesh
@@ -11,7 +12,6 @@ from gear.testing.synthetic import behind_lens, synthetic_frame
 from gear.testing.things import CAR, CYCLIST, PERSON, TRUCK, Thing, board, street
 from gear.values.frames import Frame
 from gear.values.labels import LABEL_BY_NAME
-from gear.values.optics import Lens
 from gear.values.rig import CameraMount, Rig
 
 RIG = Rig(cameras=(CameraMount(name="left", width_px=612, height_px=185),))

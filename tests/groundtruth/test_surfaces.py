@@ -3,7 +3,8 @@ import math
 import numpy as np
 import pytest
 
-from gear.camera.optics import undistorted
+from gear.camera.effects import Lens
+from gear.camera.effects.lens import undistorted
 from gear.formats import rle
 from gear.groundtruth.raster import clip_near
 from gear.groundtruth.surfaces import observe_surfaces
@@ -11,7 +12,6 @@ from gear.testing.synthetic import behind_lens, synthetic_frame
 from gear.testing.things import CAR, Part, Thing, board
 from gear.values.geometry import Intrinsics
 from gear.values.ground_truth import SurfaceTruth
-from gear.values.optics import Lens
 from gear.values.rig import CameraMount, Rig
 
 RIG = Rig(cameras=(CameraMount(name="left", width_px=612, height_px=306),))

@@ -10,13 +10,13 @@ import cv2
 import numpy as np
 import pytest
 
+from gear.camera.effects import CameraEffects
 from gear.contracts.rendering import RawView
 from gear.render.registry import open_renderer
 from gear.testing.tiny_town import CLEAR, SMALL_RIG, TINY_TOWN, build_tiny_world, tiny_scenes, tiny_world
 from gear.values.errors import PlacementError, TownError, UnknownNameError
 from gear.values.frames import STATIC_OBJECT_BASE
 from gear.values.labels import GROUND_CODES, LABEL_BY_NAME
-from gear.values.optics import CameraEffects
 from gear.values.scene import ActorRecord, Pose, SceneRecord, Weather
 from gear.world.assets.geom_classes import HIDDEN_CODE
 from gear.world.compilation.asset_prefetch import AssetPrefetcher

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from gear.camera.air import Air, Fog
+from gear.camera.effects import CameraEffects
 from gear.camera.ground_shade import GroundShade
 from gear.camera.night import Night
 from gear.camera.pipeline import CameraPipeline
@@ -16,7 +17,6 @@ from gear.camera.rain import Rain
 from gear.camera.response import encode_srgb, response_for
 from gear.camera.water import Water
 from gear.values.frames import Shape
-from gear.values.optics import CameraEffects
 from gear.values.scene import Weather
 from gear.world.weather.light import (
     Floats,

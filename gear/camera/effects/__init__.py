@@ -1,0 +1,100 @@
+"""Optional effects of the camera, one file each: motion blur, lens distortion, vignette, noise.
+
+A new effect is a new module in this folder with one subclass of `Effect`; nothing else names it. Its parameters become
+keys of the config's `camera` section, and it is applied to pictures, ground truth and composed patches in its order.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import pkgutil
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from gear.camera.effects.effect import Effect, Exposure, PixelMap, PixelSamples
+from gear.camera.effects.lens import Lens
+from gear.values.scene import CameraRecord
+from gear.values.serial import type_hints
+
+__all__ = ["EFFECTS", "CameraEffects", "Effect", "Exposure", "Lens", "PixelMap", "PixelSamples", "recorded_effects"]
+
+T = TypeVar("T")
+
+
+def _find_effects() -> tuple[type[Effect], ...]:
+    """The subclasses of `Effect` in this folder's modules, in the order in which they are applied.
+
+    Raises:
+        TypeError: an effect that is not linear has a lower order than a linear one.
+    """
+    modules = [importlib.import_module(f"{__name__}.{found.name}") for found in pkgutil.iter_modules(__path__)]
+    classes = [value for module in modules for value in vars(module).values() if isinstance(value, type)]
+    kinds = {kind for kind in classes if issubclass(kind, Effect) and kind is not Effect}
+    effects = tuple(sorted(kinds, key=lambda kind: (kind.ORDER, kind.__name__)))
+    if [kind.IS_LINEAR for kind in effects] != sorted((kind.IS_LINEAR for kind in effects), reverse=True):
+        raise TypeError("camera effects that are not linear must come after all that are")
+    return effects
+
+
+EFFECTS: tuple[type[Effect], ...] = _find_effects()
+"""All effects, in the order in which light passes them."""
+
+
+def _with_parameters(cls: type[T]) -> type[T]:
+    """Makes a class a frozen dataclass whose fields are the parameters of all effects, documented as they are there.
+
+    Raises:
+        TypeError: two effects have a parameter of the same name.
+    """
+    sections = [cls.__doc__ or "", "", "    Attributes:"]
+    annotations: dict[str, Any] = {}
+    for effect in reversed(EFFECTS):
+        for field in dataclasses.fields(effect):  # type: ignore[arg-type]
+            if field.name in annotations:
+                raise TypeError(f"two camera effects have a parameter {field.name!r}")
+            annotations[field.name] = type_hints(effect)[field.name]
+            copy: Any = dataclasses.field(default=field.default, default_factory=field.default_factory)  # type: ignore[call-overload]
+            setattr(cls, field.name, copy)
+        sections.append((effect.__doc__ or "").partition("    Attributes:\n")[2].rstrip())
+    cls.__annotations__ = annotations
+    cls.__doc__ = "\n".join(sections) + "\n    "
+    return dataclasses.dataclass(frozen=True, kw_only=True)(cls)
+
+
+@_with_parameters
+class CameraEffects:
+    """What the camera adds to a picture: the parameters of every effect, all off by default."""
+
+    if TYPE_CHECKING:
+
+        def __init__(self, **parameters: Any) -> None: ...
+
+        def __getattr__(self, name: str) -> Any: ...
+
+    def __post_init__(self) -> None:
+        self.active()
+
+    def active(self) -> tuple[Effect, ...]:
+        """The effects that these parameters ask for, in the order in which they are applied.
+
+        Raises:
+            FieldError: a parameter is out of its range; says which.
+        """
+        effects = (self._effect(kind) for kind in EFFECTS)
+        return tuple(effect for effect in effects if effect.is_active)
+
+    def linear(self) -> CameraEffects:
+        """The same without the effects that are not linear in light, such as noise."""
+        names = {f.name for kind in EFFECTS if kind.IS_LINEAR for f in dataclasses.fields(kind)}  # type: ignore[arg-type]
+        return CameraEffects(**{name: getattr(self, name) for name in names})
+
+    def _effect(self, kind: type[Effect]) -> Effect:
+        """One effect with its parameters."""
+        names = [field.name for field in dataclasses.fields(kind)]  # type: ignore[arg-type]
+        return kind(**{name: getattr(self, name) for name in names})
+
+
+def recorded_effects(camera: CameraRecord) -> tuple[Effect, ...]:
+    """The effects with `MOVES_PIXELS` that a camera's record holds: none for a pinhole, at most one."""
+    found = (kind.from_record(camera) for kind in EFFECTS if kind.MOVES_PIXELS)
+    return tuple(effect for effect in found if effect is not None)

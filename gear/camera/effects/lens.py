@@ -1,0 +1,226 @@
+"""Radial distortion of a lens, by the model of Brown and Conrady (Brown 1971)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from gear.camera.effects.effect import Effect, Exposure, PixelMap, PixelSamples
+from gear.camera.effects.sampling import read_bilinear
+from gear.contracts.rendering import RawView
+from gear.values.errors import FieldError
+from gear.values.frames import FloatImage
+from gear.values.geometry import Array, Intrinsics
+from gear.values.scene import CameraRecord, LensRecord
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+_NEWTON_STEPS = 12
+_LEAST_SLOPE = 0.05
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lens:
+    """Coefficients of radial distortion about the principal point.
+
+    A point that a pinhole sees at (x, y), in units of its focal length, appears at (x, y) (1 + k1 r² + k2 r⁴).
+
+    Attributes:
+        k1, k2: -0.5 to 0.5; barrel distortion below 0, pincushion distortion above.
+    """
+
+    k1: float = 0.0
+    k2: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("k1", "k2"):
+            if not -0.5 <= getattr(self, name) <= 0.5:
+                raise FieldError(name, f"must be -0.5 to 0.5, got {getattr(self, name):g}")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LensMap:
+    """Where each pixel of a distorted picture comes from in the pinhole's.
+
+    Attributes:
+        x, y: (H, W) float32 columns and rows of the pinhole picture, index pixels; read-only.
+        focal_px: horizontal focal length of the distorted picture. It is chosen so that the picture is filled to its
+            corners.
+    """
+
+    x: FloatImage
+    y: FloatImage
+    focal_px: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LensDistortion(Effect):
+    """Colour, depth and ids move by one map: colour bilinearly in linear light, depth and ids from the nearest pixel.
+
+    Attributes:
+        lens: radial distortion.
+    """
+
+    ORDER: ClassVar[int] = 20
+    MOVES_PIXELS: ClassVar[bool] = True
+
+    lens: Lens = field(default_factory=Lens)
+
+    @property
+    def is_active(self) -> bool:
+        """Whether any coefficient differs from 0."""
+        return self.lens.k1 != 0 or self.lens.k2 != 0
+
+    def apply(self, view: RawView, exposure: Exposure) -> RawView:
+        """The distorted view, rounded."""
+        return distort(view, self.lens, exposure.camera.intrinsics)
+
+    def apply_torch(self, light: Tensor, truth: RawView, exposure: Exposure) -> Tensor:
+        """See `Effect.apply_torch`."""
+        found = lens_map(self.lens, exposure.camera.intrinsics)
+        return read_bilinear(light, found.x.astype(np.float64), found.y.astype(np.float64))
+
+    def trace(self, samples: PixelSamples, exposure: Exposure) -> PixelSamples:
+        """(N, 1) whole pixels of the distorted picture to the (N, 4) pinhole pixels that each one mixes."""
+        found = lens_map(self.lens, exposure.camera.intrinsics)
+        at = (samples.y[:, 0].astype(int), samples.x[:, 0].astype(int))
+        from_x, from_y = found.x[at].astype(np.float64), found.y[at].astype(np.float64)
+        low_x, low_y = np.floor(from_x), np.floor(from_y)
+        part_x, part_y = from_x - low_x, from_y - low_y
+        corners = [(dx, dy) for dy in (0, 1) for dx in (0, 1)]
+        shares = [(part_x if dx else 1 - part_x) * (part_y if dy else 1 - part_y) for dx, dy in corners]
+        return replace(
+            samples,
+            x=np.stack([low_x + dx for dx, _ in corners], axis=1),
+            y=np.stack([low_y + dy for _, dy in corners], axis=1),
+            weight=np.stack(shares, axis=1),
+        )
+
+    def check(self, camera: CameraRecord) -> None:
+        """Refuses a distortion that folds the picture of a camera over.
+
+        Raises:
+            FieldError: it does.
+        """
+        try:
+            lens_map(self.lens, camera.intrinsics)
+        except ValueError as error:
+            raise FieldError("lens", f"{error}; take k1 and k2 nearer to 0, or a narrower field of view") from error
+
+    def recorded(self, camera: CameraRecord) -> CameraRecord:
+        """The camera's record with the lens in it."""
+        found = lens_map(self.lens, camera.intrinsics)
+        return replace(camera, lens=LensRecord(k1=self.lens.k1, k2=self.lens.k2, focal_px=found.focal_px))
+
+    @classmethod
+    def from_record(cls, camera: CameraRecord) -> LensDistortion | None:
+        """The lens that a camera's record holds; None for a pinhole."""
+        return None if camera.lens is None else cls(lens=Lens(k1=camera.lens.k1, k2=camera.lens.k2))
+
+    def pixel_map(self, camera: CameraRecord) -> PixelMap:
+        """How the lens moves pixels.
+
+        Beyond the picture's corners `forward` continues on a straight line: the polynomial would fold over there, or
+        grow without bounds.
+
+        Raises:
+            ValueError: the distortion folds the picture over.
+        """
+        pinhole, lens = camera.intrinsics, self.lens
+        found = lens_map(lens, pinhole)
+        middle, focal = np.array([pinhole.cx_px, pinhole.cy_px]), np.array([pinhole.fx_px, pinhole.fy_px])
+        corners = np.stack([[found.x[r, c], found.y[r, c]] for r in (0, -1) for c in (0, -1)])
+        reach = float(np.linalg.norm((corners - middle) / focal, axis=1).max())
+        bent_focal = np.array([found.focal_px, found.focal_px * (pinhole.fy_px / pinhole.fx_px)])
+
+        def forward(pinhole_px: Array) -> Array:
+            offset = (np.asarray(pinhole_px) - middle) / focal
+            radius = np.linalg.norm(offset, axis=-1, keepdims=True)
+            inner = np.minimum(radius, reach)
+            square = inner**2
+            slope = 1 + 3 * lens.k1 * square + 5 * lens.k2 * square**2
+            bent = inner * (1 + lens.k1 * square + lens.k2 * square**2) + slope * (radius - inner)
+            return np.asarray(offset * (bent / np.maximum(radius, 1e-12)) * bent_focal + middle)
+
+        return PixelMap(x=found.x, y=found.y, forward=forward)
+
+
+def distort(view: RawView, lens: Lens, pinhole: Intrinsics) -> RawView:
+    """A pinhole's view as a lens shows it: colour is rounded, depth and ids are those of the nearest pixel.
+
+    Raises:
+        ValueError: the distortion folds the picture over.
+    """
+    import cv2  # not at the top: configs are read without OpenCV
+
+    found = lens_map(lens, pinhole)
+    assert view.linear_rgb is not None
+    row, column = np.rint(found.y).astype(np.intp), np.rint(found.x).astype(np.intp)
+    return RawView(
+        linear_rgb=np.asarray(cv2.remap(view.linear_rgb, found.x, found.y, cv2.INTER_LINEAR), dtype=np.uint16),
+        depth_m=view.depth_m[row, column],
+        geom_id=view.geom_id[row, column],
+    )
+
+
+@lru_cache(maxsize=8)
+def lens_map(lens: Lens, pinhole: Intrinsics) -> LensMap:
+    """The map of a lens before a pinhole.
+
+    The distorted picture has a longer focal length where it would otherwise show what the pinhole does not see.
+
+    Raises:
+        ValueError: the distortion folds the picture over.
+    """
+    low, high = 0.2, 1.0
+    if _fits(lens, pinhole, high):
+        low = high
+    for _ in range(40):
+        middle = (low + high) / 2
+        low, high = (middle, high) if _fits(lens, pinhole, middle) else (low, middle)
+    centre, focal = np.array([pinhole.cx_px, pinhole.cy_px]), np.array([pinhole.fx_px, pinhole.fy_px])
+    x, y = np.meshgrid(np.arange(pinhole.width_px) - centre[0], np.arange(pinhole.height_px) - centre[1])
+    seen = undistorted(lens, np.stack([x, y], axis=-1) * (low / focal)) * focal + centre
+    seen = np.clip(seen, 0, np.array([pinhole.width_px - 1, pinhole.height_px - 1]))
+    maps = [np.ascontiguousarray(seen[..., axis], dtype=np.float32) for axis in (0, 1)]
+    for one in maps:
+        one.setflags(write=False)
+    return LensMap(maps[0], maps[1], round(pinhole.fx_px / low, 6))
+
+
+def undistorted(lens: Lens, distorted: Array) -> Array:
+    """(..., 2) points behind the lens to where a pinhole sees them, both in focal lengths from the principal point.
+
+    Newton's method on the radius.
+
+    Raises:
+        ValueError: the distortion folds the picture over there.
+    """
+    wanted = np.linalg.norm(distorted, axis=-1)
+    radius = wanted.copy()
+    for _ in range(_NEWTON_STEPS):
+        square = radius**2
+        slope = 1 + 3 * lens.k1 * square + 5 * lens.k2 * square**2
+        if bool((slope < _LEAST_SLOPE).any()):
+            raise ValueError(f"a lens of k1 {lens.k1:g} and k2 {lens.k2:g} folds so wide a picture over")
+        radius -= (radius * (1 + lens.k1 * square + lens.k2 * square**2) - wanted) / slope
+    return np.asarray(distorted * (radius / np.maximum(wanted, 1e-12))[..., None])
+
+
+def _fits(lens: Lens, pinhole: Intrinsics, zoom: float) -> bool:
+    """Whether the border of the distorted picture lies in the pinhole's."""
+    half = np.array([(pinhole.width_px - 1) / 2, (pinhole.height_px - 1) / 2])
+    centre, focal = np.array([pinhole.cx_px, pinhole.cy_px]), np.array([pinhole.fx_px, pinhole.fy_px])
+    ticks = np.linspace(-1, 1, 65)
+    border = np.concatenate([np.column_stack([ticks, np.full_like(ticks, edge)]) for edge in (-1, 1)])
+    border = np.concatenate([border, border[:, ::-1]]) * half
+    off_middle = centre - half
+    try:
+        seen = undistorted(lens, (border - off_middle) * (zoom / focal)) * focal + off_middle
+    except ValueError:
+        return False
+    return bool((np.abs(seen) <= half + 1e-6).all())

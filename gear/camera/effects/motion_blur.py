@@ -1,0 +1,124 @@
+"""Motion blur: the ego car drives while the shutter is open."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.camera.effects.effect import Effect, Exposure, PixelSamples
+from gear.camera.effects.sampling import read_bilinear
+from gear.contracts.rendering import RawView
+from gear.values.errors import FieldError
+from gear.values.frames import FloatImage
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+Real = TypeVar("Real", np.float32, np.float64)
+
+MOMENTS = 9
+"""Moments of the shutter that are averaged; the middle one is the moment of the ground truth."""
+
+_LEAST_DENOMINATOR = 0.1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionBlur(Effect):
+    """Each pixel is the mean along the path of its point over the picture while the shutter is open.
+
+    The path follows from depth and the ego car's velocity: other road users are taken as standing still, rotation is
+    left out, the sky and the ego car's own bonnet stay sharp.
+
+    Attributes:
+        shutter_s: exposure time, which smears what the moving ego car passes, 0 to 0.1 s; 0 is none.
+    """
+
+    ORDER: ClassVar[int] = 10
+
+    shutter_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.shutter_s <= 0.1:
+            raise FieldError("shutter_s", f"must be 0 to 0.1 s, got {self.shutter_s:g}")
+
+    @property
+    def is_active(self) -> bool:
+        """Whether the shutter is open for any time."""
+        return self.shutter_s > 0
+
+    def apply(self, view: RawView, exposure: Exposure) -> RawView:
+        """The view with blurred colour, rounded; depth and ids are those of the shutter's middle."""
+        import cv2  # not at the top: configs are read without OpenCV
+
+        assert view.linear_rgb is not None
+        total = np.zeros(view.linear_rgb.shape, np.float32)
+        for from_x, from_y in self._paths(view, exposure):
+            total += cv2.remap(view.linear_rgb, from_x, from_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        return replace(view, linear_rgb=np.asarray(total / np.float32(MOMENTS) + np.float32(0.5), dtype=np.uint16))
+
+    def apply_torch(self, light: Tensor, truth: RawView, exposure: Exposure) -> Tensor:
+        """See `Effect.apply_torch`."""
+        total = light * 0
+        for from_x, from_y in self._paths(truth, exposure):
+            total = total + read_bilinear(light, from_x.astype(np.float64), from_y.astype(np.float64))
+        return total / MOMENTS
+
+    def trace(self, samples: PixelSamples, exposure: Exposure) -> PixelSamples:
+        """(N, S) samples to (N, 9 S) of the sharp picture."""
+        pinhole = exposure.camera.intrinsics
+        inverse = np.maximum(samples.inverse_depth(samples.x, samples.y), 0.0)
+        xs, ys = [], []
+        for shift in self._shifts(exposure):
+            x, y = _moved(samples.x - pinhole.cx_px, samples.y - pinhole.cy_px, inverse, shift, exposure)
+            xs.append(x + pinhole.cx_px)
+            ys.append(y + pinhole.cy_px)
+        return replace(
+            samples,
+            x=np.concatenate(xs, axis=1),
+            y=np.concatenate(ys, axis=1),
+            weight=np.tile(samples.weight / MOMENTS, (1, MOMENTS)),
+        )
+
+    def _shifts(self, exposure: Exposure) -> Iterator[npt.NDArray[np.float64]]:
+        """(3,) metres in the camera's frame by which the camera is ahead at each moment."""
+        rotation = exposure.camera.world_from_camera_transform.rotation
+        velocity = rotation.T @ np.asarray(exposure.scene.ego.velocity_world_mps)
+        for moment in np.linspace(-0.5, 0.5, MOMENTS):
+            yield velocity * moment * self.shutter_s
+
+    def _paths(self, truth: RawView, exposure: Exposure) -> Iterator[tuple[FloatImage, FloatImage]]:
+        """(H, W) float32 columns and rows that each pixel reads, for each moment."""
+        pinhole, depth_m = exposure.camera.intrinsics, truth.depth_m
+        if exposure.geoms is not None:
+            # The ego car's own parts move with the camera: as sharp as what is endlessly far.
+            is_ego = np.append(exposure.geoms.object_id == exposure.scene.ego.id, False)[truth.geom_id]
+            depth_m = np.where(is_ego, np.float32(np.inf), depth_m)
+        inverse = np.nan_to_num(1 / depth_m, nan=0.0).astype(np.float32)
+        x, y = np.meshgrid(
+            np.arange(pinhole.width_px, dtype=np.float32) - np.float32(pinhole.cx_px),
+            np.arange(pinhole.height_px, dtype=np.float32) - np.float32(pinhole.cy_px),
+        )
+        for shift in self._shifts(exposure):
+            from_x, from_y = _moved(x, y, inverse, shift.astype(np.float32), exposure)
+            from_x += np.float32(pinhole.cx_px)
+            from_y += np.float32(pinhole.cy_px)
+            yield from_x, from_y
+
+
+def _moved(
+    x: npt.NDArray[Real],
+    y: npt.NDArray[Real],
+    inverse_depth: npt.NDArray[Real],
+    shift_m: npt.NDArray[Real],
+    exposure: Exposure,
+) -> tuple[npt.NDArray[Real], npt.NDArray[Real]]:
+    """Where points appear in a camera that is shifted; x and y are relative to the principal point."""
+    kind, pinhole = x.dtype.type, exposure.camera.intrinsics
+    scale = 1 / np.maximum(1 - shift_m[2] * inverse_depth, kind(_LEAST_DENOMINATOR))
+    from_x = (x - kind(pinhole.fx_px) * shift_m[0] * inverse_depth) * scale
+    from_y = (y - kind(pinhole.fy_px) * shift_m[1] * inverse_depth) * scale
+    return np.asarray(from_x), np.asarray(from_y)
