@@ -53,7 +53,7 @@ def _with_parameters(cls: type[T]) -> type[T]:
             if field.name in annotations:
                 raise TypeError(f"two camera effects have a parameter {field.name!r}")
             annotations[field.name] = type_hints(effect)[field.name]
-            copy: Any = dataclasses.field(default=field.default, default_factory=field.default_factory)  # type: ignore[call-overload]
+            copy: Any = dataclasses.field(default=field.default, default_factory=field.default_factory)
             setattr(cls, field.name, copy)
         sections.append((effect.__doc__ or "").partition("    Attributes:\n")[2].rstrip())
     cls.__annotations__ = annotations
