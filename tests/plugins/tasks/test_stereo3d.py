@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+from gear.camera.effects import Lens
 from gear.formats.kitti_object import format_labels, parse_calibration, parse_labels, read_baseline_m
 from gear.groundtruth.visibility import Visibility
 from gear.plugins.tasks.stereo3d import Stereo3dConfig, Stereo3dTask, stereo3d
@@ -14,7 +15,6 @@ from gear.testing.synthetic import behind_lens, synthetic_frame
 from gear.testing.task_contract import TaskContract
 from gear.testing.things import CAR, CYCLIST, VAN, Thing, street
 from gear.values.errors import FieldError
-from gear.values.optics import Lens
 from gear.values.rig import Rig
 
 
