@@ -26,7 +26,8 @@ from gear.dataset.reading import Dataset
 from gear.measuring.dataset_run import evaluate_row
 from gear.measuring.guarded_model import Player
 from gear.measuring.plugin_selection import chosen_defense, chosen_model
-from gear.measuring.scoring import TASK, Scorer
+from gear.measuring.reports import TASK
+from gear.measuring.scoring import Scorer
 from gear.measuring.statistics import draw, gather
 from gear.networks.network import as_batch
 
@@ -86,7 +87,7 @@ def main() -> None:
             spent["evaluate"].append((time.perf_counter() - begun) / len(pictures))
         print(", ".join(f"{name} {seconds[-1]:.3f} s" for name, seconds in spent.items()), flush=True)
     begun = time.perf_counter()
-    gather(scorer.makers[TASK], [note.parts[TASK] for note in notes], draw(len(notes), 1000, 0))
+    gather(scorer.reports[TASK].make, [note.parts[TASK] for note in notes], draw(len(notes), 1000, 0))
     print(f"1000 resamples: {time.perf_counter() - begun:.2f} s")
     for name in ("bare", "predict"):
         ratios = sorted(whole / one for whole, one in zip(spent["evaluate"], spent[name], strict=True))

@@ -10,7 +10,7 @@ from gear.contracts import attacks, defenses, hookspecs, models, specs, tasks
 from gear.plugins.describe import meanings_of, options
 from gear.plugins.manager import discover
 
-SPECS = (specs.Spec, specs.TaskSpec, specs.ModelSpec, specs.AttackSpec, specs.DefenseSpec)
+SPECS = (specs.Spec, specs.TaskSpec, specs.ModelSpec, specs.AttackSpec, specs.DefenseSpec, specs.MetricSpec)
 PROTOCOLS = (
     tasks.Task, tasks.Evaluator, models.Model, attacks.Attack, attacks.Compositor, defenses.Defense, defenses.Taught,
 )  # fmt: skip

@@ -51,7 +51,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         dest="reports",
-        help="further metrics: reference (those of the weights' cards), outside_patch, or a plugin's; repeatable",
+        help="further metrics: reference (what a shipped network is held to), outside_patch, or a metric plugin"
+        " (gear plugins --kind metric) as NAME or NAME:KEY=VALUE,...; repeatable",
     )
     parser.add_argument("--out", metavar="DIR", help="folder for the results (evaluations/<task>/<model>[+<defense>])")
     parser.add_argument(

@@ -153,13 +153,13 @@ class MetricSpec(Spec[ConfigT, Evaluator[Any, Any]]):
 
     Attributes:
         tasks: names of the tasks whose samples and predictions it understands; at least one.
-        main_metric: the one of the evaluator's metrics that tells better from worse.
+        metric: the one of the evaluator's metrics that tells better from worse.
         unit: of its metrics, such as `m` or `px`; "" for shares and counts.
         less_is_better: whether the main metric is an error.
     """
 
     tasks: tuple[str, ...]
-    main_metric: str
+    metric: str
     unit: str = ""
     less_is_better: bool = False
 

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from gear.dataset.reading import Dataset
-from gear.measuring.plugin_selection import Chosen, check_model, check_reports
+from gear.measuring.plugin_selection import Chosen, check_model
+from gear.measuring.reports import reports_of
 from gear.plugins.datasets import open_dataset, root_and_split, roots_of
 from gear.values.errors import DatasetError, GearError
 
@@ -38,7 +39,7 @@ def opened(paths: Sequence[str | Path], split: str | None, model: Chosen, report
         if not len(one):
             raise DatasetError(one.root, "has no samples to evaluate on")
         check_model(model, one)
-        check_reports(reports, one)
+        reports_of(reports, one)
     return datasets
 
 

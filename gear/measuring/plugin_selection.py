@@ -10,16 +10,12 @@ from gear.config.dump import to_plain
 from gear.config.nodes import Node
 from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
-from gear.contracts.evaluation import Maskable, Reports
 from gear.contracts.specs import DefenseSpec, ModelSpec
 from gear.dataset.reading import Dataset
 from gear.plugins.build import NO_OPTIONS, find
 from gear.plugins.catalogue import PluginEntry
-from gear.values.errors import GearError, UnknownNameError
+from gear.values.errors import GearError
 from gear.values.serial import Json
-
-OUTSIDE_PATCH = "outside_patch"
-"""The task's own metrics with the ground truth on and next to the patch left out."""
 
 CAMERA = ("hfov_deg", "baseline_m")
 """Options that a model shares with its task, because pictures do not say them."""
@@ -145,16 +141,3 @@ def check_defense(defense: Chosen, model: Chosen, task: str, *, is_calibrated: b
             f"defense {spec.name!r} must learn first: give --calibration DIR, a clean dataset of the task"
             " (and --calibration-patched DIR, its twin with patches, if it wants one)"
         )
-
-
-def check_reports(names: Iterable[str], dataset: Dataset[Any]) -> None:
-    """Whether the task has the reports.
-
-    Raises:
-        UnknownNameError: it has none of such a name.
-    """
-    known = [OUTSIDE_PATCH] if isinstance(dataset.task, Maskable) else []
-    known += list(dataset.task.reports()) if isinstance(dataset.task, Reports) else []
-    for name in names:
-        if name not in known:
-            raise UnknownNameError(f"report of task {dataset.plan.task['name']!r}", name, known)

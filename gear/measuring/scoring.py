@@ -2,32 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gear.contracts.evaluation import KeepsPredictions, Reports
+from gear.contracts.evaluation import KeepsPredictions, Maskable
 from gear.contracts.tasks import Sample
 from gear.dataset.files import explained, inside, read_bytes, sha256, write_whole
 from gear.dataset.output_checks import check_encoded
 from gear.dataset.reading import Dataset
 from gear.dataset.sidecar import dump_json, load_json
 from gear.measuring.guarded_model import Answer, accusation
-from gear.measuring.metric_checks import said_of
 from gear.measuring.metric_json import known_json
 from gear.measuring.patch_area import MASK_METRICS, mask_metrics, patch_masks, widened
-from gear.measuring.plugin_selection import OUTSIDE_PATCH
+from gear.measuring.reports import OUTSIDE_PATCH, Report, reports_of
 from gear.measuring.statistics import AnyEvaluator
 from gear.plugins.catalogue import PluginEntry
 from gear.plugins.manager import DISTRIBUTION
 from gear.plugins.text import one_line
 from gear.values.errors import DatasetError, FieldError, GearError
 from gear.values.serial import Json, from_json
-
-TASK = "task"
-"""The task's own evaluator, among its reports."""
 
 PREDICTIONS = "predictions"
 
@@ -104,14 +100,7 @@ class Scorer:
         self._dataset, self._root, self._folder, self._model = dataset, root, folder, model
         self._task = dataset.task
         self._keeper = self._task if isinstance(self._task, KeepsPredictions) else None
-        self.makers: dict[str, Callable[[], AnyEvaluator]] = {TASK: self._task.evaluator}
-        for name in reports:
-            self.makers[name] = self._task.evaluator if name == OUTSIDE_PATCH else self._maker(name)
-
-    def _maker(self, name: str) -> Callable[[], AnyEvaluator]:
-        task = self._task
-        assert isinstance(task, Reports)
-        return lambda: task.reports()[name]
+        self.reports: dict[str, Report] = reports_of(reports, dataset)
 
     def kept(self) -> set[int]:
         """Samples that are finished: their predictions need not be made again."""
@@ -194,13 +183,16 @@ class Scorer:
             write_whole(self._root, f"{self._folder}/{PREDICTIONS}/{relative}", data)
 
     def _measure(self, sample: Sample, prediction: Any) -> tuple[dict[str, dict[str, float]], dict[str, AnyEvaluator]]:
-        parts = {name: make() for name, make in self.makers.items()}
-        metrics = {}
-        for name, part in parts.items():
+        metrics: dict[str, dict[str, float]] = {}
+        parts: dict[str, AnyEvaluator] = {}
+        for name, report in self.reports.items():
             seen = sample
             if name == OUTSIDE_PATCH:
-                seen = self._task.without(sample, widened(patch_masks(sample)))  # type: ignore[attr-defined]
-            metrics[name] = said_of(self._dataset.plan, part.update(seen, prediction), "update")
+                assert isinstance(self._task, Maskable)
+                seen = self._task.without(sample, widened(patch_masks(sample)))
+            with report.blamed("update"):
+                parts[name] = report.make()
+                metrics[name] = report.checked(parts[name].update(seen, prediction), "update")
         return metrics, parts
 
     @contextmanager

@@ -26,6 +26,16 @@ def find(kind: Kind, name: str) -> PluginEntry:
     return catalogue().get(kind, name)
 
 
+def plugins_of_kind(kind: Kind) -> tuple[PluginEntry, ...]:
+    """All plugins of a kind, by name."""
+    return catalogue().of_kind(kind)
+
+
+def broken_hint() -> str:
+    """In brackets, the plugins that failed to load, for messages about an unknown name; "" if none did."""
+    return catalogue().broken_hint()
+
+
 def name_of_task(written: JsonMapping[str, Any]) -> str:
     """How the task that wrote a dataset is asked for, from what its plan says of it: with its package, if that is
     installed, since another's task may have the same name.

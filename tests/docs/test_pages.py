@@ -15,7 +15,7 @@ from tests.docs.blocks import DOCS, ROOT, pages
 
 def test_there_is_a_page_for_every_kind_of_plugin() -> None:
     found = [path.stem for path in sorted((DOCS / "how-to").glob("write-a*.md"))]
-    assert found == ["write-a-defense", "write-a-model", "write-a-task", "write-an-attack"]
+    assert found == ["write-a-defense", "write-a-metric", "write-a-model", "write-a-task", "write-an-attack"]
 
 
 def test_a_folder_holds_the_dataset_of_one_task_on_every_page() -> None:

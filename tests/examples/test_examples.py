@@ -74,6 +74,7 @@ def test_all_are_found_and_the_broken_ones_are_named(home: Path) -> None:
         ("model", "transformers_depth", "gear-model-transformers"),
         ("model", "transformers_detect2d", "gear-model-transformers"),
         ("attack", "art", "gear-attack-art"),
+        ("metric", "boundary_iou", "gear-metric-boundary-iou"),
         ("task", "semseg", "mujoco-gear"),
     } <= names
     assert {b["package"] for b in facts["broken"]} == {"gear-broken"}
@@ -127,7 +128,9 @@ def test_foreign_models_defenses_and_tasks_have_their_rows(home: Path) -> None:
     found = {}
     for defense in (None, "jpeg_tv", "jedi"):
         guard = ("--defense", defense) if defense else ()
-        found[defense] = json.loads(gear(home, "evaluate", *network, *guard, "--resamples", "20", "--json"))
+        words = (*network, *guard, "--report", "boundary_iou", "--resamples", "20", "--json")
+        found[defense] = json.loads(gear(home, "evaluate", *words))
+        assert "boundary_miou" in found[defense]["rows"][0]["metrics"]["boundary_iou"]
         assert [row["samples"] for row in found[defense]["rows"]] == [2, 2]
         assert (home / f"empty/evaluations/semseg/ddrnet23_slim{'+' if defense else ''}{defense or ''}").is_dir()
     cost = {name: one["rows"][1]["cost"]["defense_s"] for name, one in found.items()}
@@ -211,6 +214,6 @@ def test_each_is_typed_against_gears_published_types(
 
 
 def test_the_wheel_can_write_new_packages(home: Path) -> None:
-    for kind in ("task", "model", "attack", "defense"):
+    for kind in ("task", "model", "attack", "defense", "metric"):
         assert gear(home, "new", kind, "my_thing").startswith(f"gear-{kind}-my-thing: ")
         assert (home / f"empty/gear-{kind}-my-thing/src/gear_{kind}_my_thing/my_thing.py").is_file()

@@ -39,7 +39,7 @@ def nothing(config: Any) -> Any:
 
 PLAIN: dict[str, Any] = {"name": "thirdparty", "summary": "Does nothing.", "config": Config, "build": nothing}
 MODEL = PLAIN | {"tasks": (), "views": ("left",)}
-METRIC = PLAIN | {"tasks": ("depth",), "main_metric": "rmse_m"}
+METRIC = PLAIN | {"tasks": ("depth",), "metric": "rmse_m"}
 PUBLISHED = PublishedWeights(data="d", source="s", licence="l", size_mb=9)
 
 

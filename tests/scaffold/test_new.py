@@ -39,7 +39,7 @@ def test_a_package_is_whole(kind: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("kind", "use"),
     [("task", "gear collect --task my_thing"), ("model", "--model my_thing"), ("defense", "--defense my_thing"),
-     ("attack", "gear attack --attack my_thing")],
+     ("attack", "gear attack --attack my_thing"), ("metric", "--report my_thing")],
 )  # fmt: skip
 def test_its_readme_says_how_gear_uses_it(kind: str, use: str, tmp_path: Path) -> None:
     assert use in (new_package(kind, "my_thing", out=tmp_path) / "README.md").read_text()
@@ -68,7 +68,14 @@ def test_a_plugin_that_is_there_is_not_written_again(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("kind", "name"),
-    [("attack", "patch"), ("task", "rig"), ("task", "encoded"), ("defense", "defense_result"), ("model", "tensor")],
+    [
+        ("attack", "patch"),
+        ("task", "rig"),
+        ("task", "encoded"),
+        ("defense", "defense_result"),
+        ("model", "tensor"),
+        ("metric", "evaluator"),
+    ],
 )
 def test_its_classes_take_no_name_that_it_uses(kind: str, name: str, tmp_path: Path) -> None:
     for path in new_package(kind, name, out=tmp_path).rglob("*.py"):

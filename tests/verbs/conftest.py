@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from gear.contracts.hookspecs import hookimpl
-from gear.contracts.specs import AttackSpec, DefenseSpec, ModelSpec
+from gear.contracts.specs import AttackSpec, DefenseSpec, MetricSpec, ModelSpec
 from gear.dataset.locks import turn
 from gear.plugins import build as building
 from gear.plugins.manager import discover
@@ -70,7 +70,8 @@ def collect_small() -> Callable[..., CollectReport]:
 def put_package(monkeypatch: pytest.MonkeyPatch, specs: Sequence[Any]) -> None:
     """Installs plugins as a third party's package, in place of one that was put before."""
     module = types.ModuleType("odd_package")
-    for hook, kind in (("gear_models", ModelSpec), ("gear_attacks", AttackSpec), ("gear_defenses", DefenseSpec)):
+    hooks = {"gear_models": ModelSpec, "gear_attacks": AttackSpec, "gear_defenses": DefenseSpec}
+    for hook, kind in (hooks | {"gear_metrics": MetricSpec}).items():
         chosen = [spec for spec in specs if isinstance(spec, kind)]
         setattr(module, hook, hookimpl(lambda chosen=chosen: chosen, specname=hook))
     monkeypatch.setitem(sys.modules, "odd_package", module)

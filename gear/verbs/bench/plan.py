@@ -12,7 +12,7 @@ from gear.config.dump import to_plain
 from gear.contracts.evaluation import Maskable, Reports
 from gear.contracts.specs import AttackSpec
 from gear.contracts.tasks import NO_PATCH, RANDOM_PATCH
-from gear.measuring.plugin_selection import OUTSIDE_PATCH
+from gear.measuring.reports import OUTSIDE_PATCH
 from gear.plugins.build import build, find
 from gear.values.rng import derive_rng
 from gear.verbs.bench.config import BenchConfig, settings_of

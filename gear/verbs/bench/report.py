@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gear.contracts.tasks import NO_PATCH
-from gear.measuring.plugin_selection import OUTSIDE_PATCH
-from gear.measuring.scoring import TASK
+from gear.measuring.reports import OUTSIDE_PATCH, TASK
 from gear.values.serial import Json
 from gear.verbs.bench.plan import RANDOM
 from gear.verbs.evaluate.report import Difference, Estimate, EvaluateReport, Metrics, PairedTest, Pool

@@ -12,7 +12,6 @@ import numpy as np
 from gear.contracts.evaluation import Draws
 from gear.contracts.tasks import CONTROLS, NO_PATCH
 from gear.dataset.reading import Dataset, scenes_of
-from gear.measuring.metric_checks import said_of
 from gear.measuring.scoring import Note, Scorer
 from gear.measuring.statistics import (
     Metrics,
@@ -62,9 +61,11 @@ class Measured:
         key = (report, len(notes))
         if key not in self.spreads:
             parts = [note.parts[report] for note in notes]
-            held = partial(said_of, self.dataset.plan, method="result")
+            metric = self.scorer.reports[report]
+            checked = partial(metric.checked, method="result")
             draws = draw_clusters(self.streets[:count], resamples, seed)
-            self.spreads[key] = gather(self.scorer.makers[report], parts, draws, held)
+            with metric.blamed("result"):
+                self.spreads[key] = gather(metric.make, parts, draws, checked)
         return self.spreads[key]
 
     @property
@@ -151,7 +152,7 @@ def together(rows: Sequence[Measured], seed: int, resamples: int) -> Iterable[To
 def metrics_of(row: Measured, seed: int, resamples: int) -> dict[str, dict[str, Estimate]]:
     """Metrics over all samples, with their intervals."""
     metrics = {}
-    for report in row.scorer.makers:
+    for report in row.scorer.reports:
         one = row.gathered(report, seed, resamples)
         metrics[report] = {
             name: Estimate(value=value, interval=one.interval(name), ceiling=one.ceilings.get(name, 1.0))
@@ -187,10 +188,10 @@ def difference(row: Measured, other: Measured, seed: int, resamples: int) -> Dif
             report: _paired(
                 row.gathered(report, seed, resamples, count), other.gathered(report, seed, resamples, count)
             )
-            for report in row.scorer.makers
+            for report in row.scorer.reports
         },
         auroc=_auroc(here, there, draw_clusters(streets, resamples, seed)),
-        paired={report: _tested(here, there, streets, report, seed) for report in row.scorer.makers},
+        paired={report: _tested(here, there, streets, report, seed) for report in row.scorer.reports},
     )
 
 

@@ -78,8 +78,8 @@ def evaluate(
         split: of the datasets; may be left out where each has only one.
         calibration: dataset from which the defense learns.
         calibration_patched: the same with patches.
-        reports: further metrics: the task's own (`reference`), or `outside_patch`, the ground truth on the patch and 5
-            px around it left out.
+        reports: further metrics: the task's own (`reference`); `outside_patch`, the ground truth on the patch and 5 px
+            around it left out; or metric plugins, as `NAME` or `NAME:KEY=VALUE,KEY=VALUE`.
         out: folder for everything; `evaluations/<task>/<model>[+<defense>]` by default.
         batch: samples that go through the model together; one, or up to four small ones for gear's own, unless given.
         workers: threads that read, and threads that measure and write, beside the model.
@@ -140,7 +140,14 @@ def evaluate(
             )
         said = [note for one in datasets for note in (size_note(chosen, one), drive_note(one), learnt.note(one))]
         notes = [*learnt.doubts(), *(note for note in said if note)]
-        more = {"reports": list(reports), "resamples": resamples, "versions": _versions(player), "notes": notes}
+        plugins = {name: one.facts() for name, one in rows[0].scorer.reports.items() if one.plugin is not None}
+        more = {
+            "reports": list(reports),
+            "metric_plugins": plugins,
+            "resamples": resamples,
+            "versions": _versions(player),
+            "notes": notes,
+        }
         found = EvaluateReport(
             out=root,
             facts=facts | more,

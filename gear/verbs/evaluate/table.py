@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
-from gear.measuring.scoring import TASK
+from gear.measuring.reports import TASK
 from gear.measuring.text_table import WIDTH, number_table
 from gear.verbs.evaluate.report import Difference, Estimate, EvaluateReport, RowReport
 

@@ -31,6 +31,7 @@ USE: dict[Kind, str] = {
     " with `--probes`; `gear collect --patch PATCH` puts it into the world.",
     "defense": "Use it: `gear evaluate --model NAME --defense {{name}} --data DIR` is its row in an evaluation;"
     " `gear defend DIR --defense {{name}} --out DIR2` cleans a dataset's pictures.",
+    "metric": "Use it: `gear evaluate --model NAME --data DIR --report {{name}}` adds its columns to an evaluation.",
 }
 
 
@@ -38,7 +39,7 @@ def new_package(kind: str, name: str, *, out: str | Path = ".") -> Path:
     """Writes a complete small package for a plugin: code, tests through the contracts, README, licence.
 
     Args:
-        kind: `task`, `model`, `attack` or `defense`.
+        kind: `task`, `model`, `attack`, `defense` or `metric`.
         name: the plugin's, such as `my_blur`; hyphens are taken for underscores.
         out: folder in which the package's own folder, `gear-<kind>-<name>`, is made.
 

@@ -1,0 +1,141 @@
+"""What an evaluation measures on a dataset: the task's own metric, its reports, and metrics of plugins.
+
+A report is asked for by name. `outside_patch` is the task's own metric with the ground truth on and next to the patch
+left out; the task may have reports of its own, such as `reference`; any other name is that of a metric plugin
+(`gear_metrics`), with options after a colon: `boundary_iou:width_share=0.01`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from gear.config.overrides import with_overrides
+from gear.config.reader import read_node
+from gear.contracts.evaluation import Maskable, Reports
+from gear.contracts.specs import MetricSpec
+from gear.contracts.tasks import Evaluator
+from gear.dataset.output_checks import check_metrics
+from gear.dataset.plan import Plan
+from gear.dataset.reading import Dataset
+from gear.measuring.guarded_model import accusation
+from gear.measuring.plugin_selection import Chosen
+from gear.plugins.build import NO_OPTIONS, broken_hint, find, name_of_task, plugins_of_kind
+from gear.plugins.manager import DISTRIBUTION
+from gear.plugins.text import one_line
+from gear.values.errors import GearError, UnknownNameError
+from gear.values.serial import Json
+
+TASK = "task"
+"""Name of the task's own metric among the reports."""
+
+OUTSIDE_PATCH = "outside_patch"
+
+NEXT_OPTION = re.compile(r",(?=[\w.]+=)")
+"""The comma before another `KEY=VALUE`; commas in a value stay."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Report:
+    """One metric of an evaluation.
+
+    Attributes:
+        name: as the user asked for it.
+        make: a fresh, empty evaluator.
+        plan: of the dataset that is measured.
+        plugin: the metric plugin with its options; None for the task's own metric and reports.
+    """
+
+    name: str
+    make: Callable[[], Evaluator[Any, Any]]
+    plan: Plan
+    plugin: Chosen | None = None
+
+    def checked(self, given: Any, method: str) -> dict[str, float]:
+        """Metrics by name, as `method` of the evaluator returned them.
+
+        Raises:
+            PluginError: they are no mapping of names to numbers; says which plugin's they are.
+        """
+        try:
+            return check_metrics(given, method)
+        except TypeError as error:
+            found = find("task", name_of_task(self.plan.task)) if self.plugin is None else self.plugin.found
+            raise accusation(found, "its evaluator", str(error)) from error
+
+    @contextlib.contextmanager
+    def blamed(self, method: str) -> Iterator[None]:
+        """Around an evaluator's code, in any thread: what a third party's metric raises says which plugin's it is.
+
+        Raises:
+            PluginError: the evaluator of another package's metric raised something other than a `GearError`.
+        """
+        try:
+            yield
+        except (GearError, KeyboardInterrupt):
+            raise
+        except BaseException as error:
+            if self.plugin is None or self.plugin.found.owner.package == DISTRIBUTION:
+                raise
+            raise accusation(self.plugin.found, f"{method} of its evaluator", one_line(error)) from error
+
+    def facts(self) -> Json:
+        """What a plugin's metric is, for the results; None for the task's own."""
+        if self.plugin is None:
+            return None
+        spec = self.plugin.found.spec
+        assert isinstance(spec, MetricSpec)
+        said = {"metric": spec.metric, "unit": spec.unit, "less_is_better": spec.less_is_better}
+        return self.plugin.facts() | said
+
+
+def task_report(dataset: Dataset[Any]) -> Report:
+    """The task's own metric."""
+    return Report(name=TASK, make=dataset.task.evaluator, plan=dataset.plan)
+
+
+def reports_of(names: Iterable[str], dataset: Dataset[Any]) -> dict[str, Report]:
+    """The task's own metric and the reports that are asked for, by name.
+
+    Raises:
+        UnknownNameError: neither the task nor a plugin has one of such a name.
+        GearError: a metric is for other tasks, or an option of it does not fit.
+    """
+    found = {TASK: task_report(dataset)}
+    for name in names:
+        found[name] = _report(name, dataset)
+    return found
+
+
+def _report(name: str, dataset: Dataset[Any]) -> Report:
+    task, plan = dataset.task, dataset.plan
+    if name == OUTSIDE_PATCH and isinstance(task, Maskable):
+        return Report(name=name, make=task.evaluator, plan=plan)
+    if isinstance(task, Reports) and name in task.reports():
+        return Report(name=name, make=lambda: task.reports()[name], plan=plan)
+    plugin, _, settings = name.partition(":")
+    known = {one.spec.name: one for one in plugins_of_kind("metric")}
+    known |= {one.full_name: one for one in plugins_of_kind("metric")}
+    if plugin not in known:
+        own = [OUTSIDE_PATCH] if isinstance(task, Maskable) else []
+        own += list(task.reports()) if isinstance(task, Reports) else []
+        fitting = [one for one, entry in known.items() if _suits(entry.spec, plan)]
+        kind = f"report of task {plan.task['name']!r}"
+        raise UnknownNameError(kind, plugin, [*own, *fitting], broken_hint())
+    entry = find("metric", plugin)
+    if not _suits(entry.spec, plan):
+        assert isinstance(entry.spec, MetricSpec)
+        raise GearError(
+            f"metric {plugin!r} is for {', '.join(entry.spec.tasks)}; {dataset.root} is a {plan.task['name']} dataset"
+        )
+    options = with_overrides(NO_OPTIONS, NEXT_OPTION.split(settings) if settings else ())
+    chosen, config = Chosen(found=entry, options=options), read_node(entry.spec.config, options, "")
+
+    return Report(name=name, make=lambda: entry.spec.build(config), plan=plan, plugin=chosen)
+
+
+def _suits(spec: Any, plan: Plan) -> bool:
+    return isinstance(spec, MetricSpec) and plan.task["name"] in spec.tasks

@@ -1,0 +1,177 @@
+"""The contract of metric plugins. Subclass it in your plugin's tests and set `spec`:
+
+    class TestMyMetric(MetricContract):
+        spec = my_metric
+        task_options = {"width_px": 256, "height_px": 128}
+
+Frames come from `gear.testing.synthetic`, so no renderer is needed. For tasks other than gear's own, say with `spoil`
+how a prediction gets worse.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from gear.contracts.evaluation import Additive, Maskable, Resampled
+from gear.contracts.specs import MetricSpec, TaskSpec
+from gear.contracts.tasks import Evaluator, Task
+from gear.dataset.output_checks import check_metrics
+from gear.plugins.manager import catalogue
+from gear.testing.compare import difference, freeze
+from gear.testing.spec_checks import check_spec
+from gear.testing.synthetic import synthetic_frame
+
+SAMPLES = 3
+
+
+class MetricContract:
+    """What every metric promises, for each task that it measures.
+
+    Attributes:
+        spec: the metric.
+        options: of its config.
+        task_options: of the tasks' configs: the pictures' size, small enough for quick tests.
+    """
+
+    spec: ClassVar[MetricSpec[Any]]
+    options: ClassVar[Mapping[str, Any]] = {}
+    task_options: ClassVar[Mapping[str, Any]] = {"width_px": 256, "height_px": 128}
+
+    def spoil(self, task: str, prediction: Any) -> Any:
+        """A clearly worse prediction of the same type.
+
+        Label maps are shifted by 20 pixels, depth is doubled, detections and stereo boxes are left out.
+        """
+        if task == "semseg":
+            return np.roll(prediction, 20, axis=1)
+        if task == "depth":
+            return prediction * 2
+        if task in ("detect2d", "stereo3d"):
+            return type(prediction)()
+        raise NotImplementedError(f"override spoil: say how a prediction of task {task!r} gets worse")
+
+    def make(self) -> Evaluator[Any, Any]:
+        """A fresh, empty evaluator."""
+        return self.spec.build(self.spec.config(**self.options))
+
+    def task(self, name: str) -> Task[Any, Any]:
+        """A task of the metric."""
+        found = catalogue().get("task", name).spec
+        assert isinstance(found, TaskSpec)
+        return found.build(found.config(**self.task_options))
+
+    def pairs(self, task: str, *, spoilt: bool = False) -> list[tuple[Any, Any]]:
+        """Samples of synthetic streets with their perfect predictions, or with spoilt ones; read-only arrays."""
+        builder, found = self.task(task), []
+        for index in range(SAMPLES):
+            sample = builder.ground_truth(*synthetic_frame(builder.rig(), index=index, seed=5))
+            prediction = builder.as_prediction(sample)
+            found.append((freeze(sample), freeze(self.spoil(task, prediction) if spoilt else prediction)))
+        return found
+
+    def test_the_spec_can_be_used(self) -> None:
+        """Name, summary, protocol, config and tasks are sound."""
+        check_spec("metric", self.spec, self.options)
+        known = catalogue().names("task")
+        assert all(task in known for task in self.spec.tasks), f"its tasks must be among {', '.join(known)}"
+
+    def test_every_evaluator_is_a_fresh_one(self) -> None:
+        """`build` returns a new evaluator each time; what one gathers leaves no trace in another."""
+        for task in self.spec.tasks:
+            empty = dict(self.make().result())
+            self.gathered(self.pairs(task))
+            assert self.make() is not self.make()
+            assert not difference(dict(self.make().result()), empty)
+
+    def test_metrics_are_numbers_by_name(self) -> None:
+        """`update` and `result` give numbers by name, none infinite; the main metric is among those of `result`."""
+        for task in self.spec.tasks:
+            evaluator = self.make()
+            for sample, prediction in self.pairs(task):
+                check_metrics(evaluator.update(sample, prediction), "update")
+            result = check_metrics(evaluator.result(), "result")
+            assert self.spec.metric in result, f"{self.spec.metric!r} is not among {', '.join(result)}"
+            assert not any(math.isinf(value) for value in result.values())
+
+    def test_an_empty_evaluator_gives_nan(self) -> None:
+        """Where nothing was gathered there is no value, and no error."""
+        assert all(math.isnan(value) for value in check_metrics(self.make().result(), "result").values())
+
+    def test_a_spoilt_prediction_is_worse(self) -> None:
+        """The main metric tells better from worse, in the direction that the spec declares."""
+        for task in self.spec.tasks:
+            good, bad = (self.gathered(self.pairs(task, spoilt=spoilt)).result() for spoilt in (False, True))
+            better, worse = good[self.spec.metric], bad[self.spec.metric]
+            assert worse > better if self.spec.less_is_better else worse < better, (task, better, worse)
+
+    def test_merged_evaluators_equal_the_whole(self) -> None:
+        """Evaluators of one sample each, merged, give what one evaluator of all samples gives."""
+        for task in self.spec.tasks:
+            pairs = self.pairs(task, spoilt=True)
+            whole, merged = self.gathered(pairs), self.make()
+            for pair in pairs:
+                merged.merge(self.gathered([pair]))
+            _assert_close(merged.result(), whole.result())
+
+    def test_samples_and_predictions_are_left_alone(self) -> None:
+        """`update` writes neither to the sample nor to the prediction; the same input gives the same output."""
+        for task in self.spec.tasks:
+            pairs = self.pairs(task, spoilt=True)
+            before = copy.deepcopy(pairs)
+            first, second = self.gathered(pairs).result(), self.gathered(pairs).result()
+            assert not difference(dict(first), dict(second))
+            assert not difference(pairs, before)
+
+    def test_resampling_equals_merging(self) -> None:
+        """`resampled` (`Resampled`), or `totals` with `metrics` (`Additive`), agrees with merging."""
+        for task in self.spec.tasks:
+            pairs = self.pairs(task, spoilt=True)
+            parts = [self.gathered([pair]) for pair in pairs]
+            draws = np.array([[0, 0, 1], [2, 1, 2]], np.int64)
+            whole = self.gathered(pairs)
+            if isinstance(whole, Resampled):
+                found = whole.resampled(draws)
+            elif isinstance(whole, Additive):
+                sums: dict[str, Any] = {}
+                for name in parts[0].totals():
+                    each = np.stack([np.asarray(part.totals()[name], np.float64) for part in parts])
+                    sums[name] = np.stack([each[row].sum(axis=0) for row in draws])
+                found = whole.metrics(sums)
+            else:
+                continue
+            for number, row in enumerate(draws):
+                merged = self.make()
+                for index in row:
+                    merged.merge(parts[index])
+                expected = merged.result()
+                _assert_close({name: float(values[number]) for name, values in found.items()}, expected)
+
+    def test_masked_ground_truth_is_taken(self) -> None:
+        """A sample whose ground truth is silent everywhere, as `outside_patch` makes them, raises nothing."""
+        for task in self.spec.tasks:
+            builder = self.task(task)
+            if not isinstance(builder, Maskable):
+                continue
+            (sample, prediction), *_ = self.pairs(task)
+            masks = {name: np.ones(image.shape[:2], np.bool_) for name, image in sample.images.items()}
+            check_metrics(self.gathered([(builder.without(sample, masks), prediction)]).result(), "result")
+
+    def gathered(self, pairs: Sequence[tuple[Any, Any]]) -> Any:
+        """An evaluator that has seen these samples with these predictions."""
+        evaluator = self.make()
+        for sample, prediction in pairs:
+            evaluator.update(sample, prediction)
+        return evaluator
+
+
+def _assert_close(found: Mapping[str, float], expected: Mapping[str, float]) -> None:
+    """Equal up to the rounding of sums in another order."""
+    for name, value in found.items():
+        assert math.isclose(value, expected[name], rel_tol=1e-9, abs_tol=1e-12) or (
+            math.isnan(value) and math.isnan(expected[name])
+        ), (name, value, expected[name])
