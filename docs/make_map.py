@@ -1,7 +1,7 @@
 """Draws the map of gear's rooms and writes the table beside it: `python docs/make_map.py`.
 
-The floors come from `.importlinter`, the arrows from the imports in the code, so that neither can differ from the code. A
-test fails when the picture or the table is out of date.
+The floors come from `.importlinter`, the arrows from the imports in the code, so that neither can differ from the
+code. A test fails when the picture or the table is out of date.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ from authoring.weights.plan import (
     held_out,
     training,
 )
-from gear.cli.unread import print_no_more
+from gear.cli.closed_output import discard_output
 from gear.values.errors import GearError
 
 TRAINING_SAMPLES = 1000
@@ -83,7 +83,7 @@ def main() -> int:
         code = int(args.run(args))
         sys.stdout.flush()  # what fails at Python's own end, nobody catches
     except BrokenPipeError:
-        print_no_more()
+        discard_output()
         return 0
     except GearError as error:
         print(f"authoring.weights: {error}", file=sys.stderr)

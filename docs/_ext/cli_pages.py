@@ -26,7 +26,7 @@ def page() -> str:
 
 def _parser(name: str, summary: str) -> argparse.ArgumentParser:
     parser = Parser(prog=f"gear {name}", description=summary, formatter_class=argparse.RawDescriptionHelpFormatter)
-    importlib.import_module(f"gear.cli.{name.replace('-', '_')}").add_arguments(parser)
+    importlib.import_module(f"gear.cli.commands.{name.replace('-', '_')}").add_arguments(parser)
     return parser
 
 

@@ -36,7 +36,7 @@ COMMANDS: dict[str, str] = {
     "show-config": "print the collection config that flags and files result in",
     "completion": "print a script with which a shell completes gear's commands and flags",
 }
-"""Command names with one line each; `gear.cli.<name>` holds the command."""
+"""Command names with one line each; `gear.cli.commands.<name>` holds the command."""
 
 EXAMPLES = """examples:
   gear collect --task stereo3d                      a KITTI stereo dataset around billboard01
@@ -126,7 +126,7 @@ def full_parser(wanted: str | None = None) -> Parser:
             name, help=summary, description=summary, formatter_class=argparse.RawDescriptionHelpFormatter
         )
         if wanted in (None, name):
-            module = importlib.import_module(f"gear.cli.{name.replace('-', '_')}")
+            module = importlib.import_module(f"gear.cli.commands.{name.replace('-', '_')}")
             module.add_arguments(command)
             command.set_defaults(run=module.run)
     return parser

@@ -94,7 +94,7 @@ def test_every_command_is_one_that_gear_understands(task: str) -> None:
     plan = replace(of(task)[0], attack_settings=("batch=1",))
     for step in (*plan.commands(Path("out")), *plan.commands_again(Path("again"))):
         parser = argparse.ArgumentParser(exit_on_error=False)
-        importlib.import_module(f"gear.cli.{step.arguments[0]}").add_arguments(parser)
+        importlib.import_module(f"gear.cli.commands.{step.arguments[0]}").add_arguments(parser)
         args = parser.parse_args(step.arguments[1:])
         if step.name == "evaluate":
             folders = [f"{Path(args.out).parent}/{kind}" for kind in ("none", "random", "patched")]

@@ -12,7 +12,7 @@ from typing import IO
 
 import pytest
 
-from gear.cli import doctor
+from gear.cli.commands import doctor
 from gear.cli.device import add_device
 from gear.cli.main import COMMANDS, main
 from gear.values.errors import GearError
@@ -119,7 +119,7 @@ def test_nobody_who_reads_any_more_is_no_error() -> None:
 def printing(count: str, out: IO[bytes]) -> tuple[int, str]:
     """Status and errors of a command that prints so many lines."""
     code = (
-        "from gear.cli import doctor, main\n"
+        "from gear.cli import main\nfrom gear.cli.commands import doctor\n"
         f"doctor.run = lambda args: [print(i) for i in range({count})] and 0\n"
         "main.sys.argv = ['gear', 'doctor']\nmain.entry()"
     )

@@ -51,7 +51,7 @@ def _parsed(words: list[str]) -> argparse.Namespace:
     """The arguments as the command's own parser reads them; the test fails where it refuses them."""
     assert words[0] in COMMANDS, words
     parser = Parser(prog=f"gear {words[0]}")
-    importlib.import_module(f"gear.cli.{words[0].replace('-', '_')}").add_arguments(parser)
+    importlib.import_module(f"gear.cli.commands.{words[0].replace('-', '_')}").add_arguments(parser)
     try:
         args = parser.parse_args(words[1:])
     except SystemExit:

@@ -109,7 +109,7 @@ def test_help_is_quick_because_it_imports_next_to_nothing() -> None:
 
 def test_collecting_never_imports_torch() -> None:
     code = (
-        "import sys; import gear.cli.collect, gear.verbs.collect.run, gear.collecting.session\n"
+        "import sys; import gear.cli.commands.collect, gear.verbs.collect.run, gear.collecting.session\n"
         "from gear.plugins.manager import catalogue; catalogue()\n"
         "sys.exit('torch' in sys.modules)"
     )

@@ -15,7 +15,7 @@ import pytest
 import torch
 from torch import nn
 
-from gear.cli.train import budget
+from gear.cli.commands.train import budget
 from gear.config.nodes import Mapping, Place
 from gear.config.reader import read_node
 from gear.contracts.models import Recipe

@@ -22,8 +22,8 @@ from safetensors import safe_open
 from safetensors.torch import save as to_bytes
 
 import gear
+from gear.cli.commands.train import budget
 from gear.cli.main import main
-from gear.cli.train import budget
 from gear.config.reader import read_node
 from gear.networks.weights import load_into, read, write
 from gear.plugins.build import find

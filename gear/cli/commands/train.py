@@ -8,7 +8,7 @@ import sys
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from gear.cli.collect import positive
+from gear.cli.commands.collect import positive
 
 if TYPE_CHECKING:
     from gear.verbs.train.checkpoint import TrainingState

@@ -20,8 +20,8 @@ The dataset must have been collected with --probes. With --patch the twin is ren
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the command's flags."""
-    from gear.cli.collect import positive
-    from gear.cli.evaluate import add_calibration
+    from gear.cli.commands.collect import positive
+    from gear.cli.commands.evaluate import add_calibration
 
     parser.epilog = EXAMPLE
     parser.add_argument("dataset", help="root of a dataset with probes")

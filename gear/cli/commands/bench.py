@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from gear.cli.collect import positive
+from gear.cli.commands.collect import positive
 
 if TYPE_CHECKING:
     from gear.cli.progress import ProgressBar

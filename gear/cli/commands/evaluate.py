@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from gear.cli.collect import positive
+from gear.cli.commands.collect import positive
 from gear.cli.device import add_device
 from gear.cli.streams import line_width
 

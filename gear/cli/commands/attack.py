@@ -23,8 +23,8 @@ The folder holds patch_0.png, …, patch.safetensors, attack.json and figures/.
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the command's flags."""
-    from gear.cli.evaluate import add_calibration
-    from gear.cli.gap import add_places
+    from gear.cli.commands.evaluate import add_calibration
+    from gear.cli.commands.gap import add_places
 
     parser.epilog = EXAMPLE
     parser.add_argument("--model", required=True, action="append", metavar="NAME", help="model plugin; repeatable")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from gear.cli.collect import add_collection_arguments
+from gear.cli.commands.collect import add_collection_arguments
 
 EXAMPLE = """examples:
   gear show-config --task semseg

@@ -1,0 +1,1 @@
+"""Commands of `gear`, one file each: `add_arguments` adds the flags, `run` calls the library and prints."""
