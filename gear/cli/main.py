@@ -64,7 +64,7 @@ class Terminated(KeyboardInterrupt):
 
 
 def entry() -> None:
-    """Console entry point."""
+    """The console's entry point: runs the command of `sys.argv` and exits with its code."""
     signal.signal(signal.SIGTERM, _terminate)
     sys.exit(main(sys.argv[1:]))
 

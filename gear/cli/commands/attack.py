@@ -22,7 +22,7 @@ The folder holds patch_0.png, …, patch.safetensors, attack.json and figures/.
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags."""
+    """Adds the command's flags to its parser."""
     from gear.cli.commands.evaluate import add_calibration
     from gear.cli.commands.gap import add_places
 

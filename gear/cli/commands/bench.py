@@ -23,7 +23,7 @@ networks, defenses or scenes were added: what is there is not done twice.
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags."""
+    """Adds the command's flags to its parser."""
     parser.epilog = EXAMPLE
     parser.add_argument("config", metavar="CONFIG", help="name (quick, paper) or path of a bench config")
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for data, patches, results and the report")

@@ -13,7 +13,7 @@ The cleaned pictures have the dataset's own relative paths; masks and scores lie
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags."""
+    """Adds the command's flags to its parser."""
     parser.epilog = EXAMPLE
     parser.add_argument("dataset", help="root of a dataset of any task")
     parser.add_argument("--defense", required=True, metavar="NAME", help="defense plugin; gear plugins --kind defense")

@@ -12,7 +12,7 @@ EXAMPLE = """examples:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags."""
+    """Adds the command's flags to its parser."""
     parser.epilog = EXAMPLE
     parser.add_argument("--renderer", help="only this one: raster, filament or classic")
     parser.add_argument("--json", action="store_true", help="print JSON")

@@ -20,7 +20,7 @@ Predictions, results.json and table.txt lie under --out. Run it again to go on w
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags."""
+    """Adds the command's flags to its parser."""
     parser.epilog = EXAMPLE
     parser.add_argument("--model", required=True, metavar="NAME", help="model plugin; gear plugins --kind model")
     parser.add_argument(

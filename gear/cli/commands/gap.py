@@ -19,7 +19,7 @@ The dataset must have been collected with --probes. With --patch the twin is ren
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags."""
+    """Adds the command's flags to its parser."""
     from gear.cli.commands.collect import positive
     from gear.cli.commands.evaluate import add_calibration
 

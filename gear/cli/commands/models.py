@@ -27,7 +27,7 @@ HEAD = ("network", "tasks", "size", "weights", "usable", "summary")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags."""
+    """Adds the command's flags to its parser."""
     parser.epilog = EXAMPLE
     parser.add_argument("action", nargs="?", choices=("list", "show"), default="list", help="list, or show one (list)")
     parser.add_argument("name", nargs="?", help="with show: its name")

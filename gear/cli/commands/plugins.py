@@ -22,7 +22,7 @@ EXAMPLE = """examples:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags."""
+    """Adds the command's flags to its parser."""
     parser.epilog = EXAMPLE
     parser.add_argument("action", nargs="?", choices=("list", "show"), default="list", help="list, or show one (list)")
     parser.add_argument("name", nargs="?", help="with show: its name, or package/name")

@@ -13,7 +13,7 @@ EXAMPLE = """examples:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags."""
+    """Adds the command's flags to its parser."""
     parser.epilog = EXAMPLE
     add_collection_arguments(parser)
 

@@ -18,7 +18,7 @@ EXAMPLE = """examples:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags."""
+    """Adds the command's flags to its parser."""
     parser.epilog = EXAMPLE
     parser.add_argument("town", nargs="?", help="name of a town, or path of its MJCF (all of gear's towns)")
     parser.add_argument("--scenes", metavar="FILE", help="scene library of the town, instead of gear's own")

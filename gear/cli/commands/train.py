@@ -35,7 +35,7 @@ def budget(text: str) -> float:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags."""
+    """Adds the command's flags to its parser."""
     parser.epilog = EXAMPLE
     parser.add_argument("--task", required=True, metavar="NAME", help="task plugin; gear plugins --kind task")
     parser.add_argument("--model", required=True, metavar="NAME", help="model plugin; gear plugins --kind model")

@@ -24,7 +24,7 @@ def megabytes(text: str) -> float:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags."""
+    """Adds the command's flags to its parser."""
     parser.epilog = EXAMPLE
     parser.add_argument("dataset", help="root of a dataset of any task")
     parser.add_argument("--split", help="its split, where it has several")

@@ -22,7 +22,7 @@ gear models says where published weights are found.
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags."""
+    """Adds the command's flags to its parser."""
     parser.epilog = EXAMPLE
     actions = parser.add_subparsers(title="actions", metavar="ACTION", dest="action", required=True)
     converting = actions.add_parser(

@@ -124,5 +124,5 @@ carla_gear: AttackSpec[CarlaGearConfig] = AttackSpec(
 
 @hookimpl
 def gear_attacks() -> list[AttackSpec[CarlaGearConfig]]:
-    """This attack."""
+    """The attack plugin of this module."""
     return [carla_gear]

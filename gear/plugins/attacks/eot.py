@@ -99,5 +99,5 @@ eot: AttackSpec[EotConfig] = AttackSpec(
 
 @hookimpl
 def gear_attacks() -> list[AttackSpec[EotConfig]]:
-    """This attack."""
+    """The attack plugin of this module."""
     return [eot]

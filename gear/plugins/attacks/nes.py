@@ -129,5 +129,5 @@ nes: AttackSpec[NesConfig] = AttackSpec(
 
 @hookimpl
 def gear_attacks() -> list[AttackSpec[NesConfig]]:
-    """This attack."""
+    """The attack plugin of this module."""
     return [nes]

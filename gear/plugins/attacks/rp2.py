@@ -143,5 +143,5 @@ rp2: AttackSpec[Rp2Config] = AttackSpec(
 
 @hookimpl
 def gear_attacks() -> list[AttackSpec[Rp2Config]]:
-    """This attack."""
+    """The attack plugin of this module."""
     return [rp2]

@@ -183,5 +183,5 @@ scene_specific: AttackSpec[SceneSpecificConfig] = AttackSpec(
 
 @hookimpl
 def gear_attacks() -> list[AttackSpec[SceneSpecificConfig]]:
-    """This attack."""
+    """The attack plugin of this module."""
     return [scene_specific]

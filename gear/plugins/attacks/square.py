@@ -138,5 +138,5 @@ square: AttackSpec[SquareConfig] = AttackSpec(
 
 @hookimpl
 def gear_attacks() -> list[AttackSpec[SquareConfig]]:
-    """This attack."""
+    """The attack plugin of this module."""
     return [square]

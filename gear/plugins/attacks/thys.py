@@ -152,5 +152,5 @@ thys: AttackSpec[ThysConfig] = AttackSpec(
 
 @hookimpl
 def gear_attacks() -> list[AttackSpec[ThysConfig]]:
-    """This attack."""
+    """The attack plugin of this module."""
     return [thys]

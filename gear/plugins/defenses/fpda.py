@@ -62,5 +62,5 @@ spec = DefenseSpec(
 
 @hookimpl
 def gear_defenses() -> list[DefenseSpec[FpdaConfig]]:
-    """This module's defense."""
+    """The defense plugin of this module."""
     return [spec]

@@ -87,5 +87,5 @@ spec = DefenseSpec(
 
 @hookimpl
 def gear_defenses() -> list[DefenseSpec[GaussianConfig]]:
-    """This module's defense."""
+    """The defense plugin of this module."""
     return [spec]

@@ -59,5 +59,5 @@ spec = DefenseSpec(
 
 @hookimpl
 def gear_defenses() -> list[DefenseSpec[HyperNeuronConfig]]:
-    """This module's defense."""
+    """The defense plugin of this module."""
     return [spec]

@@ -120,5 +120,5 @@ spec = DefenseSpec(
 
 @hookimpl
 def gear_defenses() -> list[DefenseSpec[LgsConfig]]:
-    """This module's defense."""
+    """The defense plugin of this module."""
     return [spec]

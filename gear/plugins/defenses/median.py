@@ -65,5 +65,5 @@ spec = DefenseSpec(
 
 @hookimpl
 def gear_defenses() -> list[DefenseSpec[MedianConfig]]:
-    """This module's defense."""
+    """The defense plugin of this module."""
     return [spec]

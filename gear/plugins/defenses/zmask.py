@@ -29,5 +29,5 @@ spec = DefenseSpec(
 
 @hookimpl
 def gear_defenses() -> list[DefenseSpec[ZMaskConfig]]:
-    """This module's defense."""
+    """The defense plugin of this module."""
     return [spec]

@@ -65,5 +65,5 @@ spec = ModelSpec(
 
 @hookimpl
 def gear_models() -> list[ModelSpec[AdaBinsOptions]]:
-    """This module's model."""
+    """The model plugin of this module."""
     return [spec]

@@ -68,5 +68,5 @@ bisenet_x39: ModelSpec[SegmentationOptions] = ModelSpec(
 
 @hookimpl
 def gear_models() -> list[ModelSpec[SegmentationOptions]]:
-    """This network."""
+    """The model plugin of this module."""
     return [bisenet_x39]

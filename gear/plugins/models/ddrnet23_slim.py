@@ -68,5 +68,5 @@ ddrnet23_slim: ModelSpec[SegmentationOptions] = ModelSpec(
 
 @hookimpl
 def gear_models() -> list[ModelSpec[SegmentationOptions]]:
-    """This network."""
+    """The model plugin of this module."""
     return [ddrnet23_slim]

@@ -44,5 +44,5 @@ spec = ModelSpec(
 
 @hookimpl
 def gear_models() -> list[ModelSpec[DepthOptions]]:
-    """This module's model."""
+    """The model plugin of this module."""
     return [spec]

@@ -64,5 +64,5 @@ fasterrcnn: ModelSpec[OfficialDetectorOptions] = ModelSpec(
 
 @hookimpl
 def gear_models() -> list[ModelSpec[OfficialDetectorOptions]]:
-    """This network."""
+    """The model plugin of this module."""
     return [fasterrcnn]

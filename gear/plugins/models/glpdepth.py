@@ -65,5 +65,5 @@ spec = ModelSpec(
 
 @hookimpl
 def gear_models() -> list[ModelSpec[GlpnOptions]]:
-    """This module's model."""
+    """The model plugin of this module."""
     return [spec]

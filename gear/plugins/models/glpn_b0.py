@@ -43,5 +43,5 @@ spec = ModelSpec(
 
 @hookimpl
 def gear_models() -> list[ModelSpec[GlpnB0Options]]:
-    """This module's model."""
+    """The model plugin of this module."""
     return [spec]

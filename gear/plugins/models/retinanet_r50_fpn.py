@@ -64,5 +64,5 @@ retinanet: ModelSpec[OfficialDetectorOptions] = ModelSpec(
 
 @hookimpl
 def gear_models() -> list[ModelSpec[OfficialDetectorOptions]]:
-    """This network."""
+    """The model plugin of this module."""
     return [retinanet]

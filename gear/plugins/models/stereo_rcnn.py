@@ -50,5 +50,5 @@ stereo_rcnn: ModelSpec[StereoRcnnOptions] = ModelSpec(
 
 @hookimpl
 def gear_models() -> list[ModelSpec[StereoRcnnOptions]]:
-    """This network."""
+    """The model plugin of this module."""
     return [stereo_rcnn]

@@ -251,5 +251,5 @@ depth: TaskSpec[DepthConfig] = TaskSpec(
 
 @hookimpl
 def gear_tasks() -> list[TaskSpec[DepthConfig]]:
-    """This task."""
+    """The task plugin of this module."""
     return [depth]

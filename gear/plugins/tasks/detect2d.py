@@ -408,5 +408,5 @@ detect2d: TaskSpec[Detect2dConfig] = TaskSpec(
 
 @hookimpl
 def gear_tasks() -> list[TaskSpec[Detect2dConfig]]:
-    """This task."""
+    """The task plugin of this module."""
     return [detect2d]

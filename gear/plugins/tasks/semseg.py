@@ -242,5 +242,5 @@ semseg: TaskSpec[SemsegConfig] = TaskSpec(
 
 @hookimpl
 def gear_tasks() -> list[TaskSpec[SemsegConfig]]:
-    """This task."""
+    """The task plugin of this module."""
     return [semseg]

@@ -441,5 +441,5 @@ stereo3d: TaskSpec[Stereo3dConfig] = TaskSpec(
 
 @hookimpl
 def gear_tasks() -> list[TaskSpec[Stereo3dConfig]]:
-    """This task."""
+    """The task plugin of this module."""
     return [stereo3d]
