@@ -42,10 +42,8 @@ copybutton_prompt_text = "$ "
 
 # Types of other libraries, type variables and gear's internal modules have no page on this site.
 nitpick_ignore_regex = [
-    (
-        "py:.*",
-        r"(np|npt|numpy|torch|nn|mujoco|pathlib|collections|typing|argparse|dataclasses|importlib|pluggy|pytest|abc)\..*",
-    ),
+    ("py:.*", r"(np|npt|numpy|torch|nn|mujoco)\..*"),
+    ("py:.*", r"(pathlib|collections|typing|argparse|dataclasses|importlib|pluggy|pytest|abc)\..*"),
     ("py:.*", r"(Tensor|Path|Any|Self|Literal|Iterator|Iterable|Sequence|Mapping|Callable|Generator)"),
     ("py:.*", r"(Mapping\[int|Vec3|UInt8Image|Prepared|Pasting|Cache)"),
     ("py:.*", r".*(_co|_contra|T)$"),
