@@ -11,6 +11,7 @@ Each collection is one `gear collect`, so the same command again goes on where i
     python -m authoring.weights ship runs/semseg --evaluation evaluations/semseg/ddrnet23_slim
     python -m authoring.weights renew ddrnet23_slim --evaluation evaluations/semseg/ddrnet23_slim --note "…"
     python -m authoring.weights patches --task semseg --model ddrnet23_slim --out runs/patches
+    python -m authoring.weights lock                                         # after the version was raised
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
-from authoring.weights import renew, ship
+from authoring.weights import lock, renew, ship
 from authoring.weights.patches import command as patches
 from authoring.weights.plan import (
     FIRST_HELD_OUT_SEED,
@@ -78,6 +79,9 @@ def main() -> int:
     renewed = parts.add_parser("renew", help="writes today's look and figures into weights that are shipped")
     renew.add_arguments(renewed)
     renewed.set_defaults(run=renew.run)
+    locked = parts.add_parser("lock", help="writes the checksums of the shipped weights for a new version of them")
+    lock.add_arguments(locked)
+    locked.set_defaults(run=lock.run)
     args = parser.parse_args()
     try:
         code = int(args.run(args))
