@@ -93,7 +93,7 @@ def response_for(renderer_name: str, weather: Weather) -> Response:
     if renderer_name == "classic":
         return IDENTITY
     low_sun = float(np.clip((40 - weather.sun_altitude_deg) / 30, 0, 1))
-    clouds = max(weather.cloudiness, 80.0 if weather.precipitation > 0 else 0.0) / 100
+    clouds = weather.exposure_cover
     exposure = 4.5 + 1.2 * low_sun - 2.0 * clouds
     return Response(exposure=round(exposure, 3), contrast=round(1.43 + 0.05 * clouds, 3))
 

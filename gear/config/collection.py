@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from gear.camera.effects import CameraEffects
 from gear.config.nodes import Mapping, Node, Place
 from gear.contracts.rendering import Quality
+from gear.values.derived_fields import DerivedField, attribute_lines, with_fields
 from gear.values.errors import FieldError
+from gear.values.scene import WEATHER_PARAMETERS, Weather, check_weather
 from gear.values.serial import PLACES
 from gear.values.vehicle_mix import check_mix
 
@@ -17,70 +19,34 @@ SPLIT_NAME = re.compile(r"(?!(gear|patches|scratch)$)[a-z][a-z0-9]*(_[a-z0-9]+)*
 """Folders of gear's own are no splits."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+_WEATHER_FIELDS = [DerivedField(name=name, kind=float | None, field=field(default=None)) for name in WEATHER_PARAMETERS]
+
+
+@with_fields(_WEATHER_FIELDS, attribute_lines(Weather, without=["name"]))
 class WeatherConfig:
-    """A preset and what differs from it. Units are CARLA's: percent, degrees, metres.
+    """A preset and the parameters that differ from it; None is the preset's value. Derived from `Weather`.
 
     Attributes:
+        places: file, line and column of each given value, by key.
         preset: name of a weather preset.
-        cloudiness, precipitation, precipitation_deposits, wind_intensity, fog_density, wetness: percent, 0 to 100.
-        sun_azimuth_deg: counter-clockwise from east, -360 to 360.
-        sun_altitude_deg: above the horizon, -90 to 90.
-        fog_distance_m: where the fog begins; 0 to `MOST`, as all that follows.
-        fog_falloff: how quickly fog thins with height.
-        scattering_intensity, mie_scattering_scale, rayleigh_scattering_scale: strength of scattering.
-        places: where a file or a flag gives what, by key.
     """
 
     SHORTHAND: ClassVar[str] = "preset"
-    PERCENT: ClassVar[tuple[str, ...]] = (
-        "cloudiness",
-        "precipitation",
-        "precipitation_deposits",
-        "wind_intensity",
-        "fog_density",
-        "wetness",
-    )
-    DEGREES: ClassVar[dict[str, int]] = {"sun_azimuth_deg": 360, "sun_altitude_deg": 90}
-    AMOUNTS: ClassVar[tuple[str, ...]] = (
-        "fog_distance_m",
-        "fog_falloff",
-        "scattering_intensity",
-        "mie_scattering_scale",
-        "rayleigh_scattering_scale",
-    )
-    MOST: ClassVar[int] = 1_000_000
-    """CARLA's amounts have no upper end; the 32-bit numbers of pictures do."""
 
     preset: str = "ClearNoon"
-    cloudiness: float | None = None
-    precipitation: float | None = None
-    precipitation_deposits: float | None = None
-    wind_intensity: float | None = None
-    sun_azimuth_deg: float | None = None
-    sun_altitude_deg: float | None = None
-    fog_density: float | None = None
-    fog_distance_m: float | None = None
-    fog_falloff: float | None = None
-    wetness: float | None = None
-    scattering_intensity: float | None = None
-    mie_scattering_scale: float | None = None
-    rayleigh_scattering_scale: float | None = None
     places: dict[str, Place] = field(default_factory=dict, compare=False, repr=False, metadata=PLACES)
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self, *, preset: str = ..., places: dict[str, Place] = ..., **parameters: float | None
+        ) -> None: ...
+
     def __post_init__(self) -> None:
-        for name in self.PERCENT:
+        for name in WEATHER_PARAMETERS:
             value = getattr(self, name)
-            if value is not None and not 0 <= value <= 100:
-                raise FieldError(name, f"is a percentage, 0 to 100, got {value:g}")
-        for name, most in self.DEGREES.items():
-            value = getattr(self, name)
-            if value is not None and not -most <= value <= most:
-                raise FieldError(name, f"must be -{most} to {most} degrees, got {value:g}")
-        for name in self.AMOUNTS:
-            value = getattr(self, name)
-            if value is not None and not 0 <= value <= self.MOST:
-                raise FieldError(name, f"must be 0 to {self.MOST}, got {value:g}")
+            if value is not None:
+                check_weather(name, value)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

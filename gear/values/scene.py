@@ -5,11 +5,13 @@ A record is a pure function of (config, seed, index). Nothing in it depends on t
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
+from gear.values.errors import FieldError
 from gear.values.geometry import Intrinsics, RigidTransform
 
 Vec3 = tuple[float, float, float]
@@ -71,42 +73,104 @@ def _quat_from_rotation(rotation: np.ndarray) -> np.ndarray:
 
 
 NIGHT_DEG = 10.0
-"""So far below the horizon the sun leaves nothing of itself in the sky."""
+"""Degrees below the horizon at which the sun's light is gone from the sky."""
+
+RAIN_COVER, RAIN_COVER_GROWTH = 0.82, 0.18
+"""Share of the sky under clouds in the lightest rain, and by how much the heaviest rain has more."""
+
+RAIN_EXPOSURE_COVER = 0.8
+"""Share of clouds that the camera's exposure is set for in any rain."""
+
+
+MOST = 1_000_000
+"""CARLA's amounts have no upper end; the 32-bit numbers of pictures do."""
+
+
+def _bounded(default: float, low: int, high: int, unit: str = "") -> Any:
+    """A number of `Weather` with its default, its range and its unit."""
+    return dataclasses.field(default=default, metadata={"low": low, "high": high, "unit": unit})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Weather:
     """CARLA's weather parameters with CARLA's meaning and units.
 
+    This is the only list of them: `gear.config.collection.WeatherConfig`, which configs are read into, is derived from
+    it. A new parameter is a new field with its range, and a line below.
+
     Attributes:
-        cloudiness, precipitation, precipitation_deposits, wind_intensity, fog_density, wetness: percent, 0..100.
-        sun_azimuth_deg: where the sun stands, counter-clockwise from east in gear's world.
-        sun_altitude_deg: above the horizon; 90 is the zenith.
-        fog_distance_m: where the fog begins.
-        fog_falloff: how quickly fog thins with height; 0 is no thinning.
-        scattering_intensity, mie_scattering_scale, rayleigh_scattering_scale: strength of light scattering in the air.
+        name: of the preset; with `*` behind it where parameters were changed.
+        cloudiness: share of the sky under clouds, percent, 0 to 100.
+        precipitation: strength of the rain, percent, 0 to 100.
+        precipitation_deposits: puddles on open ground, percent, 0 to 100.
+        wind_intensity: strength of the wind that drives the rain, percent, 0 to 100.
+        sun_azimuth_deg: direction of the sun, counter-clockwise from east in gear's world, -360 to 360 degrees.
+        sun_altitude_deg: height of the sun above the horizon, -90 to 90 degrees; 90 is the zenith.
+        fog_density: thickness of the fog, percent, 0 to 100.
+        fog_distance_m: distance from the camera at which the fog begins, metres, 0 to 1000000.
+        fog_falloff: how quickly fog thins with height, 0 to 1000000; 0 is no thinning.
+        wetness: how wet open ground is, percent, 0 to 100.
+        scattering_intensity: strength of all light scattering in the air, 0 to 1000000.
+        mie_scattering_scale: strength of scattering by dust and vapour, 0 to 1000000.
+        rayleigh_scattering_scale: strength of scattering by molecules, 0 to 1000000.
     """
 
     name: str
-    cloudiness: float = 0.0
-    precipitation: float = 0.0
-    precipitation_deposits: float = 0.0
-    wind_intensity: float = 0.0
-    sun_azimuth_deg: float = 225.0
-    sun_altitude_deg: float = 45.0
-    fog_density: float = 0.0
-    fog_distance_m: float = 0.75
-    fog_falloff: float = 0.1
-    wetness: float = 0.0
-    scattering_intensity: float = 1.0
-    mie_scattering_scale: float = 0.03
-    rayleigh_scattering_scale: float = 0.0331
+    cloudiness: float = _bounded(0.0, 0, 100, "percent")
+    precipitation: float = _bounded(0.0, 0, 100, "percent")
+    precipitation_deposits: float = _bounded(0.0, 0, 100, "percent")
+    wind_intensity: float = _bounded(0.0, 0, 100, "percent")
+    sun_azimuth_deg: float = _bounded(225.0, -360, 360, "degrees")
+    sun_altitude_deg: float = _bounded(45.0, -90, 90, "degrees")
+    fog_density: float = _bounded(0.0, 0, 100, "percent")
+    fog_distance_m: float = _bounded(0.75, 0, MOST)
+    fog_falloff: float = _bounded(0.1, 0, MOST)
+    wetness: float = _bounded(0.0, 0, 100, "percent")
+    scattering_intensity: float = _bounded(1.0, 0, MOST)
+    mie_scattering_scale: float = _bounded(0.03, 0, MOST)
+    rayleigh_scattering_scale: float = _bounded(0.0331, 0, MOST)
+
+    def __post_init__(self) -> None:
+        for name in WEATHER_PARAMETERS:
+            check_weather(name, getattr(self, name))
 
     @property
     def night(self) -> float:
         """0 while the sun is up, 1 once its light is gone from the sky, 10 degrees below the horizon."""
         depth = min(max(-self.sun_altitude_deg / NIGHT_DEG, 0.0), 1.0)
         return depth * depth * (3 - 2 * depth)
+
+    @property
+    def cloud_cover(self) -> float:
+        """Share of the sky under clouds, 0..1. Rain falls from clouds, also where `cloudiness` has none."""
+        if self.precipitation <= 0:
+            return self.cloudiness / 100
+        return max(self.cloudiness / 100, RAIN_COVER + RAIN_COVER_GROWTH * (self.precipitation / 100))
+
+    @property
+    def exposure_cover(self) -> float:
+        """Share of clouds that the camera's exposure is set for, 0..1: as `cloud_cover`, but one value for all rain."""
+        return max(self.cloudiness, 100 * RAIN_EXPOSURE_COVER if self.precipitation > 0 else 0.0) / 100
+
+
+WEATHER_PARAMETERS: dict[str, dataclasses.Field[Any]] = {
+    field.name: field for field in dataclasses.fields(Weather) if field.metadata
+}
+"""The numbers of a weather by name, with default and range."""
+
+
+def check_weather(name: str, value: float) -> None:
+    """Refuses a number of a weather out of its range.
+
+    Raises:
+        FieldError: names the parameter, its range and the value.
+    """
+    low, high, unit = (WEATHER_PARAMETERS[name].metadata[key] for key in ("low", "high", "unit"))
+    if not low <= value <= high:
+        wanted = (
+            f"is a percentage, {low} to {high}" if unit == "percent" else f"must be {low} to {high} {unit}".rstrip()
+        )
+        raise FieldError(name, f"{wanted}, got {value:g}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,16 +9,16 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import pkgutil
-from typing import TYPE_CHECKING, Any, TypeVar
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
 from gear.camera.effects.effect import Effect, Exposure, PixelMap, PixelSamples
 from gear.camera.effects.lens import Lens
+from gear.values.derived_fields import DerivedField, attribute_lines, with_fields
 from gear.values.scene import CameraRecord
 from gear.values.serial import type_hints
 
 __all__ = ["EFFECTS", "CameraEffects", "Effect", "Exposure", "Lens", "PixelMap", "PixelSamples", "recorded_effects"]
-
-T = TypeVar("T")
 
 
 def _find_effects() -> tuple[type[Effect], ...]:
@@ -40,28 +40,15 @@ EFFECTS: tuple[type[Effect], ...] = _find_effects()
 """All effects, in the order in which light passes them."""
 
 
-def _with_parameters(cls: type[T]) -> type[T]:
-    """Makes a class a frozen dataclass whose fields are the parameters of all effects, documented as they are there.
-
-    Raises:
-        TypeError: two effects have a parameter of the same name.
-    """
-    sections = [cls.__doc__ or "", "", "    Attributes:"]
-    annotations: dict[str, Any] = {}
-    for effect in reversed(EFFECTS):
+def _parameters() -> Iterator[DerivedField]:
+    """The parameters of all effects; a name that two effects share is refused by `with_fields`."""
+    for effect in EFFECTS:
         for field in dataclasses.fields(effect):  # type: ignore[arg-type]
-            if field.name in annotations:
-                raise TypeError(f"two camera effects have a parameter {field.name!r}")
-            annotations[field.name] = type_hints(effect)[field.name]
-            copy: Any = dataclasses.field(default=field.default, default_factory=field.default_factory)
-            setattr(cls, field.name, copy)
-        sections.append((effect.__doc__ or "").partition("    Attributes:\n")[2].rstrip())
-    cls.__annotations__ = annotations
-    cls.__doc__ = "\n".join(sections) + "\n    "
-    return dataclasses.dataclass(frozen=True, kw_only=True)(cls)
+            default: Any = dataclasses.field(default=field.default, default_factory=field.default_factory)
+            yield DerivedField(name=field.name, kind=type_hints(effect)[field.name], field=default)
 
 
-@_with_parameters
+@with_fields(_parameters(), "\n".join(attribute_lines(effect) for effect in EFFECTS))
 class CameraEffects:
     """What the camera adds to a picture: the parameters of every effect, all off by default."""
 

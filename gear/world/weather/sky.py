@@ -90,10 +90,7 @@ class Sky:
                 math.sin(shown_altitude),
             ]
         )
-        cover = _fraction(weather.cloudiness)
-        if weather.precipitation > 0:
-            # Rain falls from clouds, whatever the cloudiness says.
-            cover = max(cover, 0.82 + 0.18 * _fraction(weather.precipitation))
+        cover = weather.cloud_cover
         turbidity = float(np.clip(2.5 + 40 * (weather.mie_scattering_scale - 0.03), 2.0, 9.0))
         # Twilight: the sun's last light goes within a few degrees.
         daylight = float(_smooth_step(math.radians(-8), math.radians(3), np.array(altitude)))
@@ -206,10 +203,6 @@ class Sky:
         opacity = _smooth_step(edge - 0.05, edge + 0.18, noise)
         # Distant clouds melt into the haze of the horizon.
         return np.asarray(opacity * (1 - (1 - self.cloud_cover) * (1 - _smooth_step(0.02, 0.2, height))))
-
-
-def _fraction(percent: float) -> float:
-    return min(max(percent, 0.0), 100.0) / 100.0
 
 
 def _smooth_step(low: float, high: float, value: Floats) -> Floats:

@@ -10,11 +10,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from gear.config.collection import WeatherConfig
 from gear.contracts.rendering import FULL_SCALE_LUX, Stage
 from gear.render import RENDERERS, open_renderer
 from gear.values.geometry import Intrinsics, RigidTransform
-from gear.values.scene import CameraRecord, Pose, Weather
+from gear.values.scene import MOST, WEATHER_PARAMETERS, CameraRecord, Pose, Weather
 from gear.world.compilation.quiet_mjcf import mjcf
 from gear.world.weather.air import RAIN_PER_M, air_of, camera_pipeline, fogs_of
 from gear.world.weather.light import (
@@ -297,14 +296,17 @@ def test_fog_hides_what_is_far(name: str) -> None:
     assert through == pytest.approx(expected, rel=0.03)
 
 
-@pytest.mark.parametrize("name", WeatherConfig.AMOUNTS)
+AMOUNTS = [name for name, field in WEATHER_PARAMETERS.items() if field.metadata["high"] == MOST]
+
+
+@pytest.mark.parametrize("name", AMOUNTS)
 @pytest.mark.parametrize("height_m", [2.0, 9000.0])
 def test_air_of_the_most_and_the_least_that_a_config_takes_is_finite(name: str, height_m: float) -> None:
     depth_m = np.full((96, 96), 20, np.float32)
     depth_m[:20], depth_m[40:50] = np.nan, 9000
     record = looking(np.array([[0, 0, 1.0], [-1.0, 0, 0], [0, -1.0, 0]]), (0, 0, height_m))
-    for others in (0.0, 1.0, float(WeatherConfig.MOST)):
-        amounts = {**dict.fromkeys(WeatherConfig.AMOUNTS, others), name: float(WeatherConfig.MOST)}
+    for others in (0.0, 1.0, float(MOST)):
+        amounts = {**dict.fromkeys(AMOUNTS, others), name: float(MOST)}
         weather = dataclasses.replace(Weather(name="x", fog_density=60, precipitation=50), **amounts)
         through = air_of(weather, "filament").transmittance(depth_m, record)
         assert through.min() >= 0 and through.max() <= 1, "no number is neither"

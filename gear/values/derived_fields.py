@@ -1,0 +1,67 @@
+"""Dataclasses whose fields follow from other dataclasses, so that a field and its document stand in one place."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import textwrap
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+
+HEADING = "Attributes:"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DerivedField:
+    """One field that a class is given.
+
+    Attributes:
+        name: of the field.
+        kind: its type; a real one, not its text.
+        field: default and metadata, as `dataclasses.field` makes them.
+    """
+
+    name: str
+    kind: Any
+    field: Any
+
+
+def attribute_lines(kind: type[Any], *, without: Iterable[str] = ()) -> str:
+    """The lines below `Attributes:` in a class's docstring, without those that begin with some names."""
+    _, _, section = (textwrap.dedent("    " + (kind.__doc__ or ""))).partition(f"{HEADING}\n")
+    left_out = tuple(f"    {name}:" for name in without)
+    return "\n".join(line for line in section.rstrip().splitlines() if not line.startswith(left_out))
+
+
+def with_fields(fields: Iterable[DerivedField], attributes: str) -> Callable[[type[T]], type[T]]:
+    """A decorator that makes a class a frozen, keyword-only dataclass with more fields than are written in it.
+
+    The class's own fields come first, except those whose metadata is not empty (such as `places`), which come last.
+
+    Args:
+        fields: in their order.
+        attributes: their documents, as in an `Attributes:` section.
+
+    Raises:
+        TypeError: a name is there twice.
+    """
+    more = tuple(fields)
+
+    def decorate(cls: type[T]) -> type[T]:
+        own = inspect.get_annotations(cls)
+        last = {name for name in own if isinstance(vars(cls).get(name), dataclasses.Field) and vars(cls)[name].metadata}
+        annotations = {name: kind for name, kind in own.items() if name not in last}
+        for one in more:
+            if one.name in annotations:
+                raise TypeError(f"{cls.__name__} has two fields named {one.name!r}")
+            annotations[one.name] = one.kind
+            setattr(cls, one.name, one.field)
+        cls.__annotations__ = annotations | {name: own[name] for name in own if name in last}
+        text = textwrap.dedent("    " + (cls.__doc__ or "")).rstrip()
+        cls.__doc__ = f"{text}\n{attributes}\n" if HEADING in text else f"{text}\n\n{HEADING}\n{attributes}\n"
+        return dataclass(frozen=True, kw_only=True)(cls)
+
+    return decorate
