@@ -12,7 +12,9 @@ from gear.plugins.manager import discover
 
 SPECS = (specs.Spec, specs.TaskSpec, specs.ModelSpec, specs.AttackSpec, specs.DefenseSpec, specs.MetricSpec)
 PROTOCOLS = (
-    tasks.Task, tasks.Evaluator, models.Model, attacks.Attack, attacks.Compositor, defenses.Defense, defenses.Taught,
+    tasks.Task, tasks.Evaluator, models.Model, attacks.Attack, attacks.Compositor, attacks.Objective,
+    attacks.HarmObjective, attacks.WithObjective, attacks.WithTaskOptions, attacks.WithInputFiles, models.Trainable,
+    models.BatchPredictor, defenses.Defense, defenses.Taught,
 )  # fmt: skip
 VALUES = (
     tasks.Sample, tasks.SplitInfo, tasks.Encoded, tasks.Sidecar, attacks.Patch, attacks.Budget, defenses.DefenseResult,

@@ -1,10 +1,10 @@
-"""The attack protocol. torch appears in types alone."""
+"""The attack protocol, and what an attack may offer beyond it. torch is imported for type checkers alone."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -88,14 +88,7 @@ class Watch(Protocol):
 
 
 class Attack(Protocol):
-    """Optimises patches against a model.
-
-    Two methods more are used where an attack has them, each of one sample of the data set: `objective(sample)`, a
-    `gear.plugins.attacks.optimisation.objectives.Objective` by which patches are judged on validation samples
-    (untargeted harm to the task otherwise), and `settings(sample)`, a dataclass with the options as they are used,
-    where those depend on the task. A third, `read_sha256()`, is the hash of files that its options name, or
-    None: patches that were made from other files are others.
-    """
+    """Optimises patches against a model. `WithObjective`, `WithTaskOptions` and `WithInputFiles` are optional."""
 
     def optimise(
         self,
@@ -107,8 +100,92 @@ class Attack(Protocol):
         rng: np.random.Generator,
         watch: Watch | None = None,
     ) -> tuple[Patch, ...]:
-        """One patch a surface; the model is left as it was.
+        """Optimises one patch for each surface of the samples.
 
-        An attack that pays `watch` no attention works, but shows no progress and cannot be resumed.
+        Args:
+            model: attacked network; after the call its weights, buffers and modes are as before.
+            dataset: samples of one task, whose pictures show no patch of this attack.
+            compositor: puts patches into the samples' pictures.
+            budget: steps and queries that may be spent.
+            rng: of all random choices.
+            watch: called after every step; an attack that ignores it works, but shows no progress and cannot be
+                resumed.
         """
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Term:
+    """One summand of an objective.
+
+    Attributes:
+        value: scalar tensor, differentiable, that grows with the harm.
+        weight: factor of its gradient, after that has been brought to unit length.
+    """
+
+    value: Tensor
+    weight: float = 1.0
+
+
+class Objective(Protocol):
+    """What an attack maximises: terms of a batch."""
+
+    def terms(
+        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
+    ) -> Mapping[str, Term]:
+        """Terms by name; empty where the batch has nothing left that could be harmed.
+
+        Args:
+            model: attacked network.
+            views: (B, 3, H, W) pictures in 0..1 with the patch in them, by camera name.
+            samples: the batch's samples, whose own pictures are without the patch.
+            indexes: numbers of the samples in the dataset, by which an objective may remember things.
+        """
+        ...
+
+
+@runtime_checkable
+class HarmObjective(Protocol):
+    """An objective whose weighted terms do not add up to a number by which patches can be compared."""
+
+    @property
+    def asks_for_clean(self) -> bool:
+        """Whether `harm` needs the model's answer to the picture without the patch, once for each sample.
+
+        Attacks whose queries are counted pay for that answer.
+        """
+        ...
+
+    def harm(self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]) -> Tensor:
+        """Scalar tensor that grows with the harm of a batch; arguments as of `Objective.terms`."""
+        ...
+
+
+@runtime_checkable
+class WithObjective(Protocol):
+    """An attack that says by which objective its patches are judged on validation samples.
+
+    Patches of other attacks are judged by untargeted harm to the task.
+    """
+
+    def objective(self, sample: Any) -> Objective:
+        """A fresh objective for the task that the sample is of."""
+        ...
+
+
+@runtime_checkable
+class WithTaskOptions(Protocol):
+    """An attack whose options depend on the task, such as a learning rate that is chosen for it."""
+
+    def settings(self, sample: Any) -> Any:
+        """Dataclass of the options that are used for the task that the sample is of; noted in `attack.json`."""
+        ...
+
+
+@runtime_checkable
+class WithInputFiles(Protocol):
+    """An attack whose options name files: patches that were made from other files are other patches."""
+
+    def read_sha256(self) -> str | None:
+        """Hash of the content of these files; None where the options name none."""
         ...

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
 
 from gear.values.frames import UInt8Image
 
@@ -40,19 +40,24 @@ class Model(Protocol):
         ...
 
 
-class Trainable(Model, Protocol):
-    """A model that `gear train` can train: its losses are those of `forward` with the batch's samples."""
+@runtime_checkable
+class Trainable(Protocol):
+    """A model whose weights gear reads and writes, and that `gear train` can train.
+
+    Its losses are those of `Model.forward` with the batch's samples.
+    """
 
     def module(self) -> nn.Module:
         """The network, under the key names that its weights are saved with."""
         ...
 
 
-class BatchPredictor(Model, Protocol):
+@runtime_checkable
+class BatchPredictor(Protocol):
     """A model that predicts several samples at once, which is faster on most machines."""
 
     def predict_many(self, samples: Sequence[Mapping[str, UInt8Image]]) -> list[Any]:
-        """`predict` for each; pictures may differ in size."""
+        """The predictions of `Model.predict` for each sample, in order; pictures may differ in size."""
         ...
 
 

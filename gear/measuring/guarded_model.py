@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.contracts.defenses import DefenseResult
-from gear.contracts.models import Model
+from gear.contracts.models import BatchPredictor, Model, Trainable
 from gear.contracts.specs import DefenseSpec, ModelSpec
 from gear.dataset.reading import Dataset
 from gear.measuring.calibration import NOTHING, Calibration, Views
@@ -85,10 +85,9 @@ class Player:
         if defense is not None:
             self._guard_name = defense.found.spec.name
             self._guard, self.model = self._guarded(defense, bare, calibration)
-        many = getattr(self.model, "predict_many", None)
-        # What a wrapper hands on of the bare model by `__getattr__` would pass the defense by.
+        # A wrapper that forwards `predict_many` to the bare model by `__getattr__` would leave the defense out.
         is_own = self.model is bare or inspect.getattr_static(self.model, "predict_many", None) is not None
-        self._many = many if callable(many) and is_own else None
+        self._many = self.model.predict_many if isinstance(self.model, BatchPredictor) and is_own else None
         self._is_ours = model.found.owner.package == DISTRIBUTION and defense is None
         self.lanes = lanes_of(bare) if self._is_ours else 1
         self._at_work, self._counting = 0, threading.Lock()
@@ -190,7 +189,7 @@ def weights_digest(model: Any) -> str | None:
 
 
 def _tensors(model: Any, torch: Any) -> Iterator[tuple[str, Any]]:
-    module = model.module() if callable(getattr(model, "module", None)) else model
+    module = model.module() if isinstance(model, Trainable) else model
     parts = {"": module} if isinstance(module, torch.nn.Module) else vars(model) if hasattr(model, "__dict__") else {}
     for part, network in parts.items():
         if isinstance(network, torch.nn.Module):

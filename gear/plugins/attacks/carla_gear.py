@@ -20,7 +20,7 @@ from gear.contracts.specs import AttackSpec
 from gear.plugins.attacks.optimisation.settings import Appearance, Settings
 
 if TYPE_CHECKING:
-    from gear.plugins.attacks.optimisation.objectives import Objective
+    from gear.contracts.attacks import Objective
 
 IMAGENET_STD = (0.229, 0.224, 0.225)
 PaperTask = Literal["semseg", "depth", "detect2d", "stereo3d"]

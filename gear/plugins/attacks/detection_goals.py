@@ -14,9 +14,9 @@ from typing import Any, Literal
 import numpy as np
 from torch import Tensor
 
+from gear.contracts.attacks import Term
 from gear.contracts.models import Model
 from gear.formats import rle
-from gear.plugins.attacks.optimisation.objectives import Term
 from gear.plugins.tasks.detect2d import Detect2dSample, Object2d
 
 Goal = Literal["vanish", "appear"]

@@ -23,8 +23,8 @@ from gear.values.errors import FieldError, GearError
 if TYPE_CHECKING:
     from torch import Tensor
 
+    from gear.contracts.attacks import Objective
     from gear.plugins.attacks.optimisation.loop import Seen
-    from gear.plugins.attacks.optimisation.objectives import Objective
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

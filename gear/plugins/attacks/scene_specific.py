@@ -22,7 +22,7 @@ from gear.plugins.attacks.optimisation.settings import USUAL_RATE, Settings
 from gear.values.errors import FieldError, GearError
 
 if TYPE_CHECKING:
-    from gear.plugins.attacks.optimisation.objectives import Objective
+    from gear.contracts.attacks import Objective
 
 CATEGORY_IDS = {name: number for number, name in CATEGORY_NAMES.items()}
 APPEARS = "person"

@@ -22,8 +22,8 @@ from gear.values.errors import GearError
 if TYPE_CHECKING:
     from torch import Tensor
 
+    from gear.contracts.attacks import Objective, Term
     from gear.plugins.attacks.optimisation.loop import Seen
-    from gear.plugins.attacks.optimisation.objectives import Objective, Term
 
 SCORES = ("objectness", "cls_logits")
 """Raw outputs of detectors that a sigmoid makes scores of."""
@@ -122,7 +122,7 @@ class SurestObjective:
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> Mapping[str, Term]:
         """`objectness`."""
-        from gear.plugins.attacks.optimisation.objectives import Term
+        from gear.contracts.attacks import Term
 
         return {"objectness": Term(value=-surest(model.forward(views)).mean())}
 

@@ -11,6 +11,7 @@ from gear.config.dump import to_plain
 from gear.config.nodes import Node
 from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
+from gear.contracts.attacks import WithInputFiles
 from gear.contracts.specs import AttackSpec
 from gear.dataset.files import sha256
 from gear.dataset.reading import Dataset, scenes_of
@@ -76,7 +77,7 @@ class Job:
 
     def plan(self, weights_sha256: str | None, product: Any) -> Json:
         """What decides the patches: who gives the same finds them made. Weights are those of the built network."""
-        read = product.read_sha256() if hasattr(product, "read_sha256") else None
+        read = product.read_sha256() if isinstance(product, WithInputFiles) else None
         return {
             "attack": {
                 "name": self.spec.name,

@@ -14,7 +14,7 @@ import torch
 from gear.compositor.cache import Cache
 from gear.compositor.pasting import CACHE_BYTES, Prepared
 from gear.config.dump import to_plain
-from gear.contracts.attacks import Budget, Patch
+from gear.contracts.attacks import Budget, Objective, Patch, WithObjective, WithTaskOptions
 from gear.contracts.models import Model
 from gear.dataset.files import sha256
 from gear.dataset.locks import alone_at_work
@@ -22,7 +22,7 @@ from gear.dataset.sidecar import dump_json
 from gear.measuring.guarded_model import weights_digest
 from gear.measuring.shown_size import size_note
 from gear.plugins.attacks.optimisation.model_group import device_name
-from gear.plugins.attacks.optimisation.objectives import Objective, default_objective
+from gear.plugins.attacks.optimisation.objectives import default_objective
 from gear.plugins.build import blamed, build, traced
 from gear.plugins.catalogue import PluginEntry
 from gear.values.errors import GearError, PluginError
@@ -183,8 +183,8 @@ def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, o
     cache, device = Cache[Prepared](CACHE_BYTES), device_name(network)
     seen, held = (Scenes(group, job.compositor, device, cache) for group in (job.datasets, job.validation))
     # One each: an objective remembers the clean answers of its samples by their numbers.
-    make = product.objective if hasattr(product, "objective") else default_objective
-    settings = product.settings(seen.samples[0]) if hasattr(product, "settings") else job.config
+    make = product.objective if isinstance(product, WithObjective) else default_objective
+    settings = product.settings(seen.samples[0]) if isinstance(product, WithTaskOptions) else job.config
     objective, held_objective = make(seen.samples[0]), make(seen.samples[0])
     recorder = Recorder(
         root=root,

@@ -12,12 +12,12 @@ from torch import Tensor
 from gear.compositor.cache import Cache
 from gear.compositor.opening import open_compositor
 from gear.compositor.pasting import Prepared
-from gear.contracts.attacks import Patch
+from gear.contracts.attacks import Objective, Patch
 from gear.contracts.models import Model
 from gear.dataset.reading import Dataset
 from gear.plugins.attacks.optimisation.frozen_model import frozen
 from gear.plugins.attacks.optimisation.gradient_checks import promised_and_kept
-from gear.plugins.attacks.optimisation.objectives import Objective, counted
+from gear.plugins.attacks.optimisation.objectives import counted
 from gear.readers import Kept, all_of
 from gear.values.frames import UInt8Image
 from gear.verbs.attack.data import JoinedCompositor

@@ -13,6 +13,7 @@ from typing import Any
 from gear.config.dump import to_plain
 from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
+from gear.contracts.models import Trainable
 from gear.contracts.specs import ModelSpec
 from gear.dataset.files import read_bytes, sha256
 from gear.networks.checkpoints import read_published
@@ -133,10 +134,9 @@ def _graph(found: PluginEntry, settings: Iterable[str]) -> Any:
     names = {field.name for field in dataclasses.fields(found.spec.config)}
     plain = [f"{name}={value}" for name, value in PLAIN_BUILD.items() if name in names]
     product = build(found, with_overrides(NO_OPTIONS, [*plain, *settings]))
-    module = getattr(product, "module", None)
-    if module is None:
+    if not isinstance(product, Trainable):
         raise GearError(f"model {found.spec.name!r} has no module whose weights could be converted")
-    return module()
+    return product.module()
 
 
 def _said(origin: Path) -> dict[str, str]:

@@ -11,13 +11,13 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from gear.contracts.attacks import Budget, Compositor, Patch, State, Watch
+from gear.contracts.attacks import Budget, Compositor, Objective, Patch, State, Watch
 from gear.contracts.models import Model
 from gear.plugins.attacks.optimisation.appearance import vary
 from gear.plugins.attacks.optimisation.checkpoint_state import check_saved
 from gear.plugins.attacks.optimisation.frozen_model import frozen
 from gear.plugins.attacks.optimisation.model_group import members_of
-from gear.plugins.attacks.optimisation.objectives import Objective, not_finite
+from gear.plugins.attacks.optimisation.objectives import not_finite
 from gear.plugins.attacks.optimisation.regularisers import non_printability, smoothness
 from gear.plugins.attacks.optimisation.settings import Settings, TextureSettings
 from gear.values.errors import GearError

@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from gear.contracts.attacks import HarmObjective, Objective, Term
 from gear.contracts.models import Model
 from gear.formats import rle
 from gear.formats.cityscapes import IGNORED_TRAIN_ID, LABELS
@@ -31,42 +32,6 @@ TRAIN_IDS = torch.tensor([label.train_id for label in LABELS if label.id >= 0])
 TRAIN_CLASSES = 19
 
 Kind = Literal["semseg", "depth", "losses"]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Term:
-    """One thing to make large.
-
-    Attributes:
-        value: differentiable, without dimensions.
-        weight: of its gradient, after that has been brought to unit length.
-    """
-
-    value: Tensor
-    weight: float = 1.0
-
-
-class Objective(Protocol):
-    """Terms of a batch.
-
-    An objective whose weighted terms do not add up to a number that grows with the harm has a method `harm` of the same
-    arguments beside it, which gives that number (see `counted`). One whose `harm` asks for the answer to a sample's
-    clean picture, once a sample, says so by a true attribute `asks_for_clean`: attacks that are counted in queries pay
-    for it.
-    """
-
-    def terms(
-        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
-    ) -> Mapping[str, Term]:
-        """Terms by name for pictures (B, 3, H, W) with the patch in them; none where nothing is left to be harmed.
-
-        Args:
-            model: what is attacked.
-            views: pictures by camera name.
-            samples: the batch's samples, whose own pictures are without the patch.
-            indexes: their numbers in the data set, to remember things by.
-        """
-        ...
 
 
 def default_objective(sample: Any) -> Objective:
@@ -258,9 +223,8 @@ def counted(
 
     They are the objective's own `harm` where it has one, its weighted terms otherwise.
     """
-    harm = getattr(objective, "harm", None)
-    if harm is not None:
-        return [harm(member, views, samples, indexes) for member in members_of(model).values()]
+    if isinstance(objective, HarmObjective):
+        return [objective.harm(member, views, samples, indexes) for member in members_of(model).values()]
     return weighted(objective, model, views, samples, indexes)
 
 

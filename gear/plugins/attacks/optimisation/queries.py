@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 import torch
 
-from gear.contracts.attacks import Budget, Compositor, Patch, State
+from gear.contracts.attacks import Budget, Compositor, HarmObjective, Objective, Patch, State
 from gear.contracts.models import Model
 from gear.plugins.attacks.optimisation.checkpoint_state import check_saved
 from gear.plugins.attacks.optimisation.model_group import members_of
-from gear.plugins.attacks.optimisation.objectives import Objective, counted, not_finite
+from gear.plugins.attacks.optimisation.objectives import counted, not_finite
 from gear.values.errors import GearError
 
 Textures = npt.NDArray[np.float32]
@@ -55,7 +55,7 @@ class Oracle:
 
     def cost(self, indexes: Sequence[int]) -> int:
         """Queries of one question about these samples."""
-        asks = getattr(self._objective, "asks_for_clean", False)
+        asks = isinstance(self._objective, HarmObjective) and self._objective.asks_for_clean
         clean = len(set(indexes) - self._seen) if asks else 0
         return len(members_of(self._model)) * (1 + clean)
 

@@ -12,7 +12,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from gear.contracts.attacks import Budget, Patch, State
+from gear.contracts.attacks import Budget, Patch, State, Term
 from gear.plugins.attacks.optimisation.appearance import vary
 from gear.plugins.attacks.optimisation.loop import (
     ARRAYS,
@@ -25,7 +25,7 @@ from gear.plugins.attacks.optimisation.loop import (
     one_gradient,
     unit_gradients,
 )
-from gear.plugins.attacks.optimisation.objectives import SemsegObjective, Term, train_labels
+from gear.plugins.attacks.optimisation.objectives import SemsegObjective, train_labels
 from gear.plugins.attacks.optimisation.regularisers import smoothness
 from gear.plugins.attacks.optimisation.settings import Appearance, Settings, TextureSettings
 from gear.plugins.attacks.scene_specific import scene_specific

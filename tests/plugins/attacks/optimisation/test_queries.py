@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gear.contracts.attacks import Budget
-from gear.plugins.attacks.optimisation.objectives import DepthObjective, SemsegObjective, Term
+from gear.contracts.attacks import Budget, Term
+from gear.plugins.attacks.optimisation.objectives import DepthObjective, SemsegObjective
 from gear.plugins.attacks.optimisation.queries import Oracle
 from gear.plugins.attacks.scene_specific import scene_specific
 from gear.testing.attack_contract import AttackContract
