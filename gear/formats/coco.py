@@ -62,8 +62,9 @@ class Annotation:
         box_xywh: left, top, width, height in edge pixels.
         area_px: pixels of the mask.
         rle: compressed run lengths of the visible mask.
-        is_crowd: to be ignored: seen too little of to be looked for.
+        is_crowd: whether evaluations ignore it.
         extras: what gear knows beyond COCO, under the key `gear`.
+        polygons: `x, y, x, y, ...` of each polygon of the mask in edge pixels; empty for run lengths in their place.
     """
 
     category_id: int
@@ -72,11 +73,19 @@ class Annotation:
     rle: str
     is_crowd: bool
     extras: Json
+    polygons: Sequence[Sequence[float]] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Picture:
-    """One picture of a split with its annotations."""
+    """One picture of a split with its annotations.
+
+    Attributes:
+        id: from 1.
+        file_name: relative to the folder of the split's pictures.
+        height_px, width_px: its size.
+        annotations: of its objects.
+    """
 
     id: int
     file_name: str
@@ -104,7 +113,7 @@ def dataset_json(pictures: Sequence[Picture], *, description: str, created: str)
                     "category_id": item.category_id,
                     "bbox": list(item.box_xywh),
                     "area": item.area_px,
-                    "segmentation": {"size": [picture.height_px, picture.width_px], "counts": item.rle},
+                    "segmentation": _segmentation(item, picture),
                     "iscrowd": int(item.is_crowd),
                     "gear": item.extras,
                 }
@@ -135,6 +144,13 @@ def dataset_json(pictures: Sequence[Picture], *, description: str, created: str)
         "annotations": annotations,
         "categories": list(CATEGORIES),
     }
+
+
+def _segmentation(item: Annotation, picture: Picture) -> Json:
+    """The mask as COCO has it: polygons of single objects, run lengths of crowds."""
+    if item.polygons and not item.is_crowd:
+        return [list(polygon) for polygon in item.polygons]
+    return {"size": [picture.height_px, picture.width_px], "counts": item.rle}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -59,6 +59,18 @@ def decode(counts: str, height_px: int, width_px: int) -> Mask:
     return np.ascontiguousarray(values.reshape(width_px, height_px).T)
 
 
+def decode_crop(counts: str, height_px: int, width_px: int, box_px: tuple[int, int, int, int]) -> Mask:
+    """The part of the mask of a compressed string inside a box: left, top, right, bottom, inside the picture.
+
+    Raises:
+        ValueError: it is no such string, or the runs do not fill a picture of this size.
+    """
+    left, top, right, bottom = box_px
+    runs = _runs(counts, height_px, width_px)
+    values = np.repeat(np.arange(len(runs)) % 2 == 1, runs)
+    return np.ascontiguousarray(values.reshape(width_px, height_px)[left:right, top:bottom].T)
+
+
 def _runs(counts: str, height_px: int, width_px: int) -> npt.NDArray[np.int64]:
     runs = run_lengths(counts)
     if runs.sum() != height_px * width_px:

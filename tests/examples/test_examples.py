@@ -142,7 +142,7 @@ def test_foreign_models_defenses_and_tasks_have_their_rows(home: Path) -> None:
     assert text.startswith("panoptic: panoptic_parts guarded by jedi\n") and "outside_patch.pq" in text
     (folder,) = (path for path in (home / "empty/panoptic").iterdir() if path.is_dir())
     results = json.loads((folder / "predictions/panoptic.json").read_text())["annotations"]
-    assert [one["image_id"] for one in results] == [0, 1]
+    assert [one["image_id"] for one in results] == [1, 2]
     assert all((folder / "predictions/panoptic" / one["file_name"]).is_file() for one in results)
 
 

@@ -48,6 +48,15 @@ def test_crowds_are_marked_and_boxes_are_corner_and_size() -> None:
     assert line == {"image_id": 7, "category_id": 3, "bbox": [1, 2, 5, 3], "score": 0.5}
 
 
+def test_single_objects_have_polygons_and_crowds_run_lengths() -> None:
+    one = Annotation(category_id=3, box_xywh=(1, 2, 2, 1), area_px=2, rle="abc", is_crowd=False, extras={},
+                     polygons=[[1, 2, 3, 2, 3, 3, 1, 3]])  # fmt: skip
+    shown = Picture(id=1, file_name="a.png", height_px=8, width_px=9, annotations=(one, replace(one, is_crowd=True)))
+    single, crowd = dataset_json([shown], description="", created="2022-01-01")["annotations"]
+    assert single["segmentation"] == [[1, 2, 3, 2, 3, 3, 1, 3]]
+    assert crowd["segmentation"] == {"size": [8, 9], "counts": "abc"}
+
+
 def test_json_text_is_steady() -> None:
     assert dump({"b": 1, "a": [1.5, None]}) == b'{"b":1,"a":[1.5,null]}\n'
     assert json.loads(dump({"a": "ä"})) == {"a": "ä"}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Literal
 
 import cv2
 import numpy as np
@@ -27,9 +28,11 @@ from gear.contracts.tasks import Encoded, Evaluator, Sample, Sidecar, SplitInfo
 from gear.formats import coco, results, rle
 from gear.formats.billboard_info import billboard_info
 from gear.formats.jsontext import dump
+from gear.formats.mask_polygons import mask_polygons
 from gear.formats.png import encode_rgb
 from gear.groundtruth.boxes import box_in_camera
 from gear.groundtruth.objects import observe_objects
+from gear.groundtruth.strays import without_strays
 from gear.groundtruth.visibility import Visibility
 from gear.metrics.coco_ap import CocoEvaluator
 from gear.metrics.coco_reference import TallObjects
@@ -61,11 +64,14 @@ class Detect2dConfig(CameraOptions):
     Attributes:
         visibility: what an object must show to be labelled; an object that shows less is annotated with `iscrowd` 1,
             which evaluations ignore.
+        masks: how the annotation file describes single objects: `polygons` as COCO does, or run lengths (`rle`). Both
+            give the same mask. Ignored objects have run lengths.
     """
 
     width_px: int = 1333
     height_px: int = 800
     visibility: Visibility = field(default_factory=lambda: Visibility(preset="coco"))
+    masks: Literal["polygons", "rle"] = "polygons"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,10 +83,11 @@ class Object2d:
         label: gear's name of the part's label.
         category_id: COCO's.
         is_ignored: seen too little of to be looked for.
-        box_px: tight box of the visible pixels, edge pixels.
+        box_px: tight box of the visible pixels, edge pixels. Stray pixels are left out
+            (`gear.groundtruth.strays`), here and in the area and the mask.
         amodal_box_px: tight box of the whole silhouette; may exceed the picture.
-        area_px: visible pixels.
-        rle: their run lengths for the whole picture.
+        area_px: pixels of the mask.
+        rle: run lengths of the mask for the whole picture.
         visible_fraction, occluded_fraction, truncated_fraction: of the silhouette: seen; covered, of what lies in the
             picture; outside the picture.
         distance_m: camera to the middle of the object's box.
@@ -131,17 +138,19 @@ class Detect2dTask:
             if label.coco_id is None or truth.visible_box is None or not limits.mentions(truth):
                 continue
             distance_m = box_in_camera(frame.objects[truth.object_id], view.camera).distance_m
-            left, top = int(truth.visible_box[0]), int(truth.visible_box[1])
+            mask, x, y = without_strays(truth.mask)
+            left, top = int(truth.visible_box[0]) + x, int(truth.visible_box[1]) + y
+            rows, columns = mask.shape
             found.append(
                 Object2d(
                     object_id=truth.object_id,
                     label=label.name,
                     category_id=label.coco_id,
                     is_ignored=not limits.labels(truth, truth.visible_box, distance_m),
-                    box_px=truth.visible_box,
+                    box_px=(float(left), float(top), float(left + columns), float(top + rows)),
                     amodal_box_px=truth.amodal_box,
-                    area_px=truth.visible_px,
-                    rle=rle.encode_crop(truth.mask, left, top, height, width),
+                    area_px=int(mask.sum()),
+                    rle=rle.encode_crop(mask, left, top, height, width),
                     visible_fraction=round(truth.visible_fraction, 6),
                     occluded_fraction=round(truth.occluded_fraction, 6),
                     truncated_fraction=round(truth.truncated_fraction, 6),
@@ -222,7 +231,7 @@ class Detect2dTask:
             line
             for record, one in facts
             for line in coco.results_json(
-                record.index, from_json(tuple[coco.Detection, ...], one["detections"], "detections")
+                _image_id(record), from_json(tuple[coco.Detection, ...], one["detections"], "detections")
             )
         ]
         return {results.coco_path(info.split): dump(lines)}
@@ -243,7 +252,10 @@ class Detect2dTask:
         return {"boxes": picture}
 
     def _picture(self, sidecar: Sidecar) -> coco.Picture:
-        return self._as_picture(sidecar.record, _objects(sidecar, Path()))
+        picture = self._as_picture(sidecar.record, _objects(sidecar, Path()))
+        if self.config.masks == "rle":
+            return picture
+        return replace(picture, annotations=tuple(_with_polygons(one, picture) for one in picture.annotations))
 
     def _as_shown(self, sample: Detect2dSample) -> coco.Picture:
         """At the size of the sample's own picture, which may be smaller than the one that was rendered."""
@@ -253,12 +265,25 @@ class Detect2dTask:
     def _as_picture(self, record: SceneRecord, objects: tuple[Object2d, ...]) -> coco.Picture:
         camera = record.camera(VIEW)
         return coco.Picture(
-            id=record.index,
+            id=_image_id(record),
             file_name=_name(record.index),
             height_px=camera.height_px,
             width_px=camera.width_px,
             annotations=tuple(_annotation(thing, camera) for thing in objects),
         )
+
+
+def _image_id(record: SceneRecord) -> int:
+    """COCO's, from 1: some readers take 0 for "none"."""
+    return record.index + 1
+
+
+def _with_polygons(item: coco.Annotation, picture: coco.Picture) -> coco.Annotation:
+    if item.is_crowd:
+        return item
+    left, top, width, height = (round(side) for side in item.box_xywh)
+    mask = rle.decode_crop(item.rle, picture.height_px, picture.width_px, (left, top, left + width, top + height))
+    return replace(item, polygons=mask_polygons(mask, left, top))
 
 
 def _name(index: int) -> str:

@@ -16,8 +16,8 @@ from gear.formats import rle
 from gear.groundtruth.visibility import Visibility
 from gear.plugins.tasks.detect2d import Detect2dConfig, Detect2dTask, detect2d
 from gear.testing.synthetic import synthetic_frame
-from gear.testing.task_contract import TaskContract
-from gear.testing.things import CAR, CYCLIST, PERSON, Thing
+from gear.testing.task_contract import INFO, TaskContract
+from gear.testing.things import CAR, CYCLIST, PERSON, Part, Thing, box_part
 
 # pycocotools 2.0.11 has not caught up with NumPy 2's protocol.
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
@@ -41,10 +41,10 @@ class TestDetect2d(TaskContract):
         both = [tmp_path / "annotations/instances_val.json", tmp_path / "annotations/val/coco_annotations.json"]
         assert both[0].read_bytes() == both[1].read_bytes()
         coco = load(both[0])
-        assert len(coco.cats) == 80
+        assert len(coco.cats) == 80 and sorted(coco.imgs) == [1, 2]
         assert sorted(coco.anns) == list(range(1, len(coco.anns) + 1))
         for image_id in coco.imgs:
-            frame, _ = self.frame(image_id)
+            frame, _ = self.frame(image_id - 1)
             view = frame.views["left"]
             picture = tmp_path / "images/val" / coco.imgs[image_id]["file_name"]
             assert picture.is_file()
@@ -58,6 +58,36 @@ class TestDetect2d(TaskContract):
                 assert annotation["area"] == mask.sum() == coco_mask.area(coco.annToRLE(annotation))
                 assert annotation["bbox"] == list(coco_mask.toBbox(coco.annToRLE(annotation)))
         assert any(a["iscrowd"] == 0 for a in coco.anns.values())
+
+    def test_training_code_that_knows_polygons_alone_reads_single_objects(self, tmp_path: Path) -> None:
+        """The steps of `convert_coco_poly_to_mask` in torchvision's references and in DETR's processors."""
+        self.write(tmp_path)
+        content = json.loads((tmp_path / "annotations/instances_val.json").read_text())
+        exact = load(tmp_path / "annotations/instances_val.json")
+        single = [one for one in content["annotations"] if not one["iscrowd"]]
+        assert len(single) > 10
+        for annotation in single:
+            polygons = annotation["segmentation"]
+            mask = coco_mask.decode(coco_mask.frPyObjects(polygons, 400, 667)).any(axis=2)
+            assert all(len(polygon) >= 6 and len(polygon) % 2 == 0 for polygon in polygons)
+            assert mask.sum() == annotation["area"] and np.array_equal(mask, exact.annToMask(annotation))
+
+    def test_run_lengths_describe_the_same_masks(self, tmp_path: Path) -> None:
+        self.write(tmp_path / "polygons")
+        content = json.loads((tmp_path / "polygons/annotations/instances_val.json").read_text())
+        task = Detect2dTask(Detect2dConfig(width_px=667, height_px=400, masks="rle"))
+        sidecars = [self.sidecar(sample, task.encode(sample, INFO)) for sample in map(self.sample, (0, 1))]
+        other = json.loads(task.finalise(sidecars, INFO)["annotations/instances_val.json"])
+        polygons, lengths = COCO(), COCO()
+        polygons.dataset, lengths.dataset = content, other
+        for coco in (polygons, lengths):
+            coco.createIndex()
+        assert {type(one["segmentation"]) for one in other["annotations"]} == {dict}
+        for one, two in zip(content["annotations"], other["annotations"], strict=True):
+            assert np.array_equal(polygons.annToMask(one), lengths.annToMask(two))
+            assert {k: v for k, v in one.items() if k != "segmentation"} == {
+                k: v for k, v in two.items() if k != "segmentation"
+            }
 
     @pytest.mark.parametrize("kind", ["bbox", "segm"])
     def test_ground_truth_scores_perfect_with_the_official_tool(self, tmp_path: Path, kind: str) -> None:
@@ -151,6 +181,22 @@ def test_what_is_tall_enough_is_so_in_a_smaller_picture_too() -> None:
         evaluator = task.reports()["reference"]
         assert evaluator.update(small, task.as_prediction(small))["found_share"] == 1
         assert evaluator.result()["instances_car"] == 1
+
+
+def test_stray_pixels_do_not_stretch_a_box() -> None:
+    """Of what stands behind a wall with a slit, the part beside the wall is labelled, not the line in the slit."""
+    part = Part(label="person", centre_m=(0.0, 0.0, 0.9), size_m=(0.3, 3.0, 1.8))
+    wall = [
+        Thing(parts=(box_part("building", 0.1, 0.8, 3.0),), position_m=(10.0, -0.5, 0.0)),
+        Thing(parts=(box_part("building", 0.1, 2.0, 3.0),), position_m=(10.0, -1.94, 0.0)),
+    ]
+    wide = Thing(parts=(part,), position_m=(14.0, 0.0, 0.0), object_id=3, role="pedestrian")
+    (seen,) = observe([wide])
+    (hidden,) = observe([wide, *wall])
+    assert hidden.box_px[0] == seen.box_px[0] and hidden.box_px[2] < seen.box_px[2] - 20
+    assert hidden.visible_fraction > hidden.area_px / seen.area_px
+    decoded = rle.decode(hidden.rle, 400, 667)
+    assert decoded.sum() == hidden.area_px == (hidden.box_px[2] - hidden.box_px[0]) * (seen.box_px[3] - seen.box_px[1])
 
 
 def test_annotations_keep_the_masks_order(tmp_path: Path) -> None:

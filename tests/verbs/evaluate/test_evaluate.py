@@ -72,7 +72,8 @@ def test_the_truth_scores_perfect_and_is_kept_in_the_formats_layout(
         elif task == "stereo3d":
             assert parse_labels((folder / f"data/{index:06d}.txt").read_text()) == truth
         else:
-            found = [o for o in json.loads((folder / "coco_results_debug.json").read_text()) if o["image_id"] == index]
+            lines = json.loads((folder / "coco_results_debug.json").read_text())
+            found = [one for one in lines if one["image_id"] == index + 1]
             assert [(o["category_id"], o["bbox"][0]) for o in found] == [(t.category_id, t.box_px[0]) for t in truth]
     assert json.loads((tmp_path / "out/results.json").read_text())["rows"][0]["samples"] == 2
     assert (tmp_path / "out/table.txt").read_text().startswith(f"{task}: odd\n")

@@ -74,9 +74,9 @@ class PanopticTask:
             record = sidecar.record
             camera, name = record.camera(VIEW), f"{record.index:06d}.png"
             size = {"width": camera.width_px, "height": camera.height_px}
-            images.append({"id": record.index, "file_name": name, **size})
+            images.append({"id": record.index + 1, "file_name": name, **size})
             infos = expect(sidecar.facts, "segments_info", place=Path(name))["segments_info"]
-            annotations.append({"image_id": record.index, "file_name": name, "segments_info": infos})
+            annotations.append({"image_id": record.index + 1, "file_name": name, "segments_info": infos})
         categories = [
             {
                 "id": label.id,
@@ -136,7 +136,7 @@ class PanopticTask:
         """COCO panoptic's results file."""
         annotations = [
             {
-                "image_id": record.index,
+                "image_id": record.index + 1,
                 "file_name": f"{record.index:06d}.png",
                 "segments_info": [{"id": i, "category_id": category} for i, category, _ in one["segments"]],
             }

@@ -1,0 +1,117 @@
+"""Masks as polygons along the borders of their pixels, as COCO describes single objects.
+
+The polygons run through the corners of pixels, in edge pixels: pycocotools, which fills a pixel whose centre lies
+inside, makes the same mask of them again. In COCO no polygon can be a hole, so a piece with a hole is cut in two
+through the hole.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Mask = npt.NDArray[np.bool_]
+Ints = npt.NDArray[np.int64]
+Ring = tuple[tuple[int, int], ...]
+
+
+def mask_polygons(mask: Mask, left_px: int = 0, top_px: int = 0) -> list[list[int]]:
+    """The polygons of a mask.
+
+    Args:
+        mask: (h, w).
+        left_px, top_px: where its first pixel lies in the picture.
+
+    Returns:
+        `x, y, x, y, ...` of each polygon in edge pixels. Together they cover the pixels of the mask and no others; no
+        two overlap, and none has a hole. Pieces that touch at corners alone are polygons of their own.
+    """
+    polygons: list[list[int]] = []
+    parts = [(mask, left_px, top_px)]
+    while parts:
+        part, x, y = parts.pop()
+        rings, hole_column = _rings(part)
+        if hole_column:
+            # From right to left, so that the left half comes first.
+            parts += [(part[:, hole_column:], x + hole_column, y), (part[:, :hole_column], x, y)]
+        else:
+            polygons += [[value for px, py in ring for value in (px + x, py + y)] for ring in rings]
+    return polygons
+
+
+def _rings(mask: Mask) -> tuple[list[Ring], int]:
+    """Borders of a mask's 4-connected pieces through the corners of pixels.
+
+    Returns:
+        The rings; and 0, or, where a piece has a hole, a column of pixels with a pixel of the hole to its left.
+    """
+    padded = np.zeros((mask.shape[0] + 2, mask.shape[1] + 2), dtype=np.int64)
+    padded[1:-1, 1:-1] = mask
+    corners = _corners(padded)
+    if not len(corners):
+        return [], 0
+    x, y = corners[:, 0], corners[:, 1]
+    # Corners on one grid line are joined in pairs: the first with the second, the third with the fourth.
+    along_row = _partners(np.lexsort((corners[:, 2], x, y)))
+    along_column = _partners(np.lexsort((corners[:, 3], y, x)))
+    xs, ys = x.tolist(), y.tolist()
+    is_seen = [False] * len(xs)
+    rings: list[Ring] = []
+    # Corners come row by row, so the first one of a ring is its topmost and of those its leftmost.
+    for first in range(len(xs)):
+        if is_seen[first]:
+            continue
+        if not padded[ys[first] + 1, xs[first] + 1]:
+            return [], xs[first] + 1
+        ring: list[tuple[int, int]] = []
+        here = first
+        while not is_seen[here]:
+            other = along_row[here]
+            is_seen[here] = is_seen[other] = True
+            ring += [(xs[here], ys[here]), (xs[other], ys[other])]
+            here = along_column[other]
+        rings.append(tuple(ring))
+    return rings, 0
+
+
+def _corners(padded: Ints) -> Ints:
+    """(N, 4) turns of the borders, row by row: x, y in edge pixels of the mask, whether the border leaves to the right
+    (else to the left), and whether it leaves downwards (else upwards).
+
+    Where two pixels meet at a corner alone, each has a turn of its own.
+
+    Args:
+        padded: (h + 2, w + 2) the mask with a margin of zeros, 0 or 1.
+    """
+    code = padded[:-1, :-1] + 2 * padded[:-1, 1:] + 4 * padded[1:, :-1] + 8 * padded[1:, 1:]
+    y, x = np.nonzero(_TURNS[code, 0] >= 0)
+    found = code[y, x]
+    turns = [np.column_stack([x, y, _TURNS[found, 0], _TURNS[found, 1]])]
+    is_double = _TURNS[found, 2] >= 0
+    turns.append(np.column_stack([x, y, _TURNS[found, 2], _TURNS[found, 3]])[is_double])
+    both = np.concatenate(turns)
+    return both[np.lexsort((both[:, 2], both[:, 0], both[:, 1]))]
+
+
+def _turns() -> Ints:
+    """(16, 4) by which of the four pixels around a corner are set (1 top left, 2 top right, 4 bottom left, 8 bottom
+    right): rightwards and downwards of its turn, and of a second one; -1 where there is none.
+    """
+    turns = np.full((16, 4), -1)
+    # A lone pixel's border, and that around a lone gap, turns towards that pixel.
+    towards = {1: (0, 0), 2: (1, 0), 4: (0, 1), 8: (1, 1)}
+    for pixel, turn in towards.items():
+        turns[pixel, :2] = turns[15 - pixel, :2] = turn
+    for one, other in ((1, 8), (2, 4)):
+        turns[one | other] = (*towards[one], *towards[other])
+    return turns
+
+
+_TURNS = _turns()
+
+
+def _partners(order: Ints) -> list[int]:
+    """For each corner the one that it is joined with, where `order` lists corners along their grid lines."""
+    partners = np.empty(len(order), dtype=np.int64)
+    partners[order[0::2]], partners[order[1::2]] = order[1::2], order[0::2]
+    return [int(one) for one in partners]

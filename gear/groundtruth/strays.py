@@ -1,0 +1,44 @@
+"""Stray pixels: small pieces of an object, seen through gaps far from the rest of it."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+Mask = npt.NDArray[np.bool_]
+
+STRAY_SHARE = 0.05
+"""A piece with at most this share of the visible pixels must not stretch the box."""
+
+MAIN_SHARE = 0.5
+"""The larger pieces must hold this share of the visible pixels; otherwise the object is scattered, and all of it is
+kept."""
+
+
+def without_strays(mask: Mask) -> tuple[Mask, int, int]:
+    """Leaves out pieces that would stretch the box of the visible pixels without being a part that one sees.
+
+    A piece is 8-connected. It is left out if it has at most `STRAY_SHARE` of the pixels and reaches beyond the box of
+    the larger pieces: a handlebar beyond the rider in front of it, three pixels of a person between the leaves of a
+    hedge.
+
+    Args:
+        mask: (h, w) visible pixels, tight.
+
+    Returns:
+        The mask of what is kept, tight, and the column and the row of the given mask where it begins.
+    """
+    count, pieces, stats, _ = cv2.connectedComponentsWithStats(mask.view(np.uint8), connectivity=8)
+    if count <= 2:
+        return mask, 0, 0
+    areas = stats[1:, cv2.CC_STAT_AREA]
+    left, top = stats[1:, cv2.CC_STAT_LEFT], stats[1:, cv2.CC_STAT_TOP]
+    right, bottom = left + stats[1:, cv2.CC_STAT_WIDTH], top + stats[1:, cv2.CC_STAT_HEIGHT]
+    is_main = areas > STRAY_SHARE * areas.sum()
+    if areas[is_main].sum() < MAIN_SHARE * areas.sum():
+        return mask, 0, 0
+    x0, y0, x1, y1 = left[is_main].min(), top[is_main].min(), right[is_main].max(), bottom[is_main].max()
+    is_kept = (left >= x0) & (top >= y0) & (right <= x1) & (bottom <= y1)
+    kept = np.concatenate([[False], is_kept])[pieces[y0:y1, x0:x1]]
+    return np.ascontiguousarray(kept), int(x0), int(y0)
