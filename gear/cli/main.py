@@ -11,10 +11,12 @@ from collections.abc import Sequence
 from types import FrameType
 
 from gear.cli.closed_output import discard_output
+from gear.cli.machine_limits import limit_reached
 from gear.cli.messages import one_line
 from gear.cli.parser import Parser
 from gear.cli.streams import prepare_streams
 from gear.values.errors import GearError, UnknownNameError
+from gear.values.regular_file import NotAFileError
 
 COMMANDS: dict[str, str] = {
     "collect": "collect a dataset split: pictures with exact ground truth",
@@ -88,7 +90,11 @@ def main(argv: Sequence[str]) -> int:
         if interrupt is not None:
             print("gear: stopped; run the same command again to go on", file=sys.stderr)
             return 143 if isinstance(interrupt, Terminated) else 130
-        if isinstance(error, OSError) and error.filename and error.errno in CIRCUMSTANCES:
+        if (
+            isinstance(error, OSError)
+            and error.filename
+            and (error.errno in CIRCUMSTANCES or isinstance(error, NotAFileError))
+        ):
             print(f"gear: {one_line(error.filename)}: {error.strerror}", file=sys.stderr)
             return 2
         if isinstance(error, OSError) and error.errno in FULL:  # a stream without a name, such as stdout in `> file`
@@ -99,6 +105,10 @@ def main(argv: Sequence[str]) -> int:
             print(
                 f"gear: {error.strerror}; make room there, or set TMPDIR to a folder on another disk", file=sys.stderr
             )
+            return 2
+        limit = limit_reached(error)
+        if limit is not None:
+            print(f"gear: {limit}", file=sys.stderr)
             return 2
         if not isinstance(error, GearError):
             raise

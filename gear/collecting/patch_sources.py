@@ -11,13 +11,16 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from gear.contracts.tasks import NO_PATCH, RANDOM_PATCH
 from gear.dataset.sidecar import load_json
+from gear.formats.picture_size import check_size
 from gear.formats.png_chunks import check_chunks
 from gear.networks.shipped import shipped_patches
 from gear.values.errors import DatasetError, PatchError
 from gear.values.frames import UInt8Image
+from gear.values.regular_file import read_regular
 from gear.values.rng import derive_rng
 
 RANDOM_SIZE_PX = (300, 150)
@@ -114,33 +117,40 @@ def read_patch(path: Path) -> UInt8Image:
         PatchError: it is not a picture that can be printed.
     """
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise PatchError(path, f"is larger than {MAX_BYTES >> 20} MiB")
-        data = path.read_bytes()
+        data = read_regular(path, most_bytes=MAX_BYTES + 1)
     except OSError as error:
         raise PatchError(path, f"cannot be read: {error.strerror}") from error
+    if len(data) > MAX_BYTES:
+        raise PatchError(path, f"is larger than {MAX_BYTES >> 20} MiB")
+    no_picture = "is not a picture that can be read; use an 8-bit RGB PNG"
     try:
+        check_size(data, least_px=SIDE_PX[0], most_px=SIDE_PX[1])
         check_chunks(data)
-        picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
-    except (cv2.error, ValueError):
-        picture = None
+        picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    except (cv2.error, ValueError) as error:
+        raise PatchError(path, str(error) if " px; sides of " in str(error) else no_picture) from error
     if picture is None:
-        raise PatchError(path, "is not a picture that can be read; use an 8-bit RGB PNG")
-    height, width = picture.shape[:2]
-    if not all(SIDE_PX[0] <= side <= SIDE_PX[1] for side in (height, width)):
-        raise PatchError(path, f"is {width} x {height} px; sides of {SIDE_PX[0]} to {SIDE_PX[1]} px are possible")
+        raise PatchError(path, no_picture)
     if picture.ndim == 3 and picture.shape[2] == 4:
         if not bool((picture[..., 3] == np.iinfo(picture.dtype).max).all()):
             raise PatchError(path, "is transparent in places; a printed patch is opaque")
         picture = picture[..., :3]
     if picture.dtype == np.uint16:
-        picture = (picture.astype(np.uint32) * 255 + 32767) // 65535
+        picture = _eight_bits(picture)
     elif picture.dtype != np.uint8:
         raise PatchError(path, f"has {picture.dtype} pixels; use an 8-bit RGB PNG")
     picture = np.asarray(picture, np.uint8)
     if picture.ndim == 2:
         picture = np.repeat(picture[..., None], 3, axis=2)
     return np.ascontiguousarray(picture[..., ::-1])
+
+
+def _eight_bits(picture: npt.NDArray[np.uint16]) -> UInt8Image:
+    """The nearest of 256 levels; row by row, so that a large picture does not need several times its memory."""
+    levels = np.empty(picture.shape, np.uint8)
+    for row, values in zip(levels, picture, strict=True):
+        row[:] = (values.astype(np.uint32) * 255 + 32767) // 65535
+    return levels
 
 
 def digest_of(images: Iterable[UInt8Image]) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 import yaml
 
 from gear.values.errors import ConfigError
+from gear.values.regular_file import read_regular
 
 MAX_BYTES = 4 << 20
 
@@ -73,9 +74,10 @@ def text_of(path: Path) -> str:
         ConfigError: the file is missing, too large or not UTF-8.
     """
     try:
-        if path.stat().st_size > MAX_BYTES:
+        data = read_regular(path, most_bytes=MAX_BYTES + 1)
+        if len(data) > MAX_BYTES:
             raise ConfigError(path, 0, 0, "", f"a config of more than {MAX_BYTES >> 20} MiB is no config")
-        return path.read_text(encoding="utf-8")
+        return data.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
     except OSError as error:
         raise ConfigError(path, 0, 0, "", f"cannot read it: {error.strerror}") from error
     except UnicodeDecodeError as error:

@@ -14,6 +14,7 @@ import fpng
 import numpy as np
 import numpy.typing as npt
 
+from gear.formats.picture_size import check_size
 from gear.formats.png_chunks import check_chunks
 from gear.formats.png_rows import decode_rows
 from gear.values.frames import FloatImage, UInt8Image
@@ -52,8 +53,9 @@ def decode_rgb(data: bytes) -> UInt8Image:
     """An 8-bit colour PNG to (H, W, 3) uint8 RGB.
 
     Raises:
-        ValueError: the bytes are no picture.
+        ValueError: the bytes are no picture, or one that is too large.
     """
+    check_size(data)
     plain = decode_rows(data)
     if plain is not None and plain.ndim == 3:
         return plain
@@ -67,6 +69,7 @@ def decode_plain(data: bytes) -> npt.NDArray[Any]:
     Raises:
         ValueError: the bytes are no picture.
     """
+    check_size(data)
     plain = decode_rows(data)
     return plain if plain is not None and plain.ndim == 2 else _decode(data, cv2.IMREAD_UNCHANGED)
 

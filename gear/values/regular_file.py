@@ -53,8 +53,10 @@ def read_regular(path: str | Path, *, most_bytes: int | None = None) -> bytes:
     checked = check_regular(path)  # before it is opened: opening some devices has effects
     descriptor = os.open(checked, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     with os.fdopen(descriptor, "rb") as stream:
-        _refuse_other_kinds(checked, os.fstat(descriptor).st_mode)  # another file may have taken its place
-        return stream.read() if most_bytes is None else stream.read(most_bytes)
+        status = os.fstat(descriptor)
+        _refuse_other_kinds(checked, status.st_mode)  # another file may have taken its place
+        # A file whose size the system calls 0, as those in /proc, is read to its end.
+        return stream.read() if most_bytes is None or status.st_size < most_bytes else stream.read(most_bytes)
 
 
 def _refuse_other_kinds(path: Path, mode: int) -> None:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import errno
 import json
+import os
 from pathlib import Path
 
 import cv2
@@ -9,9 +10,10 @@ import numpy as np
 import pytest
 
 from gear.collecting.job import resolve
-from gear.collecting.patch_sources import random_patch, resolve_patch
+from gear.collecting.patch_sources import random_patch, read_patch, resolve_patch
 from gear.config.collection import CollectionConfig
 from gear.values.errors import PatchError
+from tests.formats.test_picture_size import bomb
 
 
 def save(path: Path, picture: np.ndarray) -> Path:
@@ -172,3 +174,28 @@ def test_shipped_patches_are_found_by_name(
     assert found.label.startswith("semseg-billboard01-")
     with pytest.raises(PatchError, match="did you mean semseg-billboard01"):
         resolve_patch("semseg-bilboard01", surfaces=1, seed=0)
+
+
+def test_a_patch_that_unpacks_to_gigabytes_is_refused_by_its_header(tmp_path: Path) -> None:
+    path = tmp_path / "bomb.png"
+    path.write_bytes(bomb(14000))
+    with pytest.raises(PatchError, match="is 14000 x 14000 px; sides of 2 to 8192 px are possible"):
+        resolve_patch(str(path), surfaces=1, seed=0)
+
+
+def test_what_is_no_file_is_refused_at_once(tmp_path: Path, picture: np.ndarray) -> None:
+    os.mkfifo(tmp_path / "fifo.png")
+    for path, kind in (("/dev/zero", "character device"), (str(tmp_path / "fifo.png"), "FIFO")):
+        with pytest.raises(PatchError, match=f"cannot be read: is a {kind}; a file was asked for"):
+            resolve_patch(path, surfaces=1, seed=0)
+    folder = tmp_path / "patches"
+    folder.mkdir()
+    save(folder / "patch_0.png", picture)
+    os.mkfifo(folder / "attack.json")
+    assert resolve_patch(str(folder), surfaces=1, seed=0).made_for == ()
+
+
+def test_sixteen_bits_become_the_nearest_of_eight(tmp_path: Path) -> None:
+    deep = np.random.default_rng(3).integers(0, 65536, (7, 9, 3), dtype=np.uint16)
+    found = read_patch(save(tmp_path / "deep.png", deep))
+    assert np.array_equal(found, np.rint(deep[..., ::-1] / 257).astype(np.uint8))

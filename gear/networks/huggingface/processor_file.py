@@ -11,6 +11,7 @@ from typing import Any, TypeGuard
 from gear.networks.huggingface.families import FAMILIES, IN_PATCHES, NEEDED_PX, Family, family_of
 from gear.networks.huggingface.processor import Channels, Processor
 from gear.values.errors import GearError
+from gear.values.regular_file import read_regular
 
 FILE = "preprocessor_config.json"
 
@@ -56,7 +57,7 @@ def read_mapping(path: Path) -> dict[str, Any]:
         GearError: it does not.
     """
     try:
-        facts = json.loads(path.read_text(encoding="utf-8"))
+        facts = json.loads(read_regular(path).decode("utf-8"))
     except json.JSONDecodeError as error:
         raise GearError(f"{path}:{error.lineno}: not JSON: {error.msg}; fetch the folder again") from error
     except (OSError, ValueError, RecursionError) as error:

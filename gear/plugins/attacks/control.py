@@ -16,6 +16,7 @@ from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec
 from gear.values.errors import FieldError, GearError
+from gear.values.regular_file import check_regular
 
 Floats = npt.NDArray[np.float64]
 
@@ -126,7 +127,7 @@ def read_exact(folder: Path) -> list[Floats]:
     if not path.is_file():
         raise GearError(f"{path}: there is no such file; name a folder that gear attack wrote")
     try:
-        arrays = load_file(path)
+        arrays = load_file(check_regular(path))
     except SafetensorError as error:
         raise GearError(f"{path}: not a safetensors file ({error})") from error
     if not arrays or any(array.ndim != 3 or array.shape[2] != 3 for array in arrays.values()):

@@ -20,6 +20,7 @@ from gear.groundtruth.surfaces import observe_surfaces
 from gear.values.errors import DatasetError, FieldError
 from gear.values.frames import Frame, UInt8Image
 from gear.values.ground_truth import BoxPx, SurfaceTruth
+from gear.values.regular_file import read_regular
 from gear.values.rig import CameraMount
 from gear.values.scene import SceneRecord, Vec3
 from gear.values.serial import Json
@@ -130,7 +131,7 @@ def _check_size(path: Path, picture: npt.NDArray[Any], record: SceneRecord, view
 def _read(root: Path, relative: str, decode: Callable[[bytes], npt.NDArray[Any]]) -> npt.NDArray[Any]:
     path = inside(root, relative)
     try:
-        return decode(path.read_bytes())
+        return decode(read_regular(path))
     except FileNotFoundError as error:
         raise DatasetError(path, f"is gone; {REPAIR}") from error
     except OSError as error:

@@ -20,6 +20,7 @@ from gear.dataset.files import write_whole
 from gear.plugins.text import one_line
 from gear.values.errors import DatasetError, ReplaceableError
 from gear.values.progress import Progress
+from gear.values.regular_file import check_regular
 from gear.values.serial import from_json
 
 CHECKPOINT = "checkpoint.safetensors"
@@ -88,7 +89,7 @@ class Recorder:
         if not path.exists():
             return None
         try:
-            with safe_open(str(path), framework="numpy") as opened:
+            with safe_open(str(check_regular(path)), framework="numpy") as opened:
                 notes = json.loads((opened.metadata() or {})["notes"])
                 arrays = {name: opened.get_tensor(name) for name in opened.keys()}  # noqa: SIM118
             for name, kind in NOTED.items():

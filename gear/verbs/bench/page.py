@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 
 from gear.contracts.tasks import NO_PATCH
+from gear.dataset.files import read_bytes
 from gear.formats.png import decode_rgb
 from gear.plugins.datasets import open_dataset
 from gear.values.frames import UInt8Image
@@ -109,7 +110,7 @@ def _pictures(plan: Plan, contest: Contest) -> Iterable[str]:
             name = plan.name(model, defense)
             figures.append(_shown(plan, contest, scene, weather, name, number, f"with the patch against {name}"))
             figures += [
-                _figure(decode_rgb(path.read_bytes()), f"{path.stem} against {name}", PATCH_PX)
+                _figure(decode_rgb(read_bytes(path)), f"{path.stem} against {name}", PATCH_PX)
                 for path in sorted(plan.patch(contest, scene, name).glob("patch_*.png"))
             ]
         yield f'<h3>{_safe(f"{scene.label}, {weather.label}")}</h3><div class="row">{"".join(figures)}</div>'

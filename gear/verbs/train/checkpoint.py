@@ -18,6 +18,7 @@ from torch import Tensor, nn
 from gear.dataset.files import write_whole
 from gear.plugins.text import one_line
 from gear.values.errors import DatasetError, FieldError
+from gear.values.regular_file import check_regular
 from gear.values.serial import Json, from_json
 from gear.verbs.train.feed import Position
 from gear.verbs.train.optimise import RunningMean
@@ -118,7 +119,7 @@ def load(
     if not path.exists():
         return None
     try:
-        with safe_open(str(path), framework="pt") as opened:
+        with safe_open(str(check_regular(path)), framework="pt") as opened:
             texts = opened.metadata() or {}
             tensors = {key: opened.get_tensor(key) for key in opened.keys()}  # noqa: SIM118
         there, progress = json.loads(texts["plan"]), json.loads(texts["progress"])
@@ -141,7 +142,7 @@ def begun_config(root: Path) -> Json:
     if not path.exists():
         return None
     try:
-        with safe_open(str(path), framework="pt") as opened:
+        with safe_open(str(check_regular(path)), framework="pt") as opened:
             return json.loads((opened.metadata() or {})["plan"])["config"]
     except (*BROKEN, TypeError):
         return None

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from gear.values.errors import TownError
+from gear.values.regular_file import check_regular
 from gear.values.resources import data_dir
 from gear.world.assets.library import AssetLibrary, read_xml
 
@@ -62,8 +63,21 @@ def _referred(path: Path) -> Iterator[tuple[str, Path]]:
         for key, name in element.items():
             for base in _bases(path, file) if key.startswith("file") else ():
                 target = base / ("" if element.tag == "include" else folder) / name
-                if target.is_file():
+                if target.exists() and not target.is_dir():
+                    _check_asset(path, target)
                     yield name if base == path.parent else f"{file.name}/{name}", target
+
+
+def _check_asset(path: Path, target: Path) -> None:
+    """Refuses what MuJoCo would wait for when it reads it.
+
+    Raises:
+        TownError: a file that an MJCF file refers to is a device, a FIFO or a socket.
+    """
+    try:
+        check_regular(target)
+    except OSError as error:
+        raise TownError(path, f"refers to {target}, which {error.strerror}") from error
 
 
 def _bases(path: Path, file: Path) -> list[Path]:

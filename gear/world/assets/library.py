@@ -13,6 +13,7 @@ from typing import Literal, cast
 
 from gear.values.errors import TownError, UnknownNameError
 from gear.values.labels import LABEL_BY_NAME, VEHICLES, Label, VehicleKind
+from gear.values.regular_file import check_regular
 from gear.values.resources import data_dir
 from gear.values.scene import Vec3
 
@@ -38,7 +39,7 @@ def read_xml(path: Path) -> ET.Element:
         TownError: it is no XML, or cannot be read.
     """
     try:
-        return ET.parse(path).getroot()
+        return ET.parse(check_regular(path)).getroot()
     except (ET.ParseError, OSError, LookupError, ValueError) as error:  # the latter two: an encoding that nobody knows
         raise TownError(path, f"cannot be read as MJCF: {error}") from error
 

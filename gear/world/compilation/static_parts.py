@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from gear.values.errors import TownError
+from gear.values.regular_file import check_regular
 from gear.world.assets.library import read_numbers
 
 UNNAMED = "unnamed_"
@@ -139,7 +140,7 @@ def _meshes_in_place(root: ET.Element, path: Path) -> dict[str, MeshPath]:
         file = (base / mesh.get("file", "")).absolute()
         try:
             # MuJoCo is the one to read it: whether that is possible, and which file it is, shows here.
-            with file.open("rb"):
+            with check_regular(file).open("rb"):
                 mesh_paths[str(file)] = MeshPath(os.fsencode(file))
         except OSError as error:
             raise TownError(path, f"cannot be read as MJCF: {error}") from error

@@ -1,0 +1,44 @@
+"""What to say when the machine, not the user's input, ends a command: memory, open files, processes."""
+
+from __future__ import annotations
+
+import errno
+from collections.abc import Iterator
+
+OPEN_FILES = "too many open files; raise the limit (`ulimit -n 4096`) or use fewer --workers, and run the command again"
+SYSTEM_FILES = "all programs of this machine together have too many files open; close some, and run the command again"
+MEMORY = "the memory is used up; use fewer --workers or smaller pictures or batches, and run the command again"
+THREADS = "no further thread or process can be started; raise the limit (`ulimit -u`) or use fewer --workers"
+
+LINES = {errno.EMFILE: OPEN_FILES, errno.ENFILE: SYSTEM_FILES, errno.ENOMEM: MEMORY}
+
+SAID = {
+    "Too many open files in system": SYSTEM_FILES,
+    "Too many open files": OPEN_FILES,
+    "Cannot allocate memory": MEMORY,
+    "can't allocate memory": MEMORY,
+    "Insufficient memory": MEMORY,
+    "out of memory": MEMORY,
+    "can't start new thread": THREADS,
+}
+"""By what libraries in C and C++ say, in errors of their own kinds."""
+
+
+def limit_reached(error: BaseException) -> str | None:
+    """One line on the limit that an error, or one that it comes from, reports; None where it reports none."""
+    for one in _chain(error):
+        if isinstance(one, OSError) and one.errno in LINES:
+            return LINES[one.errno]
+        if isinstance(one, MemoryError):
+            return MEMORY
+        if isinstance(one, (ImportError, RuntimeError)) or type(one).__module__.partition(".")[0] == "cv2":
+            for words, line in SAID.items():
+                if words.casefold() in str(one).casefold():
+                    return line
+    return None
+
+
+def _chain(error: BaseException | None) -> Iterator[BaseException]:
+    while error is not None:
+        yield error
+        error = error.__cause__ or error.__context__
