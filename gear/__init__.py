@@ -118,6 +118,8 @@ _HOME = {
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'gear' has no attribute {name!r}")
+    if name != "GearError":
+        importlib.import_module("gear.values.mujoco_gl").check_mujoco_gl()
     return getattr(importlib.import_module(_HOME[name]), name)
 
 

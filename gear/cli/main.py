@@ -16,6 +16,7 @@ from gear.cli.messages import one_line
 from gear.cli.parser import Parser
 from gear.cli.streams import prepare_streams
 from gear.values.errors import GearError, UnknownNameError
+from gear.values.mujoco_gl import check_mujoco_gl
 from gear.values.regular_file import NotAFileError
 
 COMMANDS: dict[str, str] = {
@@ -159,6 +160,7 @@ def _run(argv: Sequence[str]) -> int:
     if args.command is None:
         parser.print_help()
         return 0
+    check_mujoco_gl()
     return int(args.run(args))
 
 

@@ -1,4 +1,7 @@
-"""An OpenGL context without a window: EGL where it works, else OSMesa."""
+"""An OpenGL context without a window: through EGL where it works, else through OSMesa.
+
+Where none starts, errors name the cause: a setting of the environment, or the package that is missing.
+"""
 
 from __future__ import annotations
 
@@ -8,43 +11,57 @@ from typing import Any
 
 from gear.values.errors import BackendError
 
-_REMEDY = "apt-get install libegl1 libopengl0 libgl1-mesa-dri (or libosmesa6)"
+_NO_LIBRARY = "apt-get install libegl1 libopengl0 libegl-mesa0 libgl1-mesa-dri"
+_NO_VENDOR = "apt-get install libegl-mesa0 libgl1-mesa-dri (or, for a GPU, its vendor's driver, such as libnvidia-gl)"
+_NO_DRIVER = "apt-get install libgl1-mesa-dri (or, for a GPU, its vendor's driver, such as libnvidia-gl)"
+_OSMESA = "apt-get install libosmesa6, or use EGL"
+_OSMESA_LIBRARIES = ("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so")
 _PLATFORM_DEVICE = 0x313F
 _MAX_DEVICES = 32
+_DEVICE = "MUJOCO_EGL_DEVICE_ID"
+_SETTINGS = ("MUJOCO_GL", "PYOPENGL_PLATFORM")
+
+
+def backend_setting() -> str | None:
+    """The environment variable that chooses between EGL and OSMesa in this process; None where none does.
+
+    PyOpenGL binds a process to one platform for good, and writes `PYOPENGL_PLATFORM` when it does.
+    """
+    for name in _SETTINGS:
+        if os.environ.get(name, "").strip().lower() in ("egl", "osmesa"):
+            return name
+    return None
 
 
 def choose_backend(renderer: str) -> str:
-    """`egl` or `osmesa`: what `MUJOCO_GL` asks for, what this process uses already, or what is there.
+    """`egl` or `osmesa`: what the environment asks for, else what works on this machine, EGL first.
 
     Args:
-        renderer: who asks, for the error.
+        renderer: name of the renderer that needs a context, for the error.
 
     Raises:
-        BackendError: there is neither.
+        BackendError: neither works; says what to install.
     """
-    wish = os.environ.get("MUJOCO_GL", "").strip().lower()
-    if wish in ("egl", "osmesa"):
-        return wish
-    # PyOpenGL binds a process to one platform for good.
-    bound = os.environ.get("PYOPENGL_PLATFORM", "").strip().lower()
-    if bound in ("egl", "osmesa"):
-        return bound
-    if _egl_works():
+    setting = backend_setting()
+    if setting is not None:
+        return os.environ[setting].strip().lower()
+    problem = egl_problem()
+    if problem is None:
         return "egl"
-    if _loads("libOSMesa.so.8") or _loads("libOSMesa.so.6") or _loads("libOSMesa.so"):
+    if any(map(_loads, _OSMESA_LIBRARIES)):
         return "osmesa"
-    raise BackendError(renderer, "neither EGL nor OSMesa is installed", _REMEDY)
+    raise BackendError(renderer, f"{problem[0]}, and OSMesa is not installed", problem[1])
 
 
 def open_context(backend: str, renderer: str) -> Any:
-    """A current GL context of the backend: MuJoCo's own `GLContext`.
+    """A current OpenGL context: MuJoCo's own `GLContext`.
 
     Args:
         backend: `egl` or `osmesa`.
-        renderer: who asks, for the error.
+        renderer: name of the renderer that needs it, for the error.
 
     Raises:
-        BackendError: the driver is missing.
+        BackendError: the driver is missing, or `MUJOCO_EGL_DEVICE_ID` names no device.
     """
     try:
         if backend == "egl":
@@ -55,20 +72,62 @@ def open_context(backend: str, renderer: str) -> Any:
         context.make_current()
     # PyOpenGL reports a missing library in many ways, AttributeError among them.
     except Exception as error:
-        problem = f"{backend} does not start ({str(error).splitlines()[0] if str(error) else type(error).__name__})"
-        raise BackendError(renderer, problem, _REMEDY) from error
+        problem, remedy = _cause(backend, error)
+        raise BackendError(renderer, problem, remedy) from error
     return context
 
 
+def _cause(backend: str, error: Exception) -> tuple[str, str]:
+    """Why a context did not start, and what to do."""
+    text = str(error).splitlines()[0] if str(error) else type(error).__name__
+    if backend != "egl":
+        return f"OSMesa does not start ({text})", _OSMESA
+    found = egl_problem()
+    if found is not None:
+        return found
+    number = os.environ.get(_DEVICE)
+    if number is not None and (_DEVICE in str(error) or not number.strip().lstrip("+-").isdigit()):
+        last = len(_egl_devices() or ()) - 1
+        return (
+            f"{_DEVICE} is {number[:40]!r}, and EGL has the devices 0 to {last}",
+            "set it to one of them, or unset it",
+        )
+    return f"EGL does not start ({text})", _NO_DRIVER
+
+
+def egl_problem() -> tuple[str, str] | None:
+    """What is missing for EGL without a display, and what to install; None where a device initialises."""
+    if not _loads("libEGL.so.1"):
+        return "the EGL library libEGL.so.1 is not installed", _NO_LIBRARY
+    devices = _egl_devices()
+    if not devices:
+        return "EGL finds no driver", _remedy(_NO_VENDOR, "__EGL_VENDOR_LIBRARY_DIRS", "__EGL_VENDOR_LIBRARY_FILENAMES")
+    if not any(map(_initialises, devices)):
+        return "EGL finds a device, but no driver for it starts", _remedy(_NO_DRIVER, "LIBGL_DRIVERS_PATH")
+    return None
+
+
+def _remedy(install: str, *settings: str) -> str:
+    """What to install; first, which settings of the environment to unset where they hide what is installed."""
+    found = [name for name in settings if os.environ.get(name)]
+    return f"unset {' and '.join(found)}, or {install}" if found else install
+
+
 def driver_and_device() -> tuple[str, str]:
-    """What the current context's driver and device call themselves."""
+    """Names that the current context's driver (with its version) and device report."""
     from OpenGL import GL  # type: ignore[import-untyped]
 
     version, device = GL.glGetString(GL.GL_VERSION), GL.glGetString(GL.GL_RENDERER)
     return version.decode("utf-8", "replace"), device.decode("utf-8", "replace")
 
 
+def is_software(device: str) -> bool:
+    """Whether a device's name is that of one of Mesa's CPU drivers."""
+    return any(word in device.casefold() for word in ("llvmpipe", "softpipe", "swrast", "software"))
+
+
 def _loads(library: str) -> bool:
+    """Whether a shared library is installed."""
     try:
         ctypes.CDLL(library)
     except OSError:
@@ -76,30 +135,28 @@ def _loads(library: str) -> bool:
     return True
 
 
-def _egl_works() -> bool:
-    """Whether EGL finds a device that initialises without a display."""
-    try:
-        library = ctypes.CDLL("libEGL.so.1")
-    except OSError:
-        return False
+def _egl_devices() -> list[int]:
+    """Handles of EGL's devices; empty where EGL cannot list any."""
+    library = ctypes.CDLL("libEGL.so.1")
     library.eglGetProcAddress.restype = ctypes.c_void_p
     query = library.eglGetProcAddress(b"eglQueryDevicesEXT")
-    get_display = library.eglGetProcAddress(b"eglGetPlatformDisplayEXT")
-    if not query or not get_display:
-        return False
+    if not query:
+        return []
     devices = (ctypes.c_void_p * _MAX_DEVICES)()
     count = ctypes.c_int32()
     query_devices = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_int32, ctypes.c_void_p, ctypes.c_void_p)(query)
     query_devices(_MAX_DEVICES, devices, ctypes.byref(count))
+    return [handle for handle in devices[: count.value] if handle]
+
+
+def _initialises(device: int) -> bool:
+    """Whether a device's driver starts without a display."""
+    library = ctypes.CDLL("libEGL.so.1")
+    library.eglGetProcAddress.restype = ctypes.c_void_p
+    get_display = library.eglGetProcAddress(b"eglGetPlatformDisplayEXT")
+    if not get_display:
+        return False
     platform_display = ctypes.CFUNCTYPE(ctypes.c_void_p, ctypes.c_uint, ctypes.c_void_p, ctypes.c_void_p)(get_display)
     library.eglInitialize.argtypes = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
-    for device in devices[: count.value]:
-        display = platform_display(_PLATFORM_DEVICE, device, None)
-        if display and library.eglInitialize(display, None, None):
-            return True
-    return False
-
-
-def is_software(device: str) -> bool:
-    """Mesa's CPU drivers by the names they give themselves."""
-    return any(word in device.casefold() for word in ("llvmpipe", "softpipe", "swrast", "software"))
+    display = platform_display(_PLATFORM_DEVICE, device, None)
+    return bool(display and library.eglInitialize(display, None, None))

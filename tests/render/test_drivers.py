@@ -10,9 +10,9 @@ import sys
 
 import pytest
 
-from gear.render import RENDERERS, describe, glcontext, open_renderer, probe
+from gear.render import RENDERERS, describe, open_renderer, probe
 from gear.render.native_output import native_output
-from gear.values.errors import BackendError, UnknownNameError
+from gear.values.errors import UnknownNameError
 
 
 def test_a_machine_without_vulkan_is_told_what_to_install() -> None:
@@ -23,33 +23,6 @@ def test_a_machine_without_vulkan_is_told_what_to_install() -> None:
     assert done.returncode == 1, "Filament must not end the process by itself"
     assert "BackendError: renderer filament:" in last
     assert "apt-get install mesa-vulkan-drivers libvulkan1" in last and "--renderer classic" in last
-
-
-def test_a_machine_without_opengl_is_told_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("MUJOCO_GL", raising=False)
-    monkeypatch.delenv("PYOPENGL_PLATFORM", raising=False)
-    monkeypatch.setattr(glcontext, "_egl_works", lambda: False)
-    monkeypatch.setattr(glcontext, "_loads", lambda library: True)
-    assert glcontext.choose_backend("classic") == "osmesa"
-    monkeypatch.setattr(glcontext, "_loads", lambda library: False)
-    with pytest.raises(BackendError, match="apt-get install libegl1 libopengl0 libgl1-mesa-dri"):
-        glcontext.choose_backend("classic")
-
-
-def test_the_wish_of_the_environment_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    for wish in ("egl", "osmesa"):
-        monkeypatch.setenv("MUJOCO_GL", wish)
-        assert glcontext.choose_backend("classic") == wish
-
-
-def test_the_raster_renderer_says_that_it_needs_egl() -> None:
-    code = "from gear.render import probe; probe('raster')"
-    environment = {**os.environ, "MUJOCO_GL": "osmesa"}
-    environment.pop("PYOPENGL_PLATFORM", None)
-    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
-    last = done.stderr.strip().splitlines()[-1]
-    assert "BackendError: renderer raster: it needs EGL, and this process uses osmesa" in last
-    assert "--renderer filament" in last
 
 
 def test_osmesa_and_egl_render_the_same() -> None:

@@ -7,10 +7,11 @@ what stands still once, and adds light up in 16 bits instead of eight.
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING
 
 from gear.contracts.rendering import Quality
-from gear.render.glcontext import choose_backend, open_context
+from gear.render.glcontext import backend_setting, choose_backend, egl_problem, open_context
 from gear.values.errors import BackendError
 
 if TYPE_CHECKING:
@@ -20,19 +21,28 @@ if TYPE_CHECKING:
 
 __all__ = ["open_raster"]
 
-_REMEDY = "unset MUJOCO_GL and PYOPENGL_PLATFORM, or use --renderer filament or classic"
+_OTHERS = "use --renderer filament or classic"
 
 
 def open_raster(model: mujoco.MjModel, *, quality: Quality = "film") -> RasterRenderer:
-    """The renderer, in a context of its own.
+    """The renderer for one model, in its own OpenGL context.
+
+    Args:
+        model: the compiled world; it is not changed.
+        quality: see `gear.contracts.rendering.Quality`.
 
     Raises:
-        BackendError: there is no driver of OpenGL 4.5 for EGL.
+        BackendError: there is no driver of OpenGL 4.5 for EGL; says which setting or package is the reason.
     """
     backend = choose_backend("raster")
     if backend != "egl":
         # OSMesa's library has no symbols for what is newer than OpenGL 1.3, and PyOpenGL looks for nothing else.
-        raise BackendError("raster", f"it needs EGL, and this process uses {backend}", _REMEDY)
+        setting = backend_setting()
+        if setting is not None:
+            problem = f"it needs EGL, and {setting} is {os.environ[setting]}"
+            raise BackendError("raster", problem, f"unset {setting}, or {_OTHERS}")
+        problem, remedy = egl_problem() or ("it needs EGL, and this process uses OSMesa", "start a new process")
+        raise BackendError("raster", problem, f"{remedy}, or {_OTHERS}")
     context = open_context(backend, "raster")
     try:
         # PyOpenGL takes whatever platform is chosen when it is imported first: the context's.
