@@ -15,7 +15,7 @@ from gear.camera.pipeline import CameraPipeline
 from gear.camera.reflection import Reflection
 from gear.camera.response import face_light
 from gear.contracts.rendering import RawView, Renderer
-from gear.formats.probes import Probe, crop_probe
+from gear.dataset.probe_files import Probe, crop_probe
 from gear.values.frames import LINEAR_FULL_SCALE, GeomTable, UInt16Image
 from gear.values.scene import SceneRecord
 from gear.world.world import PlacedStage, World

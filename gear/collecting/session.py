@@ -14,7 +14,7 @@ from gear.collecting.probes import ProbeShot, compute_probes, shoot_probes
 from gear.contracts.rendering import RawView, Renderer
 from gear.contracts.tasks import Encoded, Sample, Task
 from gear.dataset.output_checks import check_encoded
-from gear.formats.probes import AuxiliaryFiles, probe_files
+from gear.dataset.probe_files import AuxiliaryFiles, probe_files
 from gear.plugins.build import blamed, build, find
 from gear.plugins.catalogue import PluginEntry
 from gear.render.registry import open_renderer

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from gear.compositor.pasting import CACHE_BYTES, Pasting, Prepared
-from gear.formats.probes import demand_probes
+from gear.dataset.probe_files import demand_probes
 from gear.values.errors import UnknownNameError
 
 if TYPE_CHECKING:

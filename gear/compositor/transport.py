@@ -2,7 +2,7 @@
 
     picture = response(B + sum over i of (M_i p_i) (W_i - B))
 
-B and W_i are the probes (`gear.formats.probes`); p_i is patch i as light, with its coarser levels; M_i is a sparse
+B and W_i are the probes (`gear.dataset.probe_files`); p_i is patch i as light, with its coarser levels; M_i is a sparse
 matrix that samples it as the renderer samples its texture. Noise, if the dataset has any, is the sample's own.
 """
 
@@ -26,8 +26,8 @@ from gear.compositor.sampling import Scan, take_samples, unit_from_image
 from gear.compositor.sparse import SparseMatrix
 from gear.compositor.warp import warp_matrix
 from gear.contracts.rendering import Quality
+from gear.dataset.probe_files import Probe, probes_of
 from gear.formats import rle
-from gear.formats.probes import Probe, probes_of
 from gear.values.frames import LINEAR_FULL_SCALE
 
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import gear
+from gear.dataset.probe_files import probes_of
 from gear.formats import rle
-from gear.formats.probes import probes_of
 from gear.values.errors import DatasetError
 from gear.verbs.collect.run import CollectReport
 from tests.dataset.splits import tree

@@ -13,7 +13,7 @@ import gear
 from gear.compositor.homography import HomographyCompositor
 from gear.compositor.opening import open_compositor
 from gear.compositor.transport import TransportCompositor
-from gear.formats.probes import probes_of
+from gear.dataset.probe_files import probes_of
 from gear.values.errors import DatasetError, UnknownNameError
 from gear.values.frames import LINEAR_FULL_SCALE
 

@@ -73,7 +73,7 @@ def collect(
         config: name or path of a collection config; the other arguments go before what it says.
         town, scene, split, samples, seed, weather, patch, renderer, quality: as in the config.
         out: root of the dataset.
-        probes: also keep what compositors need; see `gear.formats.probes`.
+        probes: also keep what compositors need; see `gear.dataset.probe_files`.
         settings: further `KEY=VALUE` texts for any key of the config.
         workers: processes; they change nothing but time.
         apart: whether a single worker is a process of its own, too, which gives all its memory back.
