@@ -23,7 +23,7 @@ from authoring.materials.registry import Material
 from authoring.mesh import write_obj
 from gear.values.rng import derive_rng
 
-DOCS = Path(__file__).parents[2] / "docs" / "mjcf-conventions.md"
+DOCS = Path(__file__).parents[2] / "docs" / "reference" / "mjcf.md"
 Maker = Callable[[np.random.Generator], list[kit.Part]]
 
 SMALL_THINGS: dict[str, Maker] = {

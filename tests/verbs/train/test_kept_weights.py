@@ -17,7 +17,7 @@ from gear.dataset.files import sha256
 from gear.values.errors import DatasetError
 from gear.verbs.train import loop
 from gear.verbs.train.checkpoint import FILE as CHECKPOINT
-from gear.verbs.train.checkpoint import Progress
+from gear.verbs.train.checkpoint import TrainingState
 from gear.verbs.train.run import TrainReport, train
 
 Street = Callable[..., Path]
@@ -113,7 +113,7 @@ def test_that_the_best_weights_are_gone_is_told_before_the_training_goes_on(
 
     class StoppedError(Exception): ...
 
-    def stop(progress: Progress, share: float, metrics: Any) -> None:
+    def stop(progress: TrainingState, share: float, metrics: Any) -> None:
         told.append(progress.step)
         if len(progress.validations) == 3:
             raise StoppedError

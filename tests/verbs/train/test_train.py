@@ -30,7 +30,7 @@ from gear.plugins.build import find
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_segmenter
 from gear.values.errors import DatasetError, GearError, PluginError, UnknownNameError
 from gear.verbs.train import loop
-from gear.verbs.train.checkpoint import Progress
+from gear.verbs.train.checkpoint import TrainingState
 from gear.verbs.train.config import read_config
 from gear.verbs.train.run import TrainReport, train, trainable
 from gear.verbs.train.starting import with_scale
@@ -83,7 +83,7 @@ def test_stopped_and_taken_up_again_is_as_if_never_stopped(
     settings = ["augmentation.colours.noise=1", "gradient_norm=1", "crop_px=[32, 64]", "scales=[0.8, 1.2]"]
     whole = quick(street, tmp_path / "whole", settings=settings)
 
-    def stop(progress: Progress, share: float, metrics: Any) -> None:
+    def stop(progress: TrainingState, share: float, metrics: Any) -> None:
         if progress.step == stop_at:
             raise StopError
 
@@ -387,7 +387,7 @@ def test_what_was_begun_goes_on_when_the_file_that_it_began_with_is_gone(
     write(first, state, {"options": json.dumps({"input_scale": 0.75})})
     whole = quick(street, tmp_path / "whole", init=f"{before}{first}")
 
-    def stop(progress: Progress, share: float, metrics: Any) -> None:
+    def stop(progress: TrainingState, share: float, metrics: Any) -> None:
         raise StopError
 
     with pytest.raises(StopError):
