@@ -6,7 +6,7 @@ predictions of it, and is quicker than the forward pass where gear has a copy of
     python benchmarks/evaluate.py --data DIR --model ddrnet23_slim --set weights=none --samples 16
 
 Prints seconds a sample of each, measured in alternation in one run, and their ratios (target: at most 1.1 of
-bare). Building the model and the first sample are left out of both; the bootstrap is timed by itself.
+bare). Building the model and the first sample are left out of both; intervals are timed apart.
 """
 
 from __future__ import annotations
@@ -25,10 +25,11 @@ from gear.contracts.tasks import Sidecar
 from gear.dataset.reading import Dataset
 from gear.measuring.dataset_run import evaluate_row
 from gear.measuring.guarded_model import Player
+from gear.measuring.intervals import leave_one_out
 from gear.measuring.plugin_selection import chosen_defense, chosen_model
 from gear.measuring.reports import TASK
 from gear.measuring.scoring import Scorer
-from gear.measuring.statistics import draw, gather
+from gear.measuring.statistics import gather
 from gear.networks.network import as_batch
 
 
@@ -87,8 +88,8 @@ def main() -> None:
             spent["evaluate"].append((time.perf_counter() - begun) / len(pictures))
         print(", ".join(f"{name} {seconds[-1]:.3f} s" for name, seconds in spent.items()), flush=True)
     begun = time.perf_counter()
-    gather(scorer.reports[TASK].make, [note.parts[TASK] for note in notes], draw(len(notes), 1000, 0))
-    print(f"1000 resamples: {time.perf_counter() - begun:.2f} s")
+    gather(scorer.reports[TASK].make, [note.parts[TASK] for note in notes], leave_one_out(range(len(notes))))
+    print(f"intervals of {len(notes)} samples: {time.perf_counter() - begun:.2f} s")
     for name in ("bare", "predict"):
         ratios = sorted(whole / one for whole, one in zip(spent["evaluate"], spent[name], strict=True))
         print(f"evaluate / {name}: median {ratios[len(ratios) // 2]:.3f} of {args.rounds}")

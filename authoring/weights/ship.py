@@ -162,7 +162,7 @@ def head(target: Path, metadata: Mapping[str, str], measured: Measured) -> list[
         "## Measured",
         "",
         f"On {measured.samples} pictures at the task's own size, of two scenes and one weather that nothing was",
-        "trained on (`python -m authoring.weights held-out`), 95 % intervals by bootstrap over pictures:",
+        "trained on (`python -m authoring.weights held-out`), 95 % intervals by the jackknife over pictures:",
         "",
         "| metric | value | from | to |",
         "|---|---|---|---|",

@@ -19,7 +19,7 @@ Masks = Mapping[str, npt.NDArray[np.bool_]]
 """(H, W) by camera name."""
 
 Draws = npt.NDArray[np.int64]
-"""(R, N): R times N numbers of gathered samples, drawn with repetition."""
+"""(R, N) numbers of gathered samples: each row chooses N of them, possibly some of them several times."""
 
 Spread = Mapping[str, npt.NDArray[np.float64]]
 """(R,) values by metric."""
@@ -68,12 +68,13 @@ class Reports(Protocol):
 
 @runtime_checkable
 class Resampled(Protocol):
-    """An evaluator that has a quicker way to its metrics over resampled pictures than merging one of each."""
+    """An evaluator that has a quicker way to its metrics over chosen samples than merging one evaluator each."""
 
     def resampled(self, draws: Draws) -> Spread:
-        """Metrics as if the drawn samples had been gathered, in order of `update` from 0; NaN where nothing counts.
+        """Metrics as if the chosen samples had been gathered, numbered in order of `update` from 0; NaN where nothing
+        counts.
 
-        May leave metrics out.
+        May leave metrics out: these get no interval.
         """
         ...
 
@@ -97,4 +98,13 @@ class Limited(Protocol):
 
     def ceilings(self) -> Mapping[str, float]:
         """What perfect predictions of everything gathered would come to, for the metrics where that is less than 1."""
+        ...
+
+
+@runtime_checkable
+class Ranged(Protocol):
+    """An evaluator that says between which values its metrics lie, so that intervals end there."""
+
+    def range_of(self, metric: str) -> tuple[float, float]:
+        """Least and largest value that a metric can have; infinite where there is no such end."""
         ...

@@ -1,90 +1,79 @@
-"""How sure a metric is: bootstrap over samples (Efron 1979), 95 % by percentiles; sign flips for pairs of samples.
+"""How sure a metric of a dataset is: intervals by the jackknife, and a permutation test for pairs of samples.
 
-Samples that show the same street are a cluster: they are drawn, and their differences flipped, together.
+Samples that show the same street are a cluster: they are left out, and the signs of their differences are flipped,
+together.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from gear.contracts.evaluation import Additive, Draws, Limited, Resampled
+from gear.contracts.evaluation import Additive, Draws, Limited, Ranged, Resampled
 from gear.contracts.tasks import Evaluator
+from gear.measuring.intervals import (
+    LEFT_OUT,
+    REAL,
+    Interval,
+    Values,
+    jackknife_interval,
+    leave_one_out,
+    numbered,
+    separated_interval,
+)
 from gear.values.rng import derive_rng
 
-PERCENTILES = (2.5, 97.5)
-
 FLIPS = 9_999
-"""Ways of flipping signs that are drawn where there are more: the smallest p is then 0.0001."""
+"""Sign patterns that are drawn where there are more than can all be tried: the smallest p is 0.0001."""
 
 FLIPS_AT_ONCE = 1_000
-"""Bounds the memory that a test takes."""
+"""Sign patterns that are tried together, which bounds the memory of a test."""
 
 ROUNDING = 1e-9
-"""Sums that differ by less than this share of what they are made of are equal."""
-
-FILLED = -1
-"""Where a draw of clusters comes to fewer samples than another one, in place of a sample's number."""
+"""Sums that differ by less than this share of their terms' sizes are equal."""
 
 AnyEvaluator = Evaluator[Any, Any]
-Values = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Metrics:
-    """The metrics of one evaluator over one dataset.
+    """The metrics of one report over one dataset.
 
     Attributes:
-        overall: over all samples.
-        spread: (R,) over resampled ones, for the metrics that have any.
-        ceilings: what perfect predictions would come to, where that is less than 1.
+        overall: over all samples, by name.
+        replicates: (C,) without each cluster in turn, by name, for the metrics that have any.
+        ceilings: what perfect predictions of the same samples would get, where that is less than 1.
+        limits: least and largest value that a metric can have, where the evaluator says so.
     """
 
     overall: Mapping[str, float]
-    spread: Mapping[str, Values]
+    replicates: Mapping[str, Values]
     ceilings: Mapping[str, float]
+    limits: Mapping[str, Interval] = field(default_factory=dict)
 
-    def interval(self, name: str) -> tuple[float, float] | None:
-        """Bounds of 95 %, or None where there is nothing to tell."""
-        return bounds(self.spread[name]) if name in self.spread else None
+    def interval(self, name: str) -> Interval | None:
+        """Ends of the 95 % interval, or None where there is none (`jackknife_interval`)."""
+        if name not in self.replicates:
+            return None
+        return jackknife_interval(self.overall[name], self.replicates[name], self.limits.get(name, REAL))
 
 
-def draw(count: int, resamples: int, seed: int) -> Draws:
-    """(resamples, count) numbers of samples; the same for every dataset of this size, so that twins stay paired.
+def difference_interval(one: Metrics, other: Metrics, name: str) -> Interval | None:
+    """The 95 % interval of a metric of one dataset minus that of its twin.
 
-    (0, count) of fewer than two samples: one does not say how far others lie from it.
+    The same cluster is left out of both, so the interval is that of the paired difference.
     """
-    rows = resamples if count > 1 else 0
-    return derive_rng(seed, "bootstrap", count).integers(0, max(count, 1), (rows, count), dtype=np.int64)
-
-
-def draw_clusters(clusters: Sequence[Hashable], resamples: int, seed: int) -> Draws:
-    """(resamples, N) numbers of samples: clusters are drawn, and with each all of its samples (Field and Welsh 2007).
-
-    Where no two samples are of one cluster, this is `draw`. Where clusters differ in size, so do draws: `FILLED` is not
-    a sample.
-
-    Args:
-        clusters: of each sample, the one that it belongs to.
-        resamples: so many draws.
-        seed: of them.
-    """
-    owners = _numbered(clusters)
-    sizes = np.bincount(owners)
-    members = np.full((len(sizes), sizes.max(initial=0)), FILLED, np.int64)
-    members[np.arange(members.shape[1]) < sizes[:, None]] = np.argsort(owners, kind="stable")
-    drawn = draw(len(members), resamples, seed)
-    return members[drawn].reshape(len(drawn), members.size)
-
-
-def _numbered(clusters: Sequence[Hashable]) -> npt.NDArray[np.int64]:
-    """Their numbers, in the order in which they first occur."""
-    known: dict[Hashable, int] = {}
-    return np.array([known.setdefault(one, len(known)) for one in clusters], np.int64)
+    if name not in one.replicates or name not in other.replicates:
+        return None
+    here, there = one.limits.get(name, REAL), other.limits.get(name, REAL)
+    with np.errstate(invalid="ignore"):  # inf - inf is NaN: such a metric has no interval
+        replicates = one.replicates[name] - other.replicates[name]
+    limits = (here[0] - there[1], here[1] - there[0])
+    return jackknife_interval(one.overall[name] - other.overall[name], replicates, limits)
 
 
 def gather(
@@ -97,29 +86,28 @@ def gather(
 
     Args:
         fresh: makes an empty evaluator.
-        parts: in order of samples.
-        draws: (R, N), as drawn.
-        held: takes what an evaluator says of all parts, and holds it to the contract.
+        parts: one evaluator for each sample, in order.
+        draws: (R, N) numbers of samples, filled up with `LEFT_OUT`; each row is measured as a dataset of its own.
+        held: checks what an evaluator says of all parts against its contract.
     """
     whole = fresh()
     for part in parts:
         whole.merge(part)
     overall = held(whole.result())
     ceilings = dict(whole.ceilings()) if isinstance(whole, Limited) else {}
-    if not draws.size:
-        return Metrics(overall=overall, spread={}, ceilings=ceilings)
-    spread: dict[str, Values] = {}
-    counts = (draws != FILLED).sum(axis=1)
+    limits = {name: whole.range_of(name) for name in overall} if isinstance(whole, Ranged) else {}
+    replicates: dict[str, Values] = {}
+    counts = (draws != LEFT_OUT).sum(axis=1)
     for count in np.unique(counts):  # evaluators want as many samples in every draw
         rows = np.flatnonzero(counts == count)
         block = draws[rows]
-        block = block[block != FILLED].reshape(len(rows), count)
-        for name, values in _spread(fresh, whole, parts, block, overall).items():
-            spread.setdefault(name, np.full(len(draws), np.nan))[rows] = values
-    return Metrics(overall=overall, spread=spread, ceilings=ceilings)
+        block = block[block != LEFT_OUT].reshape(len(rows), count)
+        for name, values in _replicates(fresh, whole, parts, block, overall).items():
+            replicates.setdefault(name, np.full(len(draws), np.nan))[rows] = values
+    return Metrics(overall=overall, replicates=replicates, ceilings=ceilings, limits=limits)
 
 
-def _spread(
+def _replicates(
     fresh: Callable[[], AnyEvaluator],
     whole: AnyEvaluator,
     parts: Sequence[AnyEvaluator],
@@ -141,22 +129,13 @@ def _spread(
 
 
 def _added(parts: Sequence[Any], draws: Draws) -> dict[str, npt.NDArray[Any]]:
-    """The sums over each draw: how often it has a picture, times the picture's own."""
+    """The sums over each draw: how often it has a sample, times the sample's own."""
     often = np.zeros((len(draws), len(parts)))
     np.add.at(often, (np.arange(len(draws))[:, None], draws), 1)
     every = [part.totals() for part in parts]
-    # Whole numbers stay exact in float64 up to 2**53, which is more pixels than anybody has.
+    # Whole numbers stay exact in float64 up to 2**53, more pixels than any dataset has.
     stacked = {name: np.stack([one[name] for one in every]).astype(np.float64) for name in every[0]}
     return {name: np.tensordot(often, sums, 1) for name, sums in stacked.items()}
-
-
-def bounds(values: Values) -> tuple[float, float] | None:
-    """Bounds of 95 % of the known values."""
-    known = values[np.isfinite(values)]
-    if not len(known):
-        return None
-    low, high = np.percentile(known, PERCENTILES)
-    return float(low), float(high)
 
 
 def auroc(positives: Sequence[float], negatives: Sequence[float]) -> float:
@@ -169,11 +148,21 @@ def auroc(positives: Sequence[float], negatives: Sequence[float]) -> float:
     return below / pairs + 0.5 * ((not_above - below) / pairs)
 
 
-def auroc_interval(positives: Sequence[float], negatives: Sequence[float], draws: Draws) -> tuple[float, float] | None:
-    """Its bounds over the pairs of twins that `draws` chooses."""
+def auroc_interval(
+    positives: Sequence[float], negatives: Sequence[float], clusters: Sequence[Hashable]
+) -> Interval | None:
+    """The 95 % interval of the area over pairs of twins, of which one of a cluster is left out with all of the cluster.
+
+    Args:
+        positives, negatives: (N,) scores of the pairs.
+        clusters: of each pair, the cluster that it belongs to.
+    """
     high, low = np.asarray(positives), np.asarray(negatives)
-    known = [drawn[drawn != FILLED] for drawn in draws]
-    return bounds(np.array([auroc(high[drawn], low[drawn]) for drawn in known]))
+    kept = [row[row != LEFT_OUT] for row in leave_one_out(clusters)]
+    value = auroc(high, low)
+    if len(kept) > 1 and value in (0.0, 1.0):
+        return separated_interval(value, len(kept))
+    return jackknife_interval(value, np.array([auroc(high[row], low[row]) for row in kept]), (0.0, 1.0))
 
 
 def clustered(differences: Values, clusters: Sequence[Hashable]) -> Values:
@@ -181,7 +170,7 @@ def clustered(differences: Values, clusters: Sequence[Hashable]) -> Values:
 
     NaN where no difference of a cluster is known; what only rounding keeps from 0 is 0.
     """
-    owners = _numbered(clusters)
+    owners = numbered(clusters)
     known = np.where(np.isnan(differences), 0.0, differences)
     sums, sizes, counts = (np.zeros((owners.max(initial=-1) + 1, differences.shape[1])) for _ in range(3))
     for total, values in ((sums, known), (sizes, np.abs(known)), (counts, ~np.isnan(differences))):
@@ -199,7 +188,7 @@ def paired_p(differences: Values, seed: int) -> Values:
     Unlike Wilcoxon's test this looks at the mean, which is what is reported, and has no trouble with ties.
 
     Args:
-        differences: (N, F), a column a metric; NaN where a sample has no value and does not count. Where some of them
+        differences: (N, F), one column per metric; NaN where a sample has no value and does not count. Where some of them
             are not independent, of clusters (`clustered`).
         seed: of the drawn patterns.
 

@@ -106,6 +106,10 @@ class CocoEvaluator(Generic[SampleT]):
             spread[f"ap_{CATEGORY_NAMES[category_id].replace(' ', '_')}"] = values[:, column].mean(axis=1)
         return spread
 
+    def range_of(self, metric: str) -> tuple[float, float]:
+        """Every metric here is a share."""
+        return 0.0, 1.0
+
     def _matched(self) -> Any:
         """pycocotools' evaluation with every picture matched."""
         # The same picture may come twice, so pictures are numbered here.

@@ -124,6 +124,10 @@ class DepthEvaluator:
         values = {name: np.array(self.metrics.get(name, []), np.float64) for name in self._names()}
         return {name: _known_means(one[draws]) for name, one in values.items() if len(one)}
 
+    def range_of(self, metric: str) -> tuple[float, float]:
+        """Shares of pixels within a factor (`d1` to `d3`) end at 1; errors have no upper end."""
+        return 0.0, 1.0 if metric.removeprefix("eigen_") in ("d1", "d2", "d3") else math.inf
+
     @staticmethod
     def _names() -> tuple[str, ...]:
         return (*_devkit(_Sums()), *_eigen(_Sums()))

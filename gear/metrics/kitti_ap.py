@@ -100,6 +100,10 @@ class KittiEvaluator(Generic[SampleT]):
         spread["ap_3d_moderate"] = np.where(known.any(axis=0), total / np.maximum(known.sum(axis=0), 1), np.nan)
         return spread
 
+    def range_of(self, metric: str) -> tuple[float, float]:
+        """Every metric here is a share."""
+        return 0.0, 1.0
+
     def ceilings(self) -> Mapping[str, float]:
         """What perfect detections would come to, where that is less than 1."""
         most: dict[str, float] = {}

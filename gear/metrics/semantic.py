@@ -116,6 +116,10 @@ class SemanticEvaluator:
         """`miou`, `iiou`, `category_miou`, `category_iiou`, `pixel_accuracy`, and `iou_<class>`; shares, 0..1."""
         return {name: float(value) for name, value in self.metrics(self.totals()).items()}
 
+    def range_of(self, metric: str) -> tuple[float, float]:
+        """Every metric here is a share."""
+        return 0.0, 1.0
+
     def totals(self) -> Mapping[str, npt.NDArray[Any]]:
         """The counts, (COUNT, COUNT) of pixels and (COUNT,) of weighted ones."""
         return {

@@ -13,7 +13,6 @@ SMALL = {
     "collect": "--samples 1 --quality fast --set options.width_px=256 --set options.height_px=128",
     "attack": "--steps 2",
     "train": "--set epochs=1 --set batch=1",
-    "evaluate": "--resamples 20",
 }
 """Flags that are put behind those of the block, by command. The last one of a kind wins."""
 

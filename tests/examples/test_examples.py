@@ -128,7 +128,7 @@ def test_foreign_models_defenses_and_tasks_have_their_rows(home: Path) -> None:
     found = {}
     for defense in (None, "jpeg_tv", "jedi"):
         guard = ("--defense", defense) if defense else ()
-        words = (*network, *guard, "--report", "boundary_iou", "--resamples", "20", "--json")
+        words = (*network, *guard, "--report", "boundary_iou", "--json")
         found[defense] = json.loads(gear(home, "evaluate", *words))
         assert "boundary_miou" in found[defense]["rows"][0]["metrics"]["boundary_iou"]
         assert [row["samples"] for row in found[defense]["rows"]] == [2, 2]
@@ -172,7 +172,7 @@ def test_networks_from_a_folder_have_a_row_in_each_task(home: Path) -> None:
         data = f"folders/{task}"
         gear(home, "collect", "--task", task, *common, "--patch", "random", "--out", data)
         words = ("--model", f"transformers_{task}", "--set", f"folder=networks/{name}", *options, "--data", data)
-        found = json.loads(gear(home, "evaluate", *words, "--resamples", "20", "--json"))
+        found = json.loads(gear(home, "evaluate", *words, "--json"))
         assert found["model"]["name"] == f"transformers_{task}"
         (row,) = found["rows"]
         assert row["samples"] == 2 and metric in row["metrics"]["task"]

@@ -166,9 +166,9 @@ def test_what_learnt_from_more_samples_is_another_defense(small: Small, learner:
     plan = path.with_name("plan.json")
     plan.write_text(json.dumps(json.loads(plan.read_text()) | {"samples": 1}))
     facts: dict[str, Any] = {"model": "tiny_segmenter", "defense": "learner"}
-    evaluate(small(), calibration=fewer, out=tmp_path / "metrics", resamples=0, **facts)
+    evaluate(small(), calibration=fewer, out=tmp_path / "metrics", **facts)
     with pytest.raises(GearError, match=r"something else \(calibration_samples.*1.*2.*use another --out"):
-        evaluate(small(), calibration=whole, out=tmp_path / "metrics", resamples=0, **facts)
+        evaluate(small(), calibration=whole, out=tmp_path / "metrics", **facts)
     facts |= {"attack": "square", "queries": 4, "settings": ["height_px=12", "width_px=24"]}
     attack(small(), calibration=fewer, out=tmp_path / "patches", **facts)
     with pytest.raises(GearError, match=r"made otherwise \(calibration_samples"):
@@ -176,7 +176,7 @@ def test_what_learnt_from_more_samples_is_another_defense(small: Small, learner:
 
 
 def test_learning_from_what_is_measured_is_noted(small: Small, learner: list[Learner], tmp_path: Path) -> None:
-    asked: dict[str, Any] = {"model": "tiny_segmenter", "defense": "learner", "resamples": 0}
+    asked: dict[str, Any] = {"model": "tiny_segmenter", "defense": "learner"}
     read: list[tuple[int, int]] = []
     same = evaluate(
         small(), calibration=small(), out=tmp_path / "same", on_fit_progress=lambda *done: read.append(done), **asked
@@ -194,7 +194,7 @@ def test_calibration_the_wrong_way_round_is_told(
 ) -> None:
     clean, patched = small(split="val"), tmp_path / "patched"
     copy_small("semseg", patched, split="val", patch="random")
-    asked: dict[str, Any] = {"model": "tiny_segmenter", "defense": "learner", "resamples": 0}
+    asked: dict[str, Any] = {"model": "tiny_segmenter", "defense": "learner"}
     with pytest.raises(GearError, match="--calibration and --calibration-patched are swapped"):
         evaluate(small(), calibration=patched, calibration_patched=clean, out=tmp_path / "out", **asked)
     assert not learner and not (tmp_path / "out").exists()

@@ -1,4 +1,4 @@
-"""Samples of one street are drawn, and their differences flipped, together."""
+"""Samples of one street are left out, and the signs of their differences flipped, together."""
 
 from __future__ import annotations
 
@@ -8,15 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gear.measuring.intervals import LEFT_OUT, jackknife_interval, leave_one_out
 from gear.measuring.statistics import (
-    FILLED,
     ROUNDING,
     auroc,
     auroc_interval,
-    bounds,
     clustered,
-    draw,
-    draw_clusters,
+    difference_interval,
     gather,
     paired_p,
 )
@@ -57,43 +55,51 @@ class Summed(Mean):
         return {"mean": totals["sum"] / totals["count"]}
 
 
-def test_samples_of_their_own_are_drawn_as_ever() -> None:
-    assert np.array_equal(draw_clusters(list("abcdefg"), 50, 3), draw(7, 50, 3))
-    assert draw_clusters(["a"], 50, 3).shape == (0, 1) and draw_clusters(["a", "a"], 50, 3).shape == (0, 2)
+def test_clusters_of_one_sample_each_change_no_test() -> None:
     values = derive_rng(0, "alone").normal(0.3, 1, (30, 2))
     values[::4, 1] = np.nan
     assert np.array_equal(paired_p(clustered(values, range(30)), 5), paired_p(values, 5))
 
 
-def test_a_cluster_is_drawn_whole() -> None:
-    draws = draw_clusters([*range(5), *range(5)], 40, 3)
-    assert draws.shape == (40, 10)
-    for row, chosen in zip(draws, draw(5, 40, 3), strict=True):
-        assert sorted(row) == sorted([*chosen, *(chosen + 5)])
+def test_a_cluster_is_left_out_whole() -> None:
+    rows = leave_one_out([*range(5), *range(5)])
+    assert rows.shape == (5, 10)
+    for number, row in enumerate(rows):
+        assert set(range(10)) - set(row) == {number, number + 5}
 
 
 @pytest.mark.parametrize("metric", [Mean, Quick, Summed])
 def test_clusters_of_several_sizes(metric: type[Mean]) -> None:
-    """Draws come to more or fewer samples, and each is what its clusters come to."""
+    """Without a cluster more or fewer samples are left, and each replicate is what these come to."""
     clusters, values = [0, 1, 2, 0, 1, 3], [1.0, 2.0, 4.0, 8.0, 16.0, 32.0]
-    draws = draw_clusters(clusters, 60, 1)
-    found = gather(metric, [metric(value) for value in values], draws).spread["mean"]
-    members = {0: [1.0, 8.0], 1: [2.0, 16.0], 2: [4.0], 3: [32.0]}
-    wanted = [np.mean([value for one in chosen for value in members[one]]) for chosen in draw(4, 60, 1)]
-    assert found == pytest.approx(wanted) and (draws == FILLED).any()
+    draws = leave_one_out(clusters)
+    found = gather(metric, [metric(value) for value in values], draws)
+    wanted = [np.mean([value for one, value in zip(clusters, values, strict=True) if one != c]) for c in range(4)]
+    assert found.replicates["mean"] == pytest.approx(wanted) and (draws == LEFT_OUT).any()
+    assert found.interval("mean") == jackknife_interval(found.overall["mean"], found.replicates["mean"])
     low = [value - 3 for value in values[::-1]]
-    by_hand = [auroc(*(np.take(one, row[row != FILLED]) for one in (values, low))) for row in draws]
-    assert auroc_interval(values, low, draws) == bounds(np.array(by_hand))
+    by_hand = [auroc(*(np.take(one, row[row != LEFT_OUT]) for one in (values, low))) for row in draws]
+    assert auroc_interval(values, low, clusters) == jackknife_interval(auroc(values, low), np.array(by_hand), (0, 1))
 
 
 def test_what_is_said_twice_is_no_surer() -> None:
     values = derive_rng(1, "twice").normal(1, 1, 12)
-    once = gather(Quick, [Quick(value) for value in values], draw_clusters(range(12), 500, 2))
-    twice = gather(Quick, [Quick(value) for value in (*values, *values)], draw_clusters([*range(12)] * 2, 500, 2))
+    once = gather(Quick, [Quick(value) for value in values], leave_one_out(range(12)))
+    twice = gather(Quick, [Quick(value) for value in (*values, *values)], leave_one_out([*range(12)] * 2))
     assert twice.interval("mean") == pytest.approx(once.interval("mean"))
     column = values[:, None]
     p = paired_p(clustered(np.concatenate([column, column]), [*range(12)] * 2), 2)
     assert p == paired_p(column, 2) > 2 * paired_p(np.concatenate([column, column]), 2)
+
+
+def test_a_difference_is_paired() -> None:
+    """Twins that vary together differ by less than either varies."""
+    values = derive_rng(2, "paired").normal(1, 1, 12)
+    one, other = (
+        gather(Quick, [Quick(value) for value in side], leave_one_out(range(12))) for side in (values, values + 0.5)
+    )
+    assert difference_interval(other, one, "mean") == pytest.approx((0.5, 0.5))
+    assert difference_interval(other, one, "no such metric") is None
 
 
 def test_unknown_differences_of_a_cluster_do_not_count() -> None:

@@ -71,7 +71,7 @@ def test_one_lane_and_three_give_the_same_bytes(
     for count in (1, 3):
         torch.set_num_threads(count)
         out = tmp_path / str(count)
-        evaluate(pictures, model=NAME, model_settings=SETTINGS, out=out, resamples=0, batch=batch)
+        evaluate(pictures, model=NAME, model_settings=SETTINGS, out=out, batch=batch)
         made[count] = files(out)
         assert torch.get_num_threads() == count
         assert met.is_set() == (count > 1)
@@ -94,9 +94,9 @@ def test_a_network_that_fails_stops_the_run_and_it_is_taken_up_again(
     with monkeypatch.context() as patched:
         patched.setattr(Network, "predict_many", failing)
         with pytest.raises(RuntimeError, match="out of luck"):  # our own networks keep their traceback
-            evaluate(pictures, model=NAME, model_settings=SETTINGS, out=tmp_path, resamples=0, batch=1)
+            evaluate(pictures, model=NAME, model_settings=SETTINGS, out=tmp_path, batch=1)
     assert torch.get_num_threads() == 2
-    (row,) = evaluate(pictures, model=NAME, model_settings=SETTINGS, out=tmp_path, resamples=0, batch=1).rows
+    (row,) = evaluate(pictures, model=NAME, model_settings=SETTINGS, out=tmp_path, batch=1).rows
     assert row.samples == 5 and 1 <= row.made < 5
     assert len(files(tmp_path)) == 5
 
@@ -121,7 +121,7 @@ def test_nobody_works_slower_for_a_slow_disk(tmp_path: Path, pictures: Path, mon
     first, enough = threading.Lock(), threading.Event()
     monkeypatch.setattr(Network, "predict_many", watched)
     monkeypatch.setattr(scoring, "write_whole", slow)
-    (row,) = evaluate(pictures, model=NAME, model_settings=SETTINGS, out=tmp_path, resamples=0, batch=1).rows
+    (row,) = evaluate(pictures, model=NAME, model_settings=SETTINGS, out=tmp_path, batch=1).rows
     assert row.made == 5 and len(files(tmp_path)) == 5
 
 
@@ -147,7 +147,7 @@ def test_what_is_predicted_is_written_though_the_run_fails(
         patched.setattr(Network, "predict_many", failing)
         patched.setattr(scoring, "write_whole", late)
         with pytest.raises(RuntimeError, match="out of luck"):
-            evaluate(pictures, model=NAME, model_settings=SETTINGS, out=tmp_path, resamples=0, batch=1)
+            evaluate(pictures, model=NAME, model_settings=SETTINGS, out=tmp_path, batch=1)
     assert len(files(tmp_path)) >= 3
 
 
@@ -157,11 +157,11 @@ def test_batches_are_the_same_samples_after_an_interruption(
 ) -> None:
     """Networks round a batch otherwise than one sample: what is finished goes through again beside what is not."""
     torch.set_num_threads(threads)
-    evaluate(pictures, model=NAME, model_settings=SETTINGS, out=tmp_path / "whole", resamples=0, batch=2)
+    evaluate(pictures, model=NAME, model_settings=SETTINGS, out=tmp_path / "whole", batch=2)
     assert sorted(sizes) == [1, 2, 2]
     sizes.clear()
     out = tmp_path / "again"
-    evaluate(pictures, model=NAME, model_settings=SETTINGS, out=out, resamples=0, batch=2)
+    evaluate(pictures, model=NAME, model_settings=SETTINGS, out=out, batch=2)
     before = files(out)
     for note in out.rglob("samples/00000[03].json"):
         note.unlink()
@@ -169,7 +169,7 @@ def test_batches_are_the_same_samples_after_an_interruption(
         if name.endswith(("0.png", "3.png")):
             (out / name).unlink()
     sizes.clear()
-    (row,) = evaluate(pictures, model=NAME, model_settings=SETTINGS, out=out, resamples=0, batch=2).rows
+    (row,) = evaluate(pictures, model=NAME, model_settings=SETTINGS, out=out, batch=2).rows
     assert row.made == 2 and sizes == [2, 2]
     assert files(out) == before == files(tmp_path / "whole")
 
@@ -179,7 +179,7 @@ def test_what_is_left_runs_on_as_many_threads_as_the_whole(
 ) -> None:
     """Networks round otherwise on several threads than on one."""
     torch.set_num_threads(2)
-    evaluate(pictures, model=NAME, model_settings=SETTINGS, out=tmp_path, resamples=0, batch=1)
+    evaluate(pictures, model=NAME, model_settings=SETTINGS, out=tmp_path, batch=1)
     next(tmp_path.rglob("samples/000003.json")).unlink()
     predict, seen = Network.predict_many, list[int]()
 
@@ -188,7 +188,7 @@ def test_what_is_left_runs_on_as_many_threads_as_the_whole(
         return predict(network, samples)
 
     monkeypatch.setattr(Network, "predict_many", watched)
-    evaluate(pictures, model=NAME, model_settings=SETTINGS, out=tmp_path, resamples=0, batch=1)
+    evaluate(pictures, model=NAME, model_settings=SETTINGS, out=tmp_path, batch=1)
     assert seen == [1]
 
 
@@ -196,14 +196,14 @@ def test_small_pictures_go_together_unless_somebody_says(
     tmp_path: Path, pictures: Path, monkeypatch: pytest.MonkeyPatch, sizes: list[int]
 ) -> None:
     torch.set_num_threads(1)
-    evaluate(pictures, model=NAME, model_settings=SETTINGS, out=tmp_path / "usual", resamples=0)
+    evaluate(pictures, model=NAME, model_settings=SETTINGS, out=tmp_path / "usual")
     assert sizes == [guarded_model.MOST_TOGETHER, 1]
     monkeypatch.setattr(guarded_model, "SMALL_PX", 1)
     sizes.clear()
-    evaluate(pictures, model=NAME, model_settings=SETTINGS, out=tmp_path / "large", resamples=0)
+    evaluate(pictures, model=NAME, model_settings=SETTINGS, out=tmp_path / "large")
     assert sizes == [1] * 5
     sizes.clear()
-    evaluate(pictures, model=NAME, model_settings=SETTINGS, out=tmp_path / "defended", defense="jpeg", resamples=0)
+    evaluate(pictures, model=NAME, model_settings=SETTINGS, out=tmp_path / "defended", defense="jpeg")
     assert sizes == [1] * 5
 
 
@@ -241,7 +241,7 @@ def test_one_batch_gets_every_thread_and_says_its_whole_time(
 
     monkeypatch.setattr(Network, "predict_many", slow)
     monkeypatch.setattr(guarded_model, "time", SimpleNamespace(perf_counter=lambda: now))
-    report = evaluate(pictures, model=NAME, model_settings=SETTINGS, out=tmp_path, resamples=0, batch=5)
+    report = evaluate(pictures, model=NAME, model_settings=SETTINGS, out=tmp_path, batch=5)
     assert report.rows[0].cost["model_s"] * 5 == pytest.approx(1.0)
 
 
@@ -255,7 +255,7 @@ def test_what_progress_raises_stops_the_run(tmp_path: Path, pictures: Path, last
         torch.set_num_threads(threads)
         with pytest.raises(LookupError, match="the screen is gone"):
             out = tmp_path / str(threads)
-            evaluate(pictures, model=NAME, model_settings=SETTINGS, out=out, resamples=0, on_progress=progress)
+            evaluate(pictures, model=NAME, model_settings=SETTINGS, out=out, on_progress=progress)
 
 
 def test_lanes_share_the_threads_and_print_nothing_on_stdout(capsys: pytest.CaptureFixture[str]) -> None:

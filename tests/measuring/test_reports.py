@@ -63,7 +63,7 @@ def data(collected: Collected) -> Path:
 
 
 def run(data: Path, out: Path, *reports: str) -> Any:
-    return evaluate(data, model="tiny_depth", out=out, reports=reports, resamples=20)
+    return evaluate(data, model="tiny_depth", out=out, reports=reports)
 
 
 def test_a_metric_of_a_third_party_has_its_columns(tmp_path: Path, data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -148,6 +148,6 @@ def test_the_cli_lists_and_takes_it(
     tmp_path: Path, data: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     put_package(monkeypatch, [tiny_depth, metric()])
-    words = ["evaluate", "--model", "tiny_depth", "--data", str(data), "--out", str(tmp_path), "--resamples", "0"]
+    words = ["evaluate", "--model", "tiny_depth", "--data", str(data), "--out", str(tmp_path)]
     assert main([*words, "--report", "bias"]) == 0
     assert "bias.bias_m" in capsys.readouterr().out

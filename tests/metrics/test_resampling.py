@@ -10,7 +10,7 @@ import pytest
 
 from gear.formats.coco import Annotation, Detection, Picture
 from gear.formats.kitti_object import KittiLabel, dont_care
-from gear.measuring.statistics import draw, gather
+from gear.measuring.statistics import gather
 from gear.metrics.coco_ap import CocoEvaluator
 from gear.metrics.coco_reference import TallObjects
 from gear.metrics.depth import DepthEvaluator, NearDepth
@@ -291,12 +291,13 @@ def test_means_over_draws_are_what_merging_comes_to(metric: type[DepthEvaluator]
 
 
 def _same_as_merging(metric: Any, parts: list[Any]) -> None:
-    draws = np.concatenate([draw(len(parts), 30, 0), np.full((1, len(parts)), 2), np.full((1, len(parts)), 3)])
+    drawn = derive_rng(0, "draws").integers(0, len(parts), (30, len(parts)))
+    draws = np.concatenate([drawn, np.full((1, len(parts)), 2), np.full((1, len(parts)), 3)])
     quick = gather(metric, parts, draws)
-    assert set(quick.spread) == set(quick.overall)
+    assert set(quick.replicates) == set(quick.overall)
     for number, drawn in enumerate(draws):
         one = metric()
         for index in drawn:
             one.merge(parts[index])
         for name, value in one.result().items():
-            assert quick.spread[name][number] == pytest.approx(value, nan_ok=True), (name, number)
+            assert quick.replicates[name][number] == pytest.approx(value, nan_ok=True), (name, number)

@@ -60,14 +60,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--workers", type=positive, default=2, metavar="N", help="threads that read and measure (2)")
     parser.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="seed of the defense's random draws and of the bootstrap (0)"
-    )
-    parser.add_argument(
-        "--resamples",
+        "--seed",
         type=int,
-        default=1000,
+        default=0,
         metavar="N",
-        help="bootstrap resamples for the intervals; 0 for no intervals (1000)",
+        help="seed of the defense's random draws and of the permutation tests (0)",
     )
     add_device(parser, "model_set")
     parser.add_argument("--json", action="store_true", help="print results.json instead of the table")
@@ -103,7 +100,6 @@ def run(args: argparse.Namespace) -> int:
             batch=args.batch,
             workers=args.workers,
             seed=args.seed,
-            resamples=args.resamples,
             on_progress=progress,
             on_fit_progress=learning,
         )

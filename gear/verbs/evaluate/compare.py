@@ -9,18 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from gear.contracts.evaluation import Draws
 from gear.contracts.tasks import CONTROLS, NO_PATCH
 from gear.dataset.reading import Dataset, scenes_of
 from gear.measuring.scoring import Note, Scorer
 from gear.measuring.statistics import (
     Metrics,
-    Values,
     auroc,
     auroc_interval,
-    bounds,
     clustered,
-    draw_clusters,
+    difference_interval,
     gather,
     paired_p,
 )
@@ -43,7 +40,7 @@ class Measured:
         streets: that they show. Samples of one street are no independent ones.
         made: how many of them were predicted now.
         damaged: what was kept of some of them and could not be read.
-        spreads: metrics that were gathered before, by report and number of samples: resampling takes long.
+        known: metrics that were gathered already, by report and number of samples: gathering takes long.
     """
 
     name: str
@@ -53,13 +50,13 @@ class Measured:
     streets: list[Street]
     made: int
     damaged: tuple[DatasetError, ...]
-    spreads: dict[tuple[str, int], Metrics] = field(default_factory=dict, repr=False)
+    known: dict[tuple[str, int], Metrics] = field(default_factory=dict, repr=False)
 
-    def gathered(self, report: str, seed: int, resamples: int, count: int | None = None) -> Metrics:
-        """One report over the first `count` samples, all unless given; the same seed and resamples each time."""
+    def gathered(self, report: str, count: int | None = None) -> Metrics:
+        """One report over the first `count` samples, by default over all."""
         notes = self.notes[:count]
         key = (report, len(notes))
-        if key not in self.spreads:
+        if key not in self.known:
             parts = [note.parts[report] for note in notes]
             metric = self.scorer.reports[report]
             checked = partial(metric.checked, method="result")
@@ -79,7 +76,7 @@ def streets_of(dataset: Dataset[Any]) -> list[Street]:
     return [(*scenes_of(dataset), number) for number in range(len(dataset))]
 
 
-def row_report(row: Measured, seed: int, resamples: int) -> RowReport:
+def row_report(row: Measured) -> RowReport:
     """Metrics, intervals and costs of one dataset."""
     notes = row.notes
     plan = row.dataset.plan
@@ -98,7 +95,7 @@ def row_report(row: Measured, seed: int, resamples: int) -> RowReport:
         samples=len(notes),
         made=row.made,
         damaged=tuple(str(error) for error in row.damaged),
-        metrics=metrics_of(row, seed, resamples),
+        metrics=metrics_of(row),
         cost=mean_cost(notes),
         defense=mask_means(notes, has_patch=plan.info.patch_label != NO_PATCH),
         per_sample=[{k: v for k, v in note.as_json().items() if k != "facts"} for note in notes],
@@ -132,7 +129,7 @@ def drive_note(dataset: Dataset[Any]) -> str | None:
     )
 
 
-def together(rows: Sequence[Measured], seed: int, resamples: int) -> Iterable[Together]:
+def together(rows: Sequence[Measured]) -> Iterable[Together]:
     """Datasets of several scenes or weathers with patches of one label, as if they were one dataset."""
     labelled: dict[str, list[Measured]] = {}
     for row in rows:
@@ -145,15 +142,15 @@ def together(rows: Sequence[Measured], seed: int, resamples: int) -> Iterable[To
                 patch=patch,
                 rows=tuple(row.name for row in members),
                 samples=len(one.notes),
-                metrics=metrics_of(one, seed, resamples),
+                metrics=metrics_of(one),
             )
 
 
-def metrics_of(row: Measured, seed: int, resamples: int) -> dict[str, dict[str, Estimate]]:
+def metrics_of(row: Measured) -> dict[str, dict[str, Estimate]]:
     """Metrics over all samples, with their intervals."""
     metrics = {}
     for report in row.scorer.reports:
-        one = row.gathered(report, seed, resamples)
+        one = row.gathered(report)
         metrics[report] = {
             name: Estimate(value=value, interval=one.interval(name), ceiling=one.ceilings.get(name, 1.0))
             for name, value in one.overall.items()
@@ -165,19 +162,19 @@ def as_one(name: str, members: Sequence[Measured]) -> Measured:
     """Several datasets as if they were one of this name; what is not a sample's is the first one's."""
     notes = [note for row in members for note in row.notes]
     streets = [street for row in members for street in row.streets]
-    return replace(members[0], name=name, notes=notes, streets=streets, spreads={})
+    return replace(members[0], name=name, notes=notes, streets=streets, known={})
 
 
-def compared(rows: Sequence[Measured], seed: int, resamples: int) -> Iterable[Difference]:
+def compared(rows: Sequence[Measured], seed: int) -> Iterable[Difference]:
     """Every patched dataset against its twins without a patch and with a random one."""
     for row in rows:
         for control in CONTROLS[: CONTROLS.index(row.patch) if row.patch in CONTROLS else len(CONTROLS)]:
             for other in rows:
                 if other.patch == control and other.dataset.plan.twin_key == row.dataset.plan.twin_key:
-                    yield difference(row, other, seed, resamples)
+                    yield difference(row, other, seed)
 
 
-def difference(row: Measured, other: Measured, seed: int, resamples: int) -> Difference:
+def difference(row: Measured, other: Measured, seed: int) -> Difference:
     """What samples of one become in their twins, as far as both have them."""
     count = min(len(row.notes), len(other.notes))
     here, there, streets = row.notes[:count], other.notes[:count], row.streets[:count]
@@ -185,12 +182,9 @@ def difference(row: Measured, other: Measured, seed: int, resamples: int) -> Dif
         row=row.name,
         against=other.name,
         metrics={
-            report: _paired(
-                row.gathered(report, seed, resamples, count), other.gathered(report, seed, resamples, count)
-            )
-            for report in row.scorer.reports
+            report: _paired(row.gathered(report, count), other.gathered(report, count)) for report in row.scorer.reports
         },
-        auroc=_auroc(here, there, draw_clusters(streets, resamples, seed)),
+        auroc=_auroc(here, there, streets),
         paired={report: _tested(here, there, streets, report, seed) for report in row.scorer.reports},
     )
 
@@ -199,9 +193,8 @@ def _paired(one: Metrics, other: Metrics) -> dict[str, Estimate]:
     found = {}
     for name in one.overall:
         if name in other.overall:
-            both = name in one.spread and name in other.spread
-            interval = bounds(_finite(one.spread[name]) - _finite(other.spread[name])) if both else None
-            found[name] = Estimate(value=one.overall[name] - other.overall[name], interval=interval)
+            change = one.overall[name] - other.overall[name]
+            found[name] = Estimate(value=change, interval=difference_interval(one, other, name))
     return found
 
 
@@ -222,12 +215,12 @@ def _tested(
     }
 
 
-def _auroc(here: list[Note], there: list[Note], draws: Draws) -> Estimate | None:
+def _auroc(here: list[Note], there: list[Note], streets: list[Street]) -> Estimate | None:
     high = [note.score for note in here if note.score is not None]
     low = [note.score for note in there if note.score is not None]
     if len(high) != len(here) or len(low) != len(there):
         return None
-    return Estimate(value=auroc(high, low), interval=auroc_interval(high, low, draws))
+    return Estimate(value=auroc(high, low), interval=auroc_interval(high, low, streets))
 
 
 def _finite(values: Values) -> Values:

@@ -35,7 +35,7 @@ def check_pools(pools: Pools, roots: Iterable[Path]) -> None:
                 raise GearError(f"pool {name!r} holds {root}, of which several splits are among the data; evaluate one")
 
 
-def pooled(rows: Sequence[Measured], pools: Pools, seed: int, resamples: int) -> Iterable[Pool]:
+def pooled(rows: Sequence[Measured], pools: Pools, seed: int) -> Iterable[Pool]:
     """Each pool, against those without a patch (`none`) and with a random one (`random`) that show the same scenes."""
     by_root = {row.dataset.root.resolve(): row for row in rows}
     found = {name: [by_root[Path(root).resolve()] for root in members] for name, members in pools.items()}
@@ -47,13 +47,11 @@ def pooled(rows: Sequence[Measured], pools: Pools, seed: int, resamples: int) ->
             name=name,
             rows=tuple(row.name for row in members),
             samples=len(one.notes),
-            metrics=metrics_of(one, seed, resamples),
+            metrics=metrics_of(one),
             cost=mean_cost(one.notes),
             defense=mask_means(one.notes, has_patch=name != NO_PATCH),
             differences=tuple(
-                difference(one, wholes[other], seed, resamples)
-                for other in others
-                if _keys(found[other]) == _keys(members)
+                difference(one, wholes[other], seed) for other in others if _keys(found[other]) == _keys(members)
             ),
         )
 

@@ -34,6 +34,9 @@ from gear.verbs.evaluate.pools import Pools, check_pools, pooled
 from gear.verbs.evaluate.report import EvaluateReport
 from gear.verbs.evaluate.table import table
 
+INTERVALS = "95 %: jackknife over streets, Student's t"
+"""What results.json says of its intervals."""
+
 LEARNT = {"calibration", "calibration_samples"}
 """What of an evaluation's plan says from what its defense learnt."""
 
@@ -57,7 +60,6 @@ def evaluate(
     batch: int | None = None,
     workers: int = 2,
     seed: int = 0,
-    resamples: int = 1000,
     pools: Pools | None = None,
     on_progress: Progress | None = None,
     on_fit_progress: Progress | None = None,
@@ -67,7 +69,7 @@ def evaluate(
     Under `out` lie results.json, table.txt, and for each dataset a folder with the predictions in the format's own
     result layout and a note of each sample. Samples that have one are never predicted again, unless what was kept of
     them is damaged (`RowReport.damaged`). Datasets that differ in nothing but their patch are compared sample by
-    sample. Intervals are of 95 %, by bootstrap over samples; those that show one street are drawn together.
+    sample. Intervals are of 95 %, by the jackknife over streets (`gear.measuring.intervals`).
 
     Args:
         data: roots of datasets, or folders of roots, all of one task; `DIR:SPLIT` says which split of one.
@@ -83,8 +85,7 @@ def evaluate(
         out: folder for everything; `evaluations/<task>/<model>[+<defense>]` by default.
         batch: samples that go through the model together; one, or up to four small ones for gear's own, unless given.
         workers: threads that read, and threads that measure and write, beside the model.
-        seed: of the defense's draws and of the bootstrap.
-        resamples: of the bootstrap; 0 for no intervals.
+        seed: of the defense's draws and of the permutation tests.
         pools: roots among the data that are counted as one dataset, by a name; those that show the same scenes as the
             pools `none` and `random` are compared with these, sample by sample.
         progress: told after every sample.
@@ -94,10 +95,8 @@ def evaluate(
         GearError: anything that the user can put right; its text is one line.
     """
     check_seed(seed)
-    if min(1 if batch is None else batch, workers) < 1 or resamples < 0:
-        raise GearError(
-            f"batch and workers must be at least 1, resamples at least 0; got {batch}, {workers}, {resamples}"
-        )
+    if min(1 if batch is None else batch, workers) < 1:
+        raise GearError(f"batch and workers must be at least 1; got {batch}, {workers}")
     chosen = chosen_model(model, model_settings)
     guard = chosen_defense(defense, defense_settings)
     datasets = opened([data] if isinstance(data, (str, Path)) else data, split, chosen, reports)
@@ -151,10 +150,10 @@ def evaluate(
         found = EvaluateReport(
             out=root,
             facts=facts | more,
-            rows=tuple(row_report(row, seed, resamples) for row in rows),
-            together=tuple(together(rows, seed, resamples)),
-            differences=tuple(compared(rows, seed, resamples)),
-            pools=tuple(pooled(rows, pools or {}, seed, resamples)),
+            rows=tuple(row_report(row) for row in rows),
+            together=tuple(together(rows)),
+            differences=tuple(compared(rows, seed)),
+            pools=tuple(pooled(rows, pools or {}, seed)),
         )
         _end(root, found)
     return found

@@ -51,7 +51,7 @@ def test_the_truth_scores_perfect_and_is_kept_in_the_formats_layout(
 ) -> None:
     data = small(task)
     install(model_spec(lambda _: Oracle([data]), task))
-    report = evaluate(data, model="odd", out=tmp_path / "out", reports=["reference"], resamples=20)
+    report = evaluate(data, model="odd", out=tmp_path / "out", reports=["reference"])
     (row,) = report.rows
     assert (row.samples, row.made) == (2, 2)
     metric, perfect = HEADLINES[task]
@@ -94,14 +94,14 @@ def test_it_is_taken_up_again_and_predicts_nothing_twice(
         noted.append(finished)
 
     folder = tmp_path / "out"
-    evaluate(data, model="odd", out=tmp_path / "whole", reports=["reference"], resamples=20, on_progress=count)
+    evaluate(data, model="odd", out=tmp_path / "whole", reports=["reference"], on_progress=count)
     assert noted == [0, 1, 2, 3]
-    evaluate(data, model="odd", out=folder, reports=["reference"], resamples=20)
+    evaluate(data, model="odd", out=folder, reports=["reference"])
     (row,) = sorted(path for path in folder.iterdir() if path.is_dir())
     (row / "samples/000001.json").unlink()
     (folder / "results.json").unlink()
     oracle.shown = 0
-    report = evaluate(data, model="odd", out=folder, reports=["reference"], resamples=20)
+    report = evaluate(data, model="odd", out=folder, reports=["reference"])
     assert report.rows[0].made == 1 and oracle.shown == 1
     assert timeless(folder) == timeless(tmp_path / "whole")
     with pytest.raises(DatasetError, match=r"something else \(seed: 0 there, 1 now\)"):
@@ -115,7 +115,7 @@ def test_a_sample_whose_result_is_damaged_is_predicted_again_and_that_is_told(
     data = small("depth")
     install(model_spec(lambda _: Oracle([data]), "depth"))
     out = tmp_path / "out"
-    first, whole = evaluate(data, model="odd", out=out, resamples=0), timeless(out)
+    first, whole = evaluate(data, model="odd", out=out), timeless(out)
     (row,) = sorted(path for path in out.iterdir() if path.is_dir())
     note = row / "samples/000001.json"
     (row / "samples/notes-of-mine.json").write_text("[]")
@@ -124,14 +124,14 @@ def test_a_sample_whose_result_is_damaged_is_predicted_again_and_that_is_told(
             path.write_bytes(b"half")
     else:
         note.write_text({"note": "[]", "half": note.read_text()[:40], "key": '{"index": 1}'}[damage])
-    again = evaluate(data, model="odd", out=out, resamples=0)
+    again = evaluate(data, model="odd", out=out)
     assert again.rows[0].made == 1 and again.rows[0].metrics == first.rows[0].metrics
     (told,) = again.rows[0].damaged
     assert str(row) in told and "0001" in told
     assert timeless(out) == whole
-    assert evaluate(data, model="odd", out=out, resamples=0).rows[0].made == 0
+    assert evaluate(data, model="odd", out=out).rows[0].made == 0
     note.write_text("[]")
-    assert main(["evaluate", "--model", "odd", "--data", str(data), "--out", str(out), "--resamples", "0"]) == 0
+    assert main(["evaluate", "--model", "odd", "--data", str(data), "--out", str(out)]) == 0
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"gear: note: {note}: is no note of a sample") and "predicted again" in line
 
@@ -143,11 +143,11 @@ def test_a_shortened_result_is_not_taken_for_fewer_detections(
     data = small("stereo3d", samples=3)
     install(model_spec(lambda _: Oracle([data]), "stereo3d"))
     out = tmp_path / "out"
-    evaluate(data, model="odd", out=out, resamples=0)
+    evaluate(data, model="odd", out=out)
     whole = timeless(out)
     path = max(out.glob("*/predictions/data/*.txt"), key=lambda path: path.stat().st_size)
     path.write_bytes(damaged(path.read_text()).encode("latin-1"))
-    again = evaluate(data, model="odd", out=out, resamples=0)
+    again = evaluate(data, model="odd", out=out)
     assert again.rows[0].made == 1 and str(path) in again.rows[0].damaged[0]
     assert timeless(out) == whole
 
@@ -174,11 +174,11 @@ def test_a_note_that_says_something_else_is_damage(
     data = small("detect2d")
     install(model_spec(lambda _: Oracle([data]), "detect2d"))
     out = tmp_path / "out"
-    evaluate(data, model="odd", out=out, resamples=0)
+    evaluate(data, model="odd", out=out)
     whole = timeless(out)
     (note,) = out.glob("*/samples/000001.json")
     note.write_text(json.dumps(json.loads(note.read_text()) | change))
-    again = evaluate(data, model="odd", out=out, resamples=0)
+    again = evaluate(data, model="odd", out=out)
     assert again.rows[0].made == 1 and len(again.rows[0].damaged) == 1
     assert timeless(out) == whole
 
@@ -186,7 +186,7 @@ def test_a_note_that_says_something_else_is_damage(
 def test_an_evaluation_whose_plan_is_damaged_is_one_line(tmp_path: Path, small: Small, install: Install) -> None:
     data = small("depth")
     install(model_spec(lambda _: Oracle([data]), "depth"))
-    evaluate(data, model="odd", out=tmp_path, resamples=0)
+    evaluate(data, model="odd", out=tmp_path)
     plan = tmp_path / "plan.json"
     whole = json.loads(plan.read_text())
     for text, problem in (
@@ -195,7 +195,7 @@ def test_an_evaluation_whose_plan_is_damaged_is_one_line(tmp_path: Path, small: 
     ):
         plan.write_text(text)
         with pytest.raises(DatasetError, match=problem):
-            evaluate(data, model="odd", out=tmp_path, resamples=0)
+            evaluate(data, model="odd", out=tmp_path)
 
 
 @pytest.mark.parametrize("facts", [{}, None, [{"score": 1}]])
@@ -203,11 +203,11 @@ def test_facts_that_are_not_the_tasks_are_damage(tmp_path: Path, small: Small, i
     data = small("detect2d")
     install(model_spec(lambda _: Oracle([data]), "detect2d"))
     out = tmp_path / "out"
-    evaluate(data, model="odd", out=out, resamples=0)
+    evaluate(data, model="odd", out=out)
     whole = timeless(out)
     (note,) = out.glob("*/samples/000001.json")
     note.write_text(json.dumps(json.loads(note.read_text()) | {"facts": facts}))
-    again = evaluate(data, model="odd", out=out, resamples=0)
+    again = evaluate(data, model="odd", out=out)
     assert again.rows[0].made == 1 and "000001" in again.rows[0].damaged[0]
     assert timeless(out) == whole
 
@@ -220,7 +220,7 @@ def test_the_official_script_finds_the_predictions_and_agrees(
     tool = importlib.import_module("cityscapesscripts.evaluation.evalPixelLevelSemanticLabeling")
     helpers = importlib.import_module("cityscapesscripts.helpers.labels")
     install(tiny_segmenter)
-    (row,) = evaluate(data, model="tiny_segmenter", out=tmp_path / "out", resamples=0).rows
+    (row,) = evaluate(data, model="tiny_segmenter", out=tmp_path / "out").rows
     truths = sorted(str(path) for path in data.glob("gtFine/debug/*/*_gtFine_labelIds.png"))
     args = copy.copy(tool.args)
     args.evalLabels = [label.id for label in helpers.labels if label.id >= 0]
@@ -236,8 +236,8 @@ def test_the_official_script_finds_the_predictions_and_agrees(
 def test_batches_and_threads_change_nothing(tmp_path: Path, small: Small, install: Install) -> None:
     data = small("semseg", samples=5)
     install(tiny_segmenter)
-    evaluate(data, model="tiny_segmenter", out=tmp_path / "one", workers=1, resamples=30)
-    evaluate(data, model="tiny_segmenter", out=tmp_path / "two", workers=4, batch=3, resamples=30)
+    evaluate(data, model="tiny_segmenter", out=tmp_path / "one", workers=1)
+    evaluate(data, model="tiny_segmenter", out=tmp_path / "two", workers=4, batch=3)
     one, two = timeless(tmp_path / "one"), timeless(tmp_path / "two")
     assert one == two
     assert len(one["model"]["weights_sha256"]) == 64
@@ -283,7 +283,7 @@ def test_a_defense_is_fitted_wrapped_and_judged(tmp_path: Path, small: Small, in
     assert not (tmp_path / "x").exists()
     report = evaluate(
         roots, model="tiny_segmenter", defense="finder", calibration=roots[0], calibration_patched=roots[1],
-        out=tmp_path / "out", resamples=20,
+        out=tmp_path / "out",
     )  # fmt: skip
     assert finder.fits == [(2, 2, (160, 320, 3), [{"left"}])]
     assert report.row("random").defense["mask_iou"] == 1 and "mask_iou" not in report.row("none").defense
@@ -300,7 +300,7 @@ def test_a_built_in_defense_by_the_command(
 ) -> None:
     data = small("depth")
     install(tiny_depth)
-    command = ["evaluate", "--model", "tiny_depth", "--data", str(data), "--resamples", "10"]
+    command = ["evaluate", "--model", "tiny_depth", "--data", str(data)]
     assert main([*command, "--out", str(tmp_path / "plain")]) == 0
     plain = capsys.readouterr().out
     assert plain.startswith("depth: tiny_depth\n") and "mae_m" in plain and "defense" not in plain
@@ -361,7 +361,7 @@ def test_a_model_that_reckons_with_another_camera_is_refused(tmp_path: Path, sma
         with pytest.raises(GearError, match=message):
             evaluate(data, model="odd", model_settings=[f"{name}={value}"], out=tmp_path / "x")
     assert not (tmp_path / "x").exists()
-    assert evaluate(data, model="odd", out=tmp_path / "x", resamples=0).rows[0].samples == 2
+    assert evaluate(data, model="odd", out=tmp_path / "x").rows[0].samples == 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -386,7 +386,7 @@ def test_pictures_of_another_size_than_the_weights_are_for_are_noted(
     install(replace(model_spec(lambda _: Oracle([data]), "semseg"), config=ScaledConfig))
 
     def notes(out: str, *settings: str) -> list[str]:
-        evaluate(data, model="odd", model_settings=settings, out=tmp_path / out, resamples=0)
+        evaluate(data, model="odd", model_settings=settings, out=tmp_path / out)
         found: list[str] = json.loads((tmp_path / out / "results.json").read_text())["notes"]
         assert all(note in (tmp_path / out / "table.txt").read_text() for note in found)
         return found

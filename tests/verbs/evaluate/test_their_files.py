@@ -54,7 +54,7 @@ def test_of_a_prediction(
     install(model_spec(lambda _: Oracle([data]), "semseg"))
     monkeypatch.setattr(SemsegTask, "encode_prediction", lambda *_: given)
     with pytest.raises(PluginError, match=r"prediction of sample \d: .*" + message.format("encode_prediction")):
-        evaluate(data, model="odd", out=tmp_path / "out", resamples=0)
+        evaluate(data, model="odd", out=tmp_path / "out")
 
 
 UNCOUNTABLE: list[tuple[Any, str]] = [

@@ -35,7 +35,7 @@ def test_twins_are_compared_and_the_patch_can_be_left_out(tmp_path: Path, small:
         return np.where(patch_masks(sample)["left"] & is_patched, np.uint8(26), prediction)
 
     install(model_spec(lambda _: Oracle(roots, fooled), "semseg"))
-    report = evaluate(roots, model="odd", out=tmp_path / "out", reports=["outside_patch"], resamples=50)
+    report = evaluate(roots, model="odd", out=tmp_path / "out", reports=["outside_patch"])
     none, random = report.row("none"), report.row("random")
     assert none.metrics["task"]["miou"].value == 1
     # The board is "static" in Cityscapes, which is not evaluated: nothing is lost by being wrong there.
@@ -68,7 +68,7 @@ def test_pools_are_datasets_that_count_as_one(tmp_path: Path, small: Small, inst
         )
     )
     pools = {"none": roots["none"], "random": roots["random"], "first": roots["random"][:1]}
-    report = evaluate(every, model="odd", out=tmp_path / "out", resamples=50, pools=pools)
+    report = evaluate(every, model="odd", out=tmp_path / "out", pools=pools)
     none, random, first = report.pools
     assert (none.name, none.samples, none.differences) == ("none", 6, ())
     assert none.rows == tuple(row.name for row in report.rows[:2])
@@ -102,7 +102,7 @@ def test_a_street_in_two_weathers_is_no_two_streets(tmp_path: Path, install: Ins
 
     install(model_spec(lambda _: Oracle(every, by_street), "depth"))
     pools = {patch: [roots[weather, patch] for weather in ("ClearNoon", "CloudyNoon")] for patch in ("none", "random")}
-    report = evaluate(every, model="odd", out=tmp_path / "out", resamples=200, pools=pools)
+    report = evaluate(every, model="odd", out=tmp_path / "out", pools=pools)
     one, whole = report.differences[0], report.pools[1].differences[0]
     assert one.paired["task"]["mae_m"].p == whole.paired["task"]["mae_m"].p == 2 / 2**4
     assert whole.paired["task"]["mae_m"].pairs == 8
@@ -135,7 +135,7 @@ def test_datasets_of_one_label_have_a_row_together(tmp_path: Path, small: Small,
     seeds = [gear.open_dataset(root).plan.info.seed for root in roots]
     install(model_spec(lambda _: Oracle(roots, lambda s, p: p + (s.record.seed == seeds[1])), "depth"))
 
-    report = evaluate(roots, model="odd", out=tmp_path / "out", resamples=50)
+    report = evaluate(roots, model="odd", out=tmp_path / "out")
 
     whole = gear.open_dataset(other).task.evaluator()
     for root, error_m in zip(roots, (0, 1), strict=True):
@@ -148,12 +148,12 @@ def test_datasets_of_one_label_have_a_row_together(tmp_path: Path, small: Small,
     assert {name: one.value for name, one in metrics.items()} == pytest.approx(dict(whole.result()), nan_ok=True)
     assert metrics["mae_m"].interval is not None and metrics["mae_m"].interval[0] < metrics["mae_m"].value
     assert "all with patch none" in (tmp_path / "out" / "table.txt").read_text()
-    alone = evaluate(roots[:1], model="odd", out=tmp_path / "alone", resamples=50)
+    alone = evaluate(roots[:1], model="odd", out=tmp_path / "alone")
     assert alone.together == ()
     for number, root in enumerate(roots):
         (tmp_path / "all" / "depth").mkdir(parents=True, exist_ok=True)
         (tmp_path / "all" / "depth" / str(number)).symlink_to(root)
-    again = evaluate(tmp_path / "all", model="odd", out=tmp_path / "folder", resamples=50)
+    again = evaluate(tmp_path / "all", model="odd", out=tmp_path / "folder")
     assert [row.name for row in again.rows] == [row.name for row in report.rows], "a folder of datasets is all of them"
     with pytest.raises(DatasetError, match="is not a dataset of gear's"):
         evaluate(tmp_path / "out", model="odd", out=tmp_path / "none")
@@ -169,7 +169,7 @@ def test_twins_are_tested_sample_by_sample(tmp_path: Path, small: Small, install
         return np.where(patch_masks(sample)["left"], prediction, prediction + far)
 
     install(model_spec(lambda _: Oracle(roots, astray), "depth"))
-    report = evaluate(roots, model="odd", out=tmp_path / "out", reports=["outside_patch"], resamples=0)
+    report = evaluate(roots, model="odd", out=tmp_path / "out", reports=["outside_patch"])
     (difference,) = report.differences
     test = difference.paired["outside_patch"]["mae_m"]
     assert (test.mean, test.p, test.pairs) == (pytest.approx(2, abs=1e-4), 2 / 8, 3)
@@ -214,7 +214,7 @@ def test_what_is_infinite_is_nothing_in_json(
     roots = [small("depth", "none"), small("depth", "random")]
     monkeypatch.setattr(DepthTask, "evaluator", lambda self: Boundless())
     install(model_spec(lambda _: Oracle(roots), "depth"))
-    report = evaluate(roots, model="odd", out=tmp_path / "out", resamples=20)
+    report = evaluate(roots, model="odd", out=tmp_path / "out")
     found = json.loads((tmp_path / "out/results.json").read_text())
     assert found["rows"][0]["metrics"]["task"]["psnr_db"] == {"value": None, "low": None, "high": None}
     (difference,) = report.differences
@@ -231,7 +231,7 @@ def test_frames_of_a_drive_are_not_taken_for_scenes_without_a_word(
     collect_small("depth", drive, split="video", samples=2, settings=[f"simulation={simulation}"])
     roots = [drive, small("depth", "none")]
     install(model_spec(lambda _: Oracle(roots), "depth"))
-    report = evaluate(roots, model="odd", out=tmp_path / "out", resamples=10)
+    report = evaluate(roots, model="odd", out=tmp_path / "out")
     (note,) = report.as_json()["notes"]
     assert note.startswith(f"{drive}: 6 samples are frames of 2 drives")
     assert note in (tmp_path / "out" / "table.txt").read_text()
