@@ -157,9 +157,9 @@ def auroc_interval(
         positives, negatives: (N,) scores of the pairs.
         clusters: of each pair, the cluster that it belongs to.
     """
-    high, low = np.asarray(positives), np.asarray(negatives)
+    high, low = np.asarray(positives, np.float64), np.asarray(negatives, np.float64)
     kept = [row[row != LEFT_OUT] for row in leave_one_out(clusters)]
-    value = auroc(high, low)
+    value = auroc(positives, negatives)
     if len(kept) > 1 and value in (0.0, 1.0):
         return separated_interval(value, len(kept))
     return jackknife_interval(value, np.array([auroc(high[row], low[row]) for row in kept]), (0.0, 1.0))
