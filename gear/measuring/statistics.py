@@ -188,8 +188,8 @@ def paired_p(differences: Values, seed: int) -> Values:
     Unlike Wilcoxon's test this looks at the mean, which is what is reported, and has no trouble with ties.
 
     Args:
-        differences: (N, F), one column per metric; NaN where a sample has no value and does not count. Where some of them
-            are not independent, of clusters (`clustered`).
+        differences: (N, F), one column per metric; NaN where a sample has none. Where samples are not independent, the
+            sums over clusters (`clustered`).
         seed: of the drawn patterns.
 
     Returns:

@@ -11,6 +11,7 @@ import numpy as np
 
 from gear.contracts.tasks import CONTROLS, NO_PATCH
 from gear.dataset.reading import Dataset, scenes_of
+from gear.measuring.intervals import Values, leave_one_out
 from gear.measuring.scoring import Note, Scorer
 from gear.measuring.statistics import (
     Metrics,
@@ -60,10 +61,10 @@ class Measured:
             parts = [note.parts[report] for note in notes]
             metric = self.scorer.reports[report]
             checked = partial(metric.checked, method="result")
-            draws = draw_clusters(self.streets[:count], resamples, seed)
+            draws = leave_one_out(self.streets[:count])
             with metric.blamed("result"):
-                self.spreads[key] = gather(metric.make, parts, draws, checked)
-        return self.spreads[key]
+                self.known[key] = gather(metric.make, parts, draws, checked)
+        return self.known[key]
 
     @property
     def patch(self) -> str:

@@ -143,7 +143,7 @@ def evaluate(
         more = {
             "reports": list(reports),
             "metric_plugins": plugins,
-            "resamples": resamples,
+            "intervals": INTERVALS,
             "versions": _versions(player),
             "notes": notes,
         }
