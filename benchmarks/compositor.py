@@ -21,16 +21,16 @@ from gear.camera.pipeline import CameraPipeline
 from gear.collecting.job import Job, resolve
 from gear.collecting.lookup import scene_library
 from gear.collecting.pipeline import collect_samples
+from gear.collecting.run import manifest_facts
 from gear.collecting.session import Session
 from gear.compositor.opening import COMPOSITORS, open_compositor
 from gear.config.load import load_collection
 from gear.dataset.reading import Dataset
 from gear.dataset.store import Store
+from gear.measuring.gap.picture_gap import picture_gap, visible_mask
 from gear.plugins.build import build, find
 from gear.plugins.datasets import open_dataset
 from gear.render import RENDERERS, open_renderer
-from gear.verbs.collect.run import manifest_facts
-from gear.verbs.gap.picture_gap import picture_gap, visible_mask
 from gear.world.planner import ScenePlanner
 from gear.world.weather.air import camera_pipeline
 from gear.world.world import World

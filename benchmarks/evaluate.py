@@ -24,9 +24,10 @@ import gear
 from gear.contracts.tasks import Sidecar
 from gear.dataset.reading import Dataset
 from gear.measuring.dataset_run import evaluate_row
+from gear.measuring.guard import Guard, open_guard
 from gear.measuring.guarded_model import Player
 from gear.measuring.intervals import leave_one_out
-from gear.measuring.plugin_selection import chosen_defense, chosen_model
+from gear.measuring.plugin_selection import chosen_model
 from gear.measuring.reports import TASK
 from gear.measuring.scoring import Scorer
 from gear.measuring.statistics import gather
@@ -62,7 +63,7 @@ def main() -> None:
     Part.wanted = args.samples
     dataset = Part(root=opened.root, plan=opened.plan, task=opened.task, manifest=opened.manifest)
     model = chosen_model(args.model, args.settings)
-    player = Player(model, chosen_defense(args.defense, ()) if args.defense else None)
+    player = Player(model, open_guard(Guard.of(args.defense), [model], opened.plan.task["name"]))
     pictures = [sample.images for sample in dataset[:]]
     step, batch = args.batch or 1, args.batch or player.usual_batch(dataset)
     groups = [range(i, min(i + step, len(pictures))) for i in range(0, len(pictures), step)]
@@ -83,7 +84,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             scorer = Scorer(dataset, Path(folder), "row", (), model.found)
             begun = time.perf_counter()
-            notes = evaluate_row(dataset, scorer, player, batch=batch, workers=args.workers, told=lambda: None).notes
+            notes = evaluate_row(dataset, scorer, player, batch=batch, workers=args.workers, done=lambda: None).notes
             scorer.finish(notes)
             spent["evaluate"].append((time.perf_counter() - begun) / len(pictures))
         print(", ".join(f"{name} {seconds[-1]:.3f} s" for name, seconds in spent.items()), flush=True)

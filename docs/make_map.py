@@ -50,6 +50,7 @@ ROOMS: dict[str, tuple[float, str, str]] = {
     "config": (0.91, "YAML", "YAML files to typed configs; errors with file, line and column"),
     "contracts": (0.5, "protocols", "protocols and specs that rooms and plugins agree on"),
     "values": (0.5, "plain data", "scene records, frames, geometry, labels, errors; NumPy only"),
+    "reporting": (0.74, "progress", "bars on a terminal and in notebooks, plain lines in logs"),
     "executors": (0.3, "processes", "where samples are made: processes, ray, slurm"),
     "driving": (0.1, "closed loop", "vehicle dynamics, the closed loop, scenarios"),
 }

@@ -15,19 +15,20 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from gear.collecting.run import CollectReport
+    from gear.measuring.gap.report import GapReport
     from gear.plugins.datasets import Dataset, Twins, open_dataset, open_twins
     from gear.values.errors import GearError
     from gear.verbs.attack.report import AttackReport
     from gear.verbs.attack.run import attack
     from gear.verbs.bench.report import BenchReport
     from gear.verbs.bench.run import bench
-    from gear.verbs.collect.run import CollectReport, collect
-    from gear.verbs.defend import DefendReport, defend
+    from gear.verbs.collect.run import collect
+    from gear.verbs.defend.run import DefendReport, defend
     from gear.verbs.doctor import DoctorReport, doctor
     from gear.verbs.evaluate.report import EvaluateReport
     from gear.verbs.evaluate.run import evaluate
     from gear.verbs.export import export
-    from gear.verbs.gap.report import GapReport
     from gear.verbs.gap.run import gap
     from gear.verbs.models import ModelFacts, list_models
     from gear.verbs.sheet import sheet
@@ -79,13 +80,13 @@ __all__ = [
 _HOME = {
     "AttackReport": "gear.verbs.attack.report",
     "BenchReport": "gear.verbs.bench.report",
-    "CollectReport": "gear.verbs.collect.run",
+    "CollectReport": "gear.collecting.run",
     "ConvertReport": "gear.verbs.weights.convert",
     "Dataset": "gear.plugins.datasets",
-    "DefendReport": "gear.verbs.defend",
+    "DefendReport": "gear.verbs.defend.run",
     "DoctorReport": "gear.verbs.doctor",
     "EvaluateReport": "gear.verbs.evaluate.report",
-    "GapReport": "gear.verbs.gap.report",
+    "GapReport": "gear.measuring.gap.report",
     "GearError": "gear.values.errors",
     "ModelFacts": "gear.verbs.models",
     "Town": "gear.verbs.towns.facts",
@@ -98,7 +99,7 @@ _HOME = {
     "average_weights": "gear.verbs.weights.average",
     "collect": "gear.verbs.collect.run",
     "convert_weights": "gear.verbs.weights.convert",
-    "defend": "gear.verbs.defend",
+    "defend": "gear.verbs.defend.run",
     "doctor": "gear.verbs.doctor",
     "evaluate": "gear.verbs.evaluate.run",
     "export": "gear.verbs.export",

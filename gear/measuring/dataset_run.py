@@ -17,8 +17,8 @@ from gear.measuring.scoring import Note, Scorer
 from gear.readers import TorchDataset, read_ahead
 from gear.values.errors import DatasetError
 
-Told = Callable[[], None]
-"""Called after every sample that is whole."""
+SampleDone = Callable[[], None]
+"""Called after every sample whose files are all written."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +36,9 @@ class Row:
     damaged: tuple[DatasetError, ...]
 
 
-def evaluate_row(dataset: Dataset[Any], scorer: Scorer, player: Player, *, batch: int, workers: int, told: Told) -> Row:
+def evaluate_row(
+    dataset: Dataset[Any], scorer: Scorer, player: Player, *, batch: int, workers: int, done: SampleDone
+) -> Row:
     """Takes up what is kept and predicts the rest.
 
     Batches are always the same samples, those that are finished already among them, and there are as many lanes as the
@@ -46,7 +48,7 @@ def evaluate_row(dataset: Dataset[Any], scorer: Scorer, player: Player, *, batch
     pictures are decoded, and predictions measured and written, in threads beside the model. What waits is bounded, so
     memory does not grow with the dataset.
     """
-    desk = _Desk(2 * batch + workers, told)
+    desk = _Desk(2 * batch + workers, done)
     items = TorchDataset(dataset)
     with ThreadPoolExecutor(workers) as scorers:
         notes, damaged = _taken_up(scorer, scorers, desk)
@@ -106,8 +108,8 @@ def _in_lanes(
 class _Desk:
     """Where samples wait to be measured: so many at a time, and the first failure is remembered."""
 
-    def __init__(self, most: int, told: Told) -> None:
-        self._waiting, self._one_tells, self._told = threading.Semaphore(most), threading.Lock(), told
+    def __init__(self, most: int, done: SampleDone) -> None:
+        self._waiting, self._reporting, self._done = threading.Semaphore(most), threading.Lock(), done
         self._failed = list[BaseException]()
 
     def submit(self, pool: ThreadPoolExecutor, job: Callable[..., Any], *arguments: Any) -> Future[Any]:
@@ -127,8 +129,8 @@ class _Desk:
         error = None if done.cancelled() else done.exception()
         try:
             if not done.cancelled() and error is None and isinstance(done.result(), Note):
-                with self._one_tells:
-                    self._told()
+                with self._reporting:
+                    self._done()
         except BaseException as problem:  # futures keep what is raised here to themselves
             error = problem
         if error is not None:

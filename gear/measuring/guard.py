@@ -1,98 +1,105 @@
-"""A defense at work: built from its options, held to its contract at each sample."""
+"""A defense as the user asks for it: name, options and calibration data, as one value that every verb passes on."""
 
 from __future__ import annotations
 
-import dataclasses
-import functools
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
-from gear.contracts.defenses import Defense, DefenseResult
-from gear.contracts.models import Model
-from gear.plugins.build import blamed
-from gear.plugins.catalogue import PluginEntry
-from gear.values.errors import PluginError
-from gear.values.frames import UInt8Image
-
-NUMBERS = (int, float, np.floating, np.integer)
+from gear.measuring.calibration import NOTHING, Calibration, opened_calibration
+from gear.measuring.plugin_selection import Chosen, check_defense, chosen_defense
+from gear.values.errors import GearError
+from gear.values.progress import Progress
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Guard:
-    """A third party's defense, whose failures say whose they are."""
+    """A request for a defense.
 
-    def __init__(
-        self,
-        found: PluginEntry,
-        defense: Defense,
-        model: Model | None = None,
-        learn: Callable[[], Any] = lambda: None,
-    ) -> None:
-        """Args:
-        found: whose it is.
-        defense: the thing itself.
-        model: what it guards, for a defense that looks into it.
-        learn: gives what its `fit` makes of calibration data; called once, before the first sample.
-        """
-        self._found, self._defense, self._model, self._learn = found, defense, model, learn
+    Attributes:
+        defense: name of a defense plugin.
+        settings: `KEY=VALUE` texts for its options.
+        calibration: root of the dataset from which the defense learns; None for none.
+        calibration_patched: root of the same pictures with patches; None for none.
+    """
 
-    @functools.cached_property
-    def state(self) -> Any:
-        """What the defense has learnt. Learning takes minutes, and what is finished needs none of it."""
-        return self._learn()
+    defense: str
+    settings: tuple[str, ...] = ()
+    calibration: str | Path | None = None
+    calibration_patched: str | Path | None = None
 
-    def apply(self, views: Mapping[str, UInt8Image], rng: np.random.Generator, index: int) -> DefenseResult:
-        """Cleans one sample.
+    @staticmethod
+    def of(
+        defense: str | None,
+        settings: Iterable[str] = (),
+        calibration: str | Path | None = None,
+        calibration_patched: str | Path | None = None,
+    ) -> Guard | None:
+        """From the keywords of a verb; None without a defense.
 
         Raises:
-            PluginError: the defense fails, or returns something else than it promises.
+            GearError: options or calibration data are given, and no defense.
         """
-        for picture in views.values():
-            picture.setflags(write=False)
-        with blamed(self._found, f"apply on sample {index}"):
-            result = self._defense.apply(views, self._model, self.state, rng)
-        problem = self._problem(result, views)
-        if problem:
-            raise self._error(index, problem)
-        # NumPy's numbers will do, but are no JSON.
-        return result if result.score is None else dataclasses.replace(result, score=float(result.score))
-
-    def _problem(self, result: Any, views: Mapping[str, UInt8Image]) -> str:
-        """What is wrong with a result, or nothing."""
-        if not isinstance(result, DefenseResult):
-            return f"apply returns a DefenseResult, got {type(result).__name__}"
-        sizes = {name: picture.shape[:2] for name, picture in views.items()}
-        outputs = self._found.spec.outputs  # type: ignore[attr-defined]
-        has_mask = "mask" in outputs or result.mask is not None  # what was not promised is used, too
-        for name, size in sizes.items():
-            if not _is_array(_of_camera(result.views, name), (*size, 3), np.uint8):
-                return f"views[{name!r}] must have shape {(*size, 3)} of uint8"
-            if not has_mask:
-                continue
-            mask = _of_camera(result.mask, name)
-            if not _is_array(mask, size, np.float32):
-                return f"mask[{name!r}] must have shape {size} of float32"
-            if not (mask.min() >= 0 and mask.max() <= 1):  # NaN is neither
-                return f"mask[{name!r}] must lie in 0..1, got {mask.min():g} to {mask.max():g}"
-        if unknown := (result.mask or {}).keys() - sizes.keys():
-            return f"mask[{min(unknown)!r}] is of no camera that it was shown"
-        has_score = "score" in outputs or result.score is not None
-        if has_score and not (isinstance(result.score, NUMBERS) and 0 <= result.score <= 1):
-            return f"score must be a float in 0..1, got {result.score!r}"
-        return ""
-
-    def _error(self, index: int, problem: str) -> PluginError:
-        owner = self._found.owner
-        name = f"{self._found.spec.name} ({owner.package} {owner.version})"
-        return PluginError(name, f"apply on sample {index}", problem)
+        options = tuple(settings)
+        if defense:
+            return Guard(
+                defense=defense, settings=options, calibration=calibration, calibration_patched=calibration_patched
+            )
+        if options:
+            raise GearError(f"{options[0]} is a defense's option, but there is no defense: name one with --defense")
+        if calibration is not None or calibration_patched is not None:
+            raise GearError("defenses learn from calibration data, but there is no defense: name one with --defense")
+        return None
 
 
-def _of_camera(given: object, name: str) -> Any:
-    """What a defense says of a camera; None where it does not say it by name."""
-    return given.get(name) if isinstance(given, Mapping) else None
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class OpenedGuard:
+    """A guard whose plugin was found and whose calibration data were opened.
+
+    Attributes:
+        defense: the plugin with its options; None without a defense.
+        calibration: what the defense learns from.
+    """
+
+    defense: Chosen | None = None
+    calibration: Calibration = field(default=NOTHING)
 
 
-def _is_array(value: object, shape: tuple[int, ...], dtype: npt.DTypeLike) -> bool:
-    return isinstance(value, np.ndarray) and value.shape == shape and value.dtype == dtype
+UNGUARDED = OpenedGuard()
+
+
+def open_guard(
+    guard: Guard | None,
+    models: Sequence[Chosen],
+    task: str,
+    *,
+    flag: str = "--set ",
+    on_fit_progress: Progress | None = None,
+) -> OpenedGuard:
+    """Finds the defense, opens its calibration data, and checks that both suit the models and the task.
+
+    Args:
+        guard: what was asked for; None for no defense.
+        models: that the defense guards, one after the other.
+        task: of the data.
+        flag: how the user sets one of the models' options.
+        on_fit_progress: called with (calibration samples that the defense has read, their number).
+
+    Raises:
+        GearError: there is no such defense, an option does not fit, the data cannot be read, or it does not suit.
+    """
+    if guard is None:
+        return UNGUARDED
+    chosen = chosen_defense(guard.defense, guard.settings)
+    assert chosen is not None
+    calibration = opened_calibration(
+        guard.calibration,
+        guard.calibration_patched,
+        models,
+        guard.defense,
+        flag=flag,
+        on_fit_progress=on_fit_progress,
+    )
+    for model in models:
+        check_defense(chosen, model, task, is_calibrated=calibration.clean is not None)
+    return OpenedGuard(defense=chosen, calibration=calibration)

@@ -20,8 +20,9 @@ from gear.contracts.defenses import DefenseResult
 from gear.contracts.models import BatchPredictor, Model, Trainable
 from gear.contracts.specs import DefenseSpec, ModelSpec
 from gear.dataset.reading import Dataset
-from gear.measuring.calibration import NOTHING, Calibration, Views
-from gear.measuring.guard import Guard
+from gear.measuring.calibration import Calibration, Views
+from gear.measuring.checked_defense import CheckedDefense
+from gear.measuring.guard import UNGUARDED, OpenedGuard
 from gear.measuring.parallel_batches import lanes_of
 from gear.measuring.plugin_selection import Chosen
 from gear.plugins.build import blamed, build
@@ -56,7 +57,8 @@ class Player:
     """A built model with its defense, fitted where it must be.
 
     Attributes:
-        model: defended, if there is a defense.
+        plugin: the model's.
+        model: behind its defense, if there is one.
         weights_sha256: of the bare model; None for what is no torch model.
         lanes: how many threads may `play` at a time. Defenses and models of third parties are never asked to.
     """
@@ -64,9 +66,8 @@ class Player:
     def __init__(
         self,
         model: Chosen,
-        defense: Chosen | None = None,
+        guard: OpenedGuard = UNGUARDED,
         *,
-        calibration: Calibration = NOTHING,
         seed: int = 0,
     ) -> None:
         """Builds and wraps; a defense learns before the first sample.
@@ -76,23 +77,23 @@ class Player:
         """
         spec = model.found.spec
         assert isinstance(spec, ModelSpec)
-        self._found, self._views, self._seed = model.found, spec.views, seed
+        self.plugin, self._views, self._seed = model.found, spec.views, seed
         bare: Model = build(model.found, model.options)
         self.weights_sha256 = weights_digest(bare)
         self.model: Model = bare
-        self._guard: Guard | None = None
+        self._guard: CheckedDefense | None = None
         self._guard_name = ""
-        if defense is not None:
-            self._guard_name = defense.found.spec.name
-            self._guard, self.model = self._guarded(defense, bare, calibration)
+        if guard.defense is not None:
+            self._guard_name = guard.defense.found.spec.name
+            self._guard, self.model = self._guarded(guard.defense, bare, guard.calibration)
         # A wrapper that forwards `predict_many` to the bare model by `__getattr__` would leave the defense out.
         is_own = self.model is bare or inspect.getattr_static(self.model, "predict_many", None) is not None
         self._many = self.model.predict_many if isinstance(self.model, BatchPredictor) and is_own else None
-        self._is_ours = model.found.owner.package == DISTRIBUTION and defense is None
+        self._is_ours = model.found.owner.package == DISTRIBUTION and guard.defense is None
         self.lanes = lanes_of(bare) if self._is_ours else 1
         self._at_work, self._counting = 0, threading.Lock()
 
-    def _guarded(self, defense: Chosen, bare: Model, calibration: Calibration) -> tuple[Guard, Model]:
+    def _guarded(self, defense: Chosen, bare: Model, calibration: Calibration) -> tuple[CheckedDefense, Model]:
         found = defense.found
         spec = found.spec
         assert isinstance(spec, DefenseSpec)
@@ -100,7 +101,7 @@ class Player:
         with blamed(found, "wrap"):
             wrapped: Model = product.wrap(bare)
         learn = partial(calibration.fit, defense, product, bare, self._views, self._seed)
-        return Guard(found, product, bare if spec.needs_model or spec.taps else None, learn), wrapped
+        return CheckedDefense(found, product, bare if spec.needs_model or spec.taps else None, learn), wrapped
 
     def usual_batch(self, dataset: Dataset[Any]) -> int:
         """How many of a dataset's samples go through one of gear's own models together unless somebody says: as many
@@ -160,12 +161,12 @@ class Player:
 
     def _predict(self, shown: Sequence[Views], indices: Sequence[int]) -> list[Any]:
         stage = f"predict on sample {indices[0]}" + (f" to {indices[-1]}" if len(indices) > 1 else "")
-        with blamed(self._found, stage) if self.lanes == 1 else contextlib.nullcontext():
+        with blamed(self.plugin, stage) if self.lanes == 1 else contextlib.nullcontext():
             if self._many is None:
                 return [self.model.predict(views) for views in shown]
             answers = list(self._many(list(shown)))
         if len(answers) != len(shown):
-            raise accusation(self._found, stage, f"predict_many gave {len(answers)} answers to {len(shown)} samples")
+            raise accusation(self.plugin, stage, f"predict_many gave {len(answers)} answers to {len(shown)} samples")
         return answers
 
 

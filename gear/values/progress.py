@@ -3,9 +3,70 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 Progress = Callable[[int, int], None]
 """Called with (done, total), first with what an earlier run finished; a total of 0 means that it is not known."""
 
 Warn = Callable[[str], None]
 """Called with one line about something that is allowed and that the user may not have meant."""
+
+
+def _no_progress(done: int, total: int) -> None: ...
+
+
+def _no_warning(line: str) -> None: ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Callbacks:
+    """What a running verb reports to; by default nothing listens.
+
+    Attributes:
+        on_progress: called after every sample, or step of an optimisation.
+        on_fit_progress: called after every calibration sample that a defense reads for the first time.
+        on_warning: called with one line, each line once.
+    """
+
+    on_progress: Progress = _no_progress
+    on_fit_progress: Progress = _no_progress
+    on_warning: Warn = _no_warning
+
+    @classmethod
+    def of(
+        cls,
+        *,
+        on_progress: Progress | None = None,
+        on_fit_progress: Progress | None = None,
+        on_warning: Warn | None = None,
+    ) -> Callbacks:
+        """From the keywords of a verb, of which any may be None; a repeated warning is passed on once."""
+        warned: set[str] = set()
+
+        def warn_once(line: str) -> None:
+            if on_warning is not None and line not in warned:
+                warned.add(line)
+                on_warning(line)
+
+        return cls(
+            on_progress=on_progress or _no_progress,
+            on_fit_progress=on_fit_progress or _no_progress,
+            on_warning=warn_once,
+        )
+
+    def and_also(self, others: Callbacks) -> Callbacks:
+        """Callbacks that report to these and to the others."""
+
+        def both_progress(done: int, total: int) -> None:
+            self.on_progress(done, total)
+            others.on_progress(done, total)
+
+        def both_fit_progress(done: int, total: int) -> None:
+            self.on_fit_progress(done, total)
+            others.on_fit_progress(done, total)
+
+        def both_warnings(line: str) -> None:
+            self.on_warning(line)
+            others.on_warning(line)
+
+        return Callbacks(on_progress=both_progress, on_fit_progress=both_fit_progress, on_warning=both_warnings)

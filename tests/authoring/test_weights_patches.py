@@ -31,14 +31,14 @@ from gear.config.reader import read_node
 from gear.contracts.hookspecs import hookimpl
 from gear.dataset.files import write_alone
 from gear.dataset.sidecar import dump_json
+from gear.measuring.gap.picture_gap import PictureGap
+from gear.measuring.gap.report import GapReport, SampleGap
 from gear.plugins import build as building
 from gear.plugins.manager import discover
 from gear.testing.tiny_networks import tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import GearError, UnknownNameError
 from gear.verbs.evaluate.report import Difference, Estimate, EvaluateReport, PairedTest, RowReport
-from gear.verbs.gap.picture_gap import PictureGap
-from gear.verbs.gap.report import GapReport, SampleGap
 
 MODELS = {
     "semseg": "ddrnet23_slim", "depth": "ddrnet23_slim_depth", "detect2d": "retinanet_r18_fpn",

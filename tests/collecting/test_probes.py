@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import gear
+from gear.collecting.run import CollectReport
 from gear.dataset.probe_files import probes_of
 from gear.formats import rle
 from gear.values.errors import DatasetError
-from gear.verbs.collect.run import CollectReport
 from tests.dataset.splits import tree
 from tests.verbs.conftest import Copy
 

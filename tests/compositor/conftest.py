@@ -15,9 +15,9 @@ from torch import Tensor
 import gear
 from gear.collecting.patch_sources import random_patch
 from gear.dataset.reading import Dataset
+from gear.measuring.gap.picture_gap import PictureGap, picture_gap, visible_mask
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.verbs.collect.run import collect
-from gear.verbs.gap.picture_gap import PictureGap, picture_gap, visible_mask
 
 Twins = tuple[Dataset[Any], Dataset[Any]]
 MakeTwins = Callable[..., Twins]

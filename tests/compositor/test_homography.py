@@ -12,10 +12,10 @@ from torch import Tensor
 from gear.camera.effects import Exposure
 from gear.compositor.homography import HomographyCompositor
 from gear.compositor.sampling import Scan, take_samples, unit_from_image
+from gear.measuring.gap.picture_gap import visible_mask
 from gear.plugins.build import build_task
 from gear.testing.synthetic import synthetic_frame
 from gear.testing.things import CAR, Thing, board
-from gear.verbs.gap.picture_gap import visible_mask
 
 from .conftest import MakeTwins
 

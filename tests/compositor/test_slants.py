@@ -15,6 +15,7 @@ import pytest
 import gear
 from gear.collecting.job import resolve
 from gear.collecting.pipeline import collect_samples
+from gear.collecting.run import manifest_facts
 from gear.collecting.session import Session, open_session
 from gear.compositor.transport import TransportCompositor
 from gear.config.load import load_collection
@@ -23,7 +24,6 @@ from gear.dataset.store import Store
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.geometry import RigidTransform
 from gear.values.scene import Pose, SceneRecord
-from gear.verbs.collect.run import manifest_facts
 
 from .conftest import Twins, gaps
 

@@ -17,9 +17,8 @@ from gear.testing.tiny_networks import tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import GearError
 from gear.verbs.attack.run import attack
-from gear.verbs.attack.verify import verify
 from gear.verbs.evaluate.run import evaluate
-from tests.verbs.conftest import Copy, Install, Nothing, Small
+from tests.verbs.conftest import Copy, Install, Nothing, Small, verified
 
 
 class Learner:
@@ -132,7 +131,7 @@ def test_a_patch_is_checked_behind_the_defense_that_it_was_made_through(
         small(), model="tiny_segmenter", out=tmp_path / "p", attack="square", queries=4, seed=5,
         settings=["height_px=12", "width_px=24"], **behind,
     )  # fmt: skip
-    verify(
+    verified(
         tmp_path / "p", small(split="val", seed=5), models=["tiny_segmenter"], samples=1, town=TINY_TOWN,
         scenes=f"{TINY_SCENES}:board", **behind,
     )  # fmt: skip

@@ -12,11 +12,12 @@ import pytest
 import torch
 
 import gear
+from gear.collecting.run import CollectReport
 from gear.readers import TorchDataset, batches, collate, order
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import DatasetError, UnknownNameError
-from gear.verbs.collect.run import CollectReport, collect
+from gear.verbs.collect.run import collect
 from tests.verbs.conftest import size_settings
 
 

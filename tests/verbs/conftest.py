@@ -13,14 +13,20 @@ from typing import Any
 
 import pytest
 
+from gear.collecting.run import CollectReport
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import AttackSpec, DefenseSpec, MetricSpec, ModelSpec
 from gear.dataset.locks import turn
+from gear.measuring.gap.report import GapReport
+from gear.measuring.guard import Guard
 from gear.plugins import build as building
 from gear.plugins.manager import discover
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_depth, tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
-from gear.verbs.collect.run import CollectReport, collect
+from gear.values.progress import Callbacks
+from gear.verbs.attack.request import VerifyRequest
+from gear.verbs.attack.verify import verify
+from gear.verbs.collect.run import collect
 from tests.shared import shared_folder
 
 Collected = Callable[..., Path]
@@ -65,6 +71,16 @@ def collect_small() -> Callable[..., CollectReport]:
         return collect(task, out=out, settings=settings, **(arguments | changes))
 
     return run
+
+
+def verified(
+    out: Path, data: Path, models: Sequence[str], *, defense: str | None = None, calibration: Path | None = None,
+    **given: Any,
+) -> dict[str, GapReport]:  # fmt: skip
+    """The rendered check of patches on other samples."""
+    guard = Guard.of(defense, (), calibration)
+    request = VerifyRequest(out=out, data=data, models=tuple(models), guard=guard, **given)
+    return verify(request, Callbacks())
 
 
 def put_package(monkeypatch: pytest.MonkeyPatch, specs: Sequence[Any]) -> None:

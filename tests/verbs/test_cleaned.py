@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from gear.cli.main import main
-from gear.verbs.defend import DefendReport, defend
+from gear.verbs.defend.run import DefendReport, defend
 from tests.dataset.splits import tree
 from tests.verbs.conftest import Copy
 

@@ -20,6 +20,7 @@ import pytest
 
 import gear
 from gear.collecting.job import resolve
+from gear.collecting.run import CollectReport
 from gear.config.load import load_collection
 from gear.formats import rle
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
@@ -33,7 +34,6 @@ from gear.values.errors import (
     TownError,
     UnknownNameError,
 )
-from gear.verbs.collect.run import CollectReport
 from tests.dataset.splits import tree
 from tests.verbs.conftest import Copy
 
@@ -82,8 +82,8 @@ def test_a_worker_apart_gives_the_same_bytes(
     tmp_path: Path, collect_small: Collect, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     collect_small("depth", tmp_path / "a")
-    monkeypatch.setattr("gear.verbs.collect.run.open_session", lambda job: pytest.fail("rendered in this process"))
-    collect_small("depth", tmp_path / "b", apart=True)
+    monkeypatch.setattr("gear.collecting.run.open_session", lambda job: pytest.fail("rendered in this process"))
+    collect_small("depth", tmp_path / "b", in_subprocess=True)
     assert tree(tmp_path / "a") == tree(tmp_path / "b")
 
 

@@ -19,7 +19,7 @@ from gear.contracts.defenses import DefenseResult
 from gear.contracts.specs import DefenseSpec
 from gear.plugins.defenses.jpeg import Jpeg, JpegConfig
 from gear.values.errors import ConfigError, DatasetError, GearError, PluginError, UnknownNameError
-from gear.verbs.defend import defend
+from gear.verbs.defend.run import defend
 from tests.dataset.splits import tree
 from tests.verbs.conftest import Copy, put_package
 

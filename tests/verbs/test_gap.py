@@ -17,11 +17,11 @@ from gear.cli.main import main
 from gear.collecting.patch_sources import read_patch
 from gear.compositor.opening import open_compositor
 from gear.measuring import plugin_selection
+from gear.measuring.gap.picture_gap import PERFECT_DB, picture_gap
+from gear.measuring.gap.run import sample_gaps, shown_patches
 from gear.testing.tiny_networks import tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import DatasetError, GearError
-from gear.verbs.gap.picture_gap import PERFECT_DB, picture_gap
-from gear.verbs.gap.run import sample_gaps, shown_patches
 from tests.verbs.conftest import Copy
 
 

@@ -9,10 +9,10 @@ import pytest
 
 import gear
 from gear.collecting.lookup import look_up
+from gear.collecting.run import CollectReport
 from gear.config.load import load_collection
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import ConfigError
-from gear.verbs.collect.run import CollectReport
 
 Collect = Callable[..., CollectReport]
 

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import sys
+from typing import TYPE_CHECKING
 
 from gear.cli.device import add_device
+
+if TYPE_CHECKING:
+    from gear.values.serial import Json
+    from gear.verbs.attack.request import AttackRequest
 
 EXAMPLE = """examples:
   gear collect --task semseg --scene billboard01 --split train --probes --out data/b01
@@ -40,13 +44,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings", help="an option of the attack"
     )
-    parser.add_argument("--model-set", metavar="KEY=VALUE", action="append", default=[], help="an option of the models")
-    add_device(parser, "model_set")
+    parser.add_argument(
+        "--model-set", metavar="KEY=VALUE", action="append", default=[], dest="model_settings",
+        help="an option of the models",
+    )  # fmt: skip
+    add_device(parser, "model_settings")
     parser.add_argument(
         "--defense", metavar="NAME", help="defense that guards the models; the attack is adaptive to it"
     )
     parser.add_argument(
-        "--defense-set", metavar="KEY=VALUE", action="append", default=[], help="an option of the defense"
+        "--defense-set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        dest="defense_settings",
+        help="an option of the defense",
     )
     add_calibration(parser)
     parser.add_argument(
@@ -81,10 +93,12 @@ def run(args: argparse.Namespace) -> int:
     """Runs the attack and prints where the patches are."""
     import json
 
-    from gear.cli.progress import ProgressBar
+    from gear.cli.requests import guard_of, request_of
+    from gear.reporting.display import Display
     from gear.values.errors import GearError
-    from gear.verbs.attack.run import attack
-    from gear.verbs.attack.verify import check_held_out, verify
+    from gear.verbs.attack.request import AttackRequest
+    from gear.verbs.attack.run import run_attack, unit_of
+    from gear.verbs.attack.verify import check_held_out
 
     if args.verify is not None:
         check_held_out(args.data, args.verify, args.val)
@@ -92,54 +106,31 @@ def run(args: argparse.Namespace) -> int:
         raise GearError(
             "--town and --scenes are of the dataset that --verify names; add --verify DIR, or leave them out"
         )
-    unit = "step" if args.queries is None else "query"
-    with ProgressBar(unit="picture") as learning, ProgressBar(unit=unit) as progress:
-        report = attack(
-            args.data,
-            model=args.model,
-            out=args.out,
-            attack=args.attack,
-            steps=args.steps,
-            queries=args.queries,
-            settings=args.settings,
-            model_settings=args.model_set,
-            defense=args.defense,
-            defense_settings=args.defense_set,
-            calibration=args.calibration,
-            calibration_patched=args.calibration_patched,
-            val=args.val,
-            every=args.every,
-            patience=args.patience,
-            compositor=args.compositor,
-            seed=args.seed,
-            allow_test_data=args.allow_test_data,
-            force=args.force,
-            on_progress=progress,
-            on_fit_progress=learning,
-            on_warning=lambda text: print(f"gear: note: {text}", file=sys.stderr),
-        )
+    request = request_of(AttackRequest, args, models=tuple(args.model), guard=guard_of(args))
+    with Display("attack", unit=unit_of(request)) as display:
+        report = run_attack(request, display.callbacks)
     if args.verify is None or not args.json:
         print(json.dumps(report.facts, indent=2) if args.json else report.summary())
     if args.verify is not None:
-        with ProgressBar(unit="picture") as learning, ProgressBar() as progress:
-            reports = verify(
-                args.out,
-                args.verify,
-                models=args.model,
-                model_settings=args.model_set,
-                defense=args.defense,
-                defense_settings=args.defense_set,
-                calibration=args.calibration,
-                calibration_patched=args.calibration_patched,
-                town=args.town,
-                scenes=args.scenes,
-                on_progress=progress,
-                on_fit_progress=learning,
-            )
-        if args.json:
-            verified = {name: found.as_json() for name, found in reports.items()}
-            print(json.dumps({"attack": report.facts, "verify": verified}, indent=2))
-        else:
-            for found in reports.values():
-                print(found.table())
+        check_rendered(args, request, report.facts)
     return 0
+
+
+def check_rendered(args: argparse.Namespace, request: AttackRequest, facts: Json) -> None:
+    """Renders the patches on held-out samples and prints what they do there."""
+    import json
+
+    from gear.cli.requests import request_of
+    from gear.reporting.display import Display
+    from gear.verbs.attack.request import VerifyRequest
+    from gear.verbs.attack.verify import verify
+
+    check = request_of(VerifyRequest, args, data=args.verify, models=request.models, guard=request.guard)
+    with Display("attack --verify") as display:
+        reports = verify(check, display.callbacks)
+    if args.json:
+        verified = {name: found.as_json() for name, found in reports.items()}
+        print(json.dumps({"attack": facts, "verify": verified}, indent=2))
+    else:
+        for found in reports.values():
+            print(found.table())

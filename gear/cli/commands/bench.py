@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from gear.cli.commands.collect import positive
 
 if TYPE_CHECKING:
-    from gear.cli.progress import ProgressBar
     from gear.verbs.bench.plan import Step
 
 EXAMPLE = """examples:
@@ -42,75 +41,24 @@ def run(args: argparse.Namespace) -> int:
     """Runs the bench and prints its tables."""
     import json
 
+    from gear.cli.requests import request_of
+    from gear.reporting.display import Display
     from gear.verbs.bench.command import command
-    from gear.verbs.bench.run import bench, prepared
+    from gear.verbs.bench.request import BenchRequest
+    from gear.verbs.bench.run import prepared, run_bench
     from gear.verbs.bench.table import text
 
-    given = {"out": args.out, "settings": args.settings, "device": args.device, "workers": args.workers}
+    request = request_of(BenchRequest, args, in_subprocess=True)
     if args.list:
-        steps = list(prepared(args.config, **given).steps())
+        steps = list(prepared(request).steps())
         listed = [{"verb": step.verb, "title": step.title, "arguments": step.arguments} for step in steps]
         print(json.dumps(listed, indent=1) if args.json else "\n".join(map(command, steps)))
         return 0
-    with _Bars() as bars:
-        report = bench(
-            args.config,
-            **given,
-            apart=True,
-            on_step=bars.on_step,
-            on_progress=bars.on_progress,
-            on_fit_progress=bars.on_fit_progress,
-            on_warning=bars.on_warning,
-        )
+    with Display("bench") as display:
+
+        def begin(step: Step, number: int, steps: int) -> None:
+            display.begin(f"[{number}/{steps}] {step.title}", unit="step" if step.verb == "attack" else "sample")
+
+        report = run_bench(request, display.callbacks, begin)
     print(json.dumps(report.as_json(), indent=1, allow_nan=False) + "\n" if args.json else text(report), end="")
     return 0
-
-
-class _Bars:
-    """Prints the title of each step, with a progress bar of its own."""
-
-    def __init__(self) -> None:
-        self._bar: ProgressBar | None = None
-        self._lesson: ProgressBar | None = None
-
-    def on_step(self, step: Step, number: int, steps: int) -> None:
-        """Prints the step's title."""
-        import sys
-
-        self._close()
-        if sys.stderr.isatty():
-            print(f"[{number}/{steps}] {step.title}", file=sys.stderr)
-
-    def on_progress(self, done: int, total: int) -> None:
-        """Moves the step's bar."""
-        self._bar = self._bar or _bar("sample")
-        self._bar(done, total)
-
-    def on_fit_progress(self, done: int, total: int) -> None:
-        """Moves the bar of a defense that learns."""
-        self._lesson = self._lesson or _bar("picture")
-        self._lesson(done, total)
-
-    def on_warning(self, line: str) -> None:
-        """Prints it."""
-        import sys
-
-        print(f"gear: note: {line}", file=sys.stderr)
-
-    def _close(self) -> None:
-        for bar in (self._lesson, self._bar):
-            if bar is not None:
-                bar.__exit__(None, None, None)
-        self._bar = self._lesson = None
-
-    def __enter__(self) -> _Bars:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self._close()
-
-
-def _bar(unit: str) -> ProgressBar:
-    from gear.cli.progress import ProgressBar
-
-    return ProgressBar(unit=unit)

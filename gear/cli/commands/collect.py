@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 
 EXAMPLE = """examples:
   gear collect --task stereo3d
@@ -66,29 +65,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Collects and prints where the dataset is."""
-    from gear.cli.progress import ProgressBar
-    from gear.verbs.collect.run import collect
+    from gear.cli.requests import request_of
+    from gear.reporting.display import Display
+    from gear.verbs.collect.request import CollectRequest
+    from gear.verbs.collect.run import run_collect
 
-    with ProgressBar() as progress:
-        report = collect(
-            args.task,
-            config=args.config,
-            town=args.town,
-            scene=args.scene,
-            split=args.split,
-            samples=args.samples,
-            seed=args.seed,
-            weather=args.weather,
-            patch=args.patch,
-            renderer=args.renderer,
-            quality=args.quality,
-            out=args.out,
-            probes=args.probes,
-            settings=args.settings,
-            workers=args.workers,
-            force=args.force,
-            on_progress=progress,
-            on_warning=lambda text: print(f"gear: note: {text}", file=sys.stderr),
-        )
+    with Display("collect") as display:
+        report = run_collect(request_of(CollectRequest, args), display.callbacks)
     print(report.summary())
     return 0

@@ -32,18 +32,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Cleans the pictures and prints where they are."""
-    from gear.cli.progress import ProgressBar
-    from gear.verbs.defend import defend
+    from gear.cli.requests import request_of
+    from gear.reporting.display import Display
+    from gear.verbs.defend.request import DefendRequest
+    from gear.verbs.defend.run import run_defend
 
-    with ProgressBar() as progress:
-        report = defend(
-            args.dataset,
-            defense=args.defense,
-            out=args.out,
-            split=args.split,
-            settings=args.settings,
-            seed=args.seed,
-            on_progress=progress,
-        )
+    with Display("defend") as display:
+        report = run_defend(request_of(DefendRequest, args), display.callbacks)
     print(report.summary())
     return 0

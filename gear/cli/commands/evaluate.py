@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--split", help="of the datasets, where they have several")
     parser.add_argument("--defense", metavar="NAME", help="defense plugin; gear plugins --kind defense")
     for flags, dest, what in (
-        (("--set", "--model-set"), "model_set", "model"),
+        (("--set", "--model-set"), "model_settings", "model"),
         (("--defense-set",), "defense_settings", "defense"),
     ):
         parser.add_argument(
@@ -66,7 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="seed of the defense's random draws and of the permutation tests (0)",
     )
-    add_device(parser, "model_set")
+    add_device(parser, "model_settings")
     parser.add_argument("--json", action="store_true", help="print results.json instead of the table")
 
 
@@ -79,33 +79,15 @@ def add_calibration(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Evaluates and prints the table."""
     import json
-    import sys
 
-    from gear.cli.progress import ProgressBar
-    from gear.verbs.evaluate.run import evaluate
+    from gear.cli.requests import guard_of, request_of
+    from gear.reporting.display import Display
+    from gear.verbs.evaluate.request import EvaluateRequest
+    from gear.verbs.evaluate.run import run_evaluate
     from gear.verbs.evaluate.table import table
 
-    with ProgressBar(unit="picture") as learning, ProgressBar() as progress:
-        report = evaluate(
-            args.data,
-            model=args.model,
-            model_settings=args.model_set,
-            defense=args.defense,
-            defense_settings=args.defense_settings,
-            split=args.split,
-            calibration=args.calibration,
-            calibration_patched=args.calibration_patched,
-            reports=args.reports,
-            out=args.out,
-            batch=args.batch,
-            workers=args.workers,
-            seed=args.seed,
-            on_progress=progress,
-            on_fit_progress=learning,
-        )
-    for row in report.rows:
-        for problem in row.damaged:
-            print(f"gear: note: {problem}; the sample was predicted again", file=sys.stderr)
+    with Display("evaluate") as display:
+        report = run_evaluate(request_of(EvaluateRequest, args, guard=guard_of(args)), display.callbacks)
     print(
         json.dumps(report.as_json(), indent=1, allow_nan=False) + "\n"
         if args.json

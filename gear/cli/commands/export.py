@@ -22,10 +22,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Exports the dataset and prints where it is."""
-    from gear.cli.progress import ProgressBar
+    from gear.reporting.display import Display
     from gear.verbs.export import export
 
-    with ProgressBar("file") as progress:
-        count = export(args.dataset, layout=args.layout, out=args.out, on_progress=progress)
+    with Display("export", unit="file") as display:
+        count = export(args.dataset, layout=args.layout, out=args.out, on_progress=display.callbacks.on_progress)
     print(f"{args.out}: {count} samples in the layout {args.layout}")
     return 0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 
 from gear.cli.device import add_device
 
@@ -38,19 +37,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="KEY=VALUE",
         action="append",
         default=[],
-        dest="model_set",
+        dest="model_settings",
         help="an option of the model",
     )
     parser.add_argument("--defense", metavar="NAME", help="defense plugin that guards the model")
     parser.add_argument(
-        "--defense-set", metavar="KEY=VALUE", action="append", default=[], help="an option of the defense"
+        "--defense-set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        dest="defense_settings",
+        help="an option of the defense",
     )
     add_calibration(parser)
     parser.add_argument("--compositor", action="append", dest="compositors", help="transport, homography (both)")
     parser.add_argument("--samples", type=positive, metavar="N", help="the first N samples only")
     parser.add_argument("--out", metavar="DIR", help="folder for gap.json and gap.txt")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the defense's random draws (0)")
-    add_device(parser, "model_set")
+    add_device(parser, "model_settings")
     parser.add_argument("--json", action="store_true", help="print the report as JSON")
 
 
@@ -66,32 +70,13 @@ def add_places(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Compares the pictures and prints the table."""
-    from gear.cli.progress import ProgressBar
+    from gear.cli.requests import guard_of, request_of
     from gear.dataset.sidecar import dump_json
-    from gear.verbs.gap.run import gap
+    from gear.measuring.gap.request import GapRequest
+    from gear.measuring.gap.run import measure_gap
+    from gear.reporting.display import Display
 
-    given = {} if args.compositors is None else {"compositors": tuple(args.compositors)}
-    with ProgressBar(unit="picture") as learning, ProgressBar() as progress:
-        report = gap(
-            args.dataset,
-            twin=args.twin,
-            patch=args.patch,
-            split=args.split,
-            model=args.model,
-            model_settings=args.model_set,
-            defense=args.defense,
-            defense_settings=args.defense_set,
-            calibration=args.calibration,
-            calibration_patched=args.calibration_patched,
-            samples=args.samples,
-            town=args.town,
-            scenes=args.scenes,
-            out=args.out,
-            seed=args.seed,
-            on_progress=progress,
-            on_fit_progress=learning,
-            on_warning=lambda text: print(f"gear: note: {text}", file=sys.stderr),
-            **given,
-        )
+    with Display("gap") as display:
+        report = measure_gap(request_of(GapRequest, args, guard=guard_of(args)), display.callbacks)
     print(dump_json(report.as_json()).decode().rstrip() if args.json else report.table())
     return 0

@@ -55,10 +55,10 @@ def run(args: argparse.Namespace) -> int:
 
 def draw(args: argparse.Namespace) -> int:
     """Writes the map and the sheet and prints their paths."""
-    from gear.cli.progress import ProgressBar
+    from gear.reporting.display import Display
     from gear.verbs.towns.write import write_town
 
-    with ProgressBar("scene") as progress:
+    with Display("towns", unit="scene") as display:
         report = write_town(
             args.town,
             args.out,
@@ -67,7 +67,7 @@ def draw(args: argparse.Namespace) -> int:
             quality=args.quality,
             weather=args.weather,
             seed=args.seed,
-            on_progress=progress,
+            on_progress=display.callbacks.on_progress,
         )
     print(json.dumps({"map": str(report.map), "sheet": report.sheet and str(report.sheet)}) if args.json
           else report.summary())  # fmt: skip

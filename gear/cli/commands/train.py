@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import argparse
 import re
-import sys
-from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from gear.cli.commands.collect import positive
 
 if TYPE_CHECKING:
+    from gear.reporting.display import Display
     from gear.verbs.train.checkpoint import TrainingState
 
 EXAMPLE = """examples:
@@ -85,63 +84,34 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Trains and prints the result."""
-    from gear.verbs.train.run import train
+    from gear.cli.requests import request_of
+    from gear.reporting.display import Display
+    from gear.verbs.train.request import TrainRequest
+    from gear.verbs.train.run import run_train
 
-    with TrainingBar() as bar:
-        report = train(
-            args.task,
-            args.model,
-            args.data,
-            out=args.out,
-            val=args.val,
-            epochs=args.epochs,
-            time_budget_s=args.time_budget,
-            batch=args.batch,
-            lr=args.lr,
-            seed=args.seed,
-            init=args.init,
-            precision=args.precision,
-            device=args.device,
-            workers=args.workers,
-            adversarial=args.adversarial,
-            settings=args.settings,
-            allow_test_data=args.allow_test_data,
-            on_step=bar,
-            on_warning=lambda text: print(f"gear: note: {text}", file=sys.stderr),
-        )
+    request = request_of(TrainRequest, args, time_budget_s=args.time_budget)
+    with Display("train", unit="step") as display:
+        report = run_train(request, display.callbacks, TrainingLog(display))
     print(report.summary())
     return 0
 
 
-class TrainingBar:
-    """Progress, loss and the last validation on stderr; each validation prints a line."""
+class TrainingLog:
+    """Loss and learning rate beside the progress; a line after every validation."""
 
     SHOWN = 3
+    """Metrics of a validation, beside the loss."""
 
-    def __init__(self) -> None:
-        from tqdm import tqdm
+    def __init__(self, display: Display) -> None:
+        self._display = display
 
-        self._bar: tqdm[Any] = tqdm(
-            total=100, unit="%", disable=None, dynamic_ncols=True,
-            bar_format="{l_bar}{bar}| {elapsed}<{remaining} {postfix}",
-        )  # fmt: skip
-
-    def __call__(self, progress: TrainingState, share: float, metrics: dict[str, float] | None) -> None:
+    def __call__(self, state: TrainingState, share: float, metrics: dict[str, float] | None) -> None:
         """After a step, or, with metrics, after a validation."""
-        self._bar.update(100 * share - self._bar.n)
-        if progress.steps:
-            point = progress.steps[-1]
-            self._bar.set_postfix_str(f"step {progress.step} loss {point['loss']:.3f} lr {point['rate']:.1e}")
+        if state.steps:
+            point = state.steps[-1]
+            self._display.detail(f"loss {point['loss']:.3f}, lr {point['rate']:.1e}")
         if metrics is not None:
             chosen = [*list(metrics.items())[: self.SHOWN], ("loss", metrics["loss"])]
             text = "  ".join(f"{name} {value:.4f}" for name, value in dict(chosen).items())
-            mark = " *" if progress.best_step == progress.step else ""
-            self._bar.write(f"step {progress.step:>6}  {text}{mark}", file=sys.stderr)
-
-    def __enter__(self) -> TrainingBar:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._bar.close()
+            mark = " *" if state.best_step == state.step else ""
+            self._display.write(f"step {state.step:>6}  {text}{mark}")

@@ -41,17 +41,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Writes the page and prints its path."""
-    from gear.cli.progress import ProgressBar
+    from gear.reporting.display import Display
     from gear.view.write import write_view
 
-    with ProgressBar() as progress:
+    with Display("view") as display:
         report = write_view(
             args.dataset,
             args.out,
             split=args.split,
             samples=args.samples,
             max_mb=args.max_mb,
-            on_progress=progress,
+            on_progress=display.callbacks.on_progress,
         )
     print(report.summary())
     return 0

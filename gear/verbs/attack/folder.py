@@ -17,10 +17,11 @@ from gear.dataset.guarded_paths import remove_files, remove_tree
 from gear.dataset.plan import differences
 from gear.dataset.sidecar import dump_json
 from gear.dataset.store import check_output
+from gear.measuring.patch_checks import is_picture
 from gear.values.errors import DatasetError, FieldError, OutdatedError, ReplaceableError
 from gear.values.regular_file import read_regular
 from gear.values.serial import Json, from_json
-from gear.verbs.attack.monitor import CHECKPOINT, is_picture
+from gear.verbs.attack.monitor import CHECKPOINT
 
 VERIFY = "verify"
 """Folder of the rendered check, in that of the patches."""

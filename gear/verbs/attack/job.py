@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from gear.dataset.files import sha256
 from gear.dataset.reading import Dataset, scenes_of
 from gear.dataset.sidecar import dump_json
 from gear.dataset.store import plan_of, splits_of
-from gear.measuring.calibration import Calibration, opened_calibration
+from gear.measuring.guard import OpenedGuard, open_guard
 from gear.measuring.plugin_selection import Chosen
 from gear.plugins.build import NO_OPTIONS, find
 from gear.plugins.catalogue import PluginEntry
@@ -25,18 +25,16 @@ from gear.plugins.datasets import root_and_split, roots_of
 from gear.readers import open_all
 from gear.values.errors import DatasetError, GearError
 from gear.values.progress import Progress
-from gear.values.rng import check_seed
 from gear.values.serial import Json
 from gear.verbs.attack.data import check_joined
-from gear.verbs.attack.models import FLAG, check_attack, choose_defense, choose_models
+from gear.verbs.attack.models import FLAG, check_attack, check_gradient, choose_models
+from gear.verbs.attack.request import AttackRequest
 
 STEPS = 300
 """Where neither steps nor queries are given."""
 
 TRAINING = ("train", "finetuning", "debug")
 VALIDATION = ("val",)
-
-Paths = str | Path | Sequence[str | Path]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -47,8 +45,8 @@ class Job:
         datasets, validation: on whose samples patches are optimised, and judged.
         task: of both.
         surfaces: of each sample: so many patches are made.
-        models, defense: what is attacked, and what the attack looks through.
-        calibration: what the defense learns from.
+        models: what is attacked.
+        guard: the defense that the attack takes into account, with what it learns from.
         found, spec: the attack.
         options, config: of it, as given and as read.
         compositor: by name.
@@ -62,8 +60,7 @@ class Job:
     task: str
     surfaces: int
     models: Sequence[Chosen]
-    defense: Chosen | None
-    calibration: Calibration
+    guard: OpenedGuard
     found: PluginEntry
     spec: AttackSpec[Any]
     options: Node
@@ -77,6 +74,7 @@ class Job:
 
     def plan(self, weights_sha256: str | None, product: Any) -> Json:
         """What decides the patches: who gives the same finds them made. Weights are those of the built network."""
+        learnt = self.guard.calibration
         read = product.read_sha256() if isinstance(product, WithInputFiles) else None
         return {
             "attack": {
@@ -88,9 +86,9 @@ class Job:
             },
             "models": [one.facts() for one in self.models],
             "weights_sha256": weights_sha256,
-            "defense": None if self.defense is None else self.defense.facts(),
-            **({} if self.calibration.clean is None else {"calibration": self.calibration.facts()}),
-            **self.calibration.counted(),
+            "defense": None if self.guard.defense is None else self.guard.defense.facts(),
+            **({} if learnt.clean is None else {"calibration": learnt.facts()}),
+            **learnt.counted(),
             "task": self.task,
             "data": [_facts(dataset) for dataset in self.datasets],
             "validation": [_facts(dataset) for dataset in self.validation],
@@ -103,79 +101,47 @@ class Job:
         }
 
 
-def resolve(
-    data: Paths,
-    *,
-    model: str | Sequence[str],
-    attack: str,
-    steps: int | None,
-    queries: int | None,
-    settings: Iterable[str],
-    model_settings: Iterable[str],
-    defense: str | None,
-    defense_settings: Iterable[str],
-    calibration: str | Path | None,
-    calibration_patched: str | Path | None,
-    on_fit_progress: Progress | None,
-    val: Paths,
-    every: int,
-    patience: int,
-    compositor: str,
-    seed: int,
-    allow_test_data: bool,
-) -> Job:
-    """Opens, finds and checks what `gear.attack` was given; see there.
+def resolve(request: AttackRequest, on_fit_progress: Progress) -> Job:
+    """Opens, finds and checks everything that a request names.
 
     Raises:
         GearError: it is not there, or does not fit together.
     """
-    check_seed(seed)
-    if (steps is not None and steps < 1) or every < 1 or patience < 0 or (queries is not None and queries < 1):
-        raise GearError("steps, queries and every must be at least 1, patience at least 0")
-    if patience and not _list(val):
-        raise GearError("patience counts looks at validation samples, and there are none: name some with --val")
-    datasets = open_all(_list(data), _task_of(data), names=TRAINING, allow_test_data=allow_test_data)
+    allowed = request.allow_test_data
+    datasets = open_all(request.data, _task_of(request.data), names=TRAINING, allow_test_data=allowed)
     task = datasets[0].plan.task["name"]
-    validation = open_all(_list(val), task, names=VALIDATION, allow_test_data=allow_test_data)
-    check_joined([*datasets, *validation])
-    models = choose_models([model] if isinstance(model, str) else list(model), model_settings, [*datasets, *validation])
-    found, options = find("attack", attack), with_overrides(NO_OPTIONS, settings)
+    validation = open_all(request.val, task, names=VALIDATION, allow_test_data=allowed)
+    everything = [*datasets, *validation]
+    check_joined(everything)
+    models = choose_models(request.models, request.model_settings, everything)
+    found, options = find("attack", request.attack), with_overrides(NO_OPTIONS, request.settings)
     config = read_node(found.spec.config, options, "")
     surfaces = len(datasets[0].sidecar(0).record.surfaces)
-    spec = check_attack(found, models, task, surfaces, queries)
-    learnt = opened_calibration(
-        calibration, calibration_patched, models, defense, flag=FLAG, on_fit_progress=on_fit_progress
-    )
-    guard = choose_defense(
-        defense,
-        defense_settings,
-        models,
-        task,
-        is_calibrated=learnt.clean is not None,
-        needs_gradients=spec.needs_gradients,
-    )
+    spec = check_attack(found, models, task, surfaces, request.queries)
+    guard = open_guard(request.guard, models, task, flag=FLAG, on_fit_progress=on_fit_progress)
+    check_gradient(guard.defense, spec)
     if {scenes_of(one) for one in datasets} & {scenes_of(one) for one in validation}:
         raise GearError("--data and --val hold the same samples; give --val another split")
+    steps, queries = request.steps, request.queries
     if steps is None:
-        steps = STEPS if queries is None else queries  # a step costs at least one
+        steps = STEPS if queries is None else queries  # a step costs at least one query
     return Job(
         datasets=datasets,
         validation=validation,
         task=task,
         surfaces=surfaces,
         models=models,
-        defense=guard,
-        calibration=learnt,
+        guard=guard,
         found=found,
         spec=spec,
         options=options,
         config=config,
-        compositor=_usable(compositor, spec, [*datasets, *validation]),
+        compositor=_usable(request.compositor, spec, everything),
         steps=steps,
         queries=queries,
-        every=every,
-        patience=patience,
-        seed=seed,
+        every=request.every,
+        patience=request.patience,
+        seed=request.seed,
     )
 
 
@@ -208,17 +174,13 @@ def _facts(dataset: Dataset[Any]) -> Json:
     }
 
 
-def _task_of(data: Paths) -> str:
+def _task_of(data: Sequence[str | Path]) -> str:
     """The task of the first dataset that the paths mean.
 
     Raises:
         DatasetError: there is none, or it does not say its task.
     """
-    for path in _list(data):
+    for path in data:
         for root in roots_of(root_and_split(path)[0]):
             return plan_of(root, splits_of(root)[0]).task["name"]
-    raise DatasetError(str(next(iter(_list(data)), "")), "there is no dataset of gear's here")
-
-
-def _list(paths: Paths) -> list[str | Path]:
-    return [paths] if isinstance(paths, (str, Path)) else list(paths)
+    raise DatasetError(str(next(iter(data), "")), "there is no dataset of gear's here")

@@ -11,8 +11,9 @@ from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec, DefenseSpec, ModelSpec
 from gear.dataset.reading import Dataset
 from gear.measuring.calibration import Calibration
-from gear.measuring.guard import Guard
-from gear.measuring.plugin_selection import Chosen, check_defense, check_model, chosen_defense, chosen_model
+from gear.measuring.checked_defense import CheckedDefense
+from gear.measuring.guard import OpenedGuard
+from gear.measuring.plugin_selection import Chosen, check_model, chosen_model
 from gear.plugins.attacks.optimisation.model_group import Cleaned, Defended, Group
 from gear.plugins.build import blamed, build
 from gear.plugins.catalogue import PluginEntry
@@ -40,33 +41,21 @@ def choose_models(names: Sequence[str], settings: Iterable[str], datasets: Seque
     return chosen
 
 
-def choose_defense(
-    name: str | None,
-    settings: Iterable[str],
-    models: Sequence[Chosen],
-    task: str,
-    *,
-    is_calibrated: bool,
-    needs_gradients: bool,
-) -> Chosen | None:
-    """The defense that the attack knows of.
+def check_gradient(defense: Chosen | None, attack: AttackSpec[Any]) -> None:
+    """Checks that the defense, if there is one, lets the gradient pass that the attack needs.
 
     Raises:
-        GearError: it does not fit, must learn first, or lets no gradient pass to an attack that needs one.
+        GearError: it does not.
     """
-    chosen = chosen_defense(name, settings)
-    if chosen is None:
-        return None
-    for model in models:
-        check_defense(chosen, model, task, is_calibrated=is_calibrated)
-    spec = chosen.found.spec
+    if defense is None:
+        return
+    spec = defense.found.spec
     assert isinstance(spec, DefenseSpec)
-    if spec.gradient == "none" and needs_gradients:
+    if spec.gradient == "none" and attack.needs_gradients:
         raise GearError(
             f"defense {spec.name!r} declares no gradient, so an attack that needs one cannot look through it; attacks "
             "that count queries can (--attack square --queries N)"
         )
-    return chosen
 
 
 def check_attack(
@@ -97,7 +86,7 @@ def check_attack(
     return spec
 
 
-def build_model(models: Sequence[Chosen], defense: Chosen | None, calibration: Calibration, seed: int) -> Model:
+def build_model(models: Sequence[Chosen], guard: OpenedGuard, seed: int) -> Model:
     """What `Attack.optimise` is given; a defense that learns does so for each model anew."""
     built: dict[str, Model] = {}
     short = [chosen.found.spec.name for chosen in models]
@@ -105,8 +94,8 @@ def build_model(models: Sequence[Chosen], defense: Chosen | None, calibration: C
         model: Model = build(chosen.found, chosen.options)
         spec = chosen.found.spec
         assert isinstance(spec, ModelSpec)
-        if defense is not None:
-            model = _behind(defense, model, spec.views, calibration, seed)
+        if guard.defense is not None:
+            model = _behind(guard.defense, model, spec.views, guard.calibration, seed)
         # Two packages may each have a network of one name: both are attacked.
         built[spec.name if short.count(spec.name) == 1 else chosen.found.full_name] = model
     return next(iter(built.values())) if len(built) == 1 else Group(built)
@@ -120,7 +109,7 @@ def _behind(defense: Chosen, model: Model, cameras: Sequence[str], calibration: 
     with blamed(defense.found, "wrap"):
         wrapped = product.wrap(model)
     learn = partial(calibration.fit, defense, product, model, cameras, seed)
-    guard = Guard(defense.found, product, model if spec.needs_model or spec.taps else None, learn)
+    guard = CheckedDefense(defense.found, product, model if spec.needs_model or spec.taps else None, learn)
     if spec.gradient == "none":
         # What it draws, it draws alike each time it is asked.
         return Cleaned(

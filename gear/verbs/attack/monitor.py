@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save as to_bytes
 
 from gear.contracts.attacks import Patch, State, surface_of
 from gear.dataset.files import write_whole
+from gear.measuring.patch_checks import is_picture
 from gear.plugins.text import one_line
 from gear.values.errors import DatasetError, ReplaceableError
 from gear.values.progress import Progress
@@ -64,7 +64,7 @@ class Recorder:
     every: int = 25
     patience: int = 0
     queries: int | None = None
-    on_progress: Progress | None = None
+    on_progress: Progress = lambda done, total: None
     curves: dict[str, list[float]] = field(default_factory=dict)
     judged: list[tuple[int, float]] = field(default_factory=list)
     best: tuple[Patch, ...] | None = None
@@ -128,8 +128,6 @@ class Recorder:
 
     def tell(self, done: int, queries_left: float | None = None) -> None:
         """Says how far it is: in queries where they are counted, in steps otherwise."""
-        if self.on_progress is None:
-            return
         if self.queries is None:
             self.on_progress(done, self.steps)
         else:
@@ -173,11 +171,6 @@ class Recorder:
         best = max(range(len(self.judged)), key=lambda number: _worth(self.judged[number][1]))
         if self.patience and len(self.judged) - 1 - best >= self.patience:
             self.stopped = f"no better on the validation samples for {self.patience} validations"
-
-
-def is_picture(rgb: npt.NDArray[Any]) -> bool:
-    """Whether an array is what the values of a patch may be: (H, W, 3) float32, all of them numbers."""
-    return rgb.dtype == np.float32 and rgb.ndim == 3 and rgb.shape[2] == 3 and bool(np.isfinite(rgb).all())
 
 
 def _best(arrays: State, *, is_judged: bool) -> tuple[Patch, ...]:

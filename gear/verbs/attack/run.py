@@ -19,24 +19,29 @@ from gear.contracts.models import Model
 from gear.dataset.files import sha256
 from gear.dataset.locks import alone_at_work
 from gear.dataset.sidecar import dump_json
+from gear.measuring.guard import Guard
 from gear.measuring.guarded_model import weights_digest
+from gear.measuring.patch_checks import check_patches
 from gear.measuring.shown_size import size_note
 from gear.plugins.attacks.optimisation.model_group import device_name
 from gear.plugins.attacks.optimisation.objectives import default_objective
 from gear.plugins.build import blamed, build, traced
 from gear.plugins.catalogue import PluginEntry
+from gear.reporting.display import displayed
 from gear.values.errors import GearError, PluginError
-from gear.values.progress import Progress, Warn
+from gear.values.progress import Callbacks, Progress, Warn
 from gear.values.rng import derive_rng
 from gear.values.serial import Json
 from gear.verbs.attack.folder import begin, read_patches, tidy
-from gear.verbs.attack.job import Job, Paths, resolve
+from gear.verbs.attack.job import Job, resolve
 from gear.verbs.attack.models import FLAG, build_model
 from gear.verbs.attack.monitor import Recorder
-from gear.verbs.attack.output_checks import check_patches
 from gear.verbs.attack.outputs import as_picture, write_curves, write_patches, write_samples
 from gear.verbs.attack.report import AttackReport
+from gear.verbs.attack.request import AttackRequest
 from gear.verbs.attack.scenes import Scenes
+
+Paths = str | Path | Sequence[str | Path]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -81,6 +86,7 @@ def attack(
     seed: int = 0,
     allow_test_data: bool = False,
     force: bool = False,
+    progress: bool = False,
     on_progress: Progress | None = None,
     on_fit_progress: Progress | None = None,
     on_warning: Warn | None = None,
@@ -110,70 +116,90 @@ def attack(
         seed: of everything that is drawn.
         allow_test_data: whether `test` splits may be optimised on.
         force: start afresh where something else is.
-        progress: told after every step.
-        learning: told after every calibration sample that the defense reads for the first time.
-        noted: told, before anything is made, of what the user may not have meant: a model that sees these pictures at
-            another size than it learnt from, doubtful data for the defense to learn from.
+        progress: shows a progress bar.
+        on_progress: called after every step; with queries done and allowed where queries are counted.
+        on_fit_progress: called after every calibration sample that the defense reads for the first time.
+        on_warning: called, before anything is made, with what the user may not have meant: a model that sees these
+            pictures at another size than it was trained on, doubtful calibration data.
 
     Raises:
         GearError: anything that the user can put right; its text is one line.
     """
-    job = resolve(
-        data,
-        model=model,
+    request = AttackRequest(
+        data=as_tuple(data),
+        models=(model,) if isinstance(model, str) else tuple(model),
+        out=out,
         attack=attack,
         steps=steps,
         queries=queries,
-        settings=settings,
-        model_settings=model_settings,
-        defense=defense,
-        defense_settings=defense_settings,
-        calibration=calibration,
-        calibration_patched=calibration_patched,
-        on_fit_progress=on_fit_progress,
-        val=val,
+        settings=tuple(settings),
+        model_settings=tuple(model_settings),
+        guard=Guard.of(defense, defense_settings, calibration, calibration_patched),
+        val=as_tuple(val),
         every=every,
         patience=patience,
         compositor=compositor,
         seed=seed,
         allow_test_data=allow_test_data,
+        force=force,
     )
-    _note_doubts(job, on_warning)
-    product, root = build(job.found, job.options), Path(out)
-    network = build_model(job.models, job.defense, job.calibration, job.seed)
+    callbacks = Callbacks.of(on_progress=on_progress, on_fit_progress=on_fit_progress, on_warning=on_warning)
+    with displayed(callbacks, "attack", progress=progress, unit=unit_of(request)) as shown:
+        return run_attack(request, shown)
+
+
+def unit_of(request: AttackRequest) -> str:
+    """What an attack's progress counts."""
+    return "step" if request.queries is None else "query"
+
+
+def run_attack(request: AttackRequest, callbacks: Callbacks) -> AttackReport:
+    """As `attack`.
+
+    Raises:
+        GearError: anything that the user can put right; its text is one line.
+    """
+    job = resolve(request, callbacks.on_fit_progress)
+    _warn(job, callbacks.on_warning)
+    product, root = build(job.found, job.options), Path(request.out)
+    network = build_model(job.models, job.guard, job.seed)
     plan = job.plan(weights_digest(network), product)
     with alone_at_work(root):
-        there = begin(root, plan, force=force)
+        there = begin(root, plan, force=request.force)
         if there is not None:
             return AttackReport(out=root, patches=read_patches(root), facts=there, made=False)
         with traced(_asked(job), "forward"):
-            made = _optimised(job, product, network, root, plan, on_progress)
+            made = _optimised(job, product, network, root, plan, callbacks.on_progress)
             facts = _facts(job, network, plan, made)
         names = ", ".join(one.found.spec.name for one in job.models)
-        write_curves(root, f"{attack} on {names}", made.recorder.curves, made.recorder.judged)
+        write_curves(root, f"{request.attack} on {names}", made.recorder.curves, made.recorder.judged)
         write_samples(root, made.seen.pairs(made.patches))
         write_patches(root, made.patches, facts)
         tidy(root)
     return AttackReport(out=root, patches=made.patches, facts=facts, made=True)
 
 
-def _note_doubts(job: Job, on_warning: Warn | None) -> None:
-    """Tells of every model that sees the pictures, which are all of one size, larger or smaller than it knows them, and
-    of what may not have been meant in the data that the defense learns from.
+def as_tuple(paths: Paths) -> tuple[str | Path, ...]:
+    """One path or several as a tuple."""
+    return (paths,) if isinstance(paths, (str, Path)) else tuple(paths)
+
+
+def _warn(job: Job, on_warning: Warn) -> None:
+    """Warns of models that see the pictures, which are all of one size, larger or smaller than in their training, and
+    of doubtful calibration data.
     """
-    if on_warning is not None:
-        sizes = (size_note(model, job.datasets[0], FLAG) for model in job.models)
-        for note in (*sizes, *job.calibration.doubts()):
-            if note is not None:
-                on_warning(note)
+    sizes = (size_note(model, job.datasets[0], FLAG) for model in job.models)
+    for note in (*sizes, *job.guard.calibration.doubts()):
+        if note is not None:
+            on_warning(note)
 
 
 def _asked(job: Job) -> list[PluginEntry]:
     """Whose code the attack asks."""
-    return [one.found for one in (*job.models, job.defense) if one is not None]
+    return [one.found for one in (*job.models, job.guard.defense) if one is not None]
 
 
-def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, on_progress: Progress | None) -> _Made:
+def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, on_progress: Progress) -> _Made:
     """Has the attack make its patches, and sees to it that it keeps its promises.
 
     Raises:

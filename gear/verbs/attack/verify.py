@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from gear.dataset.reading import scenes_of
 from gear.dataset.sidecar import load_json
+from gear.measuring.gap.report import GapReport
+from gear.measuring.gap.request import GapRequest
+from gear.measuring.gap.run import measure_gap
+from gear.measuring.gap.twin import check_clean
 from gear.plugins.datasets import open_dataset, root_and_split
 from gear.readers import open_all
 from gear.values.errors import DatasetError, GearError
-from gear.values.progress import Progress
+from gear.values.progress import Callbacks
 from gear.verbs.attack.data import check_joined
 from gear.verbs.attack.folder import VERIFY
 from gear.verbs.attack.job import TRAINING, VALIDATION
-from gear.verbs.gap.report import GapReport
-from gear.verbs.gap.run import gap
-from gear.verbs.gap.twin import check_clean
+from gear.verbs.attack.request import VerifyRequest
 
 
 def check_held_out(data: Sequence[str | Path], held: str | Path, val: Sequence[str | Path] = ()) -> None:
@@ -42,43 +44,13 @@ def check_held_out(data: Sequence[str | Path], held: str | Path, val: Sequence[s
                 raise GearError(f"{held}: {problem} {flag}")
 
 
-def verify(
-    out: str | Path,
-    data: str | Path,
-    *,
-    models: Sequence[str],
-    model_settings: Iterable[str] = (),
-    defense: str | None = None,
-    defense_settings: Iterable[str] = (),
-    calibration: str | Path | None = None,
-    calibration_patched: str | Path | None = None,
-    samples: int | None = None,
-    town: str | Path | None = None,
-    scenes: str | Path | None = None,
-    on_progress: Progress | None = None,
-    on_fit_progress: Progress | None = None,
-) -> dict[str, GapReport]:
+def verify(request: VerifyRequest, callbacks: Callbacks) -> dict[str, GapReport]:
     """Renders a patch folder on a held-out dataset, and compares pictures and effect, digital and rendered.
 
-    A defense draws what it draws from the attack's seed: one that learns is the one that was looked through.
+    A defense draws what it draws from the attack's seed, so that one that learns is the one that was attacked.
 
-    Under `out/verify/<scene>-<split>-<hash>`, one for each dataset, lie for each model `<model>/gap.json` and
-    `gap.txt`, and beside those of the first the rendered twin.
-
-    Args:
-        out: the patch folder.
-        data: root of a dataset of the scene with probes, or `DIR:SPLIT`; not one that the patches were made on, or
-            by which the best of them were chosen.
-        models: names of model plugins.
-        model_settings: `KEY=VALUE` texts for their options.
-        defense: a defense plugin that they stand behind.
-        defense_settings: for its options.
-        calibration: dataset from which the defense learns.
-        calibration_patched: the same with patches.
-        samples: its first so many samples; all unless given.
-        town, scenes: files of its town and of that one's scene library, where they are none of gear's own.
-        progress: told after every sample.
-        learning: told after every calibration sample that the defense reads for the first time.
+    Under `out/verify/<scene>-<split>-<hash>`, one folder per dataset, lie for each model `<model>/gap.json` and
+    `gap.txt`, and beside those of the first model the rendered twin.
 
     Returns:
         Reports by model.
@@ -86,33 +58,33 @@ def verify(
     Raises:
         GearError: anything that the user can put right; its text is one line.
     """
-    root, split = root_and_split(data)
-    notes = load_json(Path(out) / "attack.json")
+    root, split = root_and_split(request.data)
+    notes = load_json(Path(request.out) / "attack.json")
     made_on = {(one["scene"], one["seed"]) for one in [*notes["data"], *notes["validation"]]}
     dataset = open_dataset(root, split)
     plan = dataset.plan
     if scenes_of(dataset) in made_on:
-        raise DatasetError(root, f"is what {out} was made on; verify it on other samples")
-    place = Path(out) / VERIFY / f"{Path(plan.info.scene).name}-{plan.info.split}-{plan.content_key[:6]}"
-    texts, defense_texts, reports = list(model_settings), list(defense_settings), {}
-    for number, model in enumerate(models):
-        reports[model] = gap(
-            root,
-            patch=out if number == 0 else None,
-            twin=None if number == 0 else place / models[0].replace("/", "-") / "twin",
-            split=split,
-            model=model,
-            model_settings=texts,
-            defense=defense,
-            defense_settings=defense_texts,
-            calibration=calibration,
-            calibration_patched=calibration_patched,
-            samples=samples,
-            town=town if number == 0 else None,
-            scenes=scenes if number == 0 else None,
-            out=place / model.replace("/", "-"),
-            seed=notes["seed"],
-            on_progress=on_progress,
-            on_fit_progress=on_fit_progress,
+        raise DatasetError(root, f"is what {request.out} was made on; verify it on other samples")
+    scene = Path(plan.info.scene).name
+    place = Path(request.out) / VERIFY / f"{scene}-{plan.info.split}-{plan.content_key[:6]}"
+    reports: dict[str, GapReport] = {}
+    for model in request.models:
+        is_first = not reports
+        reports[model] = measure_gap(
+            GapRequest(
+                dataset=root,
+                patch=request.out if is_first else None,
+                twin=None if is_first else place / request.models[0].replace("/", "-") / "twin",
+                split=split,
+                model=model,
+                model_settings=request.model_settings,
+                guard=request.guard,
+                samples=request.samples,
+                town=request.town if is_first else None,
+                scenes=request.scenes if is_first else None,
+                out=place / model.replace("/", "-"),
+                seed=notes["seed"],
+            ),
+            callbacks,
         )
     return reports

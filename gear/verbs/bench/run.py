@@ -21,14 +21,16 @@ from gear.dataset.guarded_paths import remove_tree
 from gear.dataset.sidecar import dump_json
 from gear.dataset.store import check_output
 from gear.measuring.plugin_selection import check_optics
+from gear.reporting.display import displayed
 from gear.values.errors import GearError, OutdatedError, ReplaceableError
-from gear.values.progress import Progress, Warn
+from gear.values.progress import Callbacks, Progress, Warn
 from gear.verbs.attack.run import attack
 from gear.verbs.bench.chart import chart
 from gear.verbs.bench.config import BenchConfig
 from gear.verbs.bench.page import page
 from gear.verbs.bench.plan import Match, Plan, Step, Verb
 from gear.verbs.bench.report import COLUMNS, BenchReport, Metric, Result, SceneMetric, TaskResult
+from gear.verbs.bench.request import BenchRequest
 from gear.verbs.bench.scenes import calibration_scene, located, measured_scenes
 from gear.verbs.bench.table import text
 from gear.verbs.bench.validation import contests, find_attack
@@ -42,8 +44,8 @@ VERBS: dict[Verb, Callable[..., Any]] = {"collect": collect, "attack": attack, "
 OnStep = Callable[[Step, int, int], None]
 """Called with (step, its number from 1, number of steps)."""
 
-SAID = "bench.yml"
-"""The config that reports are of, whole."""
+CONFIG = "bench.yml"
+"""The config of the reports beside it, with every default filled in."""
 
 
 def bench(
@@ -53,7 +55,8 @@ def bench(
     settings: Iterable[str] = (),
     device: str | None = None,
     workers: int = 1,
-    apart: bool = False,
+    in_subprocess: bool = False,
+    progress: bool = False,
     on_step: OnStep | None = None,
     on_progress: Progress | None = None,
     on_fit_progress: Progress | None = None,
@@ -71,8 +74,9 @@ def bench(
         settings: `KEY=VALUE` texts for any key of the config.
         device: where networks run, whatever the config says.
         workers: processes of each collection; they change nothing but time.
-        apart: whether a single worker is a process of its own, too. Each collection in this one keeps some 20 MB, so
-            large benches should say yes; a script that does needs Python's usual `if __name__ == "__main__":`.
+        in_subprocess: whether a single worker is a process of its own, too. Each collection in this process keeps some
+            20 MB, so large benches should say yes; a script that does needs `if __name__ == "__main__":`.
+        progress: shows a progress bar.
         on_step: called with each step, its number (from 1) and the number of steps, before it begins.
         on_progress: called after every sample, or step of an attack, of the current step.
         on_fit_progress: called after every calibration sample that a defense reads for the first time.
@@ -81,41 +85,46 @@ def bench(
     Raises:
         GearError: anything that the user can put right; its text is one line.
     """
-    plan = prepared(config, out=out, settings=settings, device=device, workers=workers)
-    root, warn = Path(out), on_warning or _ignore
+    request = BenchRequest(
+        config=config, out=out, settings=tuple(settings), device=device, workers=workers, in_subprocess=in_subprocess
+    )
+    callbacks = Callbacks.of(on_progress=on_progress, on_fit_progress=on_fit_progress, on_warning=on_warning)
+    with displayed(callbacks, "bench", progress=progress) as shown:
+        return run_bench(request, shown, on_step)
+
+
+def run_bench(request: BenchRequest, callbacks: Callbacks, on_step: OnStep | None = None) -> BenchReport:
+    """As `bench`.
+
+    Raises:
+        GearError: anything that the user can put right; its text is one line.
+    """
+    plan, root = prepared(request), Path(request.out)
     with explained(root):
         root.mkdir(parents=True, exist_ok=True)
-    said = to_yaml(plan.config).encode()
-    if not (root / SAID).exists():  # else it goes with the reports that are there until there are new ones
-        write_whole(root, SAID, said)
+    config = to_yaml(plan.config).encode()
+    if not (root / CONFIG).exists():  # an older one belongs to the reports beside it, until there are new reports
+        write_whole(root, CONFIG, config)
     evaluations: dict[str, EvaluateReport] = {}
     steps = list(plan.steps())
     for number, step in enumerate(steps, 1):
         if on_step is not None:
             on_step(step, number, len(steps))
-        callbacks: dict[str, Any] = {"on_progress": on_progress}
-        if step.verb == "collect":
-            callbacks["apart"] = apart
-        if step.verb != "collect":
-            callbacks["on_fit_progress"] = on_fit_progress
-        if step.verb != "evaluate":
-            callbacks["on_warning"] = warn
-        try:
-            done = _done(step, root, callbacks, warn)
-        except ReplaceableError as error:
-            raise GearError(f"{step.title}: {error.path}: {error.problem}; use another --out, or remove it") from error
-        except GearError as error:
-            raise GearError(f"{step.title}: {error}") from error
+        done = _carried_out(step, root, callbacks, in_subprocess=request.in_subprocess)
         if isinstance(done, EvaluateReport):
             evaluations[step.arguments["out"]] = done
-            for problem in (problem for row in done.rows for problem in row.damaged):
-                warn(f"{problem}; the sample was predicted again")
     report = _report(plan, root, evaluations)
+    write_whole(root, CONFIG, config)
+    _write(report, plan, root)
+    return report
+
+
+def _write(report: BenchReport, plan: Plan, root: Path) -> None:
+    """Writes the reports."""
     written = io.StringIO()
     table = csv.DictWriter(written, COLUMNS, lineterminator="\n")
     table.writeheader()
     table.writerows(report.records())
-    write_whole(root, SAID, said)
     write_whole(root, "bench.csv", written.getvalue().encode())
     write_whole(root, "bench.json", dump_json(report.as_json()))
     write_whole(root, "table.txt", text(report).encode())
@@ -124,46 +133,50 @@ def bench(
             write_whole(root, f"figures/{contest.folder}.pdf", chart(task, "pdf"))
     write_whole(root, "report.html", page(report, plan).encode())
     clear_scratch(root)
-    return report
 
 
-def _ignore(line: str) -> None: ...
+def _carried_out(step: Step, root: Path, callbacks: Callbacks, *, in_subprocess: bool) -> Any:
+    """Carries a step out.
+
+    Raises:
+        GearError: it fails; says which step.
+    """
+    keywords: dict[str, Any] = {"on_progress": callbacks.on_progress, "on_warning": callbacks.on_warning}
+    if step.verb == "collect":
+        keywords["in_subprocess"] = in_subprocess
+    else:
+        keywords["on_fit_progress"] = callbacks.on_fit_progress
+    try:
+        return _done(step, root, keywords, callbacks.on_warning)
+    except ReplaceableError as error:
+        raise GearError(f"{step.title}: {error.path}: {error.problem}; use another --out, or remove it") from error
+    except GearError as error:
+        raise GearError(f"{step.title}: {error}") from error
 
 
-def _done(step: Step, root: Path, callbacks: dict[str, Any], warn: Warn) -> Any:
+def _done(step: Step, root: Path, keywords: dict[str, Any], warn: Warn) -> Any:
     """Carries a step out; what the bench made from pictures or patches that are others now, it makes again."""
     verb, again = VERBS[step.verb], f"{step.title}: is made again, for what is there"
     try:
-        return verb(**step.arguments, **callbacks)
+        return verb(**step.arguments, **keywords)
     except OutdatedError as error:
         warn(f"{again} {error.problem}")
-        return verb(**step.arguments, **callbacks, force=True)
+        return verb(**step.arguments, **keywords, force=True)
     except OtherLessonsError as error:
         warn(f"{again} {error.problem.partition(';')[0]}")
         remove_tree(root, Path(error.path).relative_to(root).as_posix())
-        return verb(**step.arguments, **callbacks)
+        return verb(**step.arguments, **keywords)
 
 
-def prepared(
-    config: str | Path,
-    *,
-    out: str | Path,
-    settings: Iterable[str] = (),
-    device: str | None = None,
-    workers: int = 1,
-) -> Plan:
+def prepared(request: BenchRequest) -> Plan:
     """Reads and checks a config; nothing is written.
-
-    Args: as `bench`.
 
     Raises:
         GearError: something in it is not there, does not suit, or cannot be read.
     """
-    if workers < 1:
-        raise GearError(f"workers must be at least 1, got {workers}")
-    root = Path(out)
+    root = Path(request.out)
     check_output(root, "write the bench into a folder of its own")
-    node = with_overrides(parse_file(find_config("bench", str(config))), settings, BenchConfig)
+    node = with_overrides(parse_file(find_config("bench", str(request.config))), request.settings, BenchConfig)
     read = read_node(BenchConfig, node)
     scenes = measured_scenes(read, node)
     attacker = find_attack(read, node)
@@ -173,10 +186,10 @@ def prepared(
         read,
         scenes=scenes,
         calibration=calibration_scene(read, node, scenes),
-        contests=tuple(contests(read, node, attack=attacker, surfaces=surfaces, device=device)),
+        contests=tuple(contests(read, node, attack=attacker, surfaces=surfaces, device=request.device)),
         attack=attacker.spec,
         root=root,
-        workers=workers,
+        workers=request.workers,
     )
     _check_pictures(plan, node)
     return plan

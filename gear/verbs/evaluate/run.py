@@ -7,31 +7,31 @@ import platform
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 from gear.config.dump import to_plain
 from gear.dataset.files import clear_scratch, inside, write_whole
 from gear.dataset.locks import alone_at_work
 from gear.dataset.plan import differences
+from gear.dataset.reading import Dataset
 from gear.dataset.sidecar import dump_json, load_json
 from gear.dataset.store import check_output
-from gear.measuring.calibration import opened_calibration
 from gear.measuring.dataset_run import evaluate_row
+from gear.measuring.guard import Guard, open_guard
 from gear.measuring.guarded_model import Player
+from gear.measuring.notes import grouped
 from gear.measuring.open_datasets import opened, row_names
-from gear.measuring.plugin_selection import (
-    check_defense,
-    chosen_defense,
-    chosen_model,
-)
+from gear.measuring.plugin_selection import chosen_model
 from gear.measuring.scoring import Scorer
 from gear.measuring.shown_size import size_note
-from gear.values.errors import DatasetError, GearError
-from gear.values.progress import Progress
-from gear.values.rng import check_seed
+from gear.reporting.display import displayed
+from gear.values.errors import DatasetError
+from gear.values.progress import Callbacks, Progress, Warn
 from gear.values.serial import Json
 from gear.verbs.evaluate.compare import Measured, compared, drive_note, row_report, streets_of, together
 from gear.verbs.evaluate.pools import Pools, check_pools, pooled
 from gear.verbs.evaluate.report import EvaluateReport
+from gear.verbs.evaluate.request import EvaluateRequest
 from gear.verbs.evaluate.table import table
 
 INTERVALS = "95 %: jackknife over streets, Student's t"
@@ -61,8 +61,10 @@ def evaluate(
     workers: int = 2,
     seed: int = 0,
     pools: Pools | None = None,
+    progress: bool = False,
     on_progress: Progress | None = None,
     on_fit_progress: Progress | None = None,
+    on_warning: Warn | None = None,
 ) -> EvaluateReport:
     """Runs a model, with or without a defense, over datasets of its task; takes up again what was begun.
 
@@ -88,75 +90,108 @@ def evaluate(
         seed: of the defense's draws and of the permutation tests.
         pools: roots among the data that are counted as one dataset, by a name; those that show the same scenes as the
             pools `none` and `random` are compared with these, sample by sample.
-        progress: told after every sample.
-        learning: told after every calibration sample that the defense reads for the first time.
+        progress: shows a progress bar.
+        on_progress: called after every sample.
+        on_fit_progress: called after every calibration sample that the defense reads for the first time.
+        on_warning: called with every stored prediction that was damaged and is made again.
 
     Raises:
         GearError: anything that the user can put right; its text is one line.
     """
-    check_seed(seed)
-    if min(1 if batch is None else batch, workers) < 1:
-        raise GearError(f"batch and workers must be at least 1; got {batch}, {workers}")
-    chosen = chosen_model(model, model_settings)
-    guard = chosen_defense(defense, defense_settings)
-    datasets = opened([data] if isinstance(data, (str, Path)) else data, split, chosen, reports)
-    check_pools(pools or {}, [one.root for one in datasets])
+    request = EvaluateRequest(
+        data=(data,) if isinstance(data, (str, Path)) else tuple(data),
+        model=model,
+        model_settings=tuple(model_settings),
+        guard=Guard.of(defense, defense_settings, calibration, calibration_patched),
+        split=split,
+        reports=tuple(reports),
+        out=out,
+        batch=batch,
+        workers=workers,
+        seed=seed,
+        pools=pools or {},
+    )
+    callbacks = Callbacks.of(on_progress=on_progress, on_fit_progress=on_fit_progress, on_warning=on_warning)
+    with displayed(callbacks, "evaluate", progress=progress) as shown:
+        return run_evaluate(request, shown)
+
+
+def run_evaluate(request: EvaluateRequest, callbacks: Callbacks) -> EvaluateReport:
+    """As `evaluate`.
+
+    Raises:
+        GearError: anything that the user can put right; its text is one line.
+    """
+    chosen = chosen_model(request.model, request.model_settings)
+    datasets = opened(request.data, request.split, chosen, request.reports)
+    check_pools(request.pools, [one.root for one in datasets])
     task, names = datasets[0].plan.task["name"], row_names(datasets)
-    learnt = opened_calibration(calibration, calibration_patched, [chosen], defense, on_fit_progress=on_fit_progress)
-    if guard is not None:
-        check_defense(guard, chosen, task, is_calibrated=learnt.clean is not None)
-    usual = Path("evaluations", task, model.replace("/", "-") + f"+{defense}" * bool(defense))
-    root = usual if out is None else Path(out)
+    guard = open_guard(request.guard, [chosen], task, on_fit_progress=callbacks.on_fit_progress)
+    root, learnt = request.folder(task), guard.calibration
     check_output(root, "write the evaluation into a folder of its own")
-    player = Player(chosen, guard, calibration=learnt, seed=seed)
+    player = Player(chosen, guard, seed=request.seed)
     facts = {
         "task": datasets[0].plan.task,
         "model": chosen.facts() | {"weights_sha256": player.weights_sha256},
-        "defense": None if guard is None else guard.facts(),
+        "defense": None if guard.defense is None else guard.defense.facts(),
         "calibration": learnt.facts(),
         **learnt.counted(),
-        "seed": seed,
+        "seed": request.seed,
     }
     with alone_at_work(root):
         _begin(root, facts)
-        told = _counter(on_progress, sum(len(one) for one in datasets))
-        rows = []
-        for dataset, name in zip(datasets, names, strict=True):
-            scorer = Scorer(dataset, root, name, tuple(reports), chosen.found)
-            size = batch or player.usual_batch(dataset)
-            row = evaluate_row(dataset, scorer, player, batch=size, workers=workers, told=told)
-            scorer.finish(row.notes)
-            rows.append(
-                Measured(
-                    name=name,
-                    dataset=dataset,
-                    scorer=scorer,
-                    notes=row.notes,
-                    streets=streets_of(dataset),
-                    made=row.made,
-                    damaged=row.damaged,
-                )
-            )
+        rows = _measured(request, datasets, names, player, callbacks)
         said = [note for one in datasets for note in (size_note(chosen, one), drive_note(one), learnt.note(one))]
-        notes = [*learnt.doubts(), *(note for note in said if note)]
-        plugins = {name: one.facts() for name, one in rows[0].scorer.reports.items() if one.plugin is not None}
         more = {
-            "reports": list(reports),
-            "metric_plugins": plugins,
+            "reports": list(request.reports),
+            "metric_plugins": {
+                name: one.facts() for name, one in rows[0].scorer.reports.items() if one.plugin is not None
+            },
             "intervals": INTERVALS,
             "versions": _versions(player),
-            "notes": notes,
+            "notes": grouped([*learnt.doubts(), *said]),
         }
         found = EvaluateReport(
             out=root,
             facts=facts | more,
             rows=tuple(row_report(row) for row in rows),
             together=tuple(together(rows)),
-            differences=tuple(compared(rows, seed)),
-            pools=tuple(pooled(rows, pools or {}, seed)),
+            differences=tuple(compared(rows, request.seed)),
+            pools=tuple(pooled(rows, request.pools, request.seed)),
         )
         _end(root, found)
     return found
+
+
+def _measured(
+    request: EvaluateRequest,
+    datasets: Sequence[Dataset[Any]],
+    names: Sequence[str],
+    player: Player,
+    callbacks: Callbacks,
+) -> list[Measured]:
+    """Runs the model over the datasets, one after the other."""
+    done = _counter(callbacks.on_progress, sum(len(one) for one in datasets))
+    rows = []
+    for dataset, name in zip(datasets, names, strict=True):
+        scorer = Scorer(dataset, request.folder(dataset.plan.task["name"]), name, request.reports, player.plugin)
+        batch = request.batch or player.usual_batch(dataset)
+        row = evaluate_row(dataset, scorer, player, batch=batch, workers=request.workers, done=done)
+        scorer.finish(row.notes)
+        for problem in row.damaged:
+            callbacks.on_warning(f"{problem}; the sample was predicted again")
+        rows.append(
+            Measured(
+                name=name,
+                dataset=dataset,
+                scorer=scorer,
+                notes=row.notes,
+                streets=streets_of(dataset),
+                made=row.made,
+                damaged=row.damaged,
+            )
+        )
+    return rows
 
 
 def _begin(root: Path, facts: Json) -> None:
@@ -188,19 +223,17 @@ def _end(root: Path, found: EvaluateReport) -> None:
     clear_scratch(root)
 
 
-def _counter(on_progress: Progress | None, total: int) -> Callable[[], None]:
-    """Tells of each sample that is finished, and of the beginning."""
+def _counter(on_progress: Progress, total: int) -> Callable[[], None]:
+    """Counts finished samples for a progress callback, which it calls with 0 at once."""
     finished = 0
 
-    def told() -> None:
+    def done() -> None:
         nonlocal finished
         finished += 1
-        if on_progress is not None:
-            on_progress(finished, total)
+        on_progress(finished, total)
 
-    if on_progress is not None:
-        on_progress(0, total)
-    return told
+    on_progress(0, total)
+    return done
 
 
 def _versions(player: Player) -> Json:

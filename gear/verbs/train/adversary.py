@@ -21,11 +21,11 @@ from gear.compositor.opening import open_compositor
 from gear.compositor.pasting import Prepared
 from gear.contracts.attacks import Budget
 from gear.contracts.specs import AttackSpec
+from gear.measuring.patch_checks import check_patches
 from gear.plugins.build import blamed, build, find
 from gear.readers import Samples
 from gear.values.errors import GearError
 from gear.values.rng import derive_rng
-from gear.verbs.attack.output_checks import check_patches
 from gear.verbs.train.config import Adversarial
 
 CACHE_BYTES = 1 << 30

@@ -17,6 +17,7 @@ from torch import Tensor
 from gear.config.dump import to_plain
 from gear.config.nodes import Mapping
 from gear.config.reader import read_node
+from gear.contracts.specs import TaskSpec
 from gear.dataset.files import read_bytes, sha256, write_whole
 from gear.dataset.guarded_paths import remove_files
 from gear.measuring.appearance_hash import Look
@@ -43,7 +44,7 @@ class Origin:
 
     Attributes:
         model: whose they are.
-        task: its name.
+        spec, task: the task and its name.
         config: of the training.
         training, validation: the data.
         command: that makes them again.
@@ -52,6 +53,7 @@ class Origin:
     """
 
     model: PluginEntry
+    spec: TaskSpec[Any]
     task: str
     config: TrainConfig
     training: Samples

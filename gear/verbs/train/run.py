@@ -8,8 +8,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from gear.config.dump import to_plain
 from gear.contracts.specs import ModelSpec, TaskSpec
 from gear.dataset.files import clear_scratch
@@ -22,16 +20,18 @@ from gear.networks.runtime import device_of, prepare
 from gear.plugins.build import blamed, find
 from gear.plugins.catalogue import PluginEntry
 from gear.readers import Kept, Samples, all_of, open_all
+from gear.reporting.display import displayed
 from gear.values.errors import GearError
-from gear.values.progress import Warn
+from gear.values.progress import Callbacks, Progress, Warn
 from gear.values.serial import Json
 from gear.verbs.train.adversary import Adversary
-from gear.verbs.train.checkpoint import begun_config
+from gear.verbs.train.checkpoint import TrainingState, begun_config
 from gear.verbs.train.config import TrainConfig, read_config
 from gear.verbs.train.curves import write_curves
 from gear.verbs.train.data import TRAINING, VALIDATION, keep_some, spread
 from gear.verbs.train.feed import Feed
 from gear.verbs.train.loop import OnStep, Parts, Training
+from gear.verbs.train.request import TrainRequest
 from gear.verbs.train.results import WEIGHTS, Origin, command_of, known, metrics_of, packed, write_history
 from gear.verbs.train.sizes import picture_scale, without_empty_margins
 from gear.verbs.train.starting import (
@@ -104,7 +104,9 @@ def train(
     adversarial: str | None = None,
     settings: Iterable[str] = (),
     allow_test_data: bool = False,
+    progress: bool = False,
     on_step: OnStep | None = None,
+    on_progress: Progress | None = None,
     on_warning: Warn | None = None,
 ) -> TrainReport:
     """Trains a network; takes up again what was begun in `out`, and does nothing where it is finished.
@@ -124,75 +126,120 @@ def train(
         settings: further `KEY=VALUE` texts for any key of `TrainConfig`, such as `augmentation.flip=0`; the network's
             own options are `options.KEY`.
         allow_test_data: whether `test` splits may be learnt from.
-        on_step: called after every step and every validation.
-        noted: told what was chosen for the time that there is.
+        progress: shows a progress bar.
+        on_step: called after every step and every validation, with the state of the training.
+        on_progress: called after every step; with a time budget the number of all steps is an estimate.
+        on_warning: called with what was chosen for the time budget, and with what the user may not have meant.
+
+    Raises:
+        GearError: anything that the user can put right; its text is one line.
+    """
+    request = TrainRequest(
+        task=task,
+        model=model,
+        data=as_texts(data),
+        out=out,
+        val=as_texts(val),
+        epochs=epochs,
+        time_budget_s=time_budget_s,
+        batch=batch,
+        lr=lr,
+        seed=seed,
+        init=init,
+        precision=precision,
+        device=device,
+        workers=workers,
+        adversarial=adversarial,
+        settings=tuple(settings),
+        allow_test_data=allow_test_data,
+    )
+    callbacks = Callbacks.of(on_progress=on_progress, on_warning=on_warning)
+    with displayed(callbacks, "train", progress=progress, unit="step") as shown:
+        return run_train(request, shown, on_step)
+
+
+def run_train(request: TrainRequest, callbacks: Callbacks, on_step: OnStep | None = None) -> TrainReport:
+    """As `train`.
 
     Raises:
         GearError: anything that the user can put right; its text is one line.
     """
     prepare()
-    given: dict[str, Any] = {
-        "epochs": epochs, "time_budget_s": time_budget_s, "batch": batch, "learning_rate": lr, "seed": seed,
-        "init": init, "precision": precision, "device": device, "workers": workers,
-    }  # fmt: skip
-    settings = tuple(settings)
-    if adversarial is not None:
-        settings = (f"adversarial.attack={adversarial}", *settings)
-    found, task_found = find("model", model), find("task", task)
-    recipe = trainable(found, task)
-    config = read_config(recipe, given, settings)
+    origin = _origin(request, callbacks)
+    found, spec, root = origin.model, origin.spec, Path(request.out)
+    parts = _parts(origin, root, callbacks)
+    with alone_at_work(root):
+        clear_scratch(root)
+        training = Training(
+            parts, origin.config, on_step=with_progress(on_step, callbacks), pack=partial(packed, origin)
+        )
+        state = training.run()
+        write_curves(root, spec, state, f"{found.spec.name} on {request.task}")
+        write_history(root, origin, state)
+        clear_scratch(root)
+    best = next(entry for entry in state.validations if entry["step"] == state.best_step)
+    return TrainReport(
+        root=root,
+        weights=root / WEIGHTS,
+        steps=state.step,
+        elapsed_s=state.elapsed_s,
+        best_step=state.best_step,
+        metrics=known(metrics_of(best)),
+        metric=spec.metric,
+    )
+
+
+def with_progress(on_step: OnStep | None, callbacks: Callbacks) -> OnStep:
+    """Reports every step also as progress; with a time budget the number of all steps is an estimate."""
+
+    def report(state: TrainingState, share: float, metrics: dict[str, float] | None) -> None:
+        callbacks.on_progress(state.step, max(state.step, round(state.step / share)) if share > 0 else 0)
+        if on_step is not None:
+            on_step(state, share, metrics)
+
+    return report
+
+
+def _origin(request: TrainRequest, callbacks: Callbacks) -> Origin:
+    """Opens, finds and checks everything that a request names, and chooses what depends on the data."""
+    found, task_found = find("model", request.model), find("task", request.task)
+    config = read_config(trainable(found, request.task), request.config_values, request.config_settings)
     check_options(found, config)
-    training, validation = _samples(_listed(data), _listed(val), task, config, allow_test_data)
+    training, validation = _samples(request, config)
     spec = task_found.spec
     assert isinstance(spec, TaskSpec)
     for dataset in (*training.datasets, *validation.datasets):
         check_camera(Chosen(found=found, options=config.options), dataset, "--set options.")
         for keys in PLANNED:
             dataset.content(str, *keys)
-    scale = picture_scale(found, config, training)
-    if on_warning is not None and config.precision == "auto" and precision_of(found, config) == "bfloat16":
-        on_warning("steps run in bfloat16, in which this device is quicker; --precision float32 keeps them whole")
-    config = replace(config, picture_scale=scale, precision=precision_of(found, config))
+    scale, precision = picture_scale(found, config, training), precision_of(found, config)
+    if config.precision == "auto" and precision == "bfloat16":
+        callbacks.on_warning(
+            "steps run in bfloat16, in which this device is quicker; --precision float32 keeps them whole"
+        )
+    config = replace(config, picture_scale=scale, precision=precision)
     training, validation = replace(training, scale=scale), replace(validation, scale=scale)
-    if scale < 1 and on_warning is not None:
-        on_warning(
+    if scale < 1:
+        callbacks.on_warning(
             f"pictures are shown at {scale:g} of their size; --set picture_scale=1 shows them whole, and takes longer"
         )
-    if on_warning is not None and (mixed := sizes_note(found, config, training)):
-        on_warning(mixed)
-    share = scale * picture_share(training, spec)
-    root = Path(out)
-    begun = begun_config(root)
-    config = with_scale(found, without_empty_margins(config, training), share, begun)
+    if mixed := sizes_note(found, config, training):
+        callbacks.on_warning(mixed)
+    share, root = scale * picture_share(training, spec), Path(request.out)
+    config = with_scale(found, without_empty_margins(config, training), share, begun_config(root))
     check_output(root, "train into a folder of its own")
-    flags = {"epochs": epochs, "time_budget": _budget(time_budget_s), "batch": batch, "lr": lr, "seed": seed,
-             "init": init, "precision": precision, "allow_test_data": allow_test_data}  # fmt: skip
-    origin = Origin(
+    return Origin(
         model=found,
-        task=task,
+        spec=spec,
+        task=request.task,
         config=config,
         training=training,
         validation=validation,
-        command=command_of(task, model, _listed(data), _listed(val), flags, settings),
+        command=command_of(
+            request.task, request.model, request.data, request.val, request.command_flags, request.config_settings
+        ),
         look=look_of(dataset.plan for dataset in training.datasets),
         picture_share=share,
-    )
-    parts = _parts(found, spec, origin, root, on_warning, begun)
-    with alone_at_work(root):
-        clear_scratch(root)
-        progress = Training(parts, config, on_step=on_step, pack=partial(packed, origin)).run()
-        write_curves(root, spec, progress, f"{found.spec.name} on {task}")
-        write_history(root, origin, progress)
-        clear_scratch(root)
-    best = next(entry for entry in progress.validations if entry["step"] == progress.best_step)
-    return TrainReport(
-        root=root,
-        weights=root / WEIGHTS,
-        steps=progress.step,
-        elapsed_s=progress.elapsed_s,
-        best_step=progress.best_step,
-        metrics=known(metrics_of(best)),
-        metric=spec.metric,
     )
 
 
@@ -211,21 +258,14 @@ def trainable(found: PluginEntry, task: str) -> Any:
     return spec.recipe
 
 
-def _parts(
-    found: PluginEntry,
-    spec: TaskSpec[Any],
-    origin: Origin,
-    root: Path,
-    on_warning: Warn | None,
-    begun: Json,
-) -> Parts:
-    config = origin.config
+def _parts(origin: Origin, root: Path, callbacks: Callbacks) -> Parts:
+    found, config = origin.model, origin.config
     model = build_network(found, config, precision=config.precision)
-    told = "" if goes_on_alone(found, config.init, begun) else begin_with(found, model, config.init)
+    started = "" if goes_on_alone(found, config.init, begun_config(root)) else begin_with(found, model, config.init)
     with blamed(found, "module"):
         go_on_from(model, config.init)
-    if told and on_warning is not None:
-        on_warning(told)
+    if started:
+        callbacks.on_warning(started)
     twin = build_network(found, config, precision="float32")
     views = found.spec.views  # type: ignore[attr-defined]
     limit = config.cache_gb * GIGABYTE
@@ -245,7 +285,7 @@ def _parts(
             cache_bytes=int(limit / 4),
         )
     return Parts(
-        spec=spec,
+        spec=origin.spec,
         task=origin.training.datasets[0].task,
         found=found,
         model=model,
@@ -280,14 +320,12 @@ def _plan(origin: Origin) -> Json:
     }
 
 
-def _samples(
-    data: Sequence[str], val: Sequence[str], task: str, config: TrainConfig, allow_test_data: bool
-) -> tuple[Samples, Samples]:
-    if not data:
-        raise GearError("there are no data to train on; give --data DIR")
-    training = all_of(open_all(data, task, names=TRAINING, allow_test_data=allow_test_data))
-    if val:
-        held_out = all_of(open_all(val, task, names=VALIDATION, allow_test_data=allow_test_data))
+def _samples(request: TrainRequest, config: TrainConfig) -> tuple[Samples, Samples]:
+    """What to train on, and what to validate on."""
+    task, allowed = request.task, request.allow_test_data
+    training = all_of(open_all(request.data, task, names=TRAINING, allow_test_data=allowed))
+    if request.val:
+        held_out = all_of(open_all(request.val, task, names=VALIDATION, allow_test_data=allowed))
         streets = {scenes_of(one): one.root for one in training.datasets}
         for one in held_out.datasets:
             if scenes_of(one) in streets:
@@ -300,10 +338,6 @@ def _samples(
     return training, spread(held_out, config.validation_samples)
 
 
-def _listed(paths: Paths) -> list[str]:
-    return [str(paths)] if isinstance(paths, (str, Path)) else [str(path) for path in paths]
-
-
-def _budget(seconds: float | None) -> str | None:
-    """As the command takes it: every digit, no exponent, and nothing where epochs are counted."""
-    return None if not seconds else f"{np.format_float_positional(seconds, trim='-')}s"
+def as_texts(paths: Paths) -> tuple[str, ...]:
+    """One path or several as a tuple of texts."""
+    return (str(paths),) if isinstance(paths, (str, Path)) else tuple(str(path) for path in paths)

@@ -12,10 +12,9 @@ from gear.cli.main import main
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import DatasetError, GearError
 from gear.verbs.attack.run import attack
-from gear.verbs.attack.verify import verify
 from gear.verbs.collect.run import collect
 from tests.verbs.attack.conftest import SMALL
-from tests.verbs.conftest import Install, Small, size_settings
+from tests.verbs.conftest import Install, Small, size_settings, verified
 
 
 def test_the_patch_goes_back_into_the_world(small: Small, install: Install, tmp_path: Path) -> None:
@@ -44,14 +43,14 @@ def test_the_rendered_check(small: Small, install: Install, tmp_path: Path, caps
     report = json.loads(written.read_text())
     assert report["median_psnr_db"]["transport"] > 35 > report["median_psnr_db"]["homography"]
     assert (tmp_path / "p" / "patch_0.png").exists(), "the check leaves the patch folder as it was"
-    other = verify(
+    other = verified(
         tmp_path / "p", small(split="val", seed=5), models=["tiny_segmenter"], defense="median", samples=1,
         town=TINY_TOWN, scenes=f"{TINY_SCENES}:board",
     )["tiny_segmenter"]  # fmt: skip
     assert len(list((tmp_path / "p" / "verify").glob("board-val-*"))) == 2, "every dataset has a check of its own"
     assert other.defense == "median" and "tiny_segmenter behind median" in other.table()
     assert json.loads(written.read_text()) == report
-    both = verify(
+    both = verified(
         tmp_path / "p", small(split="val", seed=6), models=["tiny_segmenter", "other_segmenter"], samples=1,
         town=TINY_TOWN, scenes=f"{TINY_SCENES}:board",
     )  # fmt: skip
@@ -77,7 +76,7 @@ def test_checks_want_other_samples_than_patches_are_made_on(
     assert not (tmp_path / "x").exists(), "all of it is said before anything is made"
     attack(data, model="tiny_segmenter", out=tmp_path / "x", steps=1, settings=SMALL)
     with pytest.raises(DatasetError, match="was made on; verify it on other samples"):
-        verify(tmp_path / "x", data, models=["tiny_segmenter"], town=TINY_TOWN, scenes=TINY_SCENES)
+        verified(tmp_path / "x", data, models=["tiny_segmenter"], town=TINY_TOWN, scenes=TINY_SCENES)
 
 
 def test_patches_are_not_checked_on_what_chose_them(
@@ -91,7 +90,7 @@ def test_patches_are_not_checked_on_what_chose_them(
     assert not (tmp_path / "x").exists()
     attack(small(), model="tiny_segmenter", val=val, out=tmp_path / "x", steps=1, settings=SMALL)
     with pytest.raises(DatasetError, match="was made on; verify it on other samples"):
-        verify(tmp_path / "x", val, models=["tiny_segmenter"], town=TINY_TOWN, scenes=TINY_SCENES)
+        verified(tmp_path / "x", val, models=["tiny_segmenter"], town=TINY_TOWN, scenes=TINY_SCENES)
 
 
 def test_the_same_scenes_are_no_others_however_they_are_rendered(

@@ -15,7 +15,8 @@ from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import GearError
 from gear.verbs.bench.config import settings_of
 from gear.verbs.bench.plan import Plan
-from gear.verbs.bench.run import prepared
+from gear.verbs.bench.request import BenchRequest
+from gear.verbs.bench.run import prepared as prepared_request
 from tests.verbs.bench.conftest import FEW
 
 pytestmark = pytest.mark.usefixtures("plugins")
@@ -23,6 +24,11 @@ pytestmark = pytest.mark.usefixtures("plugins")
 LESSON = f'calibration: {{town: {TINY_TOWN}, scene: "{TINY_SCENES}:truck"}}\n'
 
 Written = Callable[..., Path]
+
+
+def prepared(config: str | Path, *, out: Path, **given: Any) -> Plan:
+    settings = tuple(given.pop("settings", ()))
+    return prepared_request(BenchRequest(config=config, out=out, settings=settings, **given))
 
 
 @pytest.mark.parametrize(
@@ -138,10 +144,10 @@ def test_probes_are_collected_for_those_that_need_them(written: Written, tmp_pat
 
 def test_where_networks_run(written: Written, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     tiny = prepared(written(), out=tmp_path, device="cuda")  # which have no such option
-    assert all("device=cuda" not in given["settings"] for given in arguments(tiny, "evaluate"))
+    assert all("device=cuda" not in given["model_settings"] for given in arguments(tiny, "evaluate"))
     monkeypatch.undo()
     shipped = prepared("quick", out=tmp_path, device="cuda")
-    assert all("device=cuda" in given["settings"] for given in arguments(shipped, "evaluate"))
+    assert all("device=cuda" in given["model_settings"] for given in arguments(shipped, "evaluate"))
     assert all("device=cuda" in given["model_settings"] for given in arguments(shipped, "attack"))
 
 

@@ -14,16 +14,18 @@ from gear.contracts.specs import DefenseSpec
 from gear.dataset.files import clear_scratch, explained, inside, write_whole
 from gear.dataset.sidecar import dump_json, load_json
 from gear.dataset.store import check_output
-from gear.measuring.guard import Guard
+from gear.measuring.checked_defense import CheckedDefense
 from gear.plugins.build import NO_OPTIONS, build, find
 from gear.plugins.catalogue import PluginEntry
 from gear.plugins.datasets import open_dataset
+from gear.reporting.display import displayed
 from gear.values.counted import counted
 from gear.values.errors import DatasetError, GearError
-from gear.values.progress import Progress
-from gear.values.rng import check_seed, derive_rng
+from gear.values.progress import Callbacks, Progress
+from gear.values.rng import derive_rng
 from gear.values.serial import Json
-from gear.verbs.cleaned import FOLDER, kept_marker, marker_path, write_sample
+from gear.verbs.defend.cleaned import FOLDER, kept_marker, marker_path, write_sample
+from gear.verbs.defend.request import DefendRequest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,6 +63,7 @@ def defend(
     split: str | None = None,
     settings: Iterable[str] = (),
     seed: int = 0,
+    progress: bool = False,
     on_progress: Progress | None = None,
 ) -> DefendReport:
     """Writes a dataset's pictures as a defense cleans them; takes up again what was begun, and cleans again what comes
@@ -77,46 +80,53 @@ def defend(
         split: of the dataset; may be left out where there is only one.
         settings: `KEY=VALUE` texts for the defense's options.
         seed: of the defense's own draws.
-        progress: told after every sample.
+        progress: shows a progress bar.
+        on_progress: called after every sample.
 
     Raises:
         GearError: anything that the user can put right; its text is one line.
     """
-    check_seed(seed)
-    found = find("defense", defense)
-    options = with_overrides(NO_OPTIONS, settings)
+    request = DefendRequest(dataset=dataset, defense=defense, out=out, split=split, settings=tuple(settings), seed=seed)
+    with displayed(Callbacks.of(on_progress=on_progress), "defend", progress=progress) as shown:
+        return run_defend(request, shown)
+
+
+def run_defend(request: DefendRequest, callbacks: Callbacks) -> DefendReport:
+    """As `defend`.
+
+    Raises:
+        GearError: anything that the user can put right; its text is one line.
+    """
+    found = find("defense", request.defense)
+    options = with_overrides(NO_OPTIONS, request.settings)
     config = read_node(found.spec.config, options, "")
-    opened = open_dataset(dataset, split)
+    opened = open_dataset(request.dataset, request.split)
     spec = suitable(found, opened.plan.task["name"])
-    root, name = Path(out), opened.plan.info.split
+    root, name, count = Path(request.out), opened.plan.info.split, len(opened)
     check_output(root, "write the cleaned pictures into a folder of their own")
     plan: Json = {
         "defense": {"name": spec.name, "package": found.owner.package, "version": found.owner.version},
         "options": to_plain(config),
-        "seed": seed,
+        "seed": request.seed,
         "dataset": opened.plan.content_key,
         "split": name,
     }
     begin(root, name, plan)
-    guard = Guard(found, build(found, options))
-    markers = {i: kept_marker(root, opened, i, spec) for i in range(len(opened))}
+    guard = CheckedDefense(found, build(found, options))
+    markers = {i: kept_marker(root, opened, i, spec) for i in range(count)}
     missing = [i for i, marker in markers.items() if marker is None]
     outdated = sum(inside(root, marker_path(name, i)).exists() for i in missing)
-    finished = len(opened) - len(missing)
-    if on_progress is not None:
-        on_progress(finished, len(opened))
-    for index in missing:
+    callbacks.on_progress(count - len(missing), count)
+    for finished, index in enumerate(missing, count - len(missing) + 1):
         sample = opened[index]
-        result = guard.apply(sample.images, derive_rng(seed, "defend", spec.name, index), index)
+        result = guard.apply(sample.images, derive_rng(request.seed, "defend", spec.name, index), index)
         markers[index] = write_sample(root, opened, index, sample, spec, result)
-        finished += 1
-        if on_progress is not None:
-            on_progress(finished, len(opened))
+        callbacks.on_progress(finished, count)
     if "score" in spec.outputs:
         scores = [marker.score for marker in markers.values() if marker is not None]
         write_whole(root, f"{FOLDER}/{name}/scores.json", dump_json({"scores": scores}))
     clear_scratch(root)
-    return DefendReport(root=root, split=name, samples=len(opened), made=len(missing), outdated=outdated)
+    return DefendReport(root=root, split=name, samples=count, made=len(missing), outdated=outdated)
 
 
 def suitable(found: PluginEntry, task: str) -> DefenseSpec[Any]:

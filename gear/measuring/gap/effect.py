@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Evaluator
 from gear.dataset.plan import Plan
 from gear.dataset.reading import Dataset
-from gear.measuring.calibration import opened_calibration
+from gear.measuring.gap.request import GapRequest
+from gear.measuring.guard import open_guard
 from gear.measuring.guarded_model import Player
 from gear.measuring.metric_checks import said_of
-from gear.measuring.plugin_selection import check_defense, check_model, chosen_defense, chosen_model
+from gear.measuring.plugin_selection import check_model, chosen_model
 from gear.measuring.shown_size import size_note
 from gear.plugins.build import find, name_of_task
-from gear.values.progress import Progress
+from gear.values.progress import Callbacks
 
 CLEAN, RENDERED = "clean", "rendered"
 
@@ -50,8 +50,6 @@ class Effect:
         plan: of the dataset.
         evaluators: by `clean`, a compositor's name, or `rendered`.
         metric: of the task, the one that is to be looked at first.
-        notes: what the user may not have meant: that the model sees the pictures at another size than it learnt from,
-            or what there is to say of the data that the defense learns from.
         samples: of those taken in so far.
     """
 
@@ -59,50 +57,35 @@ class Effect:
     plan: Plan
     evaluators: Mapping[str, Evaluator[Any, Any]]
     metric: str
-    notes: tuple[str, ...] = ()
     samples: list[SampleEffect] = field(default_factory=list)
 
     @staticmethod
-    def of(
-        model: str,
-        model_settings: Iterable[str],
-        dataset: Dataset[Any],
-        compositors: tuple[str, ...],
-        *,
-        defense: str | None = None,
-        defense_settings: Iterable[str] = (),
-        calibration: tuple[str | Path | None, str | Path | None] = (None, None),
-        seed: int = 0,
-        on_fit_progress: Progress | None = None,
-    ) -> Effect:
-        """For a model plugin, behind a defense plugin if one is named, which learns from `calibration`; `seed` is of
-        what the defense draws.
+    def of(request: GapRequest, dataset: Dataset[Any], callbacks: Callbacks) -> Effect:
+        """For the model of a request, behind its defense if there is one; warns of what the user may not have meant.
 
         Raises:
             UnknownNameError: there is no such model or defense.
             GearError: it is not made for the dataset's task, or the defense does not suit it.
             ConfigError: its options cannot be read.
         """
-        chosen = chosen_model(model, model_settings)
+        assert request.model is not None
+        chosen = chosen_model(request.model, request.model_settings)
         check_model(chosen, dataset)
-        task = dataset.plan.task["name"]
-        guard = chosen_defense(defense, defense_settings)
-        learnt = opened_calibration(*calibration, [chosen], defense, on_fit_progress=on_fit_progress)
-        if guard is not None:
-            check_defense(guard, chosen, task, is_calibrated=learnt.clean is not None)
+        guard = open_guard(
+            request.guard, [chosen], dataset.plan.task["name"], on_fit_progress=callbacks.on_fit_progress
+        )
+        learnt = guard.calibration
+        for line in (size_note(chosen, dataset), *learnt.doubts(), learnt.note(dataset)):
+            if line is not None:
+                callbacks.on_warning(line)
         spec = find("task", name_of_task(dataset.plan.task)).spec
         assert isinstance(spec, TaskSpec)
-        names = (CLEAN, *compositors, RENDERED)
+        names = (CLEAN, *request.compositors, RENDERED)
         return Effect(
-            player=Player(chosen, guard, calibration=learnt, seed=seed),
+            player=Player(chosen, guard, seed=request.seed),
             plan=dataset.plan,
             evaluators={name: dataset.task.evaluator() for name in names},
             metric=spec.metric.rpartition(".")[2],
-            notes=tuple(
-                line
-                for line in (size_note(chosen, dataset), *learnt.doubts(), learnt.note(dataset))
-                if line is not None
-            ),
         )
 
     def update(self, index: int, clean: Any, shown: Mapping[str, Any]) -> None:

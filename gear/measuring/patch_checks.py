@@ -1,13 +1,15 @@
-"""What attacks promise to return, and what is said where they do not."""
+"""Checks of the patches that an attack returns."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from gear.contracts.attacks import Patch
 from gear.measuring.guarded_model import accusation
 from gear.plugins.catalogue import PluginEntry
-from gear.verbs.attack.monitor import is_picture
 
 
 def check_patches(patches: Any, surfaces: int, found: PluginEntry) -> None:
@@ -26,3 +28,8 @@ def check_patches(patches: Any, surfaces: int, found: PluginEntry) -> None:
             raise accusation(found, "optimise", f"{patch.name} must be (H, W, 3) float32 without NaN")
         if patch.rgb.min() < 0 or patch.rgb.max() > 1:
             raise accusation(found, "optimise", f"{patch.name} leaves 0..1")
+
+
+def is_picture(rgb: npt.NDArray[Any]) -> bool:
+    """Whether an array is what the values of a patch may be: (H, W, 3) float32, all of them numbers."""
+    return rgb.dtype == np.float32 and rgb.ndim == 3 and rgb.shape[2] == 3 and bool(np.isfinite(rgb).all())

@@ -8,6 +8,7 @@ from typing import Any
 import yaml
 
 from gear.collecting.job import resolve
+from gear.collecting.run import run_job
 from gear.config.collection import CollectionConfig
 from gear.config.nodes import Place, in_one_place, parse_text
 from gear.config.reader import read_node
@@ -16,7 +17,6 @@ from gear.dataset.plan import read_plan
 from gear.dataset.reading import Dataset
 from gear.dataset.store import Store
 from gear.values.errors import ConfigError, DatasetError, UnknownNameError
-from gear.verbs.collect.run import run_job
 
 
 def check_clean(clean: Dataset[Any]) -> None:

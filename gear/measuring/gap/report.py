@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gear.measuring.gap.effect import CLEAN, RENDERED, Metrics, SampleEffect
+from gear.measuring.gap.picture_gap import PictureGap
 from gear.values.serial import Json, to_json
-from gear.verbs.gap.effect import CLEAN, RENDERED, Metrics, SampleEffect
-from gear.verbs.gap.picture_gap import PictureGap
 
 UNMOVED = 1e-9
 """Changes of a metric below this are none; no share of them is taken."""

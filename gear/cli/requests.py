@@ -1,0 +1,44 @@
+"""Requests of the verbs from parsed flags: each field comes from the flag of its name."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+from typing import TYPE_CHECKING, Any, TypeVar
+
+if TYPE_CHECKING:
+    from gear.measuring.guard import Guard
+
+RequestT = TypeVar("RequestT")
+
+
+def request_of(kind: type[RequestT], args: argparse.Namespace, **given: Any) -> RequestT:
+    """A request whose fields are flags; lists become tuples, and what was not given keeps the field's default.
+
+    Args:
+        kind: the dataclass.
+        args: of the command.
+        given: fields that are no flag of their name; they replace what the flags say.
+
+    Raises:
+        GearError: the values contradict each other.
+    """
+    values = vars(args)
+    fields = {field.name for field in dataclasses.fields(kind)}  # type: ignore[arg-type]
+    chosen = {
+        name: tuple(value) if isinstance(value, list) else value
+        for name, value in values.items()
+        if name in fields and value is not None
+    }
+    return kind(**{**chosen, **given})
+
+
+def guard_of(args: argparse.Namespace) -> Guard | None:
+    """The defense that `--defense`, `--defense-set` and the calibration flags name; None without one.
+
+    Raises:
+        GearError: its options or calibration data are given without it.
+    """
+    from gear.measuring.guard import Guard
+
+    return Guard.of(args.defense, args.defense_settings, args.calibration, args.calibration_patched)

@@ -1,0 +1,116 @@
+"""One collection job from its missing samples to the closed split."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from gear.collecting.job import Job
+from gear.collecting.pipeline import collect_samples
+from gear.collecting.session import open_session
+from gear.config.dump import to_plain
+from gear.dataset.executors.executor import Done, Executor, InThisProcess
+from gear.dataset.executors.processes import Processes
+from gear.dataset.store import Store
+from gear.plugins.build import blamed, build, find
+from gear.values.counted import counted
+from gear.values.progress import Callbacks
+from gear.values.serial import Json, to_json
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CollectReport:
+    """What a run did.
+
+    Attributes:
+        root: folder of the dataset.
+        split: its name.
+        samples: how many the split holds now.
+        made: how many of them this run made.
+    """
+
+    root: Path
+    split: str
+    samples: int
+    made: int
+
+    def summary(self) -> str:
+        """One line for a person."""
+        kept = self.samples - self.made
+        resumed = f" ({kept} were there already)" if kept else ""
+        return f"{self.root}: {counted(self.samples, 'sample')} in split {self.split!r}{resumed}"
+
+
+def executor_of(job: Job, workers: int, *, in_subprocess: bool) -> Executor:
+    """The engine for a number of workers; a single one is this process, unless it shall be a process of its own."""
+    if workers == 1 and not in_subprocess:
+        return InThisProcess()
+    return Processes(workers=workers, backend=job.config.renderer)
+
+
+def run_job(
+    job: Job, *, executor: Executor | None = None, force: bool = False, callbacks: Callbacks | None = None
+) -> CollectReport:
+    """Collects what is missing of a resolved job and closes the split.
+
+    Args:
+        job: what to collect.
+        executor: the engine that makes the samples; this process by default.
+        force: replaces a split that was made with another configuration.
+        callbacks: receive the progress.
+
+    Raises:
+        GearError: a sample cannot be made or written.
+    """
+    store = Store(job.root, job.plan)
+    plugin = find("task", job.config.task)
+    with store.begun(job.patch.files, force=force):
+        made = _collect_missing(job, store, executor or InThisProcess(), callbacks or Callbacks())
+        task = build(plugin, job.config.options)
+        with blamed(plugin, "finalise"):
+            store.close(task, manifest_facts(job))
+    return CollectReport(root=job.root, split=job.plan.info.split, samples=job.plan.samples, made=made)
+
+
+def _collect_missing(job: Job, store: Store, executor: Executor, callbacks: Callbacks) -> int:
+    """Makes the missing samples; returns their number."""
+    missing = store.missing()
+    finished = job.plan.samples - len(missing)
+
+    def done(_: int) -> None:
+        nonlocal finished
+        finished += 1
+        callbacks.on_progress(finished, job.plan.samples)
+
+    callbacks.on_progress(finished, job.plan.samples)
+    executor.run(partial(_make_samples, job), missing, done)
+    return len(missing)
+
+
+def _make_samples(job: Job, indices: Iterator[int], done: Done) -> None:
+    """One worker: a world and a renderer, opened once for all of its samples."""
+    with open_session(job) as session:
+        collect_samples(session, Store(job.root, job.plan), indices, done)
+
+
+def manifest_facts(job: Job) -> dict[str, Json]:
+    """What the manifest says beside hashes: nothing in it depends on the machine's paths, the clock or the workers."""
+    config: dict[str, Any] = to_plain(job.config)
+    for name in ("root", "patch", "town", "scenes", "simulation", *(() if job.config.probes else ("probes",))):
+        config.pop(name)
+    return {
+        "task": dict(job.plan.task),
+        "options": job.plan.options,
+        "info": to_json(job.plan.info),
+        "seed": job.split.seed,
+        "patch": dict(job.plan.patch),
+        "renderer": to_json(job.renderer),
+        "versions": job.plan.content["versions"],
+        "scene": job.plan.content["scene"],
+        "weather": to_json(job.weather),
+        "assets": job.plan.content["assets"],
+        "config": config,
+    }

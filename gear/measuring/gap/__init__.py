@@ -1,0 +1,1 @@
+"""Digital patches against rendered ones: pictures, and the effect on a model."""

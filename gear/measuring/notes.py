@@ -1,0 +1,20 @@
+"""Notes on datasets, each said once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+
+def grouped(notes: Iterable[str | None]) -> list[str]:
+    """Notes of the form `ROOT: text`, with one line per text, which names the first root and counts the others."""
+    roots: dict[str, dict[str, None]] = {}
+    for note in notes:
+        if note is not None:
+            root, _, text = note.partition(": ")
+            roots.setdefault(text, {})[root] = None
+    lines = []
+    for text, named in roots.items():
+        first, others = next(iter(named)), len(named) - 1
+        more = f" and {others} other dataset{'s' * (others > 1)}" if others else ""
+        lines.append(f"{first}{more}: {text}" if text else first)
+    return lines

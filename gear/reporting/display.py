@@ -1,0 +1,204 @@
+"""The display of a running verb: bars where somebody looks at a terminal or a notebook, plain lines in logs.
+
+Bars are tqdm's. Without a terminal a thread writes one line at least every `EVERY_S` seconds, also while a single step
+takes longer than that, so that a log always says whether the job works and how long it still takes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from types import TracebackType
+from typing import Any, Protocol, TextIO
+
+from gear.reporting.pace import Pace, duration_text
+from gear.values.progress import Callbacks
+
+EVERY_S = 30.0
+"""Seconds between two plain lines; twice as often as once a minute, for threads that wait for the interpreter."""
+
+FIT_UNIT = "picture"
+"""What a defense that learns counts."""
+
+
+class _Backend(Protocol):
+    """Bars or lines."""
+
+    def update(self, channel: str, unit: str, done: int, total: int) -> None: ...
+
+    def write(self, line: str) -> None: ...
+
+    def begin(self, title: str) -> None: ...
+
+    def detail(self, text: str) -> None: ...
+
+    def close(self) -> None: ...
+
+
+class Display:
+    """Shows progress and warnings of one verb on stderr; a context manager.
+
+    Attributes:
+        callbacks: to be given to the verb.
+    """
+
+    def __init__(self, verb: str, *, unit: str = "sample", python: bool = False) -> None:
+        """Args:
+        verb: its name, with which plain lines begin.
+        unit: what `on_progress` counts, in the singular.
+        python: whether a script asked for it, perhaps in a notebook, and not the command line.
+        """
+        self._unit = unit
+        has_bars = sys.stderr.isatty() or (python and _is_notebook())
+        self._backend: _Backend = _Bars(is_notebook=python) if has_bars else _Lines(verb)
+        self.callbacks = Callbacks.of(
+            on_progress=lambda done, total: self._backend.update("progress", self._unit, done, total),
+            on_fit_progress=lambda done, total: self._backend.update("fit", FIT_UNIT, done, total),
+            on_warning=lambda line: self._backend.write(f"gear: note: {line}"),
+        )
+
+    def write(self, line: str) -> None:
+        """Prints a line without disturbing a bar."""
+        self._backend.write(line)
+
+    def detail(self, text: str) -> None:
+        """Shows a few words beside the progress, such as the loss."""
+        self._backend.detail(text)
+
+    def begin(self, title: str, unit: str = "sample") -> None:
+        """Begins the next step of several; its progress is counted from its first report.
+
+        Args:
+            title: of the step.
+            unit: what `on_progress` counts from now on.
+        """
+        self._unit = unit
+        self._backend.begin(title)
+
+    def __enter__(self) -> Display:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._backend.close()
+
+
+@contextlib.contextmanager
+def displayed(callbacks: Callbacks, verb: str, *, progress: bool, unit: str = "sample") -> Iterator[Callbacks]:
+    """The callbacks of a Python call, and those of a display as well where `progress` asks for one."""
+    if not progress:
+        yield callbacks
+        return
+    with Display(verb, unit=unit, python=True) as display:
+        yield callbacks.and_also(display.callbacks)
+
+
+class _Bars:
+    """A tqdm bar per channel."""
+
+    def __init__(self, *, is_notebook: bool) -> None:
+        self._is_notebook = is_notebook
+        self._bars: dict[str, Any] = {}
+
+    def update(self, channel: str, unit: str, done: int, total: int) -> None:
+        bar = self._bars.get(channel)
+        if bar is None:
+            self._bars[channel] = self._make()(
+                total=total or None, initial=done, unit=unit, dynamic_ncols=True, smoothing=0.1
+            )
+            return
+        bar.total = total or None
+        bar.update(done - bar.n)
+
+    def _make(self) -> Callable[..., Any]:
+        if self._is_notebook:
+            from tqdm.auto import tqdm as auto
+
+            made: Callable[..., Any] = auto
+            return made
+        from tqdm import tqdm
+
+        return tqdm
+
+    def write(self, line: str) -> None:
+        from tqdm import tqdm
+
+        tqdm.write(line, file=sys.stderr)
+
+    def begin(self, title: str) -> None:
+        self.close()
+        self.write(title)
+
+    def detail(self, text: str) -> None:
+        for bar in self._bars.values():
+            bar.set_postfix_str(text)
+
+    def close(self) -> None:
+        for bar in self._bars.values():
+            bar.close()
+        self._bars = {}
+
+
+class _Lines:
+    """Plain lines, written by a thread."""
+
+    def __init__(self, verb: str) -> None:
+        self._verb, self._title, self._detail = verb, "", ""
+        self._stream: TextIO = sys.stderr
+        self._begun_s = time.monotonic()
+        self._pace: Pace | None = None
+        self._channel = ""
+        self._has_written = False
+        self._ended = threading.Event()
+        self._lock = threading.Lock()
+        self._thread = threading.Thread(target=self._work, name="gear-progress", daemon=True)
+        self._thread.start()
+
+    def update(self, channel: str, unit: str, done: int, total: int) -> None:
+        with self._lock:
+            if self._pace is None or channel != self._channel:
+                self._pace = Pace(unit, done, time.monotonic(), done, total)
+                self._channel = channel
+            self._pace.done, self._pace.total = done, total
+
+    def write(self, line: str) -> None:
+        with self._lock:
+            print(line, file=self._stream, flush=True)
+
+    def begin(self, title: str) -> None:
+        with self._lock:
+            self._title, self._detail, self._pace, self._channel = title, "", None, ""
+            self._begun_s = time.monotonic()
+
+    def detail(self, text: str) -> None:
+        with self._lock:
+            self._detail = text
+
+    def close(self) -> None:
+        self._ended.set()
+        self._thread.join()
+        if self._has_written and self._pace is not None:
+            self.write(self._line())
+
+    def _work(self) -> None:
+        while not self._ended.wait(EVERY_S):
+            with contextlib.suppress(ValueError, OSError):  # a stream that was closed under the thread
+                self.write(self._line())
+                self._has_written = True
+
+    def _line(self) -> str:
+        now_s = time.monotonic()
+        head = f"gear {self._verb}: {self._title + ': ' if self._title else ''}"
+        if self._pace is None:
+            return f"{head}preparing since {duration_text(now_s - self._begun_s)}"
+        learning = "the defense learns, " if self._channel == "fit" else ""
+        return f"{head}{learning}{self._pace.line(now_s)}{', ' + self._detail if self._detail else ''}"
+
+
+def _is_notebook() -> bool:
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    return shell is not None and "IPKernelApp" in getattr(shell, "config", {})

@@ -1,0 +1,69 @@
+"""How fast a job is and how long it still takes, as numbers and in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(slots=True)
+class Pace:
+    """Progress of one job, with the times at which it was reported.
+
+    Attributes:
+        unit: what is counted, in the singular: `sample`, `step`.
+        first_done, first_s: the first report: items that an earlier run finished, and the time in seconds.
+        done, total: the last report; a total of 0 means that it is not known.
+    """
+
+    unit: str
+    first_done: int
+    first_s: float
+    done: int
+    total: int
+
+    def rate(self, now_s: float) -> float:
+        """Items per second of this run; 0 before the first one."""
+        elapsed_s = now_s - self.first_s
+        return (self.done - self.first_done) / elapsed_s if elapsed_s > 0 else 0.0
+
+    def left_s(self, now_s: float) -> float | None:
+        """Seconds until all items are done; None where the rate or the total is not known."""
+        rate = self.rate(now_s)
+        return (self.total - self.done) / rate if rate and self.total else None
+
+    def line(self, now_s: float) -> str:
+        """For a log: `120 of 2000 samples, 3.1 per second, 10 minutes left`."""
+        count = f"{self.done} of {self.total}" if self.total else str(self.done)
+        parts = [f"{count} {plural(self.unit, self.total or self.done)}"]
+        rate, left_s = self.rate(now_s), self.left_s(now_s)
+        if rate:
+            parts.append(rate_text(rate))
+        if left_s:
+            parts.append(f"{duration_text(left_s)} left")
+        return ", ".join(parts)
+
+
+def rate_text(per_second: float) -> str:
+    """`3.1 per second`, or, for slow work, per minute or per hour."""
+    for name, seconds in (("second", 1), ("minute", 60), ("hour", 3600)):
+        if per_second * seconds >= 1 or name == "hour":
+            return f"{per_second * seconds:.3g} per {name}"
+    raise AssertionError
+
+
+def duration_text(seconds: float) -> str:
+    """`40 seconds`, `12 minutes`, `3.5 hours`, `2.1 days`."""
+    if seconds < 99.5:
+        return f"{max(seconds, 1):.0f} {plural('second', round(max(seconds, 1)))}"
+    if seconds < 99.5 * 60:
+        return f"{seconds / 60:.0f} minutes"
+    if seconds < 48 * 3600:
+        return f"{seconds / 3600:.1f} hours"
+    return f"{seconds / 86400:.1f} days"
+
+
+def plural(unit: str, count: int) -> str:
+    """The word for a number of units."""
+    if count == 1:
+        return unit
+    return unit[:-1] + "ies" if unit.endswith("y") else unit + "s"

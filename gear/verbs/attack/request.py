@@ -1,0 +1,69 @@
+"""What an attack, and the rendered check of one, are asked to do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from gear.measuring.guard import Guard
+from gear.values.errors import GearError
+from gear.values.rng import check_seed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AttackRequest:
+    """As the keywords of `gear.attack`, where they are explained; `guard` is the defense with what it learns from.
+
+    Raises:
+        GearError: a number is out of range.
+    """
+
+    data: tuple[str | Path, ...]
+    models: tuple[str, ...]
+    out: str | Path
+    attack: str = "scene_specific"
+    steps: int | None = None
+    queries: int | None = None
+    settings: tuple[str, ...] = ()
+    model_settings: tuple[str, ...] = ()
+    guard: Guard | None = None
+    val: tuple[str | Path, ...] = ()
+    every: int = 25
+    patience: int = 0
+    compositor: str = "transport"
+    seed: int = 0
+    allow_test_data: bool = False
+    force: bool = False
+
+    def __post_init__(self) -> None:
+        check_seed(self.seed)
+        counts = (self.steps, self.queries, self.every)
+        if any(count is not None and count < 1 for count in counts) or self.patience < 0:
+            raise GearError("steps, queries and every must be at least 1, patience at least 0")
+        if self.patience and not self.val:
+            raise GearError("patience counts looks at validation samples, and there are none: name some with --val")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VerifyRequest:
+    """A rendered check of a patch folder.
+
+    Attributes:
+        out: the patch folder.
+        data: root of a dataset of the scene with probes, or `DIR:SPLIT`; not one that the patches were made on, or
+            by which the best of them were chosen.
+        models: names of model plugins.
+        model_settings: `KEY=VALUE` texts for their options.
+        guard: the defense behind which they stand.
+        samples: number of samples, counted from the first one; all by default.
+        town, scenes: files of its town and of that town's scene library, where they are not gear's own.
+    """
+
+    out: str | Path
+    data: str | Path
+    models: tuple[str, ...]
+    model_settings: tuple[str, ...] = ()
+    guard: Guard | None = None
+    samples: int | None = None
+    town: str | Path | None = None
+    scenes: str | Path | None = None

@@ -1,0 +1,64 @@
+"""What a collection is asked to do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from gear.config.collection import CollectionConfig
+from gear.config.load import load_collection
+from gear.values.errors import GearError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CollectRequest:
+    """As the keywords of `gear.collect`, where they are explained.
+
+    Raises:
+        GearError: the number of workers is not at least 1.
+    """
+
+    task: str | None = None
+    config: str | Path | None = None
+    town: str | Path | None = None
+    scene: str | None = None
+    split: str | None = None
+    samples: int | str | None = None
+    seed: int | str | None = None
+    weather: str | None = None
+    patch: str | Path | None = None
+    renderer: str | None = None
+    quality: str | None = None
+    out: str | Path | None = None
+    probes: bool | None = None
+    settings: tuple[str, ...] = ()
+    workers: int = 1
+    in_subprocess: bool = False
+    force: bool = False
+
+    def __post_init__(self) -> None:
+        if self.workers < 1:
+            raise GearError(f"workers must be at least 1, got {self.workers}")
+
+    def loaded(self) -> CollectionConfig:
+        """The collection's config: the file, with the other values before what it says.
+
+        Raises:
+            ConfigError: a value cannot be read.
+        """
+        given = {
+            "task": self.task,
+            "town": self.town,
+            "scene": self.scene,
+            "split": self.split,
+            "samples": self.samples,
+            "seed": self.seed,
+            "weather": self.weather,
+            "patch": self.patch,
+            "renderer": self.renderer,
+            "quality": self.quality,
+            "root": self.out,
+            "probes": None if self.probes is None else str(self.probes).lower(),
+        }
+        flags = {key: None if value is None else str(value) for key, value in given.items()}
+        return load_collection(None if self.config is None else str(self.config), flags, self.settings)

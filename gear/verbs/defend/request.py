@@ -1,0 +1,27 @@
+"""What the cleaning of a dataset is asked to do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from gear.values.rng import check_seed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DefendRequest:
+    """As the keywords of `gear.defend`, where they are explained.
+
+    Raises:
+        GearError: the seed is out of range.
+    """
+
+    dataset: str | Path
+    defense: str
+    out: str | Path
+    split: str | None = None
+    settings: tuple[str, ...] = ()
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        check_seed(self.seed)

@@ -1,0 +1,44 @@
+"""What an evaluation is asked to do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from gear.measuring.guard import Guard
+from gear.values.errors import GearError
+from gear.values.rng import check_seed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EvaluateRequest:
+    """As the keywords of `gear.evaluate`, where they are explained; `guard` is the defense with what it learns from.
+
+    Raises:
+        GearError: a number is out of range.
+    """
+
+    data: tuple[str | Path, ...]
+    model: str
+    model_settings: tuple[str, ...] = ()
+    guard: Guard | None = None
+    split: str | None = None
+    reports: tuple[str, ...] = ()
+    out: str | Path | None = None
+    batch: int | None = None
+    workers: int = 2
+    seed: int = 0
+    pools: Mapping[str, Sequence[str | Path]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        check_seed(self.seed)
+        if min(1 if self.batch is None else self.batch, self.workers) < 1:
+            raise GearError(f"batch and workers must be at least 1; got {self.batch}, {self.workers}")
+
+    def folder(self, task: str) -> Path:
+        """Where everything goes: what was asked for, or `evaluations/<task>/<model>[+<defense>]`."""
+        if self.out is not None:
+            return Path(self.out)
+        guarded = "" if self.guard is None else f"+{self.guard.defense}"
+        return Path("evaluations", task, self.model.replace("/", "-") + guarded)
