@@ -21,7 +21,7 @@ def test_workers_that_are_interrupted_alone_are_told_at_once(
     tmp_path: Path, collect_small: Callable[..., CollectReport], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Somebody's `kill -INT`: it took ten minutes of silence, and then the driver was blamed."""
-    monkeypatch.setattr(workers, "SILENCE_S", 20.0)
+    monkeypatch.setattr(workers, "SILENCE_S", 120.0)
 
     def interrupt(finished: int, total: int) -> None:
         for process in multiprocessing.active_children() if finished == 1 else ():
