@@ -1,0 +1,26 @@
+"""Encodings and widths of the terminal."""
+
+from __future__ import annotations
+
+import io
+import sys
+
+import pytest
+
+from gear.cli.streams import line_width, prepare_streams
+
+
+def test_characters_that_the_encoding_lacks_are_escaped(monkeypatch: pytest.MonkeyPatch) -> None:
+    raw = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(raw, encoding="ascii"))
+    prepare_streams()
+    print("dätä … \udc80")
+    sys.stdout.flush()
+    assert raw.getvalue() == rb"d\xe4t\xe4 \u2026 \udc80" + b"\n"
+
+
+@pytest.mark.parametrize(("columns", "expected"), [("", 100), ("0", 100), ("30", 60), ("80", 80), ("200", 200)])
+def test_lines_are_as_wide_as_the_terminal(columns: str, expected: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", columns)
+    monkeypatch.setattr(sys, "__stdout__", io.StringIO())
+    assert line_width() == expected
