@@ -2,88 +2,88 @@
 
 from __future__ import annotations
 
+import argparse
 import pickle
 import pickletools
 import re
+import types
 import warnings
-from collections.abc import Mapping
-from pathlib import Path
+from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from gear.networks.checkpoint_states import Candidate, entries_of
 from gear.networks.shipped import check_file
 from gear.networks.weights import read
 from gear.values.errors import GearError
-
-STATES = ("model", "state_dict", "model_state_dict", "model_state", "net", "network", "weights", "params")
-"""Under which of these keys a checkpoint holds the network; the rest of it is the optimiser's and the loop's."""
 
 PARALLEL = "module."
 """`DataParallel` puts this before every key."""
 
 _scalar: Any = np.float64(0).__reduce__()[0]
-"""What NumPy writes a scalar with, under the names of its older and newer versions."""
+_array: Any = np.zeros(1).__reduce__()[0]
+"""What NumPy writes a scalar and an array with; newer versions have other names for them."""
+
+PATHS = (
+    (PurePosixPath, "PosixPath"),
+    (PurePosixPath, "PurePosixPath"),
+    (PureWindowsPath, "WindowsPath"),
+    (PureWindowsPath, "PureWindowsPath"),
+)
 
 PLAIN_GLOBALS: list[Any] = [
     (_scalar, "numpy.core.multiarray.scalar"),
     (_scalar, "numpy._core.multiarray.scalar"),
+    (_array, "numpy.core.multiarray._reconstruct"),
+    (_array, "numpy._core.multiarray._reconstruct"),
     np.dtype,
+    np.ndarray,
     *(type(np.dtype(code)) for code in ("f2", "f4", "f8", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", "?")),
+    argparse.Namespace,
+    types.SimpleNamespace,
+    *((pure, f"{module}.{name}") for module in ("pathlib", "pathlib._local") for pure, name in PATHS),
 ]
-"""NumPy's scalars, such as the best figure so far: numbers, which run nothing."""
+"""What training code saves with weights and what runs nothing when it is read.
+
+Numbers and arrays of NumPy, such as the best metric so far; the parsed command line; paths, which are read as pure ones
+that touch no disk.
+"""
 
 STATE_DICT_ALONE = "state dict alone (torch.save(model.state_dict(), FILE))"
 
 LOOKED_AT_BYTES = 1 << 20
 """Of a pickle, to say what it wants."""
 
-HARMLESS = ("torch", "collections", "numpy")
+HARMLESS = ("torch", "collections", "numpy", "argparse")
 """Packages that checkpoints are made of."""
-
-DEPTH = 3
-"""How deep in a checkpoint the network may lie."""
 
 
 def read_published(path: str | Path) -> dict[str, Tensor]:
     """A network's tensors by key, from a checkpoint of PyTorch's (zip or older) or from a safetensors file.
 
+    Of several entries the likeliest is taken; `module.`, which `DataParallel` puts before every key, is taken off.
+
     Raises:
         GearError: there is no such file, nothing can read it, it wants to run something, or it holds no network.
     """
-    file = Path(path)
-    check_file(file)
-    if file.suffix == ".safetensors":
-        state, _ = read(file)
-    else:
-        state = find_state(_load(file), file)
+    state = dict(read_entries(path)[0].state)
     if state and all(key.startswith(PARALLEL) for key in state):
         state = {key.removeprefix(PARALLEL): value for key, value in state.items()}
     return state
 
 
-def find_state(content: Any, path: Path) -> dict[str, Tensor]:
-    """The tensors of a checkpoint's network by key: what is nested in it under a customary name, or all of it.
+def read_entries(path: str | Path) -> list[Candidate]:
+    """The mappings of a checkpoint or a safetensors file that hold tensors, the likeliest network first.
 
     Raises:
-        GearError: it holds none.
+        GearError: there is no such file, nothing can read it, it wants to run something, or it holds no tensors.
     """
-    for _ in range(DEPTH):
-        if not isinstance(content, Mapping):
-            break
-        nested = next((content[name] for name in STATES if isinstance(content.get(name), Mapping)), None)
-        if nested is None:
-            break
-        content = nested
-    if not isinstance(content, Mapping):
-        raise GearError(f"{path}: holds no network, but a {type(content).__name__}; a state dict is wanted")
-    tensors = {str(key): value for key, value in content.items() if isinstance(value, Tensor)}
-    if not tensors:
-        keys = ", ".join(map(str, list(content)[:5])) or "nothing"
-        raise GearError(f"{path}: holds no network's tensors (but {keys}); a state dict is wanted")
-    return tensors
+    file = Path(path)
+    check_file(file)
+    return entries_of(read(file)[0] if file.suffix == ".safetensors" else _load(file), file)
 
 
 def _load(path: Path) -> Any:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import argparse
 import pickle
+import types
 import warnings
 from pathlib import Path
 from typing import Any
@@ -32,8 +33,23 @@ def same(state: dict[str, torch.Tensor]) -> bool:
         {"model": {"state_dict": STATE}, "uncert": torch.zeros(6)},
         {f"module.{key}": value for key, value in STATE.items()},
         {"model": {f"module.{key}": value for key, value in STATE.items()}},
+        {"ema": dict.fromkeys(STATE, torch.zeros(1)), "model": STATE},
+        {"optimizer": {"state": {"a": torch.zeros(1)}}, "checkpoint": {"model": STATE}},
+        {"model": STATE, "args": argparse.Namespace(lr=1, out=Path("/runs/a"), classes=["road"])},
+        {"model": STATE, "curve": np.linspace(0, 1, 3), "names": types.SimpleNamespace(a=1)},
     ],
-    ids=["plain", "checkpoint", "numpy", "nested", "parallel", "parallel checkpoint"],
+    ids=[
+        "plain",
+        "checkpoint",
+        "numpy",
+        "nested",
+        "parallel",
+        "parallel checkpoint",
+        "ema",
+        "optimiser",
+        "arguments",
+        "arrays",
+    ],
 )
 def test_official_kinds_of_files_are_read(tmp_path: Path, content: Any, zipped: bool) -> None:
     path = tmp_path / "a.pth"
@@ -60,7 +76,6 @@ class Evil:
 def test_a_file_that_wants_to_run_something_is_refused_by_name(tmp_path: Path, zipped: bool) -> None:
     mark, path = tmp_path / "mark", tmp_path / "a.pth"
     for content, name in (
-        ({"model": STATE, "args": argparse.Namespace(lr=1)}, "argparse.Namespace"),
         (nn.Linear(2, 2), "torch.nn.modules.linear.Linear"),
         ({"model": STATE, "x": Evil(mark)}, "pathlib|getattr"),
     ):

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import argparse
 import json
 import shlex
 from pathlib import Path
@@ -209,3 +210,67 @@ def test_what_has_no_mean_is_refused(
     before.rename(tmp_path / "models" / "ddrnet23_slim.safetensors")
     monkeypatch.setattr(shipped, "shipped_folders", lambda: (tmp_path,))
     assert average_weights("ddrnet23_slim", after, out).model == "ddrnet23_slim"
+
+
+@pytest.fixture(scope="module")
+def bisenet() -> dict[str, torch.Tensor]:
+    return dict(BiSeNetX39(19).state_dict())
+
+
+def _behind(prefix: str, state: dict[str, torch.Tensor]) -> dict[str, Any]:
+    return {prefix + key: value for key, value in state.items()}
+
+
+@pytest.mark.parametrize(
+    ("wrap", "entry"),
+    [
+        (lambda state: _behind("_orig_mod.", state), "_orig_mod"),
+        (lambda state: _behind("net.module.", state), "net.module"),
+        (lambda state: {"checkpoint": state}, "checkpoint"),
+        (lambda state: {"checkpoint": {"model": _behind("module.", state)}}, "checkpoint.model.module"),
+        (lambda state: {"model": state, "args": argparse.Namespace(lr=0.1)}, "model"),
+        (lambda state: {"state_dict": _behind("model.", state) | {"loss.weight": torch.ones(9)}}, "state_dict.model"),
+        (lambda state: state, ""),
+    ],
+    ids=["compiled", "lightning", "nested", "nested parallel", "arguments", "criterion", "plain"],
+)  # fmt: skip
+def test_wrapped_states_are_found_by_the_networks_own_keys(
+    bisenet: dict[str, torch.Tensor], tmp_path: Path, wrap: Any, entry: str
+) -> None:
+    torch.save(wrap(bisenet), tmp_path / "a.pth")
+    report = convert_weights("bisenet_x39", tmp_path / "a.pth", tmp_path / "a.safetensors")
+    assert (report.entry, report.others, report.tensors) == (entry, (), 461)
+    assert (f"taken from: {entry}\n" in report.summary()) == bool(entry)
+    assert torch.equal(read(report.path)[0]["heads.2.conv_1x1.bias"], bisenet["heads.2.conv_1x1.bias"])
+
+
+def test_of_several_that_fit_the_report_says_which_was_taken(
+    bisenet: dict[str, torch.Tensor], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    averaged = {key: value + 1 if value.is_floating_point() else value for key, value in bisenet.items()}
+    torch.save({"ema": {"module": averaged}, "model": bisenet}, tmp_path / "a.pth")
+    words = ["weights", "convert", "bisenet_x39", str(tmp_path / "a.pth")]
+    assert main([*words, str(tmp_path / "a.safetensors")]) == 0
+    said = capsys.readouterr().out
+    assert "taken from: model\nfits, too, and was not taken (--entry NAME): ema.module\n" in said
+    assert main([*words, str(tmp_path / "b.safetensors"), "--entry", "ema.module", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["entry"] == "ema.module"
+    key = "heads.2.conv_1x1.bias"
+    assert torch.equal(read(tmp_path / "b.safetensors")[0][key], bisenet[key] + 1)
+    assert main([*words, str(tmp_path / "c.safetensors"), "--entry", "emma"]) == 2
+    assert "has no entry 'emma'; it holds model (461 tensors), ema.module (461 tensors)" in capsys.readouterr().err
+
+
+def test_a_refusal_says_what_the_file_holds_and_what_was_wanted(
+    bisenet: dict[str, torch.Tensor], tmp_path: Path
+) -> None:
+    one_less = {key: value for key, value in bisenet.items() if key != "heads.2.conv_1x1.bias"}
+    torch.save({"generator": {"x.y": torch.ones(1)}, "model": _behind("net.", one_less)}, tmp_path / "a.pth")
+    with pytest.raises(GearError) as caught:
+        convert_weights("bisenet_x39", tmp_path / "a.pth", tmp_path / "a.safetensors")
+    text = str(caught.value)
+    assert "not weights of bisenet_x39 in 'model.net': 1 missing (heads.2.conv_1x1.bias)" in text
+    assert "the file holds model (460 tensors), generator (1 tensors)" in text and "\n" not in text
+    torch.save({"x.y": torch.ones(1)}, tmp_path / "b.pth")
+    with pytest.raises(GearError, match=r"its keys are like 'x\.y', those of bisenet_x39 like '"):
+        convert_weights("bisenet_x39", tmp_path / "b.pth", tmp_path / "a.safetensors")

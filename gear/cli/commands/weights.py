@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 EXAMPLE = """examples:
   gear weights convert ddrnet23_slim best_val.pth ddrnet.safetensors
   gear weights convert bisenet_x39 cityscapes-bisenet-X39.pth bisenet.safetensors --set auxiliary=false
+  gear weights convert ddrnet23_slim last.pt ddrnet.safetensors --entry ema
   gear weights average ddrnet23_slim runs/semseg/model.safetensors mean.safetensors
   gear weights show ddrnet.safetensors
   gear weights show ddrnet23_slim --json           the shipped reference weights of a model
@@ -36,6 +37,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings",
         help="an option of the model that changes its graph; repeatable",
     )  # fmt: skip
+    converting.add_argument(
+        "--entry", metavar="NAME", default="", help="the entry of the checkpoint to take, such as ema (one that fits)"
+    )
     converting.add_argument("--json", action="store_true", help="print JSON")
     averaging = actions.add_parser(
         "average", help="average two states of one network, such as before and after fine-tuning"
@@ -62,7 +66,10 @@ def convert(args: argparse.Namespace) -> int:
     """Converts and prints the hash."""
     from gear.verbs.weights.convert import convert_weights
 
-    return _say(convert_weights(args.model, args.source, args.out, settings=args.settings, halves=args.half), args)
+    report = convert_weights(
+        args.model, args.source, args.out, settings=args.settings, entry=args.entry, halves=args.half
+    )
+    return _say(report, args)
 
 
 def average(args: argparse.Namespace) -> int:
@@ -75,7 +82,8 @@ def average(args: argparse.Namespace) -> int:
 def _say(report: ConvertReport, args: argparse.Namespace) -> int:
     if args.json:
         facts = {"model": report.model, "path": str(report.path), "sha256": report.sha256,
-                 "size_mb": round(report.size_mb, 3), "tensors": report.tensors}  # fmt: skip
+                 "size_mb": round(report.size_mb, 3), "tensors": report.tensors,
+                 "entry": report.entry, "others": list(report.others)}  # fmt: skip
         print(json.dumps(facts, indent=1))
     else:
         print(report.summary())

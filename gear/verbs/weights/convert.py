@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -16,15 +16,16 @@ from gear.config.reader import read_node
 from gear.contracts.models import Trainable
 from gear.contracts.specs import ModelSpec
 from gear.dataset.files import read_bytes, sha256
-from gear.networks.checkpoints import read_published
+from gear.networks.checkpoints import read_entries
 from gear.networks.options import CIRCUMSTANCES, NONE
 from gear.networks.shipped import inspect
-from gear.networks.weights import mismatches, write
-from gear.plugins.build import NO_OPTIONS, blamed, build, find
+from gear.networks.weights import write
+from gear.plugins.build import NO_OPTIONS, build, find
 from gear.plugins.catalogue import PluginEntry
 from gear.plugins.manager import DISTRIBUTION
 from gear.values.errors import GearError
 from gear.values.serial import Json
+from gear.verbs.weights.choose import choose_state
 
 SUFFIX = ".safetensors"
 
@@ -42,6 +43,8 @@ class ConvertReport:
         sha256: of it.
         size_mb: of it, in 10^6 bytes.
         tensors: how many it holds.
+        entry: what was taken of the published file, as a path of names: `model`, `checkpoint.net.module`; "" for all.
+        others: paths of what fits the network, too, and was not taken.
     """
 
     model: str
@@ -49,6 +52,8 @@ class ConvertReport:
     sha256: str
     size_mb: float
     tensors: int
+    entry: str = ""
+    others: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, model: str, path: Path, tensors: int) -> ConvertReport:
@@ -58,25 +63,36 @@ class ConvertReport:
 
     def summary(self) -> str:
         """For a person."""
+        taken = f"taken from: {self.entry}\n" if self.entry else ""
+        others = f"fits, too, and was not taken (--entry NAME): {', '.join(self.others)}\n" if self.others else ""
         return (
             f"{self.path}: {self.tensors} tensors of {self.model}, {self.size_mb:.1f} MB\nsha256 {self.sha256}\n"
-            f"use it with: --model {self.model} --set weights={self.path}"
+            f"{taken}{others}use it with: --model {self.model} --set weights={self.path}"
         )
 
 
 def convert_weights(
-    model: str, source: str | Path, out: str | Path, *, settings: Iterable[str] = (), halves: bool = False
+    model: str,
+    source: str | Path,
+    out: str | Path,
+    *,
+    settings: Iterable[str] = (),
+    entry: str = "",
+    halves: bool = False,
 ) -> ConvertReport:
     """Makes a safetensors file of a published one, strictly checked against the network.
 
     Nothing in the published file is run; what of it is not the network (an optimiser's state, criteria) is left out.
-    What a safetensors file says of itself is kept, and options that are given are noted beside.
+    Prefixes of wrappers (`module.`, `_orig_mod.`, `net.module.`) are taken off the keys. Where several entries of a
+    checkpoint fit, such as `model` and `ema`, the report says which one was taken. The metadata of a safetensors file
+    are kept, and options that are given are noted with them.
 
     Args:
         model: name of a model plugin.
         source: a checkpoint of PyTorch's (zip or older), or a safetensors file.
         out: file to write.
         settings: `KEY=VALUE` texts for the model's options that change its graph.
+        entry: path of the checkpoint's entry to take, such as `ema` or `checkpoint.model`; "" chooses one that fits.
         halves: whether weights of two dimensions and more are stored in float16.
 
     Raises:
@@ -86,18 +102,9 @@ def convert_weights(
     check_target(target, origin)
     found, settings = find("model", model), tuple(settings)
     graph = _graph(found, settings)
-    state: Mapping[str, Any] = read_published(origin)
+    chosen = choose_state(found, graph.state_dict(), read_entries(origin), origin, entry)
     spec = found.spec
     assert isinstance(spec, ModelSpec)
-    if spec.convert is not None:
-        with blamed(found, "convert"):
-            state = spec.convert(state)
-    problems = mismatches(graph.state_dict(), state)
-    if problems:
-        raise GearError(
-            f"{origin}: not weights of {model}: {'; '.join(problems)}"
-            f" (options that change the graph are given by --set; gear plugins show {model})"
-        )
     published = read_bytes(origin)
     metadata = _said(origin) | {
         "model": spec.name,
@@ -109,8 +116,9 @@ def convert_weights(
     options = _options(spec, settings, metadata.get("options", ""))
     if options:
         metadata["options"] = json.dumps(options, sort_keys=True)
-    write(target, state, metadata, halves=halves)
-    return ConvertReport.of(spec.name, target, len(state))
+    write(target, chosen.state, metadata, halves=halves)
+    report = ConvertReport.of(spec.name, target, len(chosen.state))
+    return dataclasses.replace(report, entry=chosen.name, others=chosen.others)
 
 
 def check_target(target: Path, *origins: Path) -> None:

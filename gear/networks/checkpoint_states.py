@@ -1,0 +1,116 @@
+"""Which tensors of a checkpoint are a network's: entries under customary names, keys behind wrappers' prefixes.
+
+Training code wraps networks (`DataParallel` puts `module.` before every key, `torch.compile` puts `_orig_mod.`, a
+LightningModule the name of its attribute) and saves several states in one file (`model` and `ema`, `state_dict` in
+`checkpoint`). Nothing here knows all of their names: every entry and every prefix that many keys share is a candidate,
+and the network's own keys decide.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from torch import Tensor
+
+from gear.values.errors import GearError
+
+STATES = ("model", "state_dict", "model_state_dict", "model_state", "net", "network", "weights", "params", "checkpoint")
+"""Names under which checkpoints hold the network, the likelier ones first."""
+
+AVERAGED = ("ema", "avg", "average", "swa", "teacher")
+"""Words in the names of entries and prefixes that hold another state than the one that was trained."""
+
+DEPTH = 4
+"""How deep in a checkpoint, and behind how many components of a prefix, the network may lie."""
+
+LEAST_SHARE = 0.2
+"""Of an entry's tensors, to be behind a prefix that is tried."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Candidate:
+    """Tensors that may be a network's.
+
+    Attributes:
+        entry: path of the entry in the checkpoint, such as `checkpoint.model`; "" for the file's outermost mapping.
+        prefix: what was taken off every key, such as `module.`; "" for nothing.
+        state: tensors by the rest of their keys.
+        left_out: names of the entry's tensors whose keys do not begin with the prefix.
+    """
+
+    entry: str
+    prefix: str
+    state: Mapping[str, Tensor]
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Entry and prefix as one path, by which a user chooses: `checkpoint.model.module`; "" for the whole file."""
+        return ".".join(part for part in (self.entry, self.prefix.rstrip(".")) if part)
+
+
+def entries_of(content: Any, path: Path) -> list[Candidate]:
+    """The mappings of a checkpoint that hold tensors, the likeliest network first; nothing is taken off their keys.
+
+    Raises:
+        GearError: there are none.
+    """
+    if not isinstance(content, Mapping):
+        raise GearError(f"{path}: holds no network, but a {type(content).__name__}; a state dict is wanted")
+    found: list[Candidate] = []
+    waiting: deque[tuple[tuple[str, ...], Mapping[Any, Any]]] = deque([((), content)])
+    while waiting:
+        names, mapping = waiting.popleft()
+        tensors = {str(key): value for key, value in mapping.items() if isinstance(value, Tensor)}
+        if tensors:
+            found.append(Candidate(entry=".".join(names), prefix="", state=tensors))
+        if len(names) < DEPTH:
+            nested = ((key, one) for key, one in mapping.items() if isinstance(key, str) and isinstance(one, Mapping))
+            waiting.extend(((*names, key), one) for key, one in nested)
+    if not found:
+        keys = ", ".join(map(str, list(content)[:5])) or "nothing"
+        raise GearError(f"{path}: holds no network's tensors (but {keys}); a state dict is wanted")
+    return sorted(found, key=lambda one: _unlikeliness(one.entry))
+
+
+def candidates_of(entries: list[Candidate]) -> Iterator[Candidate]:
+    """Every entry with its keys as they are, and behind every prefix that many of its keys share."""
+    for one in entries:
+        yield one
+        counts: Counter[str] = Counter()
+        for key in one.state:
+            parts = key.split(".")[:-1][:DEPTH]
+            counts.update(".".join(parts[: number + 1]) + "." for number in range(len(parts)))
+        least = LEAST_SHARE * len(one.state)
+        shared = sorted((prefix for prefix, count in counts.items() if count >= least), key=_prefix_order)
+        for prefix in shared:
+            state = {key.removeprefix(prefix): one.state[key] for key in one.state if key.startswith(prefix)}
+            rest = tuple(key for key in one.state if not key.startswith(prefix))
+            yield Candidate(entry=one.entry, prefix=prefix, state=state, left_out=rest)
+
+
+def _prefix_order(prefix: str) -> tuple[bool, int]:
+    """Short prefixes first; those of averaged weights last."""
+    return _is_averaged(prefix), prefix.count(".")
+
+
+def _unlikeliness(entry: str) -> tuple[int, int, int]:
+    """Sort key of entries: customary names, then others, then averaged weights, then what an optimiser holds."""
+    names = entry.split(".") if entry else []
+    if any(name.lower().startswith("optim") for name in names):
+        rank = 3
+    elif any(_is_averaged(name) for name in names):
+        rank = 2
+    elif names and all(name in STATES for name in names):
+        rank = 0
+    else:
+        rank = 1
+    return rank, STATES.index(names[0]) if rank == 0 else len(STATES), len(names)
+
+
+def _is_averaged(name: str) -> bool:
+    return any(word in name.lower().replace(".", "_").split("_") for word in AVERAGED)

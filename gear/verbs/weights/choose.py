@@ -1,0 +1,132 @@
+"""Which state of a checkpoint fits a network, and what to say where none does."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from gear.contracts.specs import ModelSpec
+from gear.networks.checkpoint_states import Candidate, candidates_of
+from gear.networks.weights import mismatches
+from gear.plugins.build import blamed
+from gear.plugins.catalogue import PluginEntry
+from gear.plugins.text import printable
+from gear.values.errors import GearError
+
+LONGEST = 2000
+"""Characters of a message, whose keys and names are a stranger's."""
+
+SHOWN = 6
+"""Entries of a checkpoint that a message names."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Chosen:
+    """A state that fits.
+
+    Attributes:
+        name: what was taken of the checkpoint; "" for all of it.
+        state: tensors by the network's keys.
+        others: names of further states that fit.
+    """
+
+    name: str
+    state: Mapping[str, Tensor]
+    others: tuple[str, ...]
+
+
+def choose_state(
+    found: PluginEntry, wanted: Mapping[str, Tensor], entries: list[Candidate], path: Path, entry: str = ""
+) -> Chosen:
+    """The first candidate that is exactly the network's state.
+
+    Args:
+        found: the model; its spec may translate keys of published files.
+        wanted: the network's own state.
+        entries: of the checkpoint, the likeliest first.
+        path: of the checkpoint, for messages.
+        entry: path of the one to take; "" tries all.
+
+    Raises:
+        GearError: none fits, or there is no such entry.
+        PluginError: a third party's translation of keys failed.
+    """
+    candidates = list(candidates_of(entries))
+    if entry:
+        candidates = [one for one in candidates if one.name == entry or one.entry == entry]
+        if not candidates:
+            raise GearError(f"{path}: has no entry {entry!r}; it holds {printable(_listed(entries), LONGEST)}")
+    fitting: list[Chosen] = []
+    for one in candidates:
+        state = _translated(found, one)
+        if state is None or mismatches(wanted, state):
+            continue
+        # A model's own translation may have taken the prefix off already.
+        if not any(_same(state, known.state) for known in fitting):
+            fitting.append(Chosen(name=one.name, state=state, others=()))
+    if fitting:
+        first, *others = fitting
+        return Chosen(name=first.name, state=first.state, others=tuple(one.name for one in others))
+    raise _refusal(found, wanted, candidates, entries, path)
+
+
+def _same(one: Mapping[str, Tensor], other: Mapping[str, Tensor]) -> bool:
+    """Whether two states of one network hold the same numbers."""
+    return one.keys() == other.keys() and all(torch.equal(one[key], other[key]) for key in one)
+
+
+def _translated(found: PluginEntry, candidate: Candidate) -> Mapping[str, Tensor] | None:
+    """The state under the network's keys; None where the model's translation cannot make anything of it."""
+    convert = _convert_of(found)
+    if convert is None:
+        return candidate.state
+    try:
+        translated: Mapping[str, Tensor] = convert(candidate.state)
+    except Exception:  # it expects other keys; `_refusal` reports why for the likeliest candidate
+        return None
+    return translated
+
+
+def _refusal(
+    found: PluginEntry,
+    wanted: Mapping[str, Tensor],
+    candidates: list[Candidate],
+    entries: list[Candidate],
+    path: Path,
+) -> GearError:
+    """What keeps the candidate that has most of the network's keys from being its state."""
+
+    def shared(one: Candidate) -> int:
+        state = _translated(found, one)
+        return 0 if state is None else len(wanted.keys() & state.keys())
+
+    best = max(candidates, key=shared)  # the first of equals, which is the likeliest
+    state, convert = best.state, _convert_of(found)
+    if convert is not None:
+        with blamed(found, "convert"):
+            state = convert(state)
+    name = found.spec.name
+    hints = [f"options that change the graph are given by --set; gear plugins show {name}"]
+    if not wanted.keys() & state.keys():
+        theirs, own = next(iter(best.state), "nothing"), next(iter(wanted), "nothing")
+        hints.insert(0, f"its keys are like {theirs!r}, those of {name} like {own!r}")
+    if len(entries) > 1:
+        hints.insert(0, f"the file holds {_listed(entries)}")
+    where = f" in {best.name!r}" if best.name else ""
+    problems = "; ".join(mismatches(wanted, state))
+    return GearError(printable(f"{path}: not weights of {name}{where}: {problems} ({'; '.join(hints)})", LONGEST))
+
+
+def _listed(entries: list[Candidate]) -> str:
+    names = [f"{one.entry or 'tensors outside of any entry'} ({len(one.state)} tensors)" for one in entries]
+    return ", ".join(names[:SHOWN]) + (", …" if len(names) > SHOWN else "")
+
+
+def _convert_of(found: PluginEntry) -> Any:
+    assert isinstance(found.spec, ModelSpec)
+    return found.spec.convert
