@@ -1,4 +1,4 @@
-"""Batches as models take them: `model.forward(batch.views, batch.samples)`."""
+"""Batches of samples in the form that models take: `model.forward(batch.views, batch.samples)`."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ class Batch:
     """Samples that go through a network together.
 
     Attributes:
-        views: (B, 3, H, W) float32 sRGB pictures in 0..1 by camera name.
-        samples: the B samples, with their ground truth.
-        indices: their numbers in the split.
+        views: (B, 3, H, W) float32 sRGB pictures in 0..1, by camera name.
+        samples: the B samples with their ground truth.
+        indices: index of each sample in the split.
     """
 
     views: Mapping[str, Tensor]
@@ -43,19 +43,19 @@ def batches(
     only_full: bool = False,
     workers: int = 0,
 ) -> Iterator[Batch]:
-    """One pass over a split.
+    """Iterates over a split once, in batches.
 
     Args:
-        dataset: whose items have pictures of one size.
-        size: samples a batch.
-        seed: of the order; None reads from the first to the last.
-        epoch: number of the pass; order and augmentation follow from it.
-        start: batches to leave out at the beginning, without reading them: where a stopped pass goes on.
-        only_full: whether a last batch of fewer samples is left out.
-        workers: processes that read ahead; 0 reads here. They change nothing but time.
+        dataset: dataset whose pictures all have one size.
+        size: samples per batch.
+        seed: seed of the order; None keeps the order of the split.
+        epoch: number of the pass; the order and the augmentation depend on it.
+        start: batches to skip at the beginning without reading them, to resume a stopped pass.
+        only_full: whether a last batch with fewer samples is dropped.
+        workers: processes that read batches in advance; 0 reads in this process. The result does not depend on them.
 
     Raises:
-        ValueError: `size` is below 1, `start` is negative, or pictures of a batch differ in size.
+        ValueError: `size` is below 1, `start` is negative, or the pictures of a batch differ in size.
         DatasetError: a sample cannot be read.
     """
     if size < 1:
@@ -81,24 +81,24 @@ def batches(
 
 
 def collate(items: Sequence[Item]) -> Batch:
-    """A batch of items, as the `collate_fn` of torch's own `DataLoader`.
+    """Makes a batch of items; the `collate_fn` for torch's own `DataLoader`.
 
     Raises:
-        ValueError: their pictures differ in size.
+        ValueError: the pictures differ in size.
     """
     return _finished(stacked(items))
 
 
 def as_pictures(views: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """uint8 pictures to float32 in 0..1."""
+    """Converts uint8 pictures in 0..255 to float32 in 0..1, by camera name."""
     return {name: tensor.float() / 255 for name, tensor in views.items()}
 
 
 def stacked(items: Sequence[Item]) -> Batch:
-    """A batch whose pictures are uint8 still: a quarter of the bytes to send between processes, or to a GPU.
+    """Makes a batch whose pictures are still uint8, a quarter of the bytes to send between processes or to a GPU.
 
     Raises:
-        ValueError: their pictures differ in size.
+        ValueError: the pictures differ in size.
     """
     views = [item.views for item in items]
     return Batch(

@@ -1,4 +1,4 @@
-"""Which finished splits the paths of a command mean."""
+"""Finds the finished splits that the paths of a command refer to."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ KEPT_FOR_TESTS = "test"
 def open_all(
     paths: Iterable[str | Path], task: str, *, names: Sequence[str], allow_test_data: bool = False
 ) -> tuple[Dataset[Any], ...]:
-    """Opens every split that the paths mean.
+    """Opens every split that the paths refer to.
 
     Args:
-        paths: each is a dataset's root, a folder of roots, or a root and a split as `DIR:SPLIT`.
-        task: that they must be of.
-        names: splits to take where a root holds several.
-        allow_test_data: whether `test` splits may be learnt from.
+        paths: each is the root of a dataset, a folder of such roots, or a root with a split as `DIR:SPLIT`.
+        task: name of the task that all splits must have.
+        names: splits to take from a root that holds several.
+        allow_test_data: whether `test` splits are accepted as training data.
 
     Raises:
-        DatasetError: there is none, one is of another task, or not finished.
-        GearError: it is a test split, or two are of the same samples.
+        DatasetError: a path holds no dataset, or a split is of another task or not finished.
+        GearError: a split is a test split, or two splits hold the same samples.
     """
     found = [dataset for path in paths for dataset in _open(path, names)]
     known: dict[Any, Dataset[Any]] = {}

@@ -1,4 +1,4 @@
-"""Samples that stay in memory."""
+"""A cache of decoded samples with a memory limit."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ import numpy as np
 
 
 class Kept(Sequence[Any]):
-    """Samples that stay in memory once they were decoded, the first ones up to a limit: a pass in another order then
-    finds as many of them again as fit. Threads may share it.
+    """Samples that stay in memory once they are decoded, until a limit is reached.
+
+    Samples that are decoded first are kept, and none is dropped for another one, so that a pass in any order finds the
+    same number of samples in memory. Several threads may share the cache.
     """
 
     def __init__(self, samples: Sequence[Any], limit_bytes: float) -> None:
@@ -45,7 +47,7 @@ class Kept(Sequence[Any]):
 
 
 def bytes_of(sample: Any) -> int:
-    """Memory of the arrays of a sample."""
+    """Memory of all arrays of a sample, in bytes."""
     total = 0
     for field in dataclasses.fields(sample):
         value = getattr(sample, field.name)

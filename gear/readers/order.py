@@ -1,4 +1,4 @@
-"""In which order samples come."""
+"""The order in which a pass over the data takes its samples."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from gear.values.rng import derive_rng
 
 
 def order(count: int, *, seed: int | None, epoch: int = 0) -> list[int]:
-    """Indices 0 to `count` - 1 as a pass over the data takes them.
+    """The indices 0 to `count` - 1 in the order of one pass over the data.
 
     Args:
-        count: how many samples there are.
-        seed: None keeps them as they are; a number shuffles, every epoch otherwise and always alike.
-        epoch: number of the pass.
+        count: number of samples.
+        seed: seed of the shuffling; None keeps the order.
+        epoch: number of the pass; each pass is shuffled differently, and always the same for one seed.
     """
     if seed is None:
         return list(range(count))

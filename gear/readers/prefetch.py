@@ -1,4 +1,4 @@
-"""Samples that are read while earlier ones are worked on."""
+"""Reads samples in threads while earlier ones are processed."""
 
 from __future__ import annotations
 
@@ -13,21 +13,22 @@ Given = TypeVar("Given", covariant=True)
 
 
 class ByNumber(Protocol[Given]):
-    """What gives something for a number: a sequence, or a `TorchDataset`."""
+    """Anything that returns an item for an index: a sequence, or a `TorchDataset`."""
 
     def __getitem__(self, index: int, /) -> Given: ...
 
 
 def read_ahead(samples: ByNumber[T], blocks: Sequence[Sequence[int]], *, workers: int) -> Generator[list[T]]:
-    """The samples of one block after the other, in order.
+    """Yields the samples of one block after the other, in order.
 
-    Threads read on meanwhile: the next block, or as many samples as there are threads. What waits is bounded, so
-    memory does not grow with the split. Close the iterator to end its threads.
+    While a block is processed, threads read the next block, or as many samples as there are threads if that is more.
+    The number of samples that wait is bounded, so that memory does not grow with the split. Close the iterator to end
+    its threads.
 
     Args:
         samples: an opened split, or a `TorchDataset` for its items.
-        blocks: indices that are wanted together.
-        workers: threads; they change nothing but time.
+        blocks: indices of the samples of each block.
+        workers: number of threads; the result does not depend on it.
 
     Raises:
         DatasetError: a sample cannot be read.

@@ -1,4 +1,4 @@
-"""Samples of several splits as one sequence."""
+"""The samples of several splits as one sequence."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from gear.values.serial import Json
 
 @dataclass(frozen=True, slots=True)
 class Samples(Sequence[Any]):
-    """Samples of several splits, read when they are asked for.
+    """A sequence of samples from several splits, each read when it is asked for.
 
     Attributes:
-        datasets: where they come from.
-        places: (number of the dataset, index in it) of each.
-        scale: share of their size at which their pictures are shown.
+        datasets: the splits.
+        places: (index of the split, index of the sample in it) of each sample.
+        scale: factor by which pictures and ground truth are resized.
     """
 
     datasets: tuple[Dataset[Any], ...]
@@ -39,7 +39,7 @@ class Samples(Sequence[Any]):
         return shrunk(self.datasets[dataset][place], self.scale)
 
     def facts(self) -> list[Json]:
-        """What it is made of, without the machine's paths; JSON."""
+        """What the sequence consists of, as JSON without paths of this machine: one entry per split."""
         numbers = [dataset for dataset, _ in self.places]
         return [
             {
@@ -57,5 +57,5 @@ class Samples(Sequence[Any]):
 
 
 def all_of(datasets: tuple[Dataset[Any], ...]) -> Samples:
-    """Every sample, in order."""
+    """All samples of several splits, in the order of the splits."""
     return Samples(datasets, tuple((i, k) for i, dataset in enumerate(datasets) for k in range(len(dataset))))

@@ -1,4 +1,4 @@
-"""Samples as a torch dataset."""
+"""The samples of a split as a `torch.utils.data.Dataset`."""
 
 from __future__ import annotations
 
@@ -18,18 +18,17 @@ from gear.values.frames import UInt8Image
 from gear.values.rng import derive_rng
 
 Change = Callable[[Any, int, np.random.Generator], Any]
-"""Makes a sample of a given number another one, such as a crop of it, ground truth and pictures alike; draws from the
-generator."""
+"""Called with (sample, index, generator); returns a changed sample, such as a crop of pictures and ground truth."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Item:
-    """One sample.
+    """One sample with its index.
 
     Attributes:
-        index: its number among the samples.
-        sample: the task's own object, with its ground truth.
-        cameras: whose pictures are views.
+        index: index of the sample in the split.
+        sample: the task's own object with its ground truth.
+        cameras: names of the cameras whose pictures are views.
     """
 
     index: int
@@ -43,16 +42,17 @@ class Item:
 
 
 class TorchDataset(torch.utils.data.Dataset[Item]):
-    """Samples of any task, one by one, for torch's own `DataLoader`, for `gear.readers.batches` or for `read_ahead`.
+    """Samples of any task as items, for torch's own `DataLoader`, `gear.readers.batches` or `gear.readers.read_ahead`.
 
-    Items are not tensors, so torch's own loader is to be told how a batch is made of them: `batch_size=None` leaves
+    Items are not tensors, so torch's own loader needs to know how to make batches of them: `batch_size=None` leaves
     them as they are, `collate_fn=gear.readers.collate` makes a `Batch`.
 
-    Item i depends on (samples, seed, epoch, i) alone, whoever reads it. It can be sent to worker processes.
+    Item i depends only on (samples, seed, epoch, i), so that any number of workers reads the same. A `TorchDataset` can
+    be sent to worker processes.
 
     Attributes:
-        samples: the opened split, or whatever else gives samples.
-        epoch: number of the pass over the data, from which `change` draws; `batches` sets it.
+        samples: the opened split, or another sequence of samples.
+        epoch: number of the pass over the data, on which the random draws of `change` depend; `batches` sets it.
     """
 
     def __init__(
@@ -65,15 +65,15 @@ class TorchDataset(torch.utils.data.Dataset[Item]):
         seed: int = 0,
     ) -> None:
         """Args:
-            samples: an opened split, its root, or any sequence of samples, such as `Samples` of several splits.
-            split: of a root that holds several.
-            views: names of the cameras to read; all of the sample's by default.
-            change: applied to every sample, such as an augmentation.
-            seed: of what `change` draws.
+            samples: an opened split, the root of one, or any sequence of samples, such as `Samples` of several splits.
+            split: name of the split, for a root that holds several.
+            views: names of the cameras to read; all cameras of the sample by default.
+            change: function applied to every sample, such as an augmentation.
+            seed: seed of the random draws of `change`.
 
         Raises:
             DatasetError: there is no such dataset or split, or it is not finished.
-            UnknownNameError: an opened split's samples have no such camera.
+            UnknownNameError: the samples of an opened split have no such camera.
         """
         self.samples: Sequence[Any] = open_dataset(samples, split) if isinstance(samples, (str, Path)) else samples
         self.epoch = 0
@@ -93,7 +93,7 @@ class TorchDataset(torch.utils.data.Dataset[Item]):
         return self.item(index, self.epoch)
 
     def item(self, index: int, epoch: int) -> Item:
-        """The item as a pass sees it, whatever pass is under way."""
+        """The item at an index for a given pass, whatever pass is running."""
         number = range(len(self))[index]
         sample = self.samples[number]
         if self._change is not None:
@@ -103,5 +103,5 @@ class TorchDataset(torch.utils.data.Dataset[Item]):
 
 
 def picture_tensor(picture: UInt8Image) -> Tensor:
-    """(H, W, 3) to (3, H, W) uint8, its own memory."""
+    """Copies a (H, W, 3) uint8 picture into a (3, H, W) uint8 tensor."""
     return torch.from_numpy(np.array(picture.transpose(2, 0, 1), order="C"))

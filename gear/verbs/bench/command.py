@@ -1,4 +1,4 @@
-"""A step as the command line that does the same."""
+"""A step of a bench as the command line that does the same."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ FLAGS: dict[str, str] = {
     "calibration_patched": "calibration-patched",
     "reports": "report",
 }
-"""Flags that are not called like the argument."""
+"""Flags whose name differs from the argument's."""
 
 ONCE: dict[Verb, tuple[str, ...]] = {"evaluate": ("data",)}
-"""Arguments whose values follow one flag; of others each has its own."""
+"""Arguments whose values all follow one flag; for other arguments the flag is repeated."""
 
 ONLY_IN_PYTHON = ("pools",)
 
 
 def command(step: Step) -> str:
-    """For a POSIX shell."""
+    """The command line of a step, quoted for a POSIX shell."""
     return shlex.join(["gear", step.verb, *_words(step)])
 
 

@@ -1,4 +1,4 @@
-"""The bench config: which networks and defenses, in which scenes, against which patches."""
+"""The bench config: which networks and defenses are compared, in which scenes, against which patches."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ def _nothing() -> Node:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contestant:
-    """A network or a defense under a name of its own.
+    """A network or a defense with its options, under a name that the bench gives it.
 
     Attributes:
         plugin: name of the plugin; the contestant's own name unless given.
-        set: its options (`gear plugins show NAME`), `weights` above all.
+        set: its options (`gear plugins show NAME` lists them), such as `weights`.
     """
 
     plugin: str = ""
@@ -49,8 +49,8 @@ class TaskBench:
     """What is compared in one task.
 
     Attributes:
-        models: networks, by the names that tables give them.
-        defenses: that stand before each of them, by name; every network is measured without any, too.
+        models: networks, by the names that tables show.
+        defenses: defenses by name; each guards every network, and every network is also measured without a defense.
         collect: further keys of this task's collections.
     """
 
@@ -71,13 +71,13 @@ class TaskBench:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Samples:
-    """Pictures of each scene in each weather.
+    """Number of pictures of each scene in each weather, by purpose.
 
     Attributes:
-        attack: that patches are made on.
-        choose: that choose among an attack's steps.
-        measure: that networks are measured on: without a patch, with a random one, with each patch that was made.
-        calibrate: that defenses learn from.
+        attack: pictures on which patches are optimised.
+        choose: pictures on which the best step of an attack is chosen.
+        measure: pictures on which networks are measured: without a patch, with a random one, and with each patch made.
+        calibrate: pictures on which defenses are calibrated.
     """
 
     attack: int = 24
@@ -96,11 +96,11 @@ class AttackBench:
     """How patches are made.
 
     Attributes:
-        plugin: name of an attack plugin.
-        steps: of optimisation.
-        queries: forward passes, for attacks without gradients; 0 for those with.
+        plugin: name of the attack plugin.
+        steps: optimisation steps.
+        queries: forward passes, for attacks without gradients; 0 for attacks with gradients.
         compositor: `transport` (exact) or `homography`.
-        set: the attack's options.
+        set: options of the attack.
     """
 
     plugin: str = "scene_specific"
@@ -118,11 +118,11 @@ class AttackBench:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Calibration:
-    """The scene that defenses learn from; none that is measured.
+    """The scene in which defenses are calibrated; it must not be one that is measured.
 
     Attributes:
-        town: where it is.
-        scene: its name.
+        town: name of its town.
+        scene: name of the scene.
     """
 
     town: str
@@ -131,18 +131,18 @@ class Calibration:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BenchConfig:
-    """One bench.
+    """A whole bench.
 
     Attributes:
-        tasks: by name of the task plugin.
-        places: scenes by town; an empty list is every scene of the town that has a surface for patches.
-        weathers: presets, or presets and what differs; a patch is made for all of them.
-        samples: how many pictures of each scene in each weather.
+        tasks: what is compared, by name of the task plugin.
+        places: scenes by town; an empty list means every scene of the town that has a surface for patches.
+        weathers: weather presets, or presets with changed fields; one patch is made for all weathers.
+        samples: number of pictures of each scene in each weather.
         attack: how patches are made.
-        calibration: where defenses learn; needed if one of them must.
-        transfer: whether each network also sees the patches that were made against the others.
-        adaptive: whether patches are also made through every defense that an attack can look through.
-        seed: of everything that is drawn.
+        calibration: scene in which defenses are calibrated; needed if a defense requires calibration.
+        transfer: whether each network is also shown the patches made against the other networks.
+        adaptive: whether patches are also optimised through every defense that the attack can differentiate.
+        seed: seed of all random draws.
         collect: further keys of the collections of all tasks (`gear show-config` prints them).
     """
 
@@ -166,7 +166,7 @@ class BenchConfig:
 
 
 def settings_of(node: Node, above: str = "") -> Iterable[str]:
-    """A tree of options as the `KEY=VALUE` texts that set them one by one."""
+    """A tree of options as `KEY=VALUE` texts, one per option."""
     if isinstance(node, MappingNode) and (node.entries or not above):
         for key, (_, below) in node.entries.items():
             yield from settings_of(below, f"{above}.{key}" if above else key)
@@ -178,7 +178,7 @@ def settings_of(node: Node, above: str = "") -> Iterable[str]:
 
 
 def _quoted(node: Scalar) -> str:
-    """So that it is read as the same text again."""
+    """The text quoted so that YAML reads it as the same text."""
     if node.is_null:
         return ""
     is_word = WORD.fullmatch(node.text) and node.text.casefold() != "null"

@@ -1,4 +1,4 @@
-"""The report as one HTML page that needs nothing else: tables, bars, patches and what they look like in the world."""
+"""The report of a bench as one self-contained HTML page: tables, charts, and patches in the rendered world."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ figcaption { font-size: .8rem; color: #5b6672; } .row img { border: 1px solid #c
 
 
 def page(report: BenchReport, plan: Plan) -> str:
-    """All of it. Names from configs are escaped; nothing in it runs."""
+    """The whole page as HTML text. Names from configs are escaped, and the page has no scripts."""
     facts = report.facts
     counts = plan.config.samples
     where = f"{len(facts['scenes'])} scene{'s' * (len(facts['scenes']) > 1)}, {', '.join(facts['weathers'])}"
@@ -77,7 +77,7 @@ def _table(task: TaskResult) -> str:
 
 
 def _scenes(task: TaskResult) -> str:
-    """The metric scene by scene, kinds of patches as columns."""
+    """A table of the metric in each scene, with one column per kind of patch."""
     kinds = list(dict.fromkeys(at.patch for one in task.results for at in one.scenes))
     rows = []
     for one in task.results:
@@ -100,7 +100,9 @@ def _rows(titles: Sequence[str], rows: Iterable[tuple[bool, Sequence[str]]]) -> 
 
 
 def _pictures(plan: Plan, contest: Contest) -> Iterable[str]:
-    """Each scene without a patch and with each network's, in the picture that shows the most of it."""
+    """For each scene the picture without a patch and with each network's patch, at the sample that shows the patch
+    largest.
+    """
     for scene, weather in plan.places():
         clean = open_dataset(plan.pictures(contest, scene, weather, NO_PATCH))
         seen = [sum(one.visible_px for one in clean.sidecar(i).surfaces) for i in range(len(clean))]

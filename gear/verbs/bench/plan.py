@@ -1,4 +1,4 @@
-"""What a bench does: calls of gear's other verbs, in their order, and what its tables are made of."""
+"""The steps of a bench: calls of gear's other verbs in order, and the evaluations that its tables read."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ Verb = Literal["collect", "attack", "evaluate"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Step:
-    """One call of a verb; each takes up what it began, and is quick where it is done.
+    """One call of a verb. A step resumes what an earlier run began, and returns quickly where everything is done.
 
     Attributes:
-        verb: function of `gear`.
-        title: one line for people.
-        arguments: its keyword arguments.
+        verb: name of the function of `gear`.
+        title: one line for progress output.
+        arguments: keyword arguments of the call.
     """
 
     verb: Verb
@@ -45,13 +45,13 @@ class Step:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Match:
-    """One network, alone or behind a defense, over all scenes.
+    """One network, alone or guarded by a defense, over all scenes.
 
     Attributes:
-        contest: of its task.
-        model, defense: who plays.
+        contest: networks and defenses of its task.
+        model, defense: the pair that is evaluated; `defense` is None for the network alone.
         out: folder of the evaluation.
-        pools: roots of datasets, by kind of patch.
+        pools: roots of the datasets, by kind of patch.
     """
 
     contest: Contest
@@ -63,7 +63,7 @@ class Match:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Weather:
-    """A weather with a name for folders."""
+    """A weather with the name that its folders have."""
 
     label: str
     settings: tuple[str, ...]
@@ -73,12 +73,12 @@ class Plan:
     """Every step of a bench.
 
     Args:
-        config: of the bench.
-        scenes: that are measured in.
-        calibration: that defenses learn in, if one must.
-        contests: what meets what.
-        attack: that makes the patches.
-        root: folder of everything.
+        config: the bench config.
+        scenes: scenes that are measured.
+        calibration: scene in which defenses are calibrated, if one needs it.
+        contests: networks and defenses of each task.
+        attack: plugin that makes the patches.
+        root: folder of the bench.
         workers: processes of each collection.
     """
 
@@ -98,7 +98,7 @@ class Plan:
         self._calibration, self._attack, self._root, self._workers = calibration, attack, root, workers
 
     def steps(self) -> Iterator[Step]:
-        """In an order in which each finds what it needs."""
+        """All steps, in an order in which each step finds what it needs."""
         for contest in self.contests:
             for scene in self.scenes:
                 yield from self._pictures(contest, scene)
@@ -112,7 +112,7 @@ class Plan:
                 yield self._evaluation(match)
 
     def matches(self, contest: Contest) -> Iterator[Match]:
-        """Every network of a task, alone and behind each defense."""
+        """Every network of a task, alone and guarded by each defense."""
         for model in contest.models:
             for defense in contest.guards:
                 shown = {NO_PATCH: NO_PATCH, RANDOM: RANDOM, PATCH: model.label}
@@ -136,29 +136,29 @@ class Plan:
         return [(scene, weather) for scene in self.scenes for weather in self.weathers]
 
     def pictures(self, contest: Contest, scene: Scene, weather: Weather, patch: str) -> Path:
-        """Root of the pictures that networks are measured on, with one patch; a patch has its network's name."""
+        """Root of the pictures with one patch that networks are measured on; a patch has its network's name."""
         kind = patch if patch in (NO_PATCH, RANDOM) else f"patch-{patch}"
         return self._place(contest, scene) / weather.label / kind
 
     def patch(self, contest: Contest, scene: Scene, name: str) -> Path:
-        """The patch folder of a scene and a network, or of a network behind a defense."""
+        """The patch folder of a scene for a network, or for a network behind a defense."""
         return self._root / "patches" / contest.folder / name / scene.label
 
     def looked_through(self, contest: Contest) -> tuple[Entrant | None, ...]:
-        """What stands before a network while patches are made against it: nothing, and each such defense."""
+        """The guards through which patches are optimised against a network: none, and each differentiable defense."""
         return (None, *(defense for defense in contest.defenses if self._is_adaptive(defense)))
 
     @staticmethod
     def name(model: Entrant, defense: Entrant | None) -> str:
-        """Of the two together: of rows, folders and patches."""
+        """Name of a network with its defense, for rows, folders and patches."""
         return model.label if defense is None else f"{model.label}+{defense.label}"
 
     def picture_settings(self, contest: Contest) -> tuple[str, ...]:
-        """Of all of a task's collections."""
+        """Settings of all collections of a task."""
         return (*settings_of(self.config.collect), *settings_of(self.config.tasks[contest.name].collect))
 
     def seed(self, purpose: str) -> int:
-        """Of the pictures for one purpose: no two purposes show the same scenes."""
+        """Seed of the pictures for one purpose; pictures for different purposes show different scenes."""
         return int(derive_rng(self.config.seed, "bench", purpose).integers(1 << 31))
 
     def _place(self, contest: Contest, scene: Scene) -> Path:
@@ -175,7 +175,7 @@ class Plan:
                 yield self._collect(contest, scene, weather, "measure", out, patch=patch)
 
     def _grounds(self, contest: Contest, scene: Scene, weather: Weather) -> Iterator[Step]:
-        """What a patch is made on, and what it is chosen on."""
+        """The pictures on which a patch is optimised, and those on which its best step is chosen."""
         for purpose in ("attack", "choose"):
             yield self._collect(contest, scene, weather, purpose, self._ground(contest, scene, weather, purpose))
 
@@ -183,7 +183,7 @@ class Plan:
         return self._place(contest, scene) / weather.label / purpose
 
     def _patch(self, contest: Contest, scene: Scene, model: Entrant) -> Iterator[Step]:
-        """A network's patch, those through its defenses, and the pictures that show them."""
+        """Makes a network's patch, the adaptive patches through its defenses, and the pictures that show them."""
         for defense in self.looked_through(contest):
             name = self.name(model, defense)
             yield self._attacked(contest, scene, model, defense, self.weathers)
@@ -192,7 +192,7 @@ class Plan:
                 yield self._collect(contest, scene, weather, "measure", out, patch=patch)
 
     def _lessons(self, contest: Contest, scene: Scene) -> Iterator[Step]:
-        """What defenses learn from: clean pictures of another scene, and for each network its patch in them."""
+        """Calibration data of defenses: clean pictures of another scene, and for each network its patch in them."""
         weather = self.weathers[0]
         yield from self._grounds(contest, scene, weather)
         yield self._collect(contest, scene, weather, "calibrate", self._lesson(contest, NO_PATCH))
@@ -274,7 +274,7 @@ class Plan:
         )
 
     def _learnt(self, contest: Contest, model: Entrant, defense: Entrant | None) -> dict[str, Any]:
-        """What a defense that must learn learns from, before a network."""
+        """Calibration data of one defense in front of one network."""
         if defense is None or not defense.learns:
             return {}
         return {
@@ -284,7 +284,7 @@ class Plan:
 
 
 def reports_of(contest: Contest) -> tuple[str, ...]:
-    """Reports that the tables read: the task's metric may be of one, and what a patch does beside itself is another."""
+    """Names of the reports that the tables need: the one with the task's metric, and the one outside the patch."""
     product = build(find("task", contest.name))
     metric_report, dot, _ = contest.task.metric.partition(".")
     wanted = [metric_report] if dot and isinstance(product, Reports) else []
@@ -292,7 +292,7 @@ def reports_of(contest: Contest) -> tuple[str, ...]:
 
 
 def weathers(configs: tuple[WeatherConfig, ...]) -> Iterator[Weather]:
-    """Each with the settings of a collection, and a name that no other has."""
+    """The weathers with the collection settings of each, under names that are unique."""
     seen: set[str] = set()
     for one in configs:
         given = {name: value for name, value in to_plain(one).items() if value is not None}

@@ -1,4 +1,4 @@
-"""What a bench found, as values and JSON."""
+"""The results of a bench, as values and JSON."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ COLUMNS = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Metric:
-    """The metric by which a task's networks are compared.
+    """The metric by which the networks of a task are compared.
 
     Attributes:
-        report: that it is of; `task` is the task's own evaluator.
-        name: of the metric.
-        less_is_better: whether it is an error.
+        report: name of the report that contains it; `task` is the task's own evaluator.
+        name: name of the metric in the report.
+        less_is_better: whether the metric is an error.
     """
 
     report: str
@@ -50,17 +50,17 @@ class Metric:
 
     @classmethod
     def of(cls, metric: str, *, less_is_better: bool) -> Metric:
-        """Reads `miou` or `reference.car_bev_moderate_r40`."""
+        """The metric of a text such as `miou` or `reference.car_bev_moderate_r40`."""
         report, dot, name = metric.rpartition(".")
         return cls(report=report if dot else TASK, name=name, less_is_better=less_is_better)
 
     @property
     def title(self) -> str:
-        """As tables have it."""
+        """The name of the metric in tables."""
         return metric_title(self.report, self.name)
 
     def among(self, metrics: Metrics) -> Estimate | None:
-        """Its value, where it was measured."""
+        """The value of the metric among those measured, or None."""
         return metrics.get(self.report, {}).get(self.name)
 
 
@@ -69,10 +69,10 @@ class SceneMetric:
     """The task's metric in one scene.
 
     Attributes:
-        scene, weather: where.
+        scene, weather: the scene and the weather.
         patch: kind of patch that was shown.
-        samples: that it is of.
-        value: of the metric.
+        samples: number of samples.
+        value: value of the metric.
     """
 
     scene: str
@@ -84,12 +84,12 @@ class SceneMetric:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Result:
-    """One network, alone or behind a defense.
+    """One network, alone or guarded by a defense.
 
     Attributes:
-        model, defense: their names in the config; None for no defense.
-        evaluation: all metrics.
-        scenes: the task's metric scene by scene.
+        model, defense: names in the config; `defense` is None for the network alone.
+        evaluation: the evaluation with all metrics.
+        scenes: the task's metric in each scene.
     """
 
     model: str
@@ -98,10 +98,10 @@ class Result:
     scenes: tuple[SceneMetric, ...]
 
     def pool(self, patch: str) -> Pool:
-        """All scenes with one kind of patch.
+        """The pool of all scenes with one kind of patch.
 
         Raises:
-            KeyError: it was not shown.
+            KeyError: no scene was shown with this kind of patch.
         """
         for pool in self.evaluation.pools:
             if pool.name == patch:
@@ -109,19 +109,19 @@ class Result:
         raise KeyError(patch)
 
     def against(self, pool: Pool) -> Difference | None:
-        """A patch's difference to a random one, the random one's to none."""
+        """The difference of a patch to the random patch, or of the random patch to none."""
         control = NO_PATCH if pool.name == RANDOM else RANDOM
         return next((one for one in pool.differences if one.against == control), None)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class TaskResult:
-    """One task.
+    """The results of one task.
 
     Attributes:
-        name: of the task.
-        metric: by which networks are compared; None where the task names none.
-        results: in the config's order.
+        name: name of the task.
+        metric: metric by which networks are compared; None where the task names none.
+        results: results in the order of the config.
     """
 
     name: str
@@ -129,15 +129,17 @@ class TaskResult:
     results: tuple[Result, ...]
 
     def value(self, pool: Pool) -> Estimate | None:
-        """The task's metric over a pool."""
+        """The task's metric of a pool."""
         return None if self.metric is None else self.metric.among(pool.metrics)
 
     def change(self, one: Difference | None) -> Estimate | None:
-        """Of the task's metric."""
+        """The change of the task's metric in a difference."""
         return None if self.metric is None or one is None else self.metric.among(one.metrics)
 
     def beside(self, one: Difference | None) -> tuple[str, PairedTest] | None:
-        """The test of what single samples lose, with the metric's name: outside the patch where the task can tell."""
+        """The paired test over single samples with the name of its metric, outside the patch where the task offers
+        that.
+        """
         if one is None:
             return None
         report = OUTSIDE_PATCH if OUTSIDE_PATCH in one.paired else TASK
@@ -149,12 +151,12 @@ class TaskResult:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class BenchReport:
-    """A whole bench.
+    """The results of a whole bench.
 
     Attributes:
-        out: folder of bench.json, bench.csv, table.txt and report.html.
-        facts: config, samples, versions; JSON.
-        tasks: in the config's order.
+        out: folder with bench.json, bench.csv, table.txt and report.html.
+        facts: config, numbers of samples, versions; JSON.
+        tasks: results of each task, in the order of the config.
     """
 
     out: Path

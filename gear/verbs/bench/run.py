@@ -1,4 +1,4 @@
-"""`gear.bench`: pictures, patches, pictures with the patches, evaluations, one report."""
+"""`gear.bench`: collects pictures, makes patches, evaluates networks and defenses, and writes one report."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def run_bench(request: BenchRequest, callbacks: Callbacks, on_step: OnStep | Non
 
 
 def _write(report: BenchReport, plan: Plan, root: Path) -> None:
-    """Writes the reports."""
+    """Writes the reports into the folder of the bench."""
     written = io.StringIO()
     table = csv.DictWriter(written, COLUMNS, lineterminator="\n")
     table.writeheader()
@@ -136,10 +136,10 @@ def _write(report: BenchReport, plan: Plan, root: Path) -> None:
 
 
 def _carried_out(step: Step, root: Path, callbacks: Callbacks, *, in_subprocess: bool) -> Any:
-    """Carries a step out.
+    """Carries out a step.
 
     Raises:
-        GearError: it fails; says which step.
+        GearError: the step fails; the text names it.
     """
     keywords: dict[str, Any] = {"on_progress": callbacks.on_progress, "on_warning": callbacks.on_warning}
     if step.verb == "collect":
@@ -155,7 +155,7 @@ def _carried_out(step: Step, root: Path, callbacks: Callbacks, *, in_subprocess:
 
 
 def _done(step: Step, root: Path, keywords: dict[str, Any], warn: Warn) -> Any:
-    """Carries a step out; what the bench made from pictures or patches that are others now, it makes again."""
+    """Carries out a step; results whose pictures or patches have changed since are made again."""
     verb, again = VERBS[step.verb], f"{step.title}: is made again, for what is there"
     try:
         return verb(**step.arguments, **keywords)
@@ -172,7 +172,7 @@ def prepared(request: BenchRequest) -> Plan:
     """Reads and checks a config; nothing is written.
 
     Raises:
-        GearError: something in it is not there, does not suit, or cannot be read.
+        GearError: something in it does not exist, does not suit, or cannot be read.
     """
     root = Path(request.out)
     check_output(root, "write the bench into a folder of its own")
@@ -196,10 +196,10 @@ def prepared(request: BenchRequest) -> Plan:
 
 
 def _check_pictures(plan: Plan, node: Node) -> None:
-    """Whether the collections' keys and the tasks' options can be read: the last of them may be a day away.
+    """Checks that the keys of all collections and the options of all tasks can be read, before the first step runs.
 
     Raises:
-        ConfigError: one cannot; there is no such weather; or a network reckons with another camera.
+        ConfigError: a key cannot be read, a weather is unknown, or a network expects another camera.
     """
     for contest in plan.contests:
         for weather in plan.weathers:

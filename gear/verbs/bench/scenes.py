@@ -1,4 +1,4 @@
-"""Where a bench takes place, and where in its file something is said."""
+"""The scenes of a bench, and the places in its config file for error messages."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class Scene:
     """One scene of a town.
 
     Attributes:
-        town: its name, or its file.
-        name: the scene's name in the town's own library, or a library's file and a name in it, `my.yml:corner`.
-        surfaces: how many patches it shows.
+        town: name of the town, or path of its MJCF file.
+        name: name in the town's own scene library, or a library's file and a name in it, such as `my.yml:corner`.
+        surfaces: number of surfaces that show patches.
     """
 
     town: str
@@ -31,15 +31,15 @@ class Scene:
 
     @property
     def label(self) -> str:
-        """Of folders and rows."""
+        """Name of the scene in folders and rows."""
         return f"{Path(self.town).stem}-{self.name.rpartition(':')[2]}"
 
 
 def measured_scenes(config: BenchConfig, node: Node) -> tuple[Scene, ...]:
-    """All scenes that the bench measures in, in its order.
+    """All scenes in which the bench measures, in the order of the config.
 
     Raises:
-        ConfigError: a town or a scene is not known, has nothing that shows a patch, or is named twice.
+        ConfigError: a town or a scene is unknown, has no surface for patches, or is named twice.
     """
     found: dict[str, Scene] = {}
     for town, names in config.places.items():
@@ -57,10 +57,10 @@ def measured_scenes(config: BenchConfig, node: Node) -> tuple[Scene, ...]:
 
 
 def calibration_scene(config: BenchConfig, node: Node, measured: tuple[Scene, ...]) -> Scene | None:
-    """The scene that defenses learn from, if one is named.
+    """The scene in which defenses are calibrated, if the config names one.
 
     Raises:
-        ConfigError: it is not known, shows no patch, or is one of those that are measured.
+        ConfigError: the scene is unknown, has no surface for patches, or is one of the measured scenes.
     """
     if config.calibration is None:
         return None
@@ -76,7 +76,7 @@ def calibration_scene(config: BenchConfig, node: Node, measured: tuple[Scene, ..
 
 
 def _named(town: str, names: tuple[str, ...]) -> Iterator[Scene]:
-    """Those scenes of a town; all of its own that show patches, where none is named."""
+    """Yields the named scenes of a town; if none is named, all of its scenes with surfaces for patches."""
     library = AssetLibrary.for_town(town)
     own = None if all(":" in name for name in names) and names else find_scenes(library).scenes
     for name in names or [name for name, scene in (own or {}).items() if _surfaces(scene)]:
@@ -95,7 +95,7 @@ def _surfaces(scene: SceneSpec) -> int:
 
 
 def place_of(node: Node, *path: str) -> Place:
-    """Where a key stands, or the nearest one above it that is there."""
+    """The place of a key in the config file, or of the nearest key above it that is there."""
     place = node.place
     for key in path:
         if not isinstance(node, Mapping) or key not in node.entries:
@@ -105,5 +105,5 @@ def place_of(node: Node, *path: str) -> Place:
 
 
 def located(node: Node, error: GearError, *path: str) -> GearError:
-    """An error with the place in the file that it is about."""
+    """The error with the place in the config file that it refers to."""
     return place_of(node, *path).error(".".join(path), str(error))

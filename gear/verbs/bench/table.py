@@ -1,4 +1,4 @@
-"""The tables that a person reads: one a task, networks and defenses as blocks, kinds of patches as lines."""
+"""The result tables as text: one per task, with one row per network, defense and kind of patch."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from gear.verbs.evaluate.report import Pool
 from gear.verbs.evaluate.table import number, shown
 
 ALONE = "-"
-"""What stands where there is no defense."""
+"""Cell of a row without a defense."""
 
 
 def text(report: BenchReport) -> str:
-    """All tasks, then what the metrics are of."""
+    """The tables of all tasks, followed by a legend."""
     parts = ["\n".join([title(task), *number_table(columns(task))]) for task in report.tasks]
     return "\n\n".join([*parts, "\n".join([legend(), *report.facts["notes"]])]) + "\n"
 
 
 def title(task: TaskResult) -> str:
-    """Name, metric, and which way is better."""
+    """Name of the task, its metric, and whether more or less is better."""
     if task.metric is None:
         return task.name
     return f"{task.name}: {task.metric.title} ({'less' if task.metric.less_is_better else 'more'} is better)"
 
 
 def legend() -> str:
-    """What the columns are, in a line."""
+    """One line that explains the columns."""
     return (
         "in brackets 95 % intervals; change and AUROC: of patches against a random one, that against none; beside: "
         "mean change of a picture, outside the patch where the task can tell, and p, how often chance alone changes as "
@@ -36,27 +36,27 @@ def legend() -> str:
 
 
 def columns(task: TaskResult) -> list[list[str]]:
-    """The titles and all lines, without the columns in which nobody has anything."""
+    """The head and all rows, without the columns that are empty in every row."""
     every = [head(task), *lines(task)]
     used = [i for i, cells in enumerate(zip(*every, strict=True)) if any(cells[1:])]
     return [[line[i] for i in used] for line in every]
 
 
 def head(task: TaskResult) -> list[str]:
-    """Titles of the columns."""
+    """The titles of the columns."""
     metric = "" if task.metric is None else task.metric.title
     return ["network", "defense", "patch", metric, "change", "beside", "p", "AUROC", "mask IoU", "s/picture"]
 
 
 def lines(task: TaskResult) -> Iterator[list[str]]:
-    """One a network, defense and kind of patch."""
+    """Yields one row per network, defense and kind of patch."""
     for one in task.results:
         for pool in one.evaluation.pools:
             yield line(task, one, pool)
 
 
 def line(task: TaskResult, one: Result, pool: Pool) -> list[str]:
-    """The cells of one line."""
+    """The cells of one row."""
     against = one.against(pool)
     beside = task.beside(against)
     test = None if beside is None or not beside[1].pairs else beside[1]

@@ -1,4 +1,4 @@
-"""Whether networks, defenses and the attack of a bench are there and suit each other: before anything is rendered."""
+"""Checks before anything is rendered that networks, defenses and attack of a bench exist and suit each other."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from gear.verbs.bench.scenes import located
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Entrant:
-    """A network or a defense.
+    """A network or a defense of a bench, looked up.
 
     Attributes:
-        label: what tables and folders call it.
+        label: name in tables and folders.
         plugin: name of the plugin.
-        settings: `KEY=VALUE` texts for its options.
-        chosen: both, looked up.
+        settings: `KEY=VALUE` texts of its options.
+        chosen: the plugin with its options.
     """
 
     label: str
@@ -36,12 +36,12 @@ class Entrant:
 
     @property
     def learns(self) -> bool:
-        """Whether it is a defense that must be calibrated."""
+        """Whether the entrant is a defense that needs calibration."""
         spec = self.chosen.found.spec
         return isinstance(spec, DefenseSpec) and spec.needs_calibration
 
     def is_looked_through(self, attack: AttackSpec[object]) -> bool:
-        """Whether it is a defense that changes pictures and through which the attack can make patches."""
+        """Whether the entrant is a defense that changes pictures and that the attack can optimise through."""
         spec = self.chosen.found.spec
         if not isinstance(spec, DefenseSpec) or "images" not in spec.outputs:
             return False
@@ -50,12 +50,12 @@ class Entrant:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Contest:
-    """One task's networks and defenses.
+    """The networks and defenses of one task.
 
     Attributes:
-        name: of the task plugin, as the config has it.
-        task: its spec.
-        models, defenses: in the config's order.
+        name: name of the task plugin in the config.
+        task: spec of the task.
+        models, defenses: entrants in the order of the config.
     """
 
     name: str
@@ -65,20 +65,20 @@ class Contest:
 
     @property
     def folder(self) -> str:
-        """Of everything that is of this task."""
+        """Folder of all results of this task, relative to the bench's."""
         return self.name.replace("/", "-")
 
     @property
     def guards(self) -> tuple[Entrant | None, ...]:
-        """None, for networks alone, and every defense."""
+        """None, for the networks alone, and every defense."""
         return (None, *self.defenses)
 
 
 def find_attack(config: BenchConfig, node: Node) -> PluginEntry:
-    """The plugin that makes the patches.
+    """The attack plugin that makes the patches.
 
     Raises:
-        ConfigError: there is none of that name, or an option does not fit.
+        ConfigError: there is no plugin of that name, or an option does not fit.
     """
     try:
         found = find("attack", config.attack.plugin)
@@ -94,18 +94,18 @@ def find_attack(config: BenchConfig, node: Node) -> PluginEntry:
 def contests(
     config: BenchConfig, node: Node, *, attack: PluginEntry, surfaces: int, device: str | None = None
 ) -> Iterator[Contest]:
-    """What meets what, in every task.
+    """The networks and defenses of every task.
 
     Args:
-        config: of the bench.
-        node: its file, for places in errors.
-        attack: that makes the patches.
-        surfaces: most that a scene has.
-        device: where networks run, as their option `device`; None leaves it to them.
+        config: the bench config.
+        node: its YAML tree, for places in errors.
+        attack: plugin that makes the patches.
+        surfaces: largest number of surfaces in a scene.
+        device: device of the networks, as their option `device`; None leaves the choice to them.
 
     Raises:
-        ConfigError: a plugin is not there, an option is not known, a pair does not suit, or a defense must learn and
-            there is no scene for that.
+        ConfigError: a plugin does not exist, an option is unknown, a pair does not suit, or a defense needs calibration
+            and the config names no scene for it.
     """
     for name, bench in config.tasks.items():
         try:
