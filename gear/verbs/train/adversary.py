@@ -1,8 +1,8 @@
-"""Adversarial patch training: part of the pictures show patches that an attack has just made against the network.
+"""Adversarial patch training: part of the training pictures show patches optimised against the network.
 
-A pool of patches is kept, as in adversarial training with a pool of universal patches (Metzen et al., "Meta Adversarial
-Training against Universal Patches", 2021): one new set after every pass, the oldest one leaves. Patches are put into
-pictures by a compositor before augmentation, so that they are cropped, mirrored and recoloured like everything else.
+As in meta adversarial training (Metzen et al., "Meta Adversarial Training against Universal Patches", 2021) a pool of
+patches is kept: after every epoch one new set of patches enters and the oldest leaves. A compositor puts the patches
+into pictures before augmentation, so that they are cropped, mirrored and recoloured like the rest of the picture.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ CACHE_BYTES = 1 << 30
 
 
 class Adversary:
-    """Makes patches against the network, and puts them into samples."""
+    """Makes patches against the network and puts them into samples."""
 
     def __init__(
         self,
@@ -46,15 +46,15 @@ class Adversary:
         cache_bytes: int = CACHE_BYTES,
     ) -> None:
         """Args:
-            samples: to train on; those of scenes with surfaces (and probes, for `transport`) are attacked.
-            config: which attack, how often, how long.
-            task: that the attack must be able to attack.
-            seed: of everything drawn here.
-            device: of the compositor.
-            cache_bytes: memory of the compositors of all scenes together.
+            samples: training samples; those of scenes with surfaces (and with probes, for `transport`) get patches.
+            config: which attack is run, how often and how long.
+            task: task that the attack must support.
+            seed: seed of all random draws here.
+            device: device of the compositor.
+            cache_bytes: memory for the compositors of all scenes together.
 
         Raises:
-            GearError: the attack cannot attack the task, is counted in forward passes, makes fewer patches than a scene
+            GearError: the attack does not support the task, has a budget of queries, makes fewer patches than a scene
                 has surfaces, or no sample has what the compositor needs.
             DatasetError: a scene lacks probes.
         """
@@ -92,7 +92,9 @@ class Adversary:
         self._lock = threading.Lock()
 
     def refresh(self, model: Any, epoch: int) -> None:
-        """Makes one more set of patches, against the model as it is, in a scene that is drawn."""
+        """Adds one set of patches to the pool, optimised against the model in its current state, in a scene drawn
+        at random.
+        """
         rng = derive_rng(self._seed, "adversary", epoch)
         number = sorted(self._compositors)[int(rng.integers(len(self._compositors)))]
         there = self._indices[number]
@@ -111,7 +113,9 @@ class Adversary:
         self._pool = [*self._pool, tensors][-self._config.pool :]
 
     def change(self, sample: Any, index: int, rng: np.random.Generator) -> Any:
-        """The sample, perhaps with patches of the pool on its surfaces. Threads may share it."""
+        """The sample, with patches of the pool on its surfaces in a random share of the calls. Several threads may
+        call it.
+        """
         dataset, place = self._samples.places[index]
         if dataset not in self._compositors or not self._pool or rng.random() >= self._config.share:
             return sample
@@ -125,11 +129,11 @@ class Adversary:
         return dataclasses.replace(sample, images=images)
 
     def state(self) -> dict[str, Tensor]:
-        """The pool, for a checkpoint."""
+        """The pool as arrays, for a checkpoint."""
         return {f"{n:04d}.{k:02d}": patch for n, patches in enumerate(self._pool) for k, patch in enumerate(patches)}
 
     def restore(self, state: Mapping[str, Tensor]) -> None:
-        """The inverse."""
+        """Restores a pool from the arrays of `state`."""
         sets: dict[str, list[Tensor]] = {}
         for key in sorted(state):
             sets.setdefault(key.partition(".")[0], []).append(state[key])
@@ -137,7 +141,7 @@ class Adversary:
 
 
 class _Chosen:
-    """A compositor for some samples of a split, numbered from 0."""
+    """A compositor for a subset of the samples of a split, indexed from 0."""
 
     def __init__(self, compositor: Any, indices: Sequence[int]) -> None:
         self._compositor, self._indices = compositor, tuple(indices)
@@ -148,6 +152,6 @@ class _Chosen:
 
 
 def _picture(composed: Tensor) -> np.ndarray:
-    """(3, H, W) in 0..1 to (H, W, 3) uint8."""
+    """Converts a (3, H, W) tensor in 0..1 to a (H, W, 3) uint8 picture."""
     levels = (composed * 255).round().clamp(0, 255).to(torch.uint8)
     return np.ascontiguousarray(levels.permute(1, 2, 0).cpu().numpy())

@@ -1,4 +1,6 @@
-"""A training on disk, whole at any time: a safetensors file with everything that the next step depends on."""
+"""Checkpoints of a training: a safetensors file with everything on which the next step depends, always whole on
+disk.
+"""
 
 from __future__ import annotations
 
@@ -31,18 +33,18 @@ BROKEN = (SafetensorError, OSError, KeyError, ValueError, RecursionError)
 
 @dataclass(slots=True)
 class TrainingState:
-    """How far a training is.
+    """The progress of a training.
 
     Attributes:
-        step: steps that are over.
-        position: in the data.
-        elapsed_s: time that steps and validations have taken.
-        best_step: after which step the kept weights stood; -1 before the first validation.
-        best_sha256: of the file of those weights; "" in checkpoints of gears that did not note it.
-        worse: validations since then.
-        broken: steps in a row, up to the last one, that were left out.
-        steps: `step`, `loss`, `rate` of stretches of the training.
-        open_losses: of steps that are in no stretch yet.
+        step: number of finished steps.
+        position: position in the data.
+        elapsed_s: time that steps and validations have taken, in seconds.
+        best_step: step whose weights were the best in validation; -1 before the first validation.
+        best_sha256: hash of the file of those weights; "" in checkpoints of older versions.
+        worse: number of validations since then.
+        broken: number of consecutive skipped steps, up to the last step.
+        steps: `step`, `loss` and `rate` of every stretch of the training.
+        open_losses: losses of steps that belong to no stretch yet.
         validations: `step`, `elapsed_s`, `took_s`, `loss` and metrics of every validation.
     """
 
@@ -58,15 +60,16 @@ class TrainingState:
     validations: list[dict[str, Any]] = field(default_factory=list)
 
     def as_json(self) -> Json:
-        """All of it."""
+        """All fields as JSON."""
         return dataclasses.asdict(self)
 
     @staticmethod
     def from_json(value: Json) -> TrainingState:
-        """The inverse.
+        """Reads the JSON of `as_json`.
 
         Raises:
-            ValueError, KeyError, TypeError: it says something else, or nothing of what a training goes on with.
+            ValueError, KeyError, TypeError: the JSON lacks a field that a training needs to continue, or has another
+                one.
         """
         kinds = {"step": int, "best_step": int, "worse": int, "elapsed_s": float}
         for name, kind in kinds.items():
@@ -93,7 +96,7 @@ def save(
     optimiser: torch.optim.Optimizer,
     extra: Mapping[str, Tensor],
 ) -> None:
-    """Writes a checkpoint in place of the last one."""
+    """Replaces the checkpoint by a new one."""
     tensors = {f"module.{key}": value for key, value in module.state_dict().items()}
     tensors |= {f"mean.{key}": value for key, value in mean.state.items()}
     for number, entries in optimiser.state_dict()["state"].items():
@@ -107,13 +110,13 @@ def save(
 def load(
     root: Path, plan: Json, module: nn.Module, mean: RunningMean, optimiser: torch.optim.Optimizer
 ) -> tuple[TrainingState, dict[str, Tensor]] | None:
-    """Takes up a checkpoint, or does nothing where there is none.
+    """Loads a checkpoint into the parts of a training; does nothing where there is none.
 
     Returns:
         The progress and the extra tensors.
 
     Raises:
-        DatasetError: what is there was begun with other settings or data, or is damaged.
+        DatasetError: the checkpoint belongs to a training with other settings or data, or is damaged.
     """
     path = root / FILE
     if not path.exists():
@@ -137,7 +140,7 @@ def load(
 
 
 def begun_config(root: Path) -> Json:
-    """The config of the training that a folder holds; None where there is none, or no saying: `load` tells then."""
+    """The config of the training in a folder; None where there is none or it cannot be read, which `load` reports."""
     path = root / FILE
     if not path.exists():
         return None
@@ -153,7 +156,7 @@ def _damaged(path: Path, error: Exception) -> DatasetError:
 
 
 def _fill(state: Mapping[str, Tensor], given: Mapping[str, Tensor]) -> None:
-    """Copies every tensor; a smaller one would be spread over a larger one, so shapes are looked at."""
+    """Copies every tensor after comparing shapes, because torch would broadcast a smaller tensor silently."""
     for key, tensor in state.items():
         if given[key].shape != tensor.shape:
             raise ValueError(f"mean.{key} is {tuple(given[key].shape)}, not {tuple(tensor.shape)}")
@@ -161,7 +164,7 @@ def _fill(state: Mapping[str, Tensor], given: Mapping[str, Tensor]) -> None:
 
 
 def _states(tensors: Mapping[str, Tensor], optimiser: torch.optim.Optimizer) -> dict[int, dict[str, Tensor]]:
-    """What an optimiser knows of each weight: counters, and tensors of the weight's own shape."""
+    """The optimiser's state of each weight: counters, and tensors with the shape of the weight."""
     weights = [weight for group in optimiser.param_groups for weight in group["params"]]
     state: dict[int, dict[str, Tensor]] = {}
     for key, value in _below(tensors, "optimiser.").items():
@@ -177,10 +180,10 @@ def _states(tensors: Mapping[str, Tensor], optimiser: torch.optim.Optimizer) -> 
 
 
 def check_plan(root: Path, there: Json, wanted: Json) -> None:
-    """Whether a training that was begun is the one that is asked for.
+    """Checks that the training in a folder is the one that was requested.
 
     Raises:
-        DatasetError: it is not; says what differs.
+        DatasetError: it is another one; the text names what differs.
     """
     if there == wanted:
         return

@@ -1,4 +1,4 @@
-"""What a training is made of: the network's recipe, with what the user changes."""
+"""The configuration of a training: the network's recipe with the user's changes."""
 
 from __future__ import annotations
 
@@ -26,16 +26,17 @@ SHARES = ("warm_up", "final_rate", "validation_share")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Adversarial:
-    """Training on pictures that show patches which were made against the network on the way.
+    """Adversarial patch training: part of the pictures show patches optimised against the network during the
+    training.
 
     Attributes:
-        attack: name of an attack plugin; "" for none.
-        share: how often a sample with surfaces shows patches of the pool.
-        pool: sets of patches that are kept.
-        steps: of the attack, for one set.
-        samples: that one set is made on, of one scene.
-        compositor: `transport` needs data that were collected with probes, `homography` none.
-        options: the attack's own (`gear plugins show ATTACK`).
+        attack: name of the attack plugin; "" for no adversarial training.
+        share: probability that a sample with surfaces shows patches of the pool.
+        pool: number of patch sets that are kept.
+        steps: optimisation steps of the attack for one set.
+        samples: number of samples, of one scene, on which a set is optimised.
+        compositor: `transport` needs data collected with probes, `homography` does not.
+        options: options of the attack (`gear plugins show ATTACK` lists them).
     """
 
     SHORTHAND: ClassVar[str] = "attack"
@@ -61,28 +62,29 @@ class TrainConfig(Recipe):
     """A recipe and the circumstances of one training.
 
     Attributes:
-        seed: of first weights, order, augmentation and whatever the network draws.
-        time_budget_s: instead of `epochs`: the learning rate falls with the time that is left; 0 counts epochs.
-        precision: of the training steps; `auto` is bfloat16 with a time budget on a device that is quicker so, else
-            float32. Validation is always in float32.
+        seed: seed of initial weights, order, augmentation and the network's own random draws.
+        time_budget_s: training time in seconds instead of `epochs`; the learning rate then follows the time that is
+            left. 0 counts epochs.
+        precision: precision of the training steps; `auto` is bfloat16 where a time budget is set and the device is
+            faster with it, else float32. Validation always uses float32.
         device: `auto` takes a GPU where there is one.
-        init: what to begin with: "" is random weights, `shipped` the reference weights, a path of a safetensors file,
-            a name that the network knows, such as `imagenet`, or `trunk:` and a file or a network with reference
-            weights, of which is taken what has the same keys and shapes.
-        picture_scale: share of their size at which pictures are shown, in training and in validation; null is 1, and
-            with a time budget on a CPU what leaves time for enough steps (`gear.verbs.train.sizes`).
-        warm_up: share of the training in which the learning rate rises.
-        final_rate: learning rate at the end, as a share of the highest.
-        ema: weight of the past in the running mean of the weights, which is what is validated and kept; 0 for none.
-        validation_share: share of the training data that is kept for validation where no other data are given.
-        validation_samples: at most so many samples are validated on, spread over the data.
-        patience: stops after so many validations without a better one; 0 never does.
-        workers: threads that decode and augment; they change nothing but time.
-        cache_gb: memory for decoded samples, and a quarter as much for what compositors work out of them; what does not
-            fit is made again. Changes nothing but time.
-        augmentation: of training samples.
-        adversarial: patches that are made against the network while it learns.
-        options: the network's own (`gear plugins show MODEL`).
+        init: initial weights: "" is random, `shipped` the reference weights, a path a safetensors file, a name such as
+            `imagenet` one that the network knows, and `trunk:` with a file or a network with reference weights takes
+            the weights whose keys and shapes match.
+        picture_scale: factor by which pictures are resized in training and validation; null is 1, or, with a time
+            budget on a CPU, a factor that leaves time for enough steps (`gear.verbs.train.sizes`).
+        warm_up: share of the training during which the learning rate rises.
+        final_rate: learning rate at the end, as a share of the peak.
+        ema: decay of the exponential moving average of the weights, which is validated and kept; 0 for none.
+        validation_share: share of the training data that is held out for validation where no validation data are given.
+        validation_samples: largest number of samples of a validation, spread evenly over the data.
+        patience: number of validations without improvement after which the training stops; 0 for never.
+        workers: threads that decode and augment; the result does not depend on them.
+        cache_gb: memory for decoded samples, and a quarter of it for what compositors precompute; what does not fit is
+            computed again. The result does not depend on it.
+        augmentation: augmentation of training samples.
+        adversarial: adversarial patch training.
+        options: options of the network (`gear plugins show MODEL` lists them).
     """
 
     seed: int = 0
@@ -126,7 +128,7 @@ class TrainConfig(Recipe):
 
     @property
     def framing(self) -> Framing:
-        """What training sees of a picture."""
+        """The window of a picture that training samples show."""
         return Framing(crop_px=self.crop_px, scales=self.scales)
 
 
@@ -135,10 +137,10 @@ FLAGS = {"learning_rate": "lr", "time_budget_s": "time-budget"}
 
 
 def read_config(recipe: Recipe, flags: Mapping[str, Any], settings: Iterable[str] = ()) -> TrainConfig:
-    """A recipe with flags (None where one was not given) and `KEY=VALUE` texts on top.
+    """Reads a recipe with flags (None for flags that were not given) and `KEY=VALUE` texts on top.
 
     Raises:
-        ConfigError: a key is not known, or a value refused.
+        ConfigError: a key is unknown, or a value is refused.
     """
     base = parse_text(to_yaml(recipe), "recipe")
     given: dict[str, tuple[Place, Node]] = {}

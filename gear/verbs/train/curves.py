@@ -1,4 +1,4 @@
-"""The curves of a training: losses, learning rate, the task's metric."""
+"""The curves of a training: losses, learning rate and the task's metric."""
 
 from __future__ import annotations
 
@@ -58,6 +58,6 @@ def write_curves(root: Path, spec: TaskSpec, progress: TrainingState, title: str
 
 
 def _line(axis: Axes, points: Sequence[tuple[float, float]], **style: Any) -> None:
-    """A line through steps and values; of one point alone, where a line shows nothing, a dot."""
+    """Draws a line through steps and values; a single point is drawn as a dot."""
     if points:
         axis.plot(*zip(*points, strict=True), marker="" if len(points) > 1 else "o", ms=3, **style)

@@ -1,4 +1,4 @@
-"""Training data: some of it, and the share that is kept for validation."""
+"""Selects training samples, and the share that is held out for validation."""
 
 from __future__ import annotations
 
@@ -15,17 +15,19 @@ VALIDATION = ("val",)
 
 
 def spread(samples: Samples, most: int) -> Samples:
-    """At most so many of them, evenly spread."""
+    """At most `count` of the samples, evenly spread."""
     count = min(most, len(samples))
     return Samples(samples.datasets, tuple(samples.places[i * len(samples) // count] for i in range(count)))
 
 
 def keep_some(samples: Samples, share: float, seed: int) -> tuple[Samples, Samples]:
-    """Samples to train on and samples to validate on. Whole sequences go to either side, in every weather and with
-    every patch that there is of them, so that what a picture shows is never seen on the other.
+    """Splits samples into training and validation samples.
+
+    Whole sequences go to one side, together with all their weathers and patches, so that no street of the validation is
+    seen in training.
 
     Raises:
-        GearError: there are too few.
+        GearError: there are too few samples.
     """
     streets = _streets(samples.datasets)
     sequences = [_sequence(samples, place, streets) for place in samples.places]
@@ -41,13 +43,12 @@ def keep_some(samples: Samples, share: float, seed: int) -> tuple[Samples, Sampl
 
 
 def _streets(datasets: Sequence[Dataset[Any]]) -> list[int]:
-    """For each dataset the number of the first one that shows the same streets, in whatever weather, with whatever
-    patch."""
+    """For each dataset the index of the first dataset that shows the same streets in any weather and with any patch."""
     keys = [scenes_of(dataset) for dataset in datasets]
     return [keys.index(key) for key in keys]
 
 
 def _sequence(samples: Samples, place: tuple[int, int], streets: Sequence[int]) -> tuple[int, int]:
-    """Which drive a sample is of; most are one picture long."""
+    """The driving sequence that a sample belongs to; most sequences are one picture long."""
     frames = max(samples.datasets[place[0]].content(int, "frames"), 1)
     return streets[place[0]], place[1] // frames

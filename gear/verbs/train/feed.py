@@ -1,4 +1,4 @@
-"""Batches without end: decoded once where memory allows, augmented beside the network's own work."""
+"""An endless supply of training batches, decoded and augmented in threads while the network trains."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ BATCHES_AHEAD = 3
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """Where a training stands in its data.
+    """The position of a training in its data.
 
     Attributes:
-        epoch: passes that are over.
-        batch: batches of this pass that are over.
+        epoch: number of finished passes over the data.
+        batch: number of finished batches of the current pass.
     """
 
     epoch: int = 0
     batch: int = 0
 
     def following(self, batches: int) -> Position:
-        """After one more batch, with so many in a pass."""
+        """The position after one more batch, for passes of `batches` batches."""
         return Position(self.epoch, self.batch + 1) if self.batch + 1 < batches else Position(self.epoch + 1, 0)
 
 
 class Feed:
-    """Batches from a position on. What a batch holds follows from the seed, the position and the samples alone."""
+    """Batches from a position on. A batch depends only on the seed, the position and the samples."""
 
     def __init__(
         self,
@@ -68,7 +68,7 @@ class Feed:
         self.batches = len(samples) // self._size
 
     def from_position(self, position: Position) -> Generator[Batch]:
-        """Batches of this pass and all that follow; close the iterator to end its threads."""
+        """Yields the remaining batches of this pass and all that follow. Close the iterator to end its threads."""
         pool = ThreadPoolExecutor(self._config.workers, thread_name_prefix="gear-train")
         joining = ThreadPoolExecutor(1, thread_name_prefix="gear-train-batch")
         ahead: deque[Future[Batch]] = deque()
@@ -85,13 +85,13 @@ class Feed:
                 threads.shutdown(wait=True, cancel_futures=True)
 
     def _indices(self, position: Position) -> tuple[int, ...]:
-        """A last batch that would not be full is left out."""
+        """The indices of each batch of a pass; a last batch that would not be full is left out."""
         shuffled = order(len(self._items), seed=self._config.seed, epoch=position.epoch)
         start = position.batch * self._size
         return tuple(shuffled[start : start + self._size])
 
     def _item(self, epoch: int, index: int) -> Item:
-        """An augmented sample, its pictures as tensors of uint8."""
+        """An augmented sample whose pictures are uint8 tensors."""
         item = self._items.item(index, epoch)
         rng = derive_rng(self._config.seed, "augment", epoch, index)
         shown = replace(item, sample=augment(item.sample, self._config.augmentation, self._config.framing, rng))
@@ -99,7 +99,7 @@ class Feed:
         return shown
 
     def _batch(self, making: Sequence[Future[Item]]) -> Batch:
-        """A whole batch, where the network is; the thread that steps does not wait for a copy to a GPU."""
+        """Copies a batch to the network's device without making the training thread wait."""
         items = [future.result() for future in making]
         try:
             batch = stacked(items)

@@ -1,4 +1,4 @@
-"""The training itself: steps, validations, checkpoints, in an order that depends on seed and data alone."""
+"""The training loop: steps, validations and checkpoints, in an order that depends only on seed and data."""
 
 from __future__ import annotations
 
@@ -50,19 +50,19 @@ ONE_VALUE = "more than 1 value per channel"
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Parts:
-    """What a training works with.
+    """The parts that a training works with.
 
     Attributes:
-        spec, task: what is learnt, and its evaluator.
-        found: whose network it is.
-        model: being trained.
-        twin: another one of its kind, in float32, that is given the mean weights and validated.
-        views: cameras that it looks at.
+        spec, task: the task and its evaluator.
+        found: plugin of the network.
+        model: the network that is trained.
+        twin: a float32 copy of the network that receives the averaged weights and is validated.
+        views: cameras that the network sees.
         validation: held-out samples.
         feed: training batches.
-        adversary: makes patches before every pass; None for none.
+        adversary: makes patches before every pass; None without adversarial training.
         root: folder of the results.
-        plan: what a checkpoint must have been begun with.
+        plan: plan that a checkpoint must have to be continued.
     """
 
     spec: TaskSpec[Any]
@@ -86,7 +86,7 @@ Pack = Callable[[dict[str, torch.Tensor], TrainingState], bytes]
 
 
 class Training:
-    """One training, fresh or taken up again."""
+    """One training, new or continued from a checkpoint."""
 
     def __init__(self, parts: Parts, config: TrainConfig, *, on_step: OnStep | None, pack: Pack) -> None:
         self._parts, self._config, self._on_step, self._pack = parts, config, on_step, pack
@@ -107,7 +107,7 @@ class Training:
 
     @property
     def share(self) -> float:
-        """How much of the training is over, 0..1."""
+        """Share of the training that is finished, 0..1."""
         if self._config.time_budget_s:
             return min(1.0, self.progress.elapsed_s / self._config.time_budget_s)
         return min(1.0, self.progress.step / (self._config.epochs * self._parts.feed.batches))
@@ -116,7 +116,7 @@ class Training:
         """Trains to the end.
 
         Raises:
-            DatasetError: the best weights of a training that goes on are gone; told now, not when it has ended.
+            DatasetError: the file of the best weights of a continued training is missing; raised at the start.
         """
         _train_mode(self._parts.model, True)
         _train_mode(self._parts.twin, False)
@@ -134,7 +134,9 @@ class Training:
         return self.progress
 
     def _passes(self, batches: Iterator[Batch]) -> None:
-        """Steps until the end; with an adversary until the end of a pass, because the next one shows other patches."""
+        """Yields steps until the end. With an adversary it ends with a pass, because the next pass shows other
+        patches.
+        """
         while not self._is_over:
             with self._timed():
                 self._step(next(batches))
@@ -148,7 +150,7 @@ class Training:
                 return
 
     def _make_patches(self) -> None:
-        """Against the mean weights, at the beginning of a pass."""
+        """Makes patches against the averaged weights at the beginning of a pass."""
         adversary, position = self._parts.adversary, self.progress.position
         if adversary is None or position.batch:
             return
@@ -163,7 +165,9 @@ class Training:
 
     @property
     def _is_time_to_validate(self) -> bool:
-        """After every pass; with a time budget, as soon as validations have not taken more than their share."""
+        """True after every pass; with a time budget also when validations have taken less than their share of the
+        time.
+        """
         progress = self.progress
         if not self._config.time_budget_s:
             return progress.position.batch == 0
@@ -216,7 +220,7 @@ class Training:
             return loss
 
     def _count_broken(self, is_finite: bool, loss: torch.Tensor) -> None:
-        """A step that overflows is left out; a training that only overflows is over."""
+        """Counts steps that are skipped because the loss overflows; raises when nothing else happens."""
         progress = self.progress
         progress.broken = 0 if is_finite else progress.broken + 1
         if progress.broken > MOST_BROKEN_STEPS:
@@ -245,7 +249,9 @@ class Training:
             self._on_step(progress, self.share, chosen | metrics)
 
     def _keep_best(self) -> None:
-        """The checkpoint goes first: of the step that it is of, it can make the weights again, and they not it."""
+        """Writes the checkpoint before the weights: the weights can be made from the checkpoint, but not the
+        reverse.
+        """
         mean = {key: value.detach().cpu().clone() for key, value in self._mean.state.items()}
         weights = self._pack(mean, self.progress)
         self.progress.best_sha256 = sha256(weights)
@@ -261,7 +267,7 @@ class Training:
 
     @contextlib.contextmanager
     def _timed(self) -> Iterator[list[float]]:
-        """Adds what is done inside to the elapsed time; gives it as the one item of a list afterwards."""
+        """Adds the time spent inside to the elapsed time, and stores it as the only item of the yielded list."""
         spent, begin = [0.0], time.perf_counter()
         yield spent
         spent[0] = time.perf_counter() - begin

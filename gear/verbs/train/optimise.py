@@ -1,4 +1,4 @@
-"""Optimiser, learning rate, and the running mean of the weights."""
+"""Optimiser, learning rate schedule, and the moving average of the weights."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ MOMENTUM = 0.9
 
 
 def optimiser_of(module: nn.Module, config: TrainConfig) -> torch.optim.Optimizer:
-    """AdamW or SGD over what may be trained. Vectors and numbers (biases, normalisation) do not decay."""
+    """AdamW or SGD over the trainable parameters; one-dimensional parameters (biases, normalisation) have no
+    weight decay.
+    """
     trained = [parameter for parameter in module.parameters() if parameter.requires_grad]
     groups = [
         {"params": [p for p in trained if p.dim() > 1], "weight_decay": config.weight_decay},
@@ -25,13 +27,14 @@ def optimiser_of(module: nn.Module, config: TrainConfig) -> torch.optim.Optimize
 
 
 def rate_share(progress: float, *, warm_up: float, final: float) -> float:
-    """Learning rate as a share of the highest: a straight rise, then half a cosine (Loshchilov and Hutter, "SGDR",
-    2017, eq. 5, without restarts).
+    """The learning rate as a share of its peak: a linear rise, then half a cosine (Loshchilov and Hutter, "SGDR",
+    2017,
+    eq. 5, without restarts).
 
     Args:
-        progress: share of the training that is over, 0..1.
-        warm_up: share in which it rises.
-        final: at the end.
+        progress: share of the training that is finished, 0..1.
+        warm_up: share during which the rate rises.
+        final: share of the peak at the end.
     """
     if progress < warm_up:
         return final + (1 - final) * progress / warm_up
@@ -40,10 +43,11 @@ def rate_share(progress: float, *, warm_up: float, final: float) -> float:
 
 
 class RunningMean:
-    """The mean of the weights over the last steps (Polyak and Juditsky, 1992), younger in the beginning.
+    """An average of the weights over the last steps (Polyak and Juditsky, 1992), over fewer steps at the
+    beginning.
 
     Attributes:
-        state: by key, as in the module's own state; whole numbers are the module's newest.
+        state: averaged tensors by the module's keys; integer tensors are the module's newest.
     """
 
     def __init__(self, module: nn.Module, decay: float) -> None:
@@ -52,7 +56,7 @@ class RunningMean:
 
     @torch.no_grad()
     def update(self, module: nn.Module, step: int) -> None:
-        """Takes in the weights after a step, counted from 0."""
+        """Adds the weights after a step to the average; steps count from 0."""
         decay = min(self.decay, (1 + step) / (10 + step))
         newest = module.state_dict()
         moving = [key for key, value in newest.items() if value.is_floating_point()]
@@ -63,7 +67,7 @@ class RunningMean:
 
 
 class Buffers:
-    """What forward passes write into a module, such as running statistics, as it was at one time."""
+    """A copy of a module's buffers, such as running statistics, that can be restored."""
 
     def __init__(self, module: nn.Module) -> None:
         self._module = module
@@ -73,7 +77,7 @@ class Buffers:
 
     @torch.no_grad()
     def keep(self) -> None:
-        """As it is now."""
+        """Stores the buffers in their current state."""
         buffers = list(self._module.buffers())
         if list(map(id, buffers)) == list(map(id, self._buffers)) and buffers:
             torch._foreach_copy_(self._kept, buffers)
@@ -82,11 +86,11 @@ class Buffers:
 
     @torch.no_grad()
     def put_back(self) -> None:
-        """Undoes what has been written since."""
+        """Restores the stored buffers."""
         if self._kept:
             torch._foreach_copy_(self._buffers, self._kept)
 
 
 def clip_gradients(module: nn.Module, most: float) -> Tensor:
-    """Scales gradients to a norm of at most `most` (0: leaves them); returns the norm before."""
+    """Scales gradients to a norm of at most `most` (0 leaves them); returns the norm before."""
     return nn.utils.clip_grad_norm_(module.parameters(), most if most > 0 else math.inf)

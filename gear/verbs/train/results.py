@@ -1,4 +1,4 @@
-"""What a training leaves behind: weights that say where they come from, the history, a model card."""
+"""The results of a training: weights with their provenance, the history, and a model card."""
 
 from __future__ import annotations
 
@@ -40,16 +40,16 @@ CARD = "card.md"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Origin:
-    """Where weights come from.
+    """The provenance of weights.
 
     Attributes:
-        model: whose they are.
-        spec, task: the task and its name.
-        config: of the training.
-        training, validation: the data.
-        command: that makes them again.
-        look: of the training data.
-        picture_share: width of the training pictures, as a share of the task's own.
+        model: plugin of the network.
+        spec, task: spec and name of the task.
+        config: config of the training.
+        training, validation: facts of the data.
+        command: command line that repeats the training.
+        look: appearance of the training data.
+        picture_share: width of the training pictures, as a share of the task's default width.
     """
 
     model: PluginEntry
@@ -63,7 +63,7 @@ class Origin:
     picture_share: float
 
     def metadata(self, metrics: AnyMapping[str, Any]) -> dict[str, str]:
-        """What stands in the weights file: texts, those of several values as JSON."""
+        """The metadata of the weights file: texts; structured values are JSON."""
         data = {"training": self.training.facts(), "validation": self.validation.facts()}
         return {
             "model": self.model.spec.name,
@@ -80,7 +80,7 @@ class Origin:
         }
 
     def _options(self) -> dict[str, Any]:
-        """Those of the network's options that were given, for pictures of the task's own size."""
+        """The options given to the network, adapted to pictures of the task's default size."""
         given = self.config.options.entries if isinstance(self.config.options, Mapping) else {}
         values: Any = to_plain(read_node(self.model.spec.config, self.config.options, "options"))
         options = {name: values[name] for name in given if name not in CIRCUMSTANCES}
@@ -90,19 +90,19 @@ class Origin:
 
 
 def known(metrics: AnyMapping[str, Any]) -> dict[str, Any]:
-    """Without what is no finite number, for JSON."""
+    """The metrics that are finite, for JSON."""
     return {key: value for key, value in metrics.items() if not isinstance(value, float) or math.isfinite(value)}
 
 
 def metrics_of(validation: AnyMapping[str, Any]) -> dict[str, float]:
-    """A validation without its times."""
+    """The metrics of a validation, without its times."""
     return {key: value for key, value in validation.items() if key not in ("step", "elapsed_s", "took_s")}
 
 
 def command_of(
     task: str, model: str, data: Sequence[str], val: Sequence[str], flags: AnyMapping[str, Any], settings: Sequence[str]
 ) -> str:
-    """The command line that does the same; a flag that is True has no value, one that is None or False is left out."""
+    """The command line of a call; a flag that is True has no value, and one that is None or False is left out."""
     words = ["gear", "train", "--task", task, "--model", model, "--data", *data, *(["--val", *val] if val else [])]
     for key, value in flags.items():
         if value is not None and value is not False:
@@ -113,28 +113,28 @@ def command_of(
 
 
 def packed(origin: Origin, state: AnyMapping[str, Tensor], progress: TrainingState) -> bytes:
-    """The file of weights that were validated last, matrices in float16."""
+    """The validated weights as a safetensors file, with matrices in float16."""
     metrics = metrics_of(progress.validations[-1])
     return serialised(state, origin.metadata(metrics), halves=True)
 
 
 def write_weights(root: Path, weights: bytes) -> None:
-    """Writes the weights. Files that describe the previous weights are deleted first, and written anew at the end."""
+    """Writes the weights. Files that describe earlier weights are deleted first and written again at the end."""
     remove_files(root, [CARD, HISTORY, CURVES])
     write_whole(root, WEIGHTS, weights)
 
 
 def is_kept(root: Path, progress: TrainingState) -> bool:
-    """Whether the file of the best weights is there, and no other; any, where an old checkpoint does not say which."""
+    """Whether the file of the best weights is there; any file, where an old checkpoint does not record its hash."""
     path = root / WEIGHTS
     return path.is_file() and progress.best_sha256 in ("", sha256(read_bytes(path)))
 
 
 def check_kept(root: Path, progress: TrainingState) -> None:
-    """Whether the file of the best weights is there.
+    """Checks that the file of the best weights is there.
 
     Raises:
-        DatasetError: it is not, or is another one.
+        DatasetError: it is missing, or is another file.
     """
     if not (root / WEIGHTS).is_file():
         raise DatasetError(root / WEIGHTS, f"is gone; put it back, or delete {CHECKPOINT} beside it to train again")
@@ -145,7 +145,7 @@ def check_kept(root: Path, progress: TrainingState) -> None:
 
 
 def write_history(root: Path, origin: Origin, progress: TrainingState) -> None:
-    """Writes `train.json` and `card.md`."""
+    """Writes `train.json` and `card.md` into the folder of the training."""
     config: Any = to_plain(origin.config)
     history = {
         "task": origin.task,
@@ -165,7 +165,7 @@ def write_history(root: Path, origin: Origin, progress: TrainingState) -> None:
 
 
 def card(root: Path, origin: Origin, progress: TrainingState) -> str:
-    """The model card, in Markdown."""
+    """The model card as Markdown."""
     best = next(entry for entry in progress.validations if entry["step"] == progress.best_step)
     check_kept(root, progress)
     weights = read_bytes(root / WEIGHTS)
@@ -210,7 +210,7 @@ def card(root: Path, origin: Origin, progress: TrainingState) -> str:
 
 
 def _size_lines(origin: Origin) -> list[str]:
-    """How weights are used on pictures like those that they learnt from, where these are not of the task's own size."""
+    """Lines on how to use the weights on pictures of the training's size, where that is not the task's default."""
     given = origin.config.options
     scale = read_node(origin.model.spec.config, given, "options") if isinstance(given, Mapping) else None
     seen = getattr(scale, SCALE, None)

@@ -1,1 +1,1 @@
-"""Weights on disk: published files made into gear's, and what a file says of itself."""
+"""Weights files: converting published ones, averaging, and reading their metadata."""

@@ -33,19 +33,20 @@ MEASURED = ("metrics", "intervals", "source", "source_sha256")
 def average_weights(
     first: str | Path, second: str | Path, out: str | Path, *, share: float = 0.5, halves: bool = False
 ) -> ConvertReport:
-    """Writes `(1 - share) · first + share · second`; counters are the second's.
+    """Writes `(1 - share) * first + share * second`; counters are those of `second`.
 
-    The file says what the second says, without metrics; its data are those of both, and `averaged` names both hashes.
+    The metadata are those of `second` without metrics; the training data are those of both files, and `averaged` holds
+    both hashes.
 
     Args:
-        first: a safetensors file, or the name of a model whose shipped weights are meant.
+        first: a safetensors file, or the name of a model with shipped weights.
         second: likewise.
         out: file to write.
-        share: of the second, between 0 and 1.
-        halves: whether weights of two dimensions and more are stored in float16.
+        share: weight of the second file, between 0 and 1.
+        halves: whether tensors of two and more dimensions are stored in float16.
 
     Raises:
-        GearError: the files are of different networks, or anything else that the user can put right.
+        GearError: the files belong to different networks, or the user can mend something else.
     """
     if not 0 < share < 1:
         raise GearError(f"--share {share:g}: must be between 0 and 1, and neither")
@@ -87,7 +88,7 @@ def _between(one: Tensor, two: Tensor, share: float) -> Tensor:
 
 
 def _both(one: Json, two: Json) -> Json:
-    """What either was trained on, by part; what the second was, where the first says nothing that can be added."""
+    """The training data of both files, by part; those of the second where the first records none."""
     if not (isinstance(one, Mapping) and isinstance(two, Mapping)):
         return two if two is not None else one
     merged: dict[str, Any] = dict(two)

@@ -1,4 +1,4 @@
-"""What a weights file says of itself."""
+"""The metadata of a weights file."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ CHUNK_BYTES = 1 << 20
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WeightsFacts:
-    """A file and its hash.
+    """A weights file with its hash.
 
     Attributes:
-        file: its header.
-        sha256: of the whole file.
+        file: metadata in its header.
+        sha256: hash of the whole file.
     """
 
     file: WeightsFile
     sha256: str
 
     def to_json(self) -> Json:
-        """As JSON, without the shapes."""
+        """The metadata as JSON, without the shapes of the tensors."""
         return {
             "path": str(self.file.path),
             "size_mb": round(self.file.size_mb, 3),
@@ -39,14 +39,14 @@ class WeightsFacts:
 
 
 def show_weights(name: str | Path) -> WeightsFacts:
-    """Reads a file's header and hashes it.
+    """Reads the header of a weights file and hashes the file.
 
     Args:
-        name: a safetensors file, or the name of a model whose shipped weights are meant.
+        name: a safetensors file, or the name of a model with shipped weights.
 
     Raises:
-        UnknownNameError: it is no file and no model.
-        GearError: there is no such file, nothing is shipped under that name, or it is no safetensors.
+        UnknownNameError: there is neither such a file nor such a model.
+        GearError: the file is missing or no safetensors file, or no weights are shipped under that name.
     """
     path = file_of(name)
     file = inspect(path)
@@ -58,11 +58,11 @@ def show_weights(name: str | Path) -> WeightsFacts:
 
 
 def file_of(name: str | Path) -> Path:
-    """The file that is meant: one of that path, or the shipped weights of the model of that name.
+    """The path of a weights file, or of the shipped weights of a model.
 
     Raises:
-        UnknownNameError: it is no file and no model.
-        GearError: nothing is shipped under that name.
+        UnknownNameError: there is neither such a file nor such a model.
+        GearError: no weights are shipped under that name.
     """
     path = Path(name)
     if not path.exists() and not path.suffix and path.name == str(name):
