@@ -1,4 +1,4 @@
-"""What an attack sees: several datasets as one, with one compositor for all."""
+"""Several datasets as one, with one compositor for all: the pictures that an attack optimises on."""
 
 from __future__ import annotations
 
@@ -16,13 +16,15 @@ from gear.values.errors import DatasetError
 
 
 class JoinedCompositor:
-    """The compositors of several datasets, by the indices of `Samples`."""
+    """The compositors of several datasets, addressed by the indices of `Samples`."""
 
     def __init__(self, samples: Samples, compositors: Sequence[Compositor]) -> None:
         self._samples, self._compositors = samples, tuple(compositors)
 
     def compose(self, patches: Sequence[Tensor], samples: Sequence[int], view: str) -> Tensor:
-        """(B, 3, H, W) pictures in 0..1; patches (3, h, w) for all samples, or (B, 3, h, w) with one each."""
+        """Composes patches into pictures: (B, 3, H, W) float32 in 0..1. Patches are (3, h, w) for all samples, or
+        (B, 3, h, w) with one per sample.
+        """
         places = [self._samples.places[index] for index in samples]
         if len({dataset for dataset, _ in places}) == 1:
             return self._compositors[places[0][0]].compose(patches, [place for _, place in places], view)
@@ -34,11 +36,11 @@ class JoinedCompositor:
 
 
 def check_joined(datasets: Sequence[Dataset[Any]]) -> None:
-    """Whether one set of patches fits them all.
+    """Checks that one set of patches fits all datasets.
 
     Raises:
-        DatasetError: they are of different tasks or pictures, or differ in their number of surfaces, or have none, or
-            one shows patches already: what networks say of it is no clean answer to begin with.
+        DatasetError: the datasets differ in task, picture size or number of surfaces, have no surface, or one already
+            shows patches, so that its pictures give no clean predictions.
     """
     first = datasets[0]
     facts = [_facts(dataset) for dataset in datasets]

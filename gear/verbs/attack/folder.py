@@ -1,4 +1,4 @@
-"""The folder that patches are made in: what is there already, what is left of another time, what goes in the end."""
+"""The folder of an attack: existing patches, leftovers of interrupted runs, and what is deleted at the end."""
 
 from __future__ import annotations
 
@@ -48,12 +48,12 @@ TOLD: Any = {
 
 
 def begin(root: Path, plan: Json, *, force: bool) -> Json | None:
-    """The notes of patches that are there already and whole, or nothing: then the plan is noted as begun.
+    """The record of patches that are there already and whole; or None, after the plan is recorded as begun.
 
     Raises:
-        OutdatedError: patches are there that were made, or begun, in the same way from other samples.
-        ReplaceableError: something else is there, or what is there is broken.
-        DatasetError: the disk refuses.
+        OutdatedError: the folder has patches made, or begun, in the same way from other samples.
+        ReplaceableError: the folder has something else, or something damaged.
+        DatasetError: the disk refuses to write.
     """
     check_output(root, "make patches in a folder of their own")
     finished, wanted = root / NOTES, json.loads(json.dumps(plan))
@@ -78,10 +78,10 @@ def begin(root: Path, plan: Json, *, force: bool) -> Json | None:
 
 
 def read_patches(root: Path) -> tuple[Patch, ...]:
-    """The exact values of patches that are there.
+    """The exact values of finished patches.
 
     Raises:
-        ReplaceableError: they are gone or damaged.
+        ReplaceableError: the file is missing or damaged.
     """
     path = root / EXACT
     try:
@@ -100,12 +100,12 @@ def tidy(root: Path) -> None:
 
 
 def _check_begun(root: Path, wanted: Json) -> None:
-    """Whether the checkpoint is not of patches that were begun in the same way from other samples.
+    """Checks that the checkpoint is not of patches begun in the same way from other samples.
 
-    What else it may be of is the checkpoint's to say: it has the hash of its plan.
+    Any other difference is found by `Recorder.resume`, which compares the hash of the plan.
 
     Raises:
-        OutdatedError: it is.
+        OutdatedError: the samples are others.
     """
     try:
         there = json.loads(read_bytes(root / BEGUN))
@@ -130,10 +130,10 @@ def _read_notes(path: Path) -> Json:
 
 
 def _check_whole(root: Path, notes: Json) -> None:
-    """Whether the notes say what is told of finished patches, and the pictures are those that they speak of.
+    """Checks that the record has the fields of finished patches, and that the pictures have the recorded hashes.
 
     Raises:
-        ReplaceableError: they do not, or a picture is another, or is gone.
+        ReplaceableError: a field is missing, or a picture is missing or another one.
     """
     try:
         for key, kind in TOLD.items():

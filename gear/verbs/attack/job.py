@@ -1,4 +1,4 @@
-"""What is attacked, with what and how: everything chosen and checked before anything is made."""
+"""An attack whose inputs are all looked up and checked before anything is computed."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from gear.verbs.attack.models import FLAG, check_attack, check_gradient, choose_
 from gear.verbs.attack.request import AttackRequest
 
 STEPS = 300
-"""Where neither steps nor queries are given."""
+"""Steps of an attack for which neither steps nor queries are given."""
 
 TRAINING = ("train", "finetuning", "debug")
 VALIDATION = ("val",)
@@ -39,20 +39,20 @@ VALIDATION = ("val",)
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Job:
-    """An attack that can be made.
+    """An attack with all inputs looked up and checked.
 
     Attributes:
-        datasets, validation: on whose samples patches are optimised, and judged.
-        task: of both.
-        surfaces: of each sample: so many patches are made.
-        models: what is attacked.
-        guard: the defense that the attack takes into account, with what it learns from.
-        found, spec: the attack.
-        options, config: of it, as given and as read.
-        compositor: by name.
+        datasets, validation: data on which patches are optimised, and validated.
+        task: name of their task.
+        surfaces: number of surfaces in each sample, which is the number of patches.
+        models: the attacked models.
+        guard: the defense that the attack is adaptive to, with its calibration data.
+        found, spec: plugin and spec of the attack.
+        options, config: options of the attack, as given and as read.
+        compositor: name of the compositor.
         steps, queries: the budget.
-        every, patience: steps between validations, and validations without a better one until the end.
-        seed: of everything that is drawn.
+        every, patience: steps between validations, and validations without improvement before the attack stops.
+        seed: seed of all random draws.
     """
 
     datasets: Sequence[Dataset[Any]]
@@ -73,7 +73,9 @@ class Job:
     seed: int
 
     def plan(self, weights_sha256: str | None, product: Any) -> Json:
-        """What decides the patches: who gives the same finds them made. Weights are those of the built network."""
+        """Everything that decides the patches: a run with an equal plan finds them made. Weights are those of the
+        built network.
+        """
         learnt = self.guard.calibration
         read = product.read_sha256() if isinstance(product, WithInputFiles) else None
         return {
@@ -102,10 +104,10 @@ class Job:
 
 
 def resolve(request: AttackRequest, on_fit_progress: Progress) -> Job:
-    """Opens, finds and checks everything that a request names.
+    """Opens, looks up and checks everything that a request names.
 
     Raises:
-        GearError: it is not there, or does not fit together.
+        GearError: something does not exist, or does not fit together.
     """
     allowed = request.allow_test_data
     datasets = open_all(request.data, _task_of(request.data), names=TRAINING, allow_test_data=allowed)
@@ -146,10 +148,10 @@ def resolve(request: AttackRequest, on_fit_progress: Progress) -> Job:
 
 
 def _usable(compositor: str, spec: AttackSpec[Any], datasets: Sequence[Dataset[Any]]) -> str:
-    """The one that is asked for; homography where transport lacks probes that the attack does not need.
+    """The compositor of the request; homography where transport lacks probes that the attack does not need.
 
     Raises:
-        DatasetError: the attack needs them.
+        DatasetError: the attack needs probes and there are none.
     """
     lacking = next((dataset for dataset in datasets if not dataset.plan.auxiliary), None)
     if compositor != "transport" or lacking is None:
@@ -175,10 +177,10 @@ def _facts(dataset: Dataset[Any]) -> Json:
 
 
 def _task_of(data: Sequence[str | Path]) -> str:
-    """The task of the first dataset that the paths mean.
+    """The task of the first dataset that the paths refer to.
 
     Raises:
-        DatasetError: there is none, or it does not say its task.
+        DatasetError: there is no dataset, or it does not record its task.
     """
     for path in data:
         for root in roots_of(root_and_split(path)[0]):

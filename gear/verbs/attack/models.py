@@ -1,4 +1,4 @@
-"""The attacked model: one, several together, or one behind a defense."""
+"""The attacked model: one, several together, or one guarded by a defense."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ FLAG = "--model-set "
 
 
 def choose_models(names: Sequence[str], settings: Iterable[str], datasets: Sequence[Dataset[Any]]) -> list[Chosen]:
-    """Every model with the same options, checked against the datasets.
+    """Looks up every model with the same options and checks it against the datasets.
 
     Raises:
-        GearError: there is no such model, an option does not fit, it is named twice, or it does another task.
+        GearError: a model does not exist, an option does not fit, a model is named twice, or it does another task.
     """
     if not names:
         raise GearError("name a model to attack: --model NAME (gear plugins --kind model lists them)")
@@ -42,7 +42,7 @@ def choose_models(names: Sequence[str], settings: Iterable[str], datasets: Seque
 
 
 def check_gradient(defense: Chosen | None, attack: AttackSpec[Any]) -> None:
-    """Checks that the defense, if there is one, lets the gradient pass that the attack needs.
+    """Checks that the defense, if there is one, passes on the gradient that the attack needs.
 
     Raises:
         GearError: it does not.
@@ -61,10 +61,11 @@ def check_gradient(defense: Chosen | None, attack: AttackSpec[Any]) -> None:
 def check_attack(
     found: PluginEntry, models: Sequence[Chosen], task: str, surfaces: int, queries: int | None
 ) -> AttackSpec[Any]:
-    """Whether the attack can do it.
+    """Checks that the attack supports what is asked of it.
 
     Raises:
-        GearError: it is for other tasks, for fewer surfaces, needs gradients that a model does not give, or queries.
+        GearError: the attack is for other tasks or for fewer surfaces, needs gradients that a model does not give, or
+            needs a budget of queries.
     """
     spec = found.spec
     assert isinstance(spec, AttackSpec)
@@ -87,7 +88,7 @@ def check_attack(
 
 
 def build_model(models: Sequence[Chosen], guard: OpenedGuard, seed: int) -> Model:
-    """What `Attack.optimise` is given; a defense that learns does so for each model anew."""
+    """The model for `Attack.optimise`. A defense that needs calibration is calibrated for each model separately."""
     built: dict[str, Model] = {}
     short = [chosen.found.spec.name for chosen in models]
     for chosen in models:
@@ -96,13 +97,13 @@ def build_model(models: Sequence[Chosen], guard: OpenedGuard, seed: int) -> Mode
         assert isinstance(spec, ModelSpec)
         if guard.defense is not None:
             model = _behind(guard.defense, model, spec.views, guard.calibration, seed)
-        # Two packages may each have a network of one name: both are attacked.
+        # Two packages may each have a network of the same name; both are attacked.
         built[spec.name if short.count(spec.name) == 1 else chosen.found.full_name] = model
     return next(iter(built.values())) if len(built) == 1 else Group(built)
 
 
 def _behind(defense: Chosen, model: Model, cameras: Sequence[str], calibration: Calibration, seed: int) -> Model:
-    """A model behind a defense, which learns from the calibration data when it is first asked."""
+    """A model guarded by a defense, which is calibrated when it is used for the first time."""
     product: Defense = build(defense.found, defense.options)
     spec = defense.found.spec
     assert isinstance(spec, DefenseSpec)

@@ -1,4 +1,4 @@
-"""What looks on while patches are made: curves, checkpoints, validation, early stopping."""
+"""Monitors an attack: curves, checkpoints, validation, early stopping."""
 
 from __future__ import annotations
 
@@ -37,24 +37,24 @@ Judge = Callable[[tuple[Patch, ...]], float]
 
 @dataclass(eq=False, kw_only=True)
 class Recorder:
-    """A `gear.contracts.attacks.Watch` that writes into the attack's folder.
+    """A `gear.contracts.attacks.Watch` that writes into the folder of the attack.
 
     Attributes:
         root: the folder.
-        key: of what is being made; a checkpoint of something else is refused.
-        steps: of the budget.
-        judge: harm of patches on samples that the attack does not see; None without validation.
-        every: steps between validations.
-        patience: validations without a better one until the attack is ended; 0 for never.
-        queries: of the budget, where they are what is counted.
-        told: of the steps done and of those in all; of queries where they are counted.
-        curves: values by name, one a step.
+        key: hash of the plan; a checkpoint with another key is refused.
+        steps: budget of steps.
+        judge: computes the harm of patches on samples that the attack does not see; None without validation.
+        every: steps between two validations.
+        patience: validations without improvement after which the attack stops; 0 for never.
+        queries: budget of queries, for attacks that count queries.
+        told: called with the finished and the allowed steps, or queries.
+        curves: values by name, one per step.
         judged: (step, harm) of every validation.
-        best: the patches that did most harm there.
-        is_asked: whether the attack pays it attention.
-        done: steps that it was told of, over all runs.
+        best: patches with the largest harm in a validation.
+        is_asked: whether the attack reads the answer of `step`.
+        done: finished steps, over all runs.
         stopped: why the attack ended before its budget.
-        seconds: spent so far, over all runs.
+        seconds: time spent so far, over all runs.
     """
 
     root: Path
@@ -78,11 +78,11 @@ class Recorder:
         self._queries_left: float | None = None
 
     def resume(self) -> State | None:
-        """The checkpoint's state, with curves and validations taken up again.
+        """Loads the checkpoint of an interrupted attack, with its curves and validations.
 
         Raises:
-            ReplaceableError: the checkpoint is of another attack.
-            DatasetError: it cannot be read.
+            ReplaceableError: the checkpoint belongs to another attack.
+            DatasetError: the checkpoint cannot be read.
         """
         self.is_asked = True
         path = self.root / CHECKPOINT
@@ -112,7 +112,9 @@ class Recorder:
         patches: Callable[[], tuple[Patch, ...]],
         state: Callable[[], State],
     ) -> bool:
-        """Notes the values, validates and saves when it is time; True where validation says that it is enough."""
+        """Records the values of a step, and validates and saves when it is time. Returns True when validation says
+        to stop.
+        """
         self.done = done
         for name, value in values.items():
             curve = self.curves.setdefault(name, [float("nan")] * (done - 1))
@@ -127,19 +129,19 @@ class Recorder:
         return bool(self.stopped)
 
     def tell(self, done: int, queries_left: float | None = None) -> None:
-        """Says how far it is: in queries where they are counted, in steps otherwise."""
+        """Reports the progress: in queries where they are counted, in steps otherwise."""
         if self.queries is None:
             self.on_progress(done, self.steps)
         else:
             self.on_progress(0 if queries_left is None else self.queries - int(queries_left), self.queries)
 
     def finish(self, done: int, last: tuple[Patch, ...]) -> None:
-        """Judges the last patches where that has not been done: queries may end an attack between two looks."""
+        """Validates the last patches if the attack ended between two validations, as a budget of queries may end it."""
         if self.judge is not None and (not self.judged or self.judged[-1][0] != done):
             self._validate(done, last)
 
     def save(self, done: int, state: State) -> None:
-        """Writes the checkpoint, whole or not at all; nothing for an attack that keeps no state."""
+        """Writes the checkpoint, whole or not at all; does nothing for an attack without state."""
         self._saved = time.monotonic()
         if not state:
             return
@@ -157,7 +159,7 @@ class Recorder:
         write_whole(self.root, CHECKPOINT, to_bytes(arrays, {"notes": json.dumps(notes)}))
 
     def clock(self) -> float:
-        """Seconds spent so far."""
+        """Seconds spent so far, over all runs."""
         now = time.monotonic()
         self.seconds, self._since = self.seconds + now - self._since, now
         return self.seconds
@@ -174,10 +176,10 @@ class Recorder:
 
 
 def _best(arrays: State, *, is_judged: bool) -> tuple[Patch, ...]:
-    """The patches of a checkpoint that did most harm; none before the first validation.
+    """The patches of a checkpoint with the largest harm; none before the first validation.
 
     Raises:
-        ValueError: something else is there.
+        ValueError: the arrays are no such checkpoint.
     """
     names = sorted((name for name in arrays if name.startswith(BEST)), key=surface_of)
     if is_judged and not names:
@@ -189,5 +191,5 @@ def _best(arrays: State, *, is_judged: bool) -> tuple[Patch, ...]:
 
 
 def _worth(harm: float) -> float:
-    """Harm that can be compared: what cannot be measured is worth less than all that can."""
+    """The harm as a number that can be compared; harm that could not be measured is below all measured harm."""
     return -math.inf if math.isnan(harm) else harm

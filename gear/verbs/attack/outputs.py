@@ -1,4 +1,4 @@
-"""A patch folder: pictures to print, exact values, what was done."""
+"""The files of a patch folder: pictures to print, exact values, and a record of the attack."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def write_patches(root: Path, patches: Sequence[Patch], notes: Json) -> None:
 
 
 def as_picture(patch: Patch) -> UInt8Image:
-    """(H, W, 3) uint8, as it is printed."""
+    """A patch as a (H, W, 3) uint8 sRGB picture to print."""
     return np.asarray(np.floor(np.clip(patch.rgb, 0, 1) * 255 + 0.5).astype(np.uint8))
 
 
@@ -68,7 +68,9 @@ def write_curves(
 
 
 def write_samples(root: Path, pairs: Sequence[tuple[UInt8Image, UInt8Image]]) -> None:
-    """Writes `figures/samples.png`: pictures before and after, side by side, one pair a row; large ones are shrunk."""
+    """Writes `figures/samples.png`: pairs of pictures without and with the patches, one pair per row; large
+    pictures are resized.
+    """
     rows = [np.concatenate([_shown(picture) for picture in pair], axis=1) for pair in pairs]
     if rows:
         write_whole(root, "figures/samples.png", encode_rgb(np.ascontiguousarray(np.concatenate(rows))))
@@ -83,7 +85,7 @@ def _shown(picture: UInt8Image) -> UInt8Image:
 
 
 def _smoothed(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Steps and a running mean over a twentieth of them."""
+    """Steps, and a moving average over a twentieth of them."""
     known = np.isfinite(values)
     width = max(1, int(known.sum()) // 20)
     kernel = np.ones(width) / width

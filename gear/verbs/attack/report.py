@@ -1,4 +1,4 @@
-"""What an attack did."""
+"""The result of an attack."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from gear.values.serial import Json
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class AttackReport:
-    """What an attack did.
+    """The result of an attack.
 
     Attributes:
         out: the patch folder.
-        patches: one a surface.
-        facts: `attack.json`.
-        made: whether this run made them; False where they were there already.
+        patches: patches, one per surface.
+        facts: content of `attack.json`.
+        made: whether this run made the patches; False where they were there already.
     """
 
     out: Path
@@ -26,7 +26,7 @@ class AttackReport:
     made: bool
 
     def summary(self) -> str:
-        """A few lines for a person."""
+        """The result as a few lines of text."""
         done = self.facts["steps_done"]
         lines = [
             f"{self.out}: {len(self.patches)} patch{'es' * (len(self.patches) > 1)} after {done} steps"

@@ -1,4 +1,4 @@
-"""`gear.attack`: resolves, optimises, writes a patch folder."""
+"""`gear.attack`: resolves a request, optimises patches, writes a patch folder."""
 
 from __future__ import annotations
 
@@ -46,15 +46,15 @@ Paths = str | Path | Sequence[str | Path]
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Made:
-    """What an optimisation came to.
+    """The result of an optimisation.
 
     Attributes:
-        patches: the best on the validation samples, or the last.
-        settings: of the attack, with what the task decides.
-        seen: what was optimised on.
-        objective: what was made large there.
-        recorder: what looked on.
-        steps_done: so many.
+        patches: the best patches in validation, or the last ones.
+        settings: settings of the attack, completed by the task.
+        seen: samples that were optimised on.
+        objective: the objective that was maximised.
+        recorder: monitor of the attack.
+        steps_done: number of steps.
     """
 
     patches: tuple[Patch, ...]
@@ -149,7 +149,7 @@ def attack(
 
 
 def unit_of(request: AttackRequest) -> str:
-    """What an attack's progress counts."""
+    """The unit of an attack's progress: steps or queries."""
     return "step" if request.queries is None else "query"
 
 
@@ -195,16 +195,16 @@ def _warn(job: Job, on_warning: Warn) -> None:
 
 
 def _asked(job: Job) -> list[PluginEntry]:
-    """Whose code the attack asks."""
+    """The plugins whose code runs in the attack, for error messages."""
     return [one.found for one in (*job.models, job.guard.defense) if one is not None]
 
 
 def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, on_progress: Progress) -> _Made:
-    """Has the attack make its patches, and sees to it that it keeps its promises.
+    """Runs the attack and checks its result.
 
     Raises:
-        PluginError: it does not.
-        GearError: it has nothing to begin with.
+        PluginError: the attack breaks its contract.
+        GearError: there are no samples to begin with.
     """
     cache, device = Cache[Prepared](CACHE_BYTES), device_name(network)
     seen, held = (Scenes(group, job.compositor, device, cache) for group in (job.datasets, job.validation))
@@ -252,7 +252,7 @@ def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, o
 
 
 def _facts(job: Job, network: Model, plan: Json, made: _Made) -> Json:
-    """What is written beside the patches."""
+    """The content of `attack.json`."""
     recorder, done = made.recorder, made.steps_done
     seconds = recorder.clock()
     promised, kept = (0.0, 0.0) if job.spec.is_control else made.seen.masking(network, made.objective, made.patches)

@@ -1,4 +1,4 @@
-"""Samples with their compositor, and what patches do to them."""
+"""Samples with their compositor, and the effect of patches on them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SHOWN = 3
 
 
 class Scenes:
-    """Samples with their compositor."""
+    """Samples with the compositor that puts patches into them."""
 
     def __init__(self, datasets: Sequence[Dataset[Any]], compositor: str, device: str, cache: Cache[Prepared]) -> None:
         """Args:
@@ -44,28 +44,30 @@ class Scenes:
         )
 
     def harm(self, model: Model, objective: Objective, patches: Sequence[Patch]) -> float:
-        """Mean of the objective over the samples, the patches as they are."""
+        """Mean of the objective over the samples, for patches without random transforms."""
         tensors = [torch.from_numpy(patch.rgb.copy()).permute(2, 0, 1) for patch in patches]
         with torch.no_grad(), frozen(model):
             values = [float(self.value(model, objective, tensors, [index])) for index in range(len(self.samples))]
         return float(np.mean(values))
 
     def value(self, model: Model, objective: Objective, patches: Sequence[Tensor], indexes: Sequence[int]) -> Tensor:
-        """The objective of some samples as one number."""
+        """Mean of the objective over some of the samples."""
         samples = [self.samples[index] for index in indexes]
         views = {view: self.compositor.compose(patches, indexes, view) for view in samples[0].images}
         numbers = counted(objective, model, views, samples, indexes)
         return torch.stack(numbers).sum() if numbers else torch.zeros(())
 
     def masking(self, model: Model, objective: Objective, patches: Sequence[Patch]) -> tuple[float, float]:
-        """What the gradient promises at the patches, and what is kept."""
+        """The change that the gradient at the patches predicts for a small step, and the change that the step
+        causes.
+        """
         indexes = list(range(min(SHOWN, len(self.samples))))
         tensors = [torch.from_numpy(patch.rgb.copy()).permute(2, 0, 1) for patch in patches]
         with frozen(model):
             return promised_and_kept(lambda changed: self.value(model, objective, changed, indexes), tensors)
 
     def pairs(self, patches: Sequence[Patch]) -> list[tuple[UInt8Image, UInt8Image]]:
-        """A few pictures as they are and with the patches in them."""
+        """A few pictures without and with the patches."""
         tensors = [torch.from_numpy(patch.rgb.copy()).permute(2, 0, 1) for patch in patches]
         found = []
         for index in np.linspace(0, len(self.samples) - 1, min(SHOWN, len(self.samples))).astype(int).tolist():

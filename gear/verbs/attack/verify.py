@@ -1,4 +1,4 @@
-"""The rendered check of an attack: its patches in the world, on samples that it did not see."""
+"""The rendered check of an attack: its patches rendered in the world, on samples that the attack did not see."""
 
 from __future__ import annotations
 
@@ -22,11 +22,12 @@ from gear.verbs.attack.request import VerifyRequest
 
 
 def check_held_out(data: Sequence[str | Path], held: str | Path, val: Sequence[str | Path] = ()) -> None:
-    """Whether a dataset is there, has probes and no patch, fits the patches, and shows none of the scenes that they are
-    made on, or chosen by.
+    """Checks that a dataset exists, has probes, no patch and as many surfaces as patches, and shows no scene on
+    which the
+    patches were optimised or validated.
 
     Raises:
-        GearError: it is not.
+        GearError: one of these does not hold.
     """
     wanted = open_dataset(*root_and_split(held))
     if not wanted.plan.auxiliary:
@@ -45,9 +46,11 @@ def check_held_out(data: Sequence[str | Path], held: str | Path, val: Sequence[s
 
 
 def verify(request: VerifyRequest, callbacks: Callbacks) -> dict[str, GapReport]:
-    """Renders a patch folder on a held-out dataset, and compares pictures and effect, digital and rendered.
+    """Renders a patch folder on a held-out dataset, and compares pictures and effect of composed and rendered
+    patches.
 
-    A defense draws what it draws from the attack's seed, so that one that learns is the one that was attacked.
+    A defense draws its random numbers from the seed of the attack, so that a calibrated defense is the one that was
+    attacked.
 
     Under `out/verify/<scene>-<split>-<hash>`, one folder per dataset, lie for each model `<model>/gap.json` and
     `gap.txt`, and beside those of the first model the rendered twin.
