@@ -1,1 +1,1 @@
-"""Digital patches against rendered ones: pictures, and the effect on a model."""
+"""Comparison of composed and rendered patches: as pictures, and by their effect on a model."""

@@ -1,4 +1,4 @@
-"""What patches do to a model, digitally and rendered: one evaluator for each way of showing them."""
+"""The effect of patches on a model, composed and rendered: one evaluator for each way of showing them."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ Metrics = Mapping[str, float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SampleEffect:
-    """What patches change of one sample's own metrics.
+    """The effect of patches on the metrics of one sample.
 
     Attributes:
-        index: which sample.
-        clean: its metrics without a patch; those that a single sample has.
-        change: what is added to them, by compositor's name and `rendered`; NaN where either metric is.
+        index: index of the sample.
+        clean: its metrics without a patch, as far as single samples have metrics.
+        change: their changes, by name of the compositor and `rendered`; NaN where either value is NaN.
     """
 
     index: int
@@ -46,11 +46,11 @@ class Effect:
     """The task's metric on clean, composed and rendered pictures of the same samples.
 
     Attributes:
-        player: the model, behind its defense if there is one.
-        plan: of the dataset.
-        evaluators: by `clean`, a compositor's name, or `rendered`.
-        metric: of the task, the one that is to be looked at first.
-        samples: of those taken in so far.
+        player: the model, guarded by its defense if there is one.
+        plan: plan of the dataset.
+        evaluators: evaluators by `clean`, name of the compositor, or `rendered`.
+        metric: the task's main metric.
+        samples: effects of the samples so far.
     """
 
     player: Player
@@ -61,12 +61,13 @@ class Effect:
 
     @staticmethod
     def of(request: GapRequest, dataset: Dataset[Any], callbacks: Callbacks) -> Effect:
-        """For the model of a request, behind its defense if there is one; warns of what the user may not have meant.
+        """The effect for the model of a request, guarded by its defense if there is one; warns of what may be
+        unintended.
 
         Raises:
             UnknownNameError: there is no such model or defense.
-            GearError: it is not made for the dataset's task, or the defense does not suit it.
-            ConfigError: its options cannot be read.
+            GearError: the model is of another task, or the defense does not suit it.
+            ConfigError: an option cannot be read.
         """
         assert request.model is not None
         chosen = chosen_model(request.model, request.model_settings)
@@ -89,7 +90,7 @@ class Effect:
         )
 
     def update(self, index: int, clean: Any, shown: Mapping[str, Any]) -> None:
-        """Takes in one sample: untouched, and with patches, by compositor and rendered."""
+        """Adds one sample: its clean picture, the composed ones and the rendered one."""
         alone: dict[str, Metrics] = {}
         for name, sample in {CLEAN: clean, **shown}.items():
             (answer,) = self.player.play([sample.images], [index])
@@ -102,5 +103,5 @@ class Effect:
         self.samples.append(SampleEffect(index=index, clean=before, change=change))
 
     def result(self) -> dict[str, Metrics]:
-        """The metric of each."""
+        """The metrics by `clean`, name of the compositor, and `rendered`."""
         return {name: said_of(self.plan, one.result(), "result") for name, one in self.evaluators.items()}

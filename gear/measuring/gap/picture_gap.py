@@ -1,4 +1,4 @@
-"""How far two pictures are apart where a patch is seen, and elsewhere."""
+"""The difference between two pictures, inside the visible patch and outside."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from gear.values.ground_truth import SurfaceTruth
 Mask = npt.NDArray[np.bool_]
 
 PERFECT_DB = 99.0
-"""What equal pictures are given instead of infinity."""
+"""PSNR that is reported for equal pictures instead of infinity."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PictureGap:
-    """Digital against rendered, in one picture.
+    """The difference between the composed and the rendered picture.
 
     Attributes:
-        psnr_db: over the pixels that show a patch; sRGB bytes, at most `PERFECT_DB`.
+        psnr_db: peak signal-to-noise ratio over the pixels that show a patch, on sRGB bytes; at most `PERFECT_DB`.
         worst: largest difference there, in levels of 255.
-        outside_rms: root mean square over all other pixels, in levels.
+        outside_rms: root mean square difference over all other pixels, in levels.
         outside_worst: largest difference there.
-        outside_px: other pixels that differ at all.
+        outside_px: number of other pixels that differ.
     """
 
     psnr_db: float
@@ -39,7 +39,7 @@ class PictureGap:
 
 
 def visible_mask(surfaces: Sequence[SurfaceTruth], view: str, height_px: int, width_px: int) -> Mask:
-    """(H, W) where a view shows any of the surfaces, by ids."""
+    """(H, W) bool: the pixels of a view that show any of the surfaces, by the id buffer."""
     mask = np.zeros((height_px, width_px), np.bool_)
     for surface in surfaces:
         if surface.camera == view and surface.visible_px:
@@ -48,7 +48,7 @@ def visible_mask(surfaces: Sequence[SurfaceTruth], view: str, height_px: int, wi
 
 
 def picture_gap(digital: UInt8Image, rendered: UInt8Image, mask: Mask) -> PictureGap:
-    """Compares (H, W, 3) pictures inside and outside a mask that is not empty."""
+    """Compares two (H, W, 3) uint8 pictures inside and outside a (H, W) mask that is not empty."""
     difference = np.abs(digital.astype(np.int16) - rendered)
     inside, outside = difference[mask], difference[~mask]
     return PictureGap(
@@ -61,5 +61,5 @@ def picture_gap(digital: UInt8Image, rendered: UInt8Image, mask: Mask) -> Pictur
 
 
 def psnr_db(mean_square: float) -> float:
-    """Peak signal to noise ratio of a mean squared difference in levels of 255."""
+    """Peak signal-to-noise ratio in dB of a mean squared difference in levels of 255."""
     return min(PERFECT_DB, 10 * math.log10(255**2 / mean_square)) if mean_square > 0 else PERFECT_DB

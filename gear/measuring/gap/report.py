@@ -1,4 +1,4 @@
-"""What a run of `gap` found, as JSON and as a table."""
+"""The results of a comparison of composed and rendered patches, as JSON and as a table."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from gear.measuring.gap.picture_gap import PictureGap
 from gear.values.serial import Json, to_json
 
 UNMOVED = 1e-9
-"""Changes of a metric below this are none; no share of them is taken."""
+"""Smaller changes of a metric count as no change, so that no share of them is computed."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SampleGap:
-    """One picture that shows a patch.
+    """The comparison of one picture that shows a patch.
 
     Attributes:
-        index, view: which picture.
-        visible_px: pixels that show a patch.
-        distance_m: to the nearest surface that is seen.
-        incidence_deg: the largest slant of those.
-        gaps: by compositor.
+        index, view: index of the sample and name of its camera.
+        visible_px: number of pixels that show a patch.
+        distance_m: distance to the nearest visible surface.
+        incidence_deg: largest angle between line of sight and normal among the visible surfaces.
+        gaps: differences by name of the compositor.
     """
 
     index: int
@@ -38,18 +38,18 @@ class SampleGap:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GapReport:
-    """Digital against rendered.
+    """The comparison of composed and rendered patches on a split.
 
     Attributes:
-        dataset, twin: roots.
-        split, patch, renderer, quality: of both.
-        samples: pictures that show a patch; others have no gap.
-        effect: the task's metric by `clean`, compositor and `rendered`; empty without a model.
-        sample_effects: what patches change of single samples' metrics, by sample.
-        metric: the task's own, that a table shows by sample, or another where single samples do not have it.
-        model: whose effect it is.
-        defense: that it stands behind.
-        seed: of what the defense draws.
+        dataset, twin: roots of both datasets.
+        split, patch, renderer, quality: properties of both.
+        samples: pictures that show a patch; other pictures have no gap.
+        effect: the task's metrics by `clean`, compositor and `rendered`; empty without a model.
+        sample_effects: changes of the metrics of single samples.
+        metric: metric that the table shows by sample.
+        model: name of the model.
+        defense: name of the defense that guards it.
+        seed: seed of the defense's random draws.
     """
 
     dataset: str
@@ -67,17 +67,19 @@ class GapReport:
     seed: int = 0
 
     def median_db(self, compositor: str) -> float:
-        """Over all pictures; NaN where none shows a patch."""
+        """Median PSNR over all pictures in dB; NaN where none shows a patch."""
         values = [sample.gaps[compositor].psnr_db for sample in self.samples]
         return float(np.median(values)) if values else math.nan
 
     @property
     def compositors(self) -> tuple[str, ...]:
-        """Their names."""
+        """The names of the compositors."""
         return tuple(self.samples[0].gaps) if self.samples else ()
 
     def kept(self, compositor: str) -> dict[str, float]:
-        """Rendered change of each metric as a share of the digital one; metrics that the patch does not move lack."""
+        """Rendered change of each metric as a share of the composed change; metrics that the patch does not change
+        are left out.
+        """
         if not self.effect:
             return {}
         clean, digital, rendered = self.effect[CLEAN], self.effect[compositor], self.effect[RENDERED]
@@ -88,14 +90,14 @@ class GapReport:
         }
 
     def as_json(self) -> Json:
-        """Everything; metrics that are not finite become null."""
+        """The whole report as JSON; null for metrics that are not finite."""
         content = to_json(self)
         content["median_psnr_db"] = {name: self.median_db(name) for name in self.compositors}
         content["rendered_share_of_digital_effect"] = {name: self.kept(name) for name in self.compositors}
         return _finite(content)
 
     def table(self) -> str:
-        """For a person."""
+        """The report as a table of plain text."""
         names = self.compositors
         lines = [f"{self.dataset} {self.split}: {self.patch}, {self.renderer} {self.quality}; PSNR inside the patch"]
         head = f"{'sample':>6} {'view':8}{'pixels':>8}{'m':>6}{'slant':>6}"
@@ -115,7 +117,7 @@ class GapReport:
         return self.metric if self.metric in known else next(iter(known), "")
 
     def _sample_lines(self) -> list[str]:
-        """Changes of one metric, sample by sample, and their means over the samples that have it."""
+        """Rows with the changes of one metric by sample, and their means over the samples that have it."""
         metric = self.shown_metric()
         if not metric:
             return []
@@ -147,7 +149,7 @@ class GapReport:
         return lines
 
     def summary(self) -> str:
-        """One line for a person."""
+        """The report in one line."""
         found = ", ".join(f"{name} {self.median_db(name):.1f} dB" for name in self.compositors)
         return f"{len(self.samples)} pictures with a patch: {found or 'none'}"
 
@@ -157,7 +159,7 @@ def _cells(gap: PictureGap) -> str:
 
 
 def _numbers(values: Sequence[float]) -> str:
-    """A sample's metric and its changes; `-` where there is none."""
+    """A sample's metric and its changes as text; `-` where there is none."""
     first, *changes = [
         f"{value:{sign}.4f}" if math.isfinite(value) else "-"
         for sign, value in zip(["", *"+" * (len(values) - 1)], values, strict=True)

@@ -1,4 +1,4 @@
-"""The rendered twin of a split: found, or collected from what its manifest says."""
+"""The rendered twin of a split: an existing one, or one collected from the recipe in the manifest."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from gear.values.errors import ConfigError, DatasetError, UnknownNameError
 
 
 def check_clean(clean: Dataset[Any]) -> None:
-    """Whether a split can stand for what is there without a patch.
+    """Checks that a split shows no patch.
 
     Raises:
         DatasetError: it shows one.
@@ -39,19 +39,19 @@ def collect_twin(
     town: str | Path | None = None,
     scenes: str | Path | None = None,
 ) -> None:
-    """Collects a split's twin with a patch, or completes it.
+    """Collects the twin of a split with a patch, or completes it.
 
     Args:
-        clean: the split.
-        patch: what to show.
-        root: of the twin.
-        samples: at least so many of the first ones, whole sequences of them; all unless given.
-        town, scenes: files of the town and of its scene library (`FILE`, or `FILE:SCENE`), where they were given by
-            path: a dataset holds no paths of the machine that it was made on.
+        clean: the split without a patch.
+        patch: patch to show.
+        root: root of the twin.
+        samples: number of samples from the first one on, rounded up to whole sequences; all by default.
+        town, scenes: files of the town and of its scene library (`FILE`, or `FILE:SCENE`) of a town that does not come
+            with gear, because a dataset records no paths of the machine that made it.
 
     Raises:
         PatchError: the patch cannot be used.
-        DatasetError: with these files and versions the same scenes cannot be made again.
+        DatasetError: the same scenes cannot be made with these files and versions.
     """
     wanted = clean.plan.samples if samples is None else min(samples, clean.plan.samples)
     there = read_plan(root, clean.plan.info.split)

@@ -1,4 +1,4 @@
-"""From single samples to datasets, and from datasets to what their patches change."""
+"""Metrics of datasets from their samples, and the difference that patches make between twins."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ Street = tuple[str, int, int]
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Measured:
-    """One dataset, sample by sample.
+    """One dataset with the scores of its samples.
 
     Attributes:
-        name: of its folder.
-        dataset: itself.
-        scorer: that measured it.
-        notes: of its samples, in order.
-        streets: that they show. Samples of one street are no independent ones.
-        made: how many of them were predicted now.
-        damaged: what was kept of some of them and could not be read.
-        known: metrics that were gathered already, by report and number of samples: gathering takes long.
+        name: name of its folder in the evaluation.
+        dataset: the dataset.
+        scorer: scorer of its samples.
+        notes: stored scores of the samples, in order.
+        streets: the street that each sample shows; samples of one street are not independent.
+        made: number of samples predicted in this run.
+        damaged: one line per stored prediction that could not be read.
+        known: metrics gathered before, by report and number of samples, because gathering takes long.
     """
 
     name: str
@@ -54,7 +54,7 @@ class Measured:
     known: dict[tuple[str, int], Metrics] = field(default_factory=dict, repr=False)
 
     def gathered(self, report: str, count: int | None = None) -> Metrics:
-        """One report over the first `count` samples, by default over all."""
+        """The metrics of one report over the first `count` samples; over all by default."""
         notes = self.notes[:count]
         key = (report, len(notes))
         if key not in self.known:
@@ -68,17 +68,19 @@ class Measured:
 
     @property
     def patch(self) -> str:
-        """Label of what its surfaces show."""
+        """Label of the patch that the dataset shows."""
         return self.dataset.plan.info.patch_label
 
 
 def streets_of(dataset: Dataset[Any]) -> list[Street]:
-    """Of each sample: no weather, renderer or patch decides where the cars are."""
+    """The street of each sample. Weather, renderer and patch do not decide where the cars stand, so they are left
+    out.
+    """
     return [(*scenes_of(dataset), number) for number in range(len(dataset))]
 
 
 def row_report(row: Measured) -> RowReport:
-    """Metrics, intervals and costs of one dataset."""
+    """Metrics, intervals and times of one dataset."""
     notes = row.notes
     plan = row.dataset.plan
     return RowReport(
@@ -104,14 +106,14 @@ def row_report(row: Measured) -> RowReport:
 
 
 def mean_cost(notes: Sequence[Note]) -> dict[str, float]:
-    """Seconds a sample: `model_s`, `defense_s`."""
+    """Mean seconds per sample: `model_s`, `defense_s`."""
     return {key: float(np.mean([note.cost[key] for note in notes])) for key in ("model_s", "defense_s")}
 
 
 def mask_means(notes: Sequence[Note], *, has_patch: bool) -> dict[str, float]:
-    """Metrics of the defense's masks, as far as there are any.
+    """Mean metrics of the masks of a defense, for a defense that gives masks.
 
-    Without a patch there is nothing to be found, only something to be covered by mistake.
+    Without a patch there is nothing to find, and only what is masked by mistake counts.
     """
     masks = [note.mask for note in notes if note.mask is not None]
     keys = [key for key in (masks[0] if masks else {}) if key == "mask_area" or has_patch]
@@ -119,7 +121,7 @@ def mask_means(notes: Sequence[Note], *, has_patch: bool) -> dict[str, float]:
 
 
 def drive_note(dataset: Dataset[Any]) -> str | None:
-    """One line where samples are frames of drives, which intervals and tests take for scenes of their own."""
+    """One line about samples that are frames of drives, which intervals and tests treat as scenes of their own."""
     last = dataset.sidecar(-1).record
     if not last.frame:
         return None
@@ -131,7 +133,7 @@ def drive_note(dataset: Dataset[Any]) -> str | None:
 
 
 def together(rows: Sequence[Measured]) -> Iterable[Together]:
-    """Datasets of several scenes or weathers with patches of one label, as if they were one dataset."""
+    """Datasets of several scenes or weathers with patches of one label, counted as one dataset."""
     labelled: dict[str, list[Measured]] = {}
     for row in rows:
         labelled.setdefault(row.patch, []).append(row)
@@ -148,7 +150,7 @@ def together(rows: Sequence[Measured]) -> Iterable[Together]:
 
 
 def metrics_of(row: Measured) -> dict[str, dict[str, Estimate]]:
-    """Metrics over all samples, with their intervals."""
+    """Metrics over all samples with their intervals."""
     metrics = {}
     for report in row.scorer.reports:
         one = row.gathered(report)
@@ -160,14 +162,16 @@ def metrics_of(row: Measured) -> dict[str, dict[str, Estimate]]:
 
 
 def as_one(name: str, members: Sequence[Measured]) -> Measured:
-    """Several datasets as if they were one of this name; what is not a sample's is the first one's."""
+    """Several datasets as one with the given name; what belongs to a dataset, not to a sample, is taken from the
+    first.
+    """
     notes = [note for row in members for note in row.notes]
     streets = [street for row in members for street in row.streets]
     return replace(members[0], name=name, notes=notes, streets=streets, known={})
 
 
 def compared(rows: Sequence[Measured], seed: int) -> Iterable[Difference]:
-    """Every patched dataset against its twins without a patch and with a random one."""
+    """The differences of every patched dataset to its twins without a patch and with a random one."""
     for row in rows:
         for control in CONTROLS[: CONTROLS.index(row.patch) if row.patch in CONTROLS else len(CONTROLS)]:
             for other in rows:
@@ -176,7 +180,7 @@ def compared(rows: Sequence[Measured], seed: int) -> Iterable[Difference]:
 
 
 def difference(row: Measured, other: Measured, seed: int) -> Difference:
-    """What samples of one become in their twins, as far as both have them."""
+    """The difference between twins over the samples that both have."""
     count = min(len(row.notes), len(other.notes))
     here, there, streets = row.notes[:count], other.notes[:count], row.streets[:count]
     return Difference(
@@ -202,7 +206,7 @@ def _paired(one: Metrics, other: Metrics) -> dict[str, Estimate]:
 def _tested(
     here: list[Note], there: list[Note], streets: list[Street], report: str, seed: int
 ) -> dict[str, PairedTest]:
-    """Of every metric that a single sample of the report has."""
+    """Paired tests of every metric that single samples of the report have."""
     names = list(dict.fromkeys(name for note in here for name in note.metrics[report]))
     ours, theirs = (
         np.array([[note.metrics[report].get(name, np.nan) for name in names] for note in notes], np.float64)

@@ -1,4 +1,4 @@
-"""Several datasets counted as one, whose patches differ from scene to scene but are of one kind."""
+"""Pools: several datasets counted as one, whose patches differ from scene to scene but are of one kind."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ Pools = Mapping[str, Sequence[str | Path]]
 
 
 def check_pools(pools: Pools, roots: Iterable[Path]) -> None:
-    """Whether pools hold what is evaluated, and some of it.
+    """Checks that every pool names datasets of the evaluation.
 
     Raises:
-        GearError: one is empty, names a dataset twice, or one that is not among the data, or is there in several
-            splits.
+        GearError: a pool is empty, names a dataset twice, or names one that is not among the data or is there in
+            several splits.
     """
     known = Counter(root.resolve() for root in roots)
     for name, members in pools.items():
@@ -36,7 +36,7 @@ def check_pools(pools: Pools, roots: Iterable[Path]) -> None:
 
 
 def pooled(rows: Sequence[Measured], pools: Pools, seed: int) -> Iterable[Pool]:
-    """Each pool, against those without a patch (`none`) and with a random one (`random`) that show the same scenes."""
+    """Each pool with its differences to the pools `none` and `random`, where these show the same scenes."""
     by_root = {row.dataset.root.resolve(): row for row in rows}
     found = {name: [by_root[Path(root).resolve()] for root in members] for name, members in pools.items()}
     wholes = {name: as_one(name, members) for name, members in found.items()}

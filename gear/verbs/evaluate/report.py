@@ -1,4 +1,4 @@
-"""What an evaluation found, as values, JSON and a table."""
+"""The results of an evaluation, as values and JSON."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from gear.values.serial import Json
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate:
-    """A metric with its bounds of 95 %.
+    """A metric with its 95 % interval.
 
     Attributes:
-        value: NaN where nothing counts.
-        interval: bounds by bootstrap over samples, or None.
-        ceiling: what perfect predictions of the same samples would come to, for metrics that count up to 1.
+        value: the metric; NaN where there is nothing to measure.
+        interval: lower and upper bound, or None.
+        ceiling: value of perfect predictions on the same samples, for metrics of at most 1.
     """
 
     value: float
@@ -26,7 +26,7 @@ class Estimate:
     ceiling: float = 1.0
 
     def as_json(self) -> Json:
-        """null for what is not finite; the ceiling is left out where it is 1."""
+        """As JSON; null for values that are not finite, and no ceiling where it is 1."""
         low, high = self.interval or (math.nan, math.nan)
         value = known_json({"value": self.value, "low": low, "high": high})
         return value | ({"ceiling": self.ceiling} if self.ceiling < 1 else {})
@@ -38,19 +38,19 @@ Metrics = Mapping[str, Mapping[str, Estimate]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RowReport:
-    """One dataset.
+    """The results of one dataset.
 
     Attributes:
-        name: folder of the row in the evaluation.
+        name: name of its folder in the evaluation.
         dataset: root of the dataset.
         facts: its split, town, scene, weather, patch and keys; JSON.
-        samples: how many it has.
-        made: how many of them this run predicted.
-        damaged: what a former run had kept and could not be read; a line for each sample that was predicted again.
-        metrics: over all samples.
-        cost: mean seconds a sample: `model_s`, `defense_s`.
-        defense: mean metrics of the defense's mask; empty without one.
-        per_sample: each sample's own metrics; JSON.
+        samples: number of samples.
+        made: number of samples predicted in this run.
+        damaged: one line per stored prediction that could not be read and was made again.
+        metrics: metrics over all samples.
+        cost: mean seconds per sample: `model_s`, `defense_s`.
+        defense: mean metrics of the defense's masks; empty without a defense.
+        per_sample: metrics of each single sample; JSON.
     """
 
     name: str
@@ -66,11 +66,11 @@ class RowReport:
 
     @property
     def patch(self) -> str:
-        """`none`, `random`, or the patch's name and hash."""
+        """The label of the dataset's patch: `none`, `random`, or a name with a hash."""
         return str(self.facts["patch"])
 
     def as_json(self) -> Json:
-        """As written into results.json."""
+        """The entry of the row in results.json."""
         return {
             "name": self.name,
             "dataset": self.facts,
@@ -84,13 +84,13 @@ class RowReport:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Together:
-    """Several datasets with patches of one label as one.
+    """Several datasets with patches of one label, counted as one.
 
     Attributes:
-        patch: the label.
-        rows: names of their rows.
-        samples: of all of them.
-        metrics: over all samples.
+        patch: label of the patches.
+        rows: names of the datasets' rows.
+        samples: number of samples of all of them.
+        metrics: metrics over all samples.
     """
 
     patch: str
@@ -99,7 +99,7 @@ class Together:
     metrics: Metrics
 
     def as_json(self) -> Json:
-        """As written into results.json."""
+        """The entry in results.json."""
         return {
             "patch": self.patch,
             "rows": list(self.rows),
@@ -110,12 +110,12 @@ class Together:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairedTest:
-    """Whether the samples' own metrics differ between twins by more than chance.
+    """A paired test of a metric that single samples have, between twins.
 
     Attributes:
-        mean: of the differences, over the pairs; NaN without any.
-        p: two-sided, by `gear.measuring.statistics.paired_p`; NaN without pairs.
-        pairs: samples that have a metric in both.
+        mean: mean difference over the pairs; NaN without pairs.
+        p: two-sided p-value of `gear.measuring.statistics.paired_p`; NaN without pairs.
+        pairs: number of samples with a value in both datasets.
     """
 
     mean: float
@@ -123,19 +123,20 @@ class PairedTest:
     pairs: int
 
     def as_json(self) -> Json:
-        """null for NaN."""
+        """As JSON; null for NaN."""
         return {**known_json({"mean": self.mean, "p": self.p}), "pairs": self.pairs}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
-    """One dataset against its twin, sample by sample.
+    """The difference between a dataset and its twin, sample by sample.
 
     Attributes:
-        row, against: names of the rows; what is said is `row` minus `against`.
-        metrics: of the differences.
-        auroc: how well the defense's score tells the rows apart, or None without scores.
-        paired: tests of the metrics that single samples have, by report, then by metric.
+        row, against: names of the rows; differences are `row` minus `against`.
+        metrics: differences of the metrics.
+        auroc: area under the ROC curve of the defense's score as a detector of `row` among both, or None without
+            scores.
+        paired: tests of the metrics that single samples have, by report and metric.
     """
 
     row: str
@@ -145,7 +146,7 @@ class Difference:
     paired: Mapping[str, Mapping[str, PairedTest]]
 
     def as_json(self) -> Json:
-        """As written into results.json."""
+        """The entry of the difference in results.json."""
         return {
             "row": self.row,
             "against": self.against,
@@ -159,15 +160,15 @@ class Difference:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pool:
-    """Several datasets counted as one, by whoever evaluates them.
+    """Several datasets counted as one at the user's request.
 
     Attributes:
-        name: of the pool.
+        name: name of the pool.
         rows: names of the datasets' rows.
-        samples: of all of them.
-        metrics: over all samples.
-        cost: mean seconds a sample: `model_s`, `defense_s`.
-        defense: mean metrics of the defense's mask; empty without one.
+        samples: number of samples of all of them.
+        metrics: metrics over all samples.
+        cost: mean seconds per sample: `model_s`, `defense_s`.
+        defense: mean metrics of the defense's masks; empty without a defense.
         differences: to the pools `none` and `random`, where these show the same scenes; `row` and `against` name pools.
     """
 
@@ -180,7 +181,7 @@ class Pool:
     differences: tuple[Difference, ...]
 
     def as_json(self) -> Json:
-        """As written into results.json."""
+        """The entry of the pool in results.json."""
         return {
             "name": self.name,
             "rows": list(self.rows),
@@ -194,15 +195,15 @@ class Pool:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EvaluateReport:
-    """A model, with or without a defense, over datasets.
+    """The results of a model, with or without a defense, on datasets.
 
     Attributes:
         out: folder of results.json, table.txt and the predictions.
-        facts: model, defense, task, seed, versions, notes for whoever reads the metrics; JSON.
-        rows: the datasets, in the order given.
-        together: datasets that differ in more than their patch, by the patch's label.
-        differences: between twins.
-        pools: datasets that were to be counted as one.
+        facts: model, defense, task, seed, versions, and notes for the reader of the metrics; JSON.
+        rows: results of the datasets, in the order given.
+        together: datasets that differ in more than their patch, counted as one by the patch's label.
+        differences: differences between twins.
+        pools: datasets counted as one at the user's request.
     """
 
     out: Path
@@ -237,5 +238,5 @@ class EvaluateReport:
 
 
 def metrics_json(metrics: Metrics) -> Json:
-    """By report, then by metric."""
+    """Metrics as JSON, by report and name."""
     return {report: {name: one.as_json() for name, one in rows.items()} for report, rows in metrics.items()}

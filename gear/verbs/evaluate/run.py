@@ -1,4 +1,4 @@
-"""`gear.evaluate`: resolves, predicts, compares, writes."""
+"""`gear.evaluate`: resolves a request, predicts, compares twins, writes the results."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ LEARNT = {"calibration", "calibration_samples"}
 
 
 class OtherLessonsError(DatasetError):
-    """An evaluation is there that differs in what the defense learnt from, and in nothing else."""
+    """The folder holds an evaluation that differs only in the calibration data of its defense."""
 
 
 def evaluate(
@@ -195,7 +195,9 @@ def _measured(
 
 
 def _begin(root: Path, facts: Json) -> None:
-    """Writes what the evaluation is of, or checks that what is there is of the same, as far as a sample is."""
+    """Records what the evaluation consists of, or checks that an existing record agrees in all that decides a
+    prediction.
+    """
     clear_scratch(root)
     path = inside(root, "plan.json")
     plain = to_plain(facts)
@@ -217,7 +219,7 @@ def _begin(root: Path, facts: Json) -> None:
 
 
 def _end(root: Path, found: EvaluateReport) -> None:
-    """Writes what was found, and leaves nothing else behind."""
+    """Writes the results and deletes leftovers."""
     write_whole(root, "results.json", dump_json(found.as_json()))
     write_whole(root, "table.txt", table(found).encode())
     clear_scratch(root)

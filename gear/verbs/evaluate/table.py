@@ -10,7 +10,7 @@ from gear.measuring.text_table import WIDTH, number_table
 from gear.verbs.evaluate.report import Difference, Estimate, EvaluateReport, RowReport
 
 COLUMNS, FURTHER = 4, 2
-"""Metrics that are shown, of the task's own and of each report; all are in results.json."""
+"""Number of metrics shown: of the task's own, and of each further report. results.json has all of them."""
 
 LABEL_LENGTH = 36
 """Characters of a row's label."""
@@ -57,7 +57,7 @@ def _columns(report: EvaluateReport) -> list[tuple[str, str]]:
 
 
 def metric_title(report: str, metric: str) -> str:
-    """Of a column: the metric's name, after that of its report where it is not the task's own."""
+    """Title of a column: the metric's name, after the name of its report where that is not the task's own."""
     return metric if report == TASK else f"{report}.{metric}"
 
 
@@ -94,7 +94,7 @@ def row_labels(rows: Sequence[RowReport]) -> dict[str, str]:
 
 
 def _paired(report: EvaluateReport, labels: Mapping[str, str]) -> list[str]:
-    """What twins change in single samples, and how often chance alone would change as much."""
+    """Lines with the mean change of single samples between twins, and its p-value."""
     lines = []
     for one in report.differences:
         against = next(row for row in report.rows if row.name == one.against)
@@ -109,7 +109,7 @@ def _paired(report: EvaluateReport, labels: Mapping[str, str]) -> list[str]:
 
 
 def shown(one: Estimate | None, *, is_signed: bool = False) -> str:
-    """A metric with its interval; empty where there is none."""
+    """A metric with its interval as text; empty where there is none."""
     if one is None:
         return ""
     text = number(one.value, is_signed=is_signed)
@@ -117,7 +117,7 @@ def shown(one: Estimate | None, *, is_signed: bool = False) -> str:
 
 
 def number(value: float | None, *, is_signed: bool = False) -> str:
-    """Three decimals, one of large numbers; `-` where nothing was measured."""
+    """A number with three decimals, or with one if it is large; `-` where nothing was measured."""
     if value is None or value != value:
         return "-"
     sign = "+" if is_signed else ""
@@ -125,7 +125,7 @@ def number(value: float | None, *, is_signed: bool = False) -> str:
 
 
 def _limited(report: EvaluateReport, columns: Iterable[tuple[str, str]], labels: Mapping[str, str]) -> list[str]:
-    """Columns in which not even perfect predictions would come to 1, because a dataset has too little to be found."""
+    """Lines about columns in which even perfect predictions stay below 1, because a dataset has too few objects."""
     rows = [(labels[row.name], row.metrics) for row in report.rows]
     rows += [(f"all with patch {pooled.patch}", pooled.metrics) for pooled in report.together]
     lines = []
@@ -137,7 +137,7 @@ def _limited(report: EvaluateReport, columns: Iterable[tuple[str, str]], labels:
 
 
 def _absent(report: EvaluateReport, labels: Mapping[str, str]) -> list[str]:
-    """What had nothing to be measured on; rows and reports that agree share a line."""
+    """Lines about metrics with nothing to measure; rows and reports that agree share a line."""
     where: dict[tuple[str, ...], list[str]] = {}
     for row in report.rows:
         for name, metrics in row.metrics.items():
@@ -150,7 +150,7 @@ def _absent(report: EvaluateReport, labels: Mapping[str, str]) -> list[str]:
 
 
 def _families(missing: Sequence[str], every: Iterable[str]) -> tuple[str, ...]:
-    """The names, `cyclist_*` for several of one beginning of which none is there."""
+    """The names of the metrics; several with one prefix, of which none has a value, become `prefix_*`."""
     there = {name.partition("_")[0] for name in set(every) - set(missing)}
     heads = Counter(name.partition("_")[0] for name in missing)
     short = [
