@@ -17,7 +17,7 @@ import numpy.typing as npt
 from gear.values.geometry import Array, RigidTransform
 from gear.values.scene import Pose
 from gear.world.assets.actor_types import ActorType
-from gear.world.compilation.compose import PARKED_DEPTH_M
+from gear.world.compilation.actor_pool import PARKED_DEPTH_M
 from gear.world.compilation.model_compilation import ACTOR_GROUP, GROUND_GROUP, OBSTACLE_GROUP
 
 EVEN_M = 0.005

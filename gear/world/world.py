@@ -1,4 +1,4 @@
-"""A town with its scene, compiled once; every sample only moves what is there."""
+"""A town with its scene, compiled once. A sample moves its actors and changes its surfaces; it compiles nothing."""
 
 from __future__ import annotations
 
@@ -20,19 +20,21 @@ from gear.values.scene import ActorRecord, SceneRecord, SurfaceRecord, Vec3, Wea
 from gear.world.assets.actor_types import ActorType, StaticObjects, actor_types, static_objects, visible_geoms
 from gear.world.assets.geom_classes import GeomClasses
 from gear.world.assets.library import AssetLibrary
+from gear.world.compilation.actor_pool import PARKED_DEPTH_M, Slot
 from gear.world.compilation.compiled_world import CompiledWorld, compile_world
-from gear.world.compilation.compose import PARKED_DEPTH_M, Slot
 from gear.world.compilation.memory import release_memory
+from gear.world.compilation.world_plan import WorldPlan, plan_world
 from gear.world.roads.lanes import LaneGraph
 from gear.world.scene_spec import SceneSpec
 from gear.world.surfaces.face_texture import SurfaceAlbedo, SurfaceAlbedos
 from gear.world.surfaces.patch_faces import Face, find_faces
 
-FACES_KEPT, SHOWN_A_FACE = 8, 5
-"""Resampled faces are kept: so many in all, or so many of each, which in a sample may be seen with a patch, neutral,
-white, black and grey."""
+FACES_KEPT, TEXTURES_PER_FACE = 8, 5
+"""Resampled textures that a world keeps: `FACES_KEPT` in all, or `TEXTURES_PER_FACE` for each face if that is more: in
+one sample a face may show a patch, its neutral texture, white, black and grey."""
 
 _OUT_OF_SIGHT_M = -1e5
+"""Height at which no camera sees a geom."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -40,9 +42,9 @@ class PlacedStage:
     """One sample, ready to be rendered and to be measured.
 
     Attributes:
-        stage: for the renderer. Its `data` is the world's own: it holds until the next `place`.
-        geoms: what each geom is.
-        objects: countable things by object id.
+        stage: what a renderer needs. Its `data` belongs to the world and is valid until the next `place`.
+        geoms: label, object and surface of each geom of the render model.
+        objects: countable objects by object id.
     """
 
     stage: Stage
@@ -52,6 +54,8 @@ class PlacedStage:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _SlotGeoms:
+    """A slot of the pool, with its mocap body and its visible geoms in the render model."""
+
     slot: Slot
     mocap_id: int
     geom_ids: tuple[int, ...]
@@ -60,19 +64,19 @@ class _SlotGeoms:
 
 @dataclass(eq=False, kw_only=True)
 class World:
-    """A compiled town, scene, weather and pool of actors.
+    """A compiled town with a scene, a weather and a pool of actors.
 
     Attributes:
-        library: where its MJCF comes from.
+        library: the town's MJCF and the folders of its assets.
         scene_name, scene, weather: what it was built for.
-        model: what is seen.
-        placement_model: what is felt; its actors are free, by the same body names.
-        classes: label of each visible geom.
-        slots: the pool.
-        types: assets of the pool by name.
-        faces: what takes patches, in patch order.
-        statics: countable things of the town.
-        lanes: where road users may be.
+        model: the render model: visible geoms, actors as mocap bodies.
+        placement_model: the placement model: collision geoms, actors as free bodies of the same names.
+        classes: labels of the render model's geoms.
+        slots: the pool of actors.
+        types: the assets of the pool, measured, by name.
+        faces: faces that take patches, in patch order.
+        statics: countable objects of the town, such as traffic lights.
+        lanes: lanes, walks and parking bays.
     """
 
     library: AssetLibrary
@@ -89,7 +93,9 @@ class World:
     lanes: LaneGraph
     _data: mujoco.MjData = field(init=False, repr=False)
     _slot_geoms: tuple[_SlotGeoms, ...] = field(init=False, repr=False)
-    _shown: OrderedDict[tuple[str, str], UInt8Image] = field(init=False, repr=False, default_factory=OrderedDict)
+    _face_textures: OrderedDict[tuple[str, str], UInt8Image] = field(
+        init=False, repr=False, default_factory=OrderedDict
+    )
 
     def __post_init__(self) -> None:
         self._data = mujoco.MjData(self.model)
@@ -97,38 +103,41 @@ class World:
 
     @staticmethod
     def build(*, town: str | Path, scene_name: str, scene: SceneSpec, weather: Weather) -> World:
-        """Composes and compiles.
+        """Composes and compiles a world.
 
         Args:
-            town: a town's name, or the path of its MJCF.
-            scene_name: what records call the scene.
-            scene: boards, truck and limits.
+            town: name of a town, or path of its MJCF.
+            scene_name: name of the scene in records.
+            scene: boards or truck, and limits.
             weather: light and air.
 
         Raises:
             UnknownNameError: there is no such town, board or truck.
             TownError: a file breaks the conventions.
         """
-        library = AssetLibrary.for_town(town)
-        return World.of(library, scene_name, scene, weather, compile_world(library, scene, weather))
+        plan = plan_world(AssetLibrary.for_town(town), scene, weather)
+        return World.of(plan, scene_name, compile_world(plan))
 
     @staticmethod
-    def of(
-        library: AssetLibrary, scene_name: str, scene: SceneSpec, weather: Weather, compiled: CompiledWorld
-    ) -> World:
-        """What was compiled of a scene, measured.
+    def of(plan: WorldPlan, scene_name: str, compiled: CompiledWorld) -> World:
+        """Makes a world of compiled models: measures its actors and faces, and reads its lanes.
+
+        Args:
+            plan: that the models were compiled from.
+            scene_name: name of the scene in records.
+            compiled: the models.
 
         Raises:
-            TownError: a file breaks the conventions.
+            TownError: an actor, a face or a lane breaks the conventions.
         """
-        model, classes, slots = compiled.model, compiled.classes, compiled.slots
+        library, model, classes, slots = plan.assets.library, compiled.model, compiled.classes, compiled.slots
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
         world = World(
             library=library,
             scene_name=scene_name,
-            scene=scene,
-            weather=weather,
+            scene=plan.scene,
+            weather=plan.weather,
             model=model,
             placement_model=compiled.placement_model,
             classes=classes,
@@ -143,12 +152,12 @@ class World:
 
     @property
     def shapes(self) -> dict[str, Shape]:
-        """Visible triangles of the pool's assets by name."""
+        """Visible triangles of the pool's assets, by the asset's name."""
         return {name: actor_type.shape for name, actor_type in self.types.items()}
 
     @property
     def parked_m(self) -> float:
-        """Height at which actors of the pool wait that a sample does not use, also in a town far below its origin."""
+        """Height in metres at which the actors wait that a sample does not use, below every lane of the town."""
         return min(0.0, self.lanes.lowest_m) - PARKED_DEPTH_M
 
     @property
@@ -157,21 +166,21 @@ class World:
         return self.library.town_name
 
     def surface_records(self, carrier_id: int | None = None) -> tuple[SurfaceRecord, ...]:
-        """What takes patches, as data; `carrier_id` is the actor that bears them in a truck's scene."""
+        """The faces as data; `carrier_id` is the id of the actor that carries them in a scene with a truck."""
         return tuple(face.record(carrier_id) for face in self.faces)
 
     def place(self, record: SceneRecord, surfaces: SurfaceAlbedos | None = None) -> PlacedStage:
-        """Moves everything to where the record says.
+        """Moves the actors to their poses in a record, and gives the faces their textures.
 
         Args:
-            record: of this world's town and scene.
-            surfaces: what each surface shows, by name; the neutral face where nothing is said.
+            record: a sample of this world's town and scene.
+            surfaces: what each surface shows, by its name; a surface that is not named shows its neutral texture.
 
         Raises:
-            PlacementError: the record needs actors that this world does not hold.
-            ValueError: a surface is named that is not there.
+            PlacementError: the record has more actors of an asset than this world holds.
+            ValueError: no surface has one of the names.
         """
-        faces = self._faces(surfaces or {})
+        faces = self._textures_of(surfaces or {})
         taken = self._assign(record)
         self._pose(record, taken)
         object_id = self.statics.object_id.copy()
@@ -194,23 +203,25 @@ class World:
         )
 
     def with_surfaces(self, placed: PlacedStage, surfaces: SurfaceAlbedos) -> Stage:
-        """What was placed last, with other faces; nothing is moved.
+        """The sample that was placed last, with other textures on its faces; nothing is moved.
 
         Args:
-            placed: of the last `place`.
-            surfaces: what each surface shows, by name; the neutral face where nothing is said.
+            placed: result of the last `place`.
+            surfaces: as for `place`.
 
         Raises:
-            ValueError: a surface is named that is not there.
+            ValueError: no surface has one of the names.
         """
-        return replace(placed.stage, faces=self._faces(surfaces))
+        return replace(placed.stage, faces=self._textures_of(surfaces))
 
     @contextmanager
     def without_ground(self, placed: PlacedStage) -> Iterator[Stage]:
-        """What was placed last, with neutral faces and nothing that hides it from below; its ground is back at the end.
+        """The sample that was placed last, with neutral faces and without its ground, so that it is seen from below.
+
+        The ground returns when the context ends.
 
         Args:
-            placed: of the last `place`.
+            placed: result of the last `place`.
         """
         is_ground = np.isin(self.classes.label_code, GROUND_CODES)
         heights_m = self._data.geom_xpos[is_ground, 2]
@@ -220,11 +231,12 @@ class World:
         finally:
             self._data.geom_xpos[is_ground, 2] = heights_m
 
-    def _faces(self, surfaces: SurfaceAlbedos) -> dict[int, UInt8Image]:
+    def _textures_of(self, surfaces: SurfaceAlbedos) -> dict[int, UInt8Image]:
+        """Texture of each face by its geom id."""
         unknown = set(surfaces) - {face.name for face in self.faces}
         if unknown:
             raise ValueError(f"no surface named {', '.join(sorted(unknown))}; there are {len(self.faces)}")
-        return {face.geom_id: self._show(face, surfaces.get(face.name, "none")) for face in self.faces}
+        return {face.geom_id: self._texture(face, surfaces.get(face.name, "none")) for face in self.faces}
 
     def _geoms_of(self, slot: Slot) -> _SlotGeoms:
         body = self.model.body(slot.body).id
@@ -233,7 +245,7 @@ class World:
         return _SlotGeoms(slot, int(self.model.body_mocapid[body]), tuple(geoms), paint)
 
     def _assign(self, record: SceneRecord) -> list[_SlotGeoms]:
-        """A slot for each actor: the first free one of its asset, so that a record always takes the same."""
+        """The slot of each actor: the first free one of its asset, so that a record always gets the same slots."""
         free = list(self._slot_geoms)
         taken = []
         for actor in record.actors:
@@ -250,6 +262,7 @@ class World:
         return taken
 
     def _pose(self, record: SceneRecord, taken: list[_SlotGeoms]) -> None:
+        """Moves the actors of a record to their poses, and all others below the middle of the town."""
         xmin, ymin, xmax, ymax = self.lanes.bounds_m
         self._data.mocap_pos[:] = ((xmin + xmax) / 2, (ymin + ymax) / 2, self.parked_m)
         self._data.mocap_quat[:] = (1.0, 0.0, 0.0, 0.0)
@@ -273,16 +286,17 @@ class World:
             shape=actor_type.shape,
         )
 
-    def _show(self, face: Face, albedo: SurfaceAlbedo) -> UInt8Image:
-        """Resampled faces are kept: a data set shows one patch thousands of times."""
+    def _texture(self, face: Face, albedo: SurfaceAlbedo) -> UInt8Image:
+        """The texture of a face. The last ones are kept: a dataset shows one patch thousands of times."""
         key: str = (
             albedo
             if isinstance(albedo, str)
             else f"{albedo.shape} {hashlib.blake2b(albedo.tobytes(), digest_size=16).hexdigest()}"
         )
-        if (face.name, key) not in self._shown:
-            self._shown[face.name, key] = face.show(albedo)
-            if len(self._shown) > max(FACES_KEPT, SHOWN_A_FACE * len(self.faces)):
-                self._shown.popitem(last=False)
-        self._shown.move_to_end((face.name, key))
-        return self._shown[face.name, key]
+        textures = self._textures
+        if (face.name, key) not in textures:
+            textures[face.name, key] = face.texture(albedo)
+            if len(textures) > max(FACES_KEPT, TEXTURES_PER_FACE * len(self.faces)):
+                textures.popitem(last=False)
+        textures.move_to_end((face.name, key))
+        return textures[face.name, key]

@@ -17,7 +17,7 @@ from gear.values.labels import LABELS, Label, VehicleKind
 from gear.world.assets.geom_classes import HIDDEN_CODE, GeomClasses
 from gear.world.assets.geom_triangles import body_shape
 from gear.world.assets.library import ActorFacts
-from gear.world.compilation.compose import Slot
+from gear.world.compilation.actor_pool import Slot
 from gear.world.compilation.model_compilation import PlacementBody
 
 PERSON_MASS_KG = 75.0

@@ -1,53 +1,66 @@
-"""Which actors a scene's world holds, and how many instances of each: enough for every sample, no more."""
+"""The pool of actors that a scene's world holds: enough instances of each asset for every sample, and no more."""
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass
 
-from gear.values.errors import TownError
-from gear.world.assets.library import ActorFacts, AssetLibrary
+from gear.world.assets.library import ActorFacts
+from gear.world.assets.scene_assets import SceneAssets
 from gear.world.scene_spec import SceneSpec
 
-EGO_ASSET = "car_saloon"
+PARKED_DEPTH_M = 60.0
+"""Actors that a sample does not use wait this far below the town, under its ground."""
 
 POOL_SLACK = 2.0
-"""An asset has this many times the instances that its share of the largest crowd would be."""
+"""An asset gets this many times the instances that its share of the largest crowd would be."""
 
 
-def plan_pool(scene: SceneSpec, library: AssetLibrary) -> list[tuple[ActorFacts, int]]:
-    """The ego car first, then vehicles and people with their counts.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Slot:
+    """One place in the pool: an instance of an actor that samples may use.
 
-    Raises:
-        UnknownNameError: the town's vehicles hold no ego car.
-        TownError: a vehicle is named like a pedestrian.
+    Attributes:
+        body: name of its body in the render model and in the placement model.
+        actor: the asset that it is an instance of.
+        carries_surface: whether its face has a texture of its own, which can show a patch.
     """
-    for name in library.vehicles.keys() & library.pedestrians.keys():
-        problem = f"has the name of {library.pedestrians[name].path}, so records could not tell them apart; rename one"
-        raise TownError(library.vehicles[name].path, problem)
-    library.path("vehicle", EGO_ASSET)
-    vehicles = vehicles_of(scene, library)
-    pool = [(vehicles[EGO_ASSET], 1)]
-    if scene.npc_vehicles.count[1]:
-        pool += _shares(vehicles, scene.npc_vehicles.count[1])
-    if scene.pedestrians.count[1]:
-        pool += _shares(library.pedestrians, scene.pedestrians.count[1])
-    return pool
+
+    body: str
+    actor: ActorFacts
+    carries_surface: bool = False
 
 
-def vehicles_of(scene: SceneSpec, library: AssetLibrary) -> dict[str, ActorFacts]:
-    """A library's vehicles by name, as common as a scene has them."""
-    mix = scene.npc_vehicles.mix
-    return {
-        name: replace(facts, weight=facts.weight * mix.get(facts.kind, 1.0)) for name, facts in library.vehicles.items()
-    }
+def plan_slots(scene: SceneSpec, assets: SceneAssets) -> tuple[Slot, ...]:
+    """Decides which actors a world holds: the ego car, then vehicles, people, and the carrier of the patch.
 
-
-def _shares(actors: Mapping[str, ActorFacts], most: int) -> list[tuple[ActorFacts, int]]:
-    total = sum(actor.weight for actor in actors.values())
-    return [
-        (actor, min(most, max(1, math.ceil(POOL_SLACK * most * actor.weight / total))))
-        for actor in actors.values()
-        if actor.weight > 0
+    Args:
+        scene: its largest counts of vehicles and people decide the size of the pool.
+        assets: read for the same scene.
+    """
+    counts: Counter[str] = Counter({assets.ego.name: 1})
+    actors = {assets.ego.name: assets.ego}
+    for candidates, limits in ((assets.vehicles, scene.npc_vehicles), (assets.pedestrians, scene.pedestrians)):
+        for name, count in _instances(candidates, limits.count[1]).items():
+            counts[name] += count
+            actors[name] = candidates[name]
+    slots = [
+        Slot(body=f"{name}_{index}", actor=actors[name]) for name, count in counts.items() for index in range(count)
     ]
+    if assets.carrier is not None:
+        slots.append(Slot(body="carrier", actor=assets.carrier, carries_surface=True))
+    return tuple(slots)
+
+
+def _instances(actors: Mapping[str, ActorFacts], largest_count: int) -> dict[str, int]:
+    """How many instances of each asset a crowd of at most `largest_count` actors needs."""
+    if not largest_count:
+        return {}
+    total = sum(actor.weight for actor in actors.values())
+    return {
+        name: min(largest_count, max(1, math.ceil(POOL_SLACK * largest_count * actor.weight / total)))
+        for name, actor in actors.items()
+        if actor.weight > 0
+    }

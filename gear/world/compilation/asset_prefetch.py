@@ -1,7 +1,8 @@
-"""Meshes and textures read while their world is still being composed: that is Python's, and reading is MuJoCo's.
+"""Reads meshes and textures in threads while their world is still being composed.
 
-What is read waits in MuJoCo's own cache, by path and time of the file. What is then asked for otherwise, such as a mesh
-with a scale, is read again.
+Composing is Python's work and reading is MuJoCo's, so both run at once. What was read waits in MuJoCo's cache, by the
+path and the modification time of the file. MuJoCo reads a file again where the world uses it with other settings, such
+as a scaled mesh.
 """
 
 from __future__ import annotations
@@ -16,40 +17,44 @@ import mujoco
 
 from gear.world.compilation.memory import disable_asset_cache
 
-_SHARE_BYTES = 2 << 20
-"""Of files that one thread reads at a time: what it needs besides the meshes is given back after each share."""
+_BATCH_BYTES = 2 << 20
+"""Size of the files that one thread reads at a time; it gives back its temporary memory after each batch."""
 
 _CACHE_BYTES = 2 << 30
-"""Room for more than any town: it is taken as it is needed. Without it the last ones would be read twice."""
+"""Capacity of MuJoCo's cache, more than any town needs. In a smaller one the last files would be read twice."""
 
 _INERTIA = "shell"
-"""As gear's files have it; with MuJoCo's own default an open surface is refused."""
+"""How gear's files compute the inertia of a mesh; MuJoCo's default refuses open surfaces."""
 
 
 class AssetPrefetcher:
-    """Files on their way into the cache."""
+    """Reads files into MuJoCo's cache, in the threads of a pool."""
 
     def __init__(self, readers: ThreadPoolExecutor | None) -> None:
+        """Takes the pool; without one nothing is read."""
         self._readers = readers
 
     def prefetch(self, files: Iterable[str]) -> None:
-        """Begins to read files: PNGs, and else meshes. What is wrong with one is for those to say who need it."""
+        """Begins to read files: a path ending in `.png` is a texture, any other a mesh.
+
+        A file that cannot be read is no error here: it is one where the world is compiled.
+        """
         if self._readers is not None:
-            for share in _shares(files):
-                self._readers.submit(_read, share)
+            for batch in _batches(files):
+                self._readers.submit(_read, batch)
 
     def wait(self) -> None:
-        """Returns when all are read; none can be expected after that."""
+        """Waits until all files are read. No further file can be prefetched."""
         if self._readers is not None:
             self._readers.shutdown()
 
 
 @contextlib.contextmanager
 def asset_prefetcher(readers: int) -> Iterator[AssetPrefetcher]:
-    """Lets files be read ahead, and forgets them in the end.
+    """Opens MuJoCo's cache for a prefetcher, and empties and closes it at the end.
 
     Args:
-        readers: threads that read; with 0 nothing is read ahead, and nothing is in memory twice.
+        readers: number of threads that read; with 0 nothing is prefetched, and nothing is in memory twice.
     """
     disable_asset_cache()
     if not readers:
@@ -67,21 +72,22 @@ def asset_prefetcher(readers: int) -> Iterator[AssetPrefetcher]:
         disable_asset_cache()
 
 
-def _shares(files: Iterable[str]) -> Iterator[list[str]]:
-    """The largest come first, so that nobody is left with one of them in the end."""
-    share: list[str] = []
-    share_bytes = 0
+def _batches(files: Iterable[str]) -> Iterator[list[str]]:
+    """Batches of files, the largest files first, so that no thread is left with a large one at the end."""
+    batch: list[str] = []
+    batch_bytes = 0
     for size_bytes, file in sorted(((Path(file).stat().st_size, file) for file in files), reverse=True):
-        share.append(file)
-        share_bytes += size_bytes
-        if share_bytes >= _SHARE_BYTES:
-            yield share
-            share, share_bytes = [], 0
-    if share:
-        yield share
+        batch.append(file)
+        batch_bytes += size_bytes
+        if batch_bytes >= _BATCH_BYTES:
+            yield batch
+            batch, batch_bytes = [], 0
+    if batch:
+        yield batch
 
 
 def _read(files: list[str]) -> None:
+    """Compiles a model of the files alone, which leaves them in MuJoCo's cache."""
     root = ET.Element("mujoco")
     assets = ET.SubElement(root, "asset")
     for number, file in enumerate(files):

@@ -1,4 +1,4 @@
-"""The process that compiles a world for others to load."""
+"""The subprocess in which `world_cache` compiles a world."""
 
 from __future__ import annotations
 
@@ -20,60 +20,66 @@ from gear.world.assets.asset_hash import asset_files
 from gear.world.assets.library import AssetLibrary
 from gear.world.compilation.compiled_world import compile_world
 from gear.world.compilation.world_cache import DONE, MAY_CACHE, world_key
+from gear.world.compilation.world_plan import plan_world
 from gear.world.scene_spec import SceneSpec
 from gear.world.weather.light import Lighting, lighting_of
 
 _SWITCH_S = 0.0005
-"""How long one thread may keep others from Python: what runs beside is quick to go on."""
+"""How long one thread may hold the interpreter, so that the threads which feed MuJoCo continue quickly."""
 
 _READERS = 8
-"""There are no more than forty shares to read."""
+"""Most threads that read assets: no town has more than forty batches of them."""
 
 _CODE_SUFFIXES = (".py", ".pyc", ".so")
 
 
 def main(folder: str) -> None:
-    """Compiles the order on the first line of standard input into a folder, and says there whether the order covers
-    all that was read, and on standard output when it is done.
+    """Compiles the world whose key is on the first line of standard input.
 
-    The order does not where a town refers to files far from it, or where somebody edited one meanwhile.
+    It saves the world into the folder, with a file `MAY_CACHE` if the key covers every file that was read, and writes
+    `DONE` to standard output. The key does not cover a town that refers to files outside of its assets, or a file that
+    somebody edited meanwhile.
     """
-    gc.disable()  # half a million objects of MJCF, all kept to the end: looking for garbage took a third of the time
+    gc.disable()  # the half million objects of the MJCF all live to the end; collecting took a third of the time
     sys.setswitchinterval(_SWITCH_S)
-    order = json.loads(sys.stdin.readline())
-    library = AssetLibrary(Path(order["town"]))
-    scene, weather = from_json(SceneSpec, order["scene"]), from_json(Weather, order["weather"])
+    key = json.loads(sys.stdin.readline())
+    library = AssetLibrary(Path(key["town"]))
+    scene, weather = from_json(SceneSpec, key["scene"]), from_json(Weather, key["weather"])
     lighting = _lighting_in_process(weather)
     threading.Thread(target=_exit_with_parent, daemon=True).start()
     known = {os.path.realpath(path) for path in asset_files(library).values()}
     files_read = _record_files_read()
-    compiled = compile_world(library, scene, weather, lighting, readers=min(_READERS, cores()))
+    plan = plan_world(library, scene, weather)
+    compiled = compile_world(plan, lighting, readers=min(_READERS, cores()))
     is_covered = files_read <= known
-    with ThreadPoolExecutor(1) as aside:
-        read = aside.submit(world_key, library, scene, weather)
+    with ThreadPoolExecutor(1) as thread:
+        key_afterwards = thread.submit(world_key, plan)
         compiled.save(Path(folder))
-    if is_covered and read.result() == order:
+    if is_covered and key_afterwards.result() == key:
         (Path(folder) / MAY_CACHE).touch()
     os.write(sys.stdout.fileno(), DONE)
 
 
 def _lighting_in_process(weather: Weather) -> Callable[[], Lighting] | None:
-    """What waits for a weather's light, which another process works out: in this one Python would hold it up."""
+    """Computes a weather's light in a process of its own, and returns a function that waits for it.
+
+    In this process the interpreter would be shared with the composition. None where processes cannot be forked.
+    """
     if sys.platform != "linux":
         return None
     fork = multiprocessing.get_context("fork")
-    here, there = fork.Pipe(duplex=False)
+    receiver, sender = fork.Pipe(duplex=False)
 
     def work() -> None:
-        here.close()  # so that it ends with the one that waits
-        there.send(lighting_of(weather))
+        receiver.close()  # so that sending fails, and this process ends, when its parent is gone
+        sender.send(lighting_of(weather))
 
     fork.Process(target=work, daemon=True).start()
-    there.close()
+    sender.close()
 
     def wait() -> Lighting:
         try:
-            lighting: Lighting = here.recv()
+            lighting: Lighting = receiver.recv()
         except EOFError:
             return lighting_of(weather)
         return lighting
@@ -82,22 +88,21 @@ def _lighting_in_process(weather: Weather) -> Callable[[], Lighting] | None:
 
 
 def _exit_with_parent() -> None:
-    """Ends this process when the one that waits for the world is gone, killed perhaps: who gives the command again
-    should have the machine for itself."""
+    """Ends this process when its parent is gone, for example killed: nobody else waits for the world."""
     while os.read(0, 1):
         pass
     os._exit(1)
 
 
 def _record_files_read() -> set[str]:
-    """Real paths of the files that Python opens to read from now on, code left out."""
-    read: set[str] = set()
+    """Returns a set that grows by the real path of each file, code aside, that Python opens for reading from now on."""
+    files: set[str] = set()
 
     def record(event: str, details: tuple[Any, ...]) -> None:
         if event == "open" and isinstance(details[0], str) and str(details[1] or "").startswith("r"):
             path = os.path.realpath(details[0])
             if not path.endswith(_CODE_SUFFIXES):
-                read.add(path)
+                files.add(path)
 
     sys.addaudithook(record)
-    return read
+    return files

@@ -1,4 +1,4 @@
-"""What compiling a world leaves, in memory and on disk."""
+"""A compiled world, in memory and on disk."""
 
 from __future__ import annotations
 
@@ -12,20 +12,19 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from gear.values.scene import Weather
 from gear.values.serial import from_json, to_json
 from gear.world.assets.actor_types import actor_types
 from gear.world.assets.geom_classes import GeomClasses
-from gear.world.assets.library import ActorFacts, AssetLibrary
-from gear.world.compilation.actor_pool import plan_pool, vehicles_of
+from gear.world.compilation.actor_pool import Slot
 from gear.world.compilation.asset_prefetch import asset_prefetcher
-from gear.world.compilation.compose import Slot, compose, slots_of
+from gear.world.compilation.compose import compose
 from gear.world.compilation.drop_bvh import without_mesh_bvh
 from gear.world.compilation.instances import FaceNames
 from gear.world.compilation.mjb import read_model, write_model
 from gear.world.compilation.model_compilation import placement_model, placement_spec, render_model
 from gear.world.compilation.normal_maps import align_normal_maps
-from gear.world.scene_spec import SceneSpec
+from gear.world.compilation.scene_mjcf import read_scene_mjcf
+from gear.world.compilation.world_plan import WorldPlan
 from gear.world.weather.light import Lighting
 from gear.world.weather.presets import wetness
 from gear.world.weather.wet_ground import wet_own_colours
@@ -35,14 +34,14 @@ _RENDER, _PLACEMENT, _FACTS = "render.mjb", "placement.mjb", "facts.json"
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class CompiledWorld:
-    """A world's two models and what they do not say of themselves.
+    """The two models of a world, and the facts about them that the models do not hold.
 
     Attributes:
-        model: what is seen.
-        placement_model: what is felt.
-        classes: labels of the geoms of what is seen.
-        slots: the pool.
-        faces: what takes patches, in patch order.
+        model: the render model: visible geoms, actors as mocap bodies.
+        placement_model: the placement model: collision geoms, actors as free bodies on four feet.
+        classes: labels of the render model's geoms.
+        slots: the pool of actors.
+        faces: names of the faces that take patches, in patch order.
     """
 
     model: mujoco.MjModel
@@ -52,7 +51,13 @@ class CompiledWorld:
     faces: tuple[FaceNames, ...]
 
     def save(self, folder: Path) -> None:
-        """Writes it into an empty folder, without what rays find triangles by."""
+        """Writes both models and the facts into an empty folder.
+
+        The render model is saved without the bounding volumes of its meshes, which only rays need.
+
+        Raises:
+            OSError: there is no room for the files.
+        """
         with without_mesh_bvh(self.model):
             crc32 = {_RENDER: write_model(self.model, folder / _RENDER)}
         crc32[_PLACEMENT] = write_model(self.placement_model, folder / _PLACEMENT)
@@ -66,12 +71,16 @@ class CompiledWorld:
         (folder / _FACTS).write_text(json.dumps(facts), encoding="utf-8")
 
     @staticmethod
-    def load(folder: Path, library: AssetLibrary, scene: SceneSpec) -> CompiledWorld:
-        """Reads what `save` wrote for the same library and scene.
+    def load(folder: Path, slots: tuple[Slot, ...]) -> CompiledWorld:
+        """Reads a world that `save` wrote.
+
+        Args:
+            folder: that it was saved into.
+            slots: its pool of actors, decided anew from the same plan.
 
         Raises:
-            OSError: there is nothing, or it cannot be read.
-            ValueError, KeyError, GearError: something else lies there, or half of it.
+            OSError: a file is missing or cannot be read.
+            ValueError, KeyError, GearError: the files are damaged, or are not those of a world.
         """
         facts = json.loads((folder / _FACTS).read_text(encoding="utf-8"))
         model, placement = (read_model(folder / name, facts["crc32"][name]) for name in (_RENDER, _PLACEMENT))
@@ -86,65 +95,46 @@ class CompiledWorld:
             model=model,
             placement_model=placement,
             classes=classes,
-            slots=slots_of(plan_pool(scene, library), carrier_of(scene, library)),
+            slots=slots,
             faces=from_json(tuple[FaceNames, ...], facts["faces"]),
         )
 
 
 def compile_world(
-    library: AssetLibrary,
-    scene: SceneSpec,
-    weather: Weather,
-    lighting: Callable[[], Lighting] | None = None,
-    *,
-    readers: int = 0,
+    plan: WorldPlan, lighting: Callable[[], Lighting] | None = None, *, readers: int = 0
 ) -> CompiledWorld:
-    """Composes and compiles.
+    """Composes and compiles a planned world.
 
     Args:
-        library, scene, weather: of the world.
+        plan: everything that the world holds.
         lighting: as for `compose`.
-        readers: threads that read meshes and textures meanwhile. It is sooner done, and town10 takes 2.0 GB for 1.4 GB.
+        readers: threads that read meshes and textures while the world is composed; 0 for none. With them it is done
+            sooner, and town10 takes 2.0 GB of memory instead of 1.4 GB.
 
     Raises:
-        UnknownNameError: there is no such board or truck.
-        TownError: a file breaks the conventions.
+        TownError: a file breaks the conventions, or MuJoCo cannot compile it.
     """
     with (
         asset_prefetcher(readers) as prefetcher,
         tempfile.TemporaryDirectory(prefix="gear-") as folder,
-        ThreadPoolExecutor(1) as aside,
+        ThreadPoolExecutor(1) as thread,
     ):
-        pool, carrier = plan_pool(scene, library), carrier_of(scene, library)
-        composition = compose(library, scene.boards, pool, carrier, weather, lighting, prefetcher).laid_out(
-            Path(folder)
-        )
-        prefetcher.prefetch(composition.pictures)
+        files = read_scene_mjcf(plan, prefetcher)
+        composition = compose(plan, files, lighting).write_assets(Path(folder))
+        prefetcher.prefetch(composition.texture_files)
         prefetcher.wait()
-        placement = aside.submit(placement_spec, composition)
+        placement = thread.submit(placement_spec, composition)
         model, classes = render_model(composition)
     align_normal_maps(model)
-    wet_own_colours(model, classes.label_code, wetness(weather))
+    wet_own_colours(model, classes.label_code, wetness(plan.weather))
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    types = actor_types(model, data, classes, composition.slots)
-    placement_bodies = {slot.body: types[slot.actor.name].placement_body for slot in composition.slots}
+    types = actor_types(model, data, classes, plan.slots)
+    bodies = {slot.body: types[slot.actor.name].placement_body for slot in plan.slots}
     return CompiledWorld(
         model=model,
-        placement_model=placement_model(composition, placement.result(), placement_bodies),
+        placement_model=placement_model(composition, placement.result(), bodies),
         classes=classes,
-        slots=composition.slots,
+        slots=plan.slots,
         faces=composition.faces,
     )
-
-
-def carrier_of(scene: SceneSpec, library: AssetLibrary) -> ActorFacts | None:
-    """The actor that bears a scene's surface, if one does.
-
-    Raises:
-        UnknownNameError: there is no such truck.
-    """
-    if scene.truck is None:
-        return None
-    library.path("vehicle", scene.truck.asset)
-    return vehicles_of(scene, library)[scene.truck.asset]

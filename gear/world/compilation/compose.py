@@ -1,8 +1,8 @@
-"""One MJCF out of many: a town, its boards, and a pool of actors.
+"""Composes one MJCF out of many: a town, its boards, and a pool of actors.
 
-dm_control.mjcf keeps the names of different files apart; what stands in a town goes around it as it is. Every asset's
-file is attached once, for its meshes, textures and materials; each instance is a body whose geoms refer to those, so
-ten equal cars cost one mesh. Only faces that take a patch get a material and a texture of their own.
+dm_control.mjcf keeps the names of different files apart. Each asset's file is attached once, for its meshes, textures
+and materials; each instance is a body whose geoms refer to those, so ten equal cars cost one mesh. Only faces that take
+a patch get a material and a texture of their own.
 """
 
 from __future__ import annotations
@@ -11,8 +11,7 @@ import copy
 import math
 import os
 import xml.etree.ElementTree as ET
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -20,33 +19,15 @@ from pathlib import Path
 from typing import Any
 
 from gear.values.errors import TownError
-from gear.values.scene import Weather
-from gear.world.assets.library import ActorFacts, AssetLibrary
-from gear.world.compilation.asset_prefetch import AssetPrefetcher
+from gear.world.compilation.actor_pool import Slot
 from gear.world.compilation.instances import AssetInstances, FaceNames, load_mjcf
 from gear.world.compilation.quiet_mjcf import mjcf
-from gear.world.compilation.static_parts import MeshPath, StaticParts, split_town
+from gear.world.compilation.scene_mjcf import SceneMjcf
+from gear.world.compilation.static_parts import MeshPath
+from gear.world.compilation.world_plan import WorldPlan
 from gear.world.scene_spec import BoardSpec
 from gear.world.weather.light import Lighting, lighting_of
 from gear.world.weather.presets import apply_weather
-
-PARKED_DEPTH_M = 60.0
-"""Actors of the pool that a sample does not use wait this far below the town, under its ground."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Slot:
-    """One place of the pool: an instance of an actor that samples may use.
-
-    Attributes:
-        body: its body in both models.
-        actor: what it is an instance of.
-        carries_surface: whether its face has a texture of its own.
-    """
-
-    body: str
-    actor: ActorFacts
-    carries_surface: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -54,13 +35,13 @@ class Composition:
     """A composed world, not yet compiled.
 
     Attributes:
-        tree: the whole of it as MJCF.
-        assets: files that it refers to, by name; of meshes, where they lie.
-        folder: where those of them lie that are no longer in `assets`.
+        tree: the whole world as MJCF.
+        assets: content of the files that the tree refers to, by name; for a mesh, the path of its file.
         town: path of the town's MJCF.
-        files: every MJCF file that it is composed of, the town's first.
-        slots: the pool.
-        faces: what takes patches, in patch order.
+        files: every MJCF file that the world is composed of, the town's first.
+        slots: the pool of actors.
+        faces: faces that take patches, in patch order.
+        folder: folder of the files that were written by `write_assets`; None before.
     """
 
     tree: ET.Element
@@ -72,13 +53,14 @@ class Composition:
     folder: Path | None = None
 
     @property
-    def pictures(self) -> list[str]:
-        """Paths of the textures, once it is laid out."""
+    def texture_files(self) -> list[str]:
+        """Paths of the textures that `write_assets` wrote."""
         return [str(path) for path in self.folder.glob("*.png")] if self.folder else []
 
-    def laid_out(self, folder: Path) -> Composition:
-        """The same with its files written into a folder, but for meshes, which it refers to where they lie: MuJoCo
-        copies what is in memory, all of it at once.
+    def write_assets(self, folder: Path) -> Composition:
+        """Writes the textures into a folder and returns the composition that refers to files alone.
+
+        MuJoCo copies every asset that is given to it in memory, all of them at once. It reads files one by one.
         """
         for name, content in self.assets.items():
             if not isinstance(content, MeshPath):
@@ -86,118 +68,95 @@ class Composition:
         tree = copy.deepcopy(self.tree)
         for element in tree.iter():
             element.attrib.pop("strippath", None)
-            place = self.assets.get(element.get("file", ""))
-            if isinstance(place, MeshPath):
-                element.set("file", os.fsdecode(place))
+            content = self.assets.get(element.get("file", ""), b"")
+            if isinstance(content, MeshPath):
+                element.set("file", os.fsdecode(content))
         return replace(self, tree=tree, assets={}, folder=folder)
 
 
-def compose(
-    library: AssetLibrary,
-    boards: Sequence[BoardSpec],
-    pool: Sequence[tuple[ActorFacts, int]],
-    carrier: ActorFacts | None,
-    weather: Weather,
-    lighting: Callable[[], Lighting] | None,
-    prefetcher: AssetPrefetcher,
-) -> Composition:
-    """Puts a town, its boards and its actors into one tree.
+def compose(plan: WorldPlan, files: SceneMjcf, lighting: Callable[[], Lighting] | None = None) -> Composition:
+    """Puts a town, its boards, its actors and its weather into one MJCF tree.
 
     Args:
-        library: of the town.
-        boards: in patch order.
-        pool: actors and how many instances of each; the first one is the ego car's.
-        carrier: an actor that bears a surface, besides the pool.
-        weather: light and air.
-        lighting: waits for the weather's light, where that is being worked out already; else None.
-        prefetcher: is told of meshes as soon as they are known.
+        plan: what the world holds.
+        files: the MJCF of the plan.
+        lighting: returns the light of the plan's weather, where something else computes it already; otherwise a thread
+            computes it meanwhile.
 
     Raises:
-        TownError: a file cannot be composed.
-        UnknownNameError: a board's asset is not there.
+        TownError: a file cannot be composed with the others.
     """
-    with ThreadPoolExecutor(1) as aside:
-        light = aside.submit(lighting or partial(lighting_of, weather))
-        text, statics = split_town(library.town)
-        prefetcher.prefetch(map(os.fsdecode, statics.mesh_paths.values()))
-        root = load_mjcf(library.town, text, statics.mesh_paths)
-        slots = slots_of(pool, carrier)
-        parts = AssetInstances(root, prefetcher)
-        faces = _fill(root, parts, library, statics, boards, slots)
-    apply_weather(root, weather, light.result(), statics.geom_materials)
-    tree = ET.fromstring(statics.put_into(parts.put_defaults_into(root.to_xml_string())))
-    parts.put_copies_into(tree)
+    with ThreadPoolExecutor(1) as thread:
+        light = thread.submit(lighting or partial(lighting_of, plan.weather))
+        root = load_mjcf(plan.town, files.town.text, files.town.mesh_paths)
+        instances = AssetInstances(root, files.assets)
+        faces = _Filling(plan, root, instances, files.town.statics.body_names).fill()
+    apply_weather(root, plan.weather, light.result(), files.town.statics.geom_materials)
+    tree = ET.fromstring(files.town.statics.insert_into(instances.put_defaults_into(root.to_xml_string())))
+    instances.put_copies_into(tree)
     return Composition(
         tree=tree,
         assets=root.get_assets(),
-        town=library.town,
-        files=(library.town, *parts.files),
-        slots=slots,
+        town=plan.town,
+        files=(plan.town, *instances.files),
+        slots=plan.slots,
         faces=faces,
     )
 
 
-def _fill(
-    root: mjcf.RootElement,
-    parts: AssetInstances,
-    library: AssetLibrary,
-    statics: StaticParts,
-    boards: Sequence[BoardSpec],
-    slots: Iterable[Slot],
-) -> tuple[FaceNames, ...]:
-    """Puts boards and actors into the town's tree."""
-    faces: list[FaceNames] = []
-    for index, board in enumerate(boards):
-        path = library.path("surface", board.asset)
-        body = _new_body(root, library.town, statics, f"board_{index}", **_placed(board))
-        faces.append(parts.add_surface_instance(path, body, is_carried=False))
-    for slot in slots:
-        if slot.body in {face.owner for face in faces}:
-            problem = f"is called {slot.actor.name!r}, so its instances would have the names of the boards; rename it"
-            raise TownError(slot.actor.path, problem)
-        path = slot.actor.path
-        if not slot.carries_surface and parts.has_instance(path):
-            _refuse_taken(root, library.town, statics, slot.body)
-            parts.copy_instance(path, slot.body)
-            continue
-        body = _new_body(root, library.town, statics, slot.body, mocap=True)
-        if slot.carries_surface:
-            faces.append(parts.add_surface_instance(path, body, is_carried=True))
-        else:
-            parts.add_instance(path, body)
-    parts.drop_templates()
-    return tuple(faces)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Filling:
+    """Puts boards and actors into the tree of a town.
+
+    Attributes:
+        plan: names them.
+        root: the tree.
+        instances: makes their bodies.
+        town_bodies: names of the bodies of the town that are not in the tree.
+    """
+
+    plan: WorldPlan
+    root: mjcf.RootElement
+    instances: AssetInstances
+    town_bodies: frozenset[str]
+
+    def fill(self) -> tuple[FaceNames, ...]:
+        """Adds a body for every board and every slot, and returns the faces that take patches."""
+        plan, instances = self.plan, self.instances
+        faces: list[FaceNames] = []
+        for index, (board, path) in enumerate(zip(plan.scene.boards, plan.assets.boards, strict=True)):
+            body = self._new_body(f"board_{index}", **_pose(board))
+            faces.append(instances.add_surface_instance(path, body, is_carried=False))
+        for slot in plan.slots:
+            path = slot.actor.path
+            if slot.body in {face.owner for face in faces}:
+                problem = (
+                    f"is called {slot.actor.name!r}, so its instances would have the names of the boards; rename it"
+                )
+                raise TownError(path, problem)
+            if not slot.carries_surface and instances.has_instance(path):
+                self._check_free(slot.body)
+                instances.copy_instance(path, slot.body)
+                continue
+            body = self._new_body(slot.body, mocap=True)
+            if slot.carries_surface:
+                faces.append(instances.add_surface_instance(path, body, is_carried=True))
+            else:
+                instances.add_instance(path, body)
+        instances.drop_templates()
+        return tuple(faces)
+
+    def _new_body(self, name: str, **attributes: Any) -> Any:
+        self._check_free(name)
+        return self.root.worldbody.add("body", name=name, **attributes)
+
+    def _check_free(self, name: str) -> None:
+        if name in self.town_bodies or self.root.find("body", name) is not None:
+            problem = f"has a body named {name!r}, a name that gear gives to what it puts there"
+            raise TownError(self.plan.town, problem)
 
 
-def slots_of(pool: Sequence[tuple[ActorFacts, int]], carrier: ActorFacts | None) -> tuple[Slot, ...]:
-    """The slots of a pool, and of the actor that bears a surface besides."""
-    slots = [
-        Slot(body=f"{actor.name}_{index}", actor=actor) for actor, count in _merged(pool) for index in range(count)
-    ]
-    if carrier is not None:
-        slots.append(Slot(body="carrier", actor=carrier, carries_surface=True))
-    return tuple(slots)
-
-
-def _new_body(root: mjcf.RootElement, town: Path, statics: StaticParts, name: str, **attributes: Any) -> Any:
-    _refuse_taken(root, town, statics, name)
-    return root.worldbody.add("body", name=name, **attributes)
-
-
-def _refuse_taken(root: mjcf.RootElement, town: Path, statics: StaticParts, name: str) -> None:
-    if name in statics.body_names or root.find("body", name) is not None:
-        raise TownError(town, f"has a body named {name!r}, a name that gear gives to what it puts there")
-
-
-def _merged(pool: Sequence[tuple[ActorFacts, int]]) -> list[tuple[ActorFacts, int]]:
-    counts: Counter[str] = Counter()
-    facts: dict[str, ActorFacts] = {}
-    for actor, count in pool:
-        facts[actor.name] = actor
-        counts[actor.name] += count
-    return [(facts[name], count) for name, count in counts.items()]
-
-
-def _placed(board: BoardSpec) -> dict[str, Any]:
+def _pose(board: BoardSpec) -> dict[str, Any]:
+    """MJCF attributes of a board's body: position in metres, and a quaternion (w, x, y, z) about z."""
     half = math.radians(board.facing_deg) / 2
     return {"pos": board.position_m, "quat": (math.cos(half), 0.0, 0.0, math.sin(half))}

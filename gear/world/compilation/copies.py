@@ -1,7 +1,7 @@
-"""Instances of an asset but for its first: copies of what dm_control has written of that one.
+"""Copies of an asset's first instance, made in the MJCF that dm_control wrote.
 
-They differ in names and number plates alone, and dm_control takes nearly two milliseconds for each: three quarters of a
-second for a town's crowd.
+Instances of one asset differ in names and number plates alone. dm_control takes nearly two milliseconds to make each,
+three quarters of a second for the crowd of a town.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Copy:
-    """One of them.
+    """One copy of an instance.
 
     Attributes:
-        name: of its body.
-        original: name of the body that it is a copy of; names of all that is in there begin with it.
-        plates: meshes that it wears where the first instance wears others, by the asset's names of its geoms.
+        name: name of its body.
+        original: name of the body that it is a copy of. The names of all elements in that body begin with it.
+        plates: meshes of its number plates, by the names that the asset's file gives to their geoms.
     """
 
     name: str
@@ -28,11 +28,16 @@ class Copy:
 
 
 def put_copies_into(world: ET.Element, copies: Mapping[str, Sequence[Copy]]) -> None:
-    """Writes copies into a `<worldbody>`, by name of the body in it that they stand behind."""
+    """Inserts copies into a `<worldbody>`.
+
+    Args:
+        world: the worldbody, changed in place.
+        copies: the copies to insert, by the name of the body that they follow.
+    """
     bodies = {body.get("name", ""): body for body in world.iterfind("body")}
-    for place, element in reversed(list(enumerate(world))):
+    for index, element in reversed(list(enumerate(world))):
         wanted = copies.get(element.get("name", ""), ()) if element.tag == "body" else ()
-        world[place + 1 : place + 1] = [_copied(bodies[one.original], one) for one in wanted]
+        world[index + 1 : index + 1] = [_copied(bodies[one.original], one) for one in wanted]
 
 
 def _copied(body: ET.Element, wanted: Copy) -> ET.Element:
@@ -41,7 +46,7 @@ def _copied(body: ET.Element, wanted: Copy) -> ET.Element:
         if name := element.get("name"):
             element.set("name", wanted.name + name[len(wanted.original) :])
     for geom in copied.iter("geom"):
-        own_name = geom.get("name", "")[len(wanted.name) + 1 :]
-        if own_name in wanted.plates:
-            geom.set("mesh", wanted.plates[own_name])
+        asset_name = geom.get("name", "")[len(wanted.name) + 1 :]
+        if asset_name in wanted.plates:
+            geom.set("mesh", wanted.plates[asset_name])
     return copied

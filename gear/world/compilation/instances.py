@@ -1,8 +1,7 @@
-"""Instances of assets inside a dm_control tree: bodies that share the meshes and materials of one attached file."""
+"""Instances of assets in a dm_control tree: bodies that share the meshes and materials of one attached file."""
 
 from __future__ import annotations
 
-import os
 import xml.etree.ElementTree as ET
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping
@@ -11,26 +10,25 @@ from pathlib import Path
 from typing import Any
 
 from gear.values.errors import TownError
-from gear.world.compilation.asset_prefetch import AssetPrefetcher
 from gear.world.compilation.copies import Copy, put_copies_into
 from gear.world.compilation.mujoco_errors import compile_problem, without_breaks
 from gear.world.compilation.quiet_mjcf import mjcf
-from gear.world.compilation.static_parts import UNNAMED, MeshPath, split_asset
+from gear.world.compilation.static_parts import UNNAMED, MeshPath, SplitAsset
 from gear.world.surfaces.face_texture import FACE_SIZE_PX
 
 _UNREAD = ("frame", "replicate", "attach")
-"""What MuJoCo knows in a body, and dm_control does not."""
+"""Elements of a body that MuJoCo knows and dm_control does not."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaceNames:
-    """A face that takes a patch, by its names in the composed MJCF.
+    """A face that takes a patch, by the names of its elements in the composed MJCF.
 
     Attributes:
-        asset: MJCF that it comes from.
-        owner: body of the board or of the carrier.
+        asset: name of the MJCF file that it comes from, without suffix.
+        owner: body of the board, or of the actor that carries the face.
         is_carried: whether the owner is an actor.
-        geom, site: the face and its frame.
+        geom, site: the geom of the face, and the site that gives its frame.
         neutral_material: the asset's own material, which says what the face looks like without a patch.
     """
 
@@ -45,12 +43,12 @@ class FaceNames:
 def load_mjcf(
     path: Path, text: str | None = None, mesh_paths: Mapping[str, MeshPath] | None = None
 ) -> mjcf.RootElement:
-    """Reads one file; its model is named after the file and everything in it has a name.
+    """Reads one MJCF file into dm_control. Its model is named after the file, and every element gets a name.
 
     Args:
         path: of the file.
-        text: what is read in its place.
-        mesh_paths: files of the text that stay where they are.
+        text: an MJCF text that is read in place of the file's content.
+        mesh_paths: path of each mesh file, by the name that `text` gives it.
 
     Raises:
         TownError: dm_control cannot read it.
@@ -62,19 +60,19 @@ def load_mjcf(
             root = mjcf.from_xml_string(text, model_dir=str(path.parent), assets=mesh_paths)
     except (KeyError, ValueError, OSError, AttributeError, SyntaxError, RecursionError) as error:
         if text is not None:
-            load_mjcf(path)  # fails too, and its lines are those of the file
+            load_mjcf(path)  # fails too, with the line numbers of the file
         if isinstance(error, KeyError):
             what = f"{error.args[0]} is not known here"
             if what.endswith(tuple(f"'{tag}' is not known here" for tag in _UNREAD)):
                 what += "; write bodies where it says frame, replicate or attach"
         elif isinstance(error, (SyntaxError, RecursionError)):
-            # The file itself is XML: it is one that it includes, which MuJoCo names.
+            # The file itself is XML, so the error is in a file that it includes, which MuJoCo names.
             what = compile_problem(path) or without_breaks(error)
         else:
             what = without_breaks(error)
         raise TownError(path, f"cannot be read as MJCF: {what}") from error
     root.model = path.stem
-    # Writing an element without a name makes dm_control count all elements before it: quadratic in their number.
+    # For each element without a name dm_control would count all elements in front of it, in quadratic time.
     for tag in ("geom", "site", "body"):
         for index, element in enumerate(root.find_all(tag)):
             if getattr(element, "name", "") is None:
@@ -83,24 +81,34 @@ def load_mjcf(
 
 
 def class_name(dclass: Any) -> str:
-    """Of an element's default class: dm_control knows it, or has only its name, or there is none."""
+    """Name of an element's default class; empty where it has none.
+
+    Args:
+        dclass: as dm_control gives it: the class, its name where dm_control does not know the class, or None.
+    """
     return dclass if isinstance(dclass, str) else "" if dclass is None else str(dclass.dclass)
 
 
 def free_name(root: mjcf.RootElement, kind: str, name: str) -> str:
-    """The name, or one like it where the town has something of that kind and name."""
+    """Returns the name, with underscores added until no element of that kind in the tree has it."""
     while root.find(kind, name) is not None:
         name += "_"
     return name
 
 
 class AssetInstances:
-    """The assets that a composition has taken in, each file once."""
+    """The assets of a composition: attaches each file once and makes its instances."""
 
-    def __init__(self, root: mjcf.RootElement, prefetcher: AssetPrefetcher) -> None:
+    def __init__(self, root: mjcf.RootElement, files: Mapping[Path, SplitAsset]) -> None:
+        """Makes instances in the tree of a town.
+
+        Args:
+            root: the tree.
+            files: the assets' MJCF by path.
+        """
         self._root = root
-        self._prefetcher = prefetcher
-        self._turns = _turns_of(root)
+        self._files = files
+        self._angles = _angle_settings(root)
         self._models: dict[Path, mjcf.RootElement] = {}
         self._textures: dict[tuple[str, ...], Any] = {}
         self._defaults: dict[str, str] = {}
@@ -111,24 +119,26 @@ class AssetInstances:
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """Those that were taken in."""
+        """Paths of the attached files, in the order in which they were attached."""
         return tuple(self._models)
 
     def add_instance(self, path: Path, body: Any) -> None:
-        """Fills `body` with an instance of the asset that shares everything; number plates are worn by turns.
+        """Fills a body with an instance of an asset that shares everything with the asset's other instances.
+
+        The number plates that the file holds go round among the instances.
 
         Raises:
-            TownError: the file cannot be used, or its instance would have the name of something else in the world.
+            TownError: the file cannot be attached, or the instance would have the name of another element.
         """
         self._fill(path, body)
         self._originals.setdefault(path, body.name)
 
     def has_instance(self, path: Path) -> bool:
-        """Whether there is one that others can be copied from."""
+        """Whether `add_instance` has made an instance of the asset, which `copy_instance` can copy."""
         return path in self._originals
 
     def copy_instance(self, path: Path, name: str) -> None:
-        """As `add_instance` into a body of that name, but for dm_control: it is `put_copies_into` that writes it."""
+        """Makes another instance, in a body of that name, without dm_control: `put_copies_into` writes it later."""
         plates = {geom: plate.full_identifier for geom, plate in self._next_plates(path).items()}
         frame = self._model(path).full_identifier  # of the empty body that dm_control puts behind the first instance
         self._copies[frame].append(Copy(name=name, original=self._originals[path], plates=plates))
@@ -139,19 +149,19 @@ class AssetInstances:
             for child in model.worldbody.all_children():
                 _copy(child, body, body.name)
         except ValueError as error:
-            told = f"cannot be put into one world with the town as {body.name!r}: {without_breaks(error)}"
-            raise TownError(path, told) from error
+            problem = f"cannot be put into one world with the town as {body.name!r}: {without_breaks(error)}"
+            raise TownError(path, problem) from error
         for geom, plate in self._next_plates(path).items():
             self._root.find("geom", f"{body.name}_{geom}").mesh = plate
 
     def _next_plates(self, path: Path) -> dict[str, Any]:
-        """Meshes that the next instance wears, by geom."""
-        turn = self._instances[path]
+        """Meshes of the next instance's number plates, by the name of the geom."""
+        number = self._instances[path]
         self._instances[path] += 1
-        return {geom: plates[turn % len(plates)] for geom, plates in self._plates[path]}
+        return {geom: plates[number % len(plates)] for geom, plates in self._plates[path]}
 
     def add_surface_instance(self, path: Path, body: Any, *, is_carried: bool) -> FaceNames:
-        """Fills `body` with an instance whose face has a texture of its own.
+        """Fills a body with an instance whose face has a texture of its own, which can show a patch.
 
         Raises:
             TownError: the asset has not exactly one face, or the face has no material or no `surface` site.
@@ -160,7 +170,7 @@ class AssetInstances:
         model = self._model(path)
         faces = [geom for geom in model.find_all("geom") if class_name(geom.dclass).endswith(".face")]
         if len(faces) != 1:
-            raise TownError(path, f"must have one geom of a class ending in `.face` to bear a patch, has {len(faces)}")
+            raise TownError(path, f"must have one geom of a class ending in `.face` to show a patch, has {len(faces)}")
         face = faces[0]
         if model.find("site", "surface") is None or face.material is None:
             raise TownError(path, f"face {face.name!r} needs a material, and a site `surface` in its middle")
@@ -178,36 +188,35 @@ class AssetInstances:
         )
 
     def drop_templates(self) -> None:
-        """Removes the attached files' own bodies; only what the instances refer to stays."""
+        """Removes the bodies of the attached files themselves; their meshes, textures and materials stay."""
         for model in self._models.values():
             for child in list(model.worldbody.all_children()):
                 child.remove()
 
     def put_copies_into(self, tree: ET.Element) -> None:
-        """Writes the instances that went around dm_control into the MJCF that it has written."""
+        """Adds the instances that `copy_instance` made to the MJCF that dm_control wrote."""
         for worldbody in tree.iterfind("worldbody"):
             put_copies_into(worldbody, self._copies)
 
     def put_defaults_into(self, xml: str) -> str:
-        """MJCF with the default classes that went around dm_control, where it left room for them."""
+        """Returns the MJCF that dm_control wrote, with the default classes that went around it."""
         for name, defaults in self._defaults.items():
-            before, room, after = xml.partition(f'<default class="{name}/"/>')
-            assert room  # dm_control writes one for every file
+            before, empty, after = xml.partition(f'<default class="{name}/"/>')
+            assert empty  # dm_control writes an empty class for every file
             xml = before + defaults + after
         return xml
 
     def _model(self, path: Path) -> mjcf.RootElement:
-        """The asset's file, attached when first asked for."""
+        """The asset's file, attached at the first call."""
         if path not in self._models:
             for other in self._models:
                 if other.stem == path.stem:
                     raise TownError(path, f"has the name of {other}, which is in the same world; rename one of them")
-            split = split_asset(path)
-            self._prefetcher.prefetch(map(os.fsdecode, split.mesh_paths.values()))
+            split = self._files[path]
             model = load_mjcf(path, split.text, split.mesh_paths)
-            if _turns_of(model) != self._turns:
-                told = "turns geoms by {} and the town by {}; write both with the same compiler setting"
-                raise TownError(path, told.format(_turns_of(model), self._turns))
+            if _angle_settings(model) != self._angles:
+                problem = "turns geoms by {} and the town by {}; write both with the same compiler setting"
+                raise TownError(path, problem.format(_angle_settings(model), self._angles))
             if split.text is not None:
                 self._defaults[model.model] = split.defaults
             try:
@@ -220,7 +229,7 @@ class AssetInstances:
         return self._models[path]
 
     def _share_textures(self, model: mjcf.RootElement) -> None:
-        """Lets a file's materials wear the textures that another file has brought already, picture for picture."""
+        """Replaces textures of a file by equal ones that another file has brought: same image, same attributes."""
         for texture in list(model.asset.texture):
             if texture.file is None:
                 continue
@@ -232,12 +241,13 @@ class AssetInstances:
             if known is texture:
                 continue
             for material in model.asset.material:
-                for wearer in (material, *material.all_children()):
-                    if getattr(wearer, "texture", None) is texture:
-                        wearer.texture = known
+                for user in (material, *material.all_children()):
+                    if getattr(user, "texture", None) is texture:
+                        user.texture = known
             texture.remove()
 
     def _own_material(self, material: Any, name: str) -> Any:
+        """A copy of a material whose colour comes from a texture of its own, of the size of a face."""
         width, height = FACE_SIZE_PX
         texture = self._root.asset.add(
             "texture",
@@ -261,14 +271,16 @@ class AssetInstances:
         return own
 
 
-def _turns_of(model: mjcf.RootElement) -> str:
-    """How a file writes its angles. One setting holds for the whole world, so that of one file, which another only
-    lacks, would turn the other's geoms as well."""
+def _angle_settings(model: mjcf.RootElement) -> str:
+    """The compiler settings of a file that say how its angles are written.
+
+    A composed world has one setting for all of its files, so files that differ in it cannot be composed.
+    """
     return f"angle={model.compiler.angle or 'degree'} eulerseq={model.compiler.eulerseq or 'xyz'}"
 
 
 def _plates_of(model: mjcf.RootElement) -> Iterator[tuple[str, list[Any]]]:
-    """Geoms of a class ending in `.plate`, and the meshes that they can wear: `m`, their own, `m_1`, `m_2` …"""
+    """Names of the geoms of a class ending in `.plate`, each with its meshes: its own, `m`, and `m_1`, `m_2` …"""
     for geom in model.find_all("geom"):
         if class_name(geom.dclass).endswith(".plate") and getattr(geom.mesh, "name", None):
             meshes = [geom.mesh]
@@ -278,7 +290,7 @@ def _plates_of(model: mjcf.RootElement) -> Iterator[tuple[str, list[Any]]]:
 
 
 def _attributes_outside(element: Any) -> dict[str, Any]:
-    """Attributes that mean the same in the tree that the element's file is attached to."""
+    """Attributes of an element as they must be written in the tree that the element's file is attached to."""
     attributes: dict[str, Any] = element.get_attributes()
     for reference in ("dclass", "childclass"):
         if isinstance(attributes.get(reference), str):

@@ -1,7 +1,8 @@
-"""What stays as its file says and goes around dm_control, which would change nothing.
+"""Parts of MJCF files that are copied into a world as they are, without passing through dm_control.
 
-Geoms and bodies of a town cost it half a millisecond each, default classes of assets five. Meshes it would read, hash
-and have written again: it gets their paths for their content.
+dm_control changes nothing in them, and it is slow: half a millisecond for each geom and body of a town, five for each
+default class of an asset. It would also read, hash and rewrite every mesh, so it gets the path of a mesh file in place
+of the file's content.
 """
 
 from __future__ import annotations
@@ -18,54 +19,69 @@ from gear.values.regular_file import check_regular
 from gear.world.assets.library import read_numbers
 
 UNNAMED = "unnamed_"
-"""How names begin that gear gives to what has none."""
+"""Prefix of the names that gear gives to elements without one."""
 
 _PLAIN = ("geom", "body")
 _PLAIN_DEFAULTS = ("default", "geom", "mesh")
 _REFERENCES = frozenset({"material", "mesh", "hfield", "fluidshape"})
 _PLAIN_STEM = re.compile(r"[\w.-]+", re.ASCII)
 _MAIN = "main"
-"""MuJoCo's own name of the class of all defaults: in files that it has written."""
+"""Name that MuJoCo gives to the class of all defaults in the files that it writes."""
 
 _WORLD = "<worldbody>"
 
 
 class MeshPath(bytes):
-    """Where a file lies, for its content."""
+    """The path of a mesh file, handed to dm_control in place of the file's content."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StaticParts:
-    """Elements of a town's worldbody, in their order.
+    """The geoms and bodies of a town's worldbody that go around dm_control, in the order of the file.
 
     Attributes:
-        xml: as MJCF; every geom has a name.
-        body_names: of the bodies.
-        geom_materials: default class and own material, if it has one, of the geoms; each pair once, in the order of the
+        xml: the elements as MJCF; every geom has a name.
+        body_names: names of all bodies among them.
+        geom_materials: default class and own material (None for none) of the geoms; each pair once, in the order of the
             file.
-        mesh_paths: of the meshes, by what the rest of the town calls their files.
     """
 
     xml: str = ""
     body_names: frozenset[str] = frozenset()
     geom_materials: tuple[tuple[str, str | None], ...] = ()
-    mesh_paths: Mapping[str, MeshPath] = field(default_factory=dict)
 
-    def put_into(self, xml: str) -> str:
-        """MJCF with them before everything else in its worldbody."""
+    def insert_into(self, xml: str) -> str:
+        """Returns an MJCF text with these elements at the beginning of its worldbody."""
         before, world, after = xml.partition(_WORLD)
         return before + world + self.xml + after if self.xml else xml
 
 
-def split_town(path: Path) -> tuple[str | None, StaticParts]:
-    """A town's MJCF without its geoms and bodies, and those.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SplitTown:
+    """A town's MJCF in two parts.
 
-    Nothing is taken out of a town whose geoms and bodies are not all plain ones: such with joints, cameras or sites in
-    them, geoms without a class of their own, or files that include others. dm_control reads such a file itself: the
-    text is None, unless the class of all defaults has its usual name, which dm_control would make another class.
+    Attributes:
+        path: of its file.
+        text: the MJCF that dm_control reads; None where it must read the file itself.
+        statics: what was taken out of the text.
+        mesh_paths: path of each mesh file, by the name that `text` gives the file.
+    """
+
+    path: Path
+    text: str | None
+    statics: StaticParts
+    mesh_paths: Mapping[str, MeshPath] = field(default_factory=dict)
+
+
+def split_town(path: Path) -> SplitTown:
+    """Separates the plain geoms and bodies of a town from the rest of its MJCF.
+
+    Nothing is taken out of a town that has anything else in its worldbody (joints, cameras, sites, geoms without a
+    class) or that includes other files. dm_control then reads the file itself, unless the file names the class of all
+    defaults `main`: dm_control would make that a second class, so it gets a text without that name.
 
     Raises:
-        TownError: it is no XML, or cannot be read.
+        TownError: the file is no XML, cannot be read, or holds a NaN.
     """
     root = read_numbers(path)
     named = [default for default in root.findall("default") if default.get("class") == _MAIN]
@@ -74,7 +90,9 @@ def split_town(path: Path) -> tuple[str | None, StaticParts]:
     worlds = root.findall("worldbody")
     taken = [child for world in worlds for child in world if child.tag in _PLAIN]
     if len(worlds) != 1 or next(root.iter("include"), None) is not None or not all(map(_is_plain, taken)):
-        return ET.tostring(root, encoding="unicode") if named else None, StaticParts()
+        return SplitTown(
+            path=path, text=ET.tostring(root, encoding="unicode") if named else None, statics=StaticParts()
+        )
     for child in taken:
         worlds[0].remove(child)
     geoms = [geom for child in taken for geom in child.iter("geom")]
@@ -84,19 +102,19 @@ def split_town(path: Path) -> tuple[str | None, StaticParts]:
         xml="".join(ET.tostring(child, encoding="unicode") for child in taken),
         body_names=frozenset(body.get("name", "") for child in taken for body in child.iter("body")),
         geom_materials=tuple(dict.fromkeys((geom.get("class", ""), geom.get("material")) for geom in geoms)),
-        mesh_paths=_meshes_in_place(root, path),
     )
-    return ET.tostring(root, encoding="unicode"), statics
+    mesh_paths = _replace_mesh_names(root, path)
+    return SplitTown(path=path, text=ET.tostring(root, encoding="unicode"), statics=statics, mesh_paths=mesh_paths)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SplitAsset:
-    """An asset's MJCF in two.
+    """An asset's MJCF in two parts.
 
     Attributes:
-        text: without its default classes; None where it is to be read whole.
-        defaults: those, named as dm_control names them in a town.
-        mesh_paths: of the meshes, by what `text` calls their files.
+        text: the MJCF without its default classes; None where dm_control must read the file itself.
+        defaults: the default classes as MJCF, named as dm_control names them in a composed world.
+        mesh_paths: path of each mesh file, by the name that `text` gives the file.
     """
 
     text: str | None = None
@@ -105,10 +123,13 @@ class SplitAsset:
 
 
 def split_asset(path: Path) -> SplitAsset:
-    """Takes out default classes of geoms and meshes; a file whose classes refer to anything is left whole.
+    """Separates the default classes of an asset from the rest of its MJCF.
+
+    A file stays whole if its default classes refer to anything, such as a material, or apply to more than geoms and
+    meshes, and if it includes other files.
 
     Raises:
-        TownError: it is no XML, or a file cannot be read.
+        TownError: the file is no XML, cannot be read, or holds a NaN.
     """
     root = read_numbers(path)
     sections = root.findall("default")
@@ -123,7 +144,7 @@ def split_asset(path: Path) -> SplitAsset:
     root.remove(sections[0])
     for default in sections[0].iter("default"):
         default.set("class", f"{path.stem}/{default.get('class', '')}")
-    mesh_paths = _meshes_in_place(root, path)
+    mesh_paths = _replace_mesh_names(root, path)
     return SplitAsset(
         text=ET.tostring(root, encoding="unicode"),
         defaults=ET.tostring(sections[0], encoding="unicode").strip(),
@@ -131,15 +152,15 @@ def split_asset(path: Path) -> SplitAsset:
     )
 
 
-def _meshes_in_place(root: ET.Element, path: Path) -> dict[str, MeshPath]:
-    """Has meshes named by their whole paths, and where those lead to."""
+def _replace_mesh_names(root: ET.Element, path: Path) -> dict[str, MeshPath]:
+    """Renames each mesh file in a tree to its absolute path, and returns the paths by these names."""
     folders = {name: folder for part in root.iter("compiler") for name, folder in part.items()}
     base = path.parent / folders.get("meshdir", folders.get("assetdir", ""))
     mesh_paths: dict[str, MeshPath] = {}
     for mesh in root.iterfind("asset/mesh[@file]"):
         file = (base / mesh.get("file", "")).absolute()
         try:
-            # MuJoCo is the one to read it: whether that is possible, and which file it is, shows here.
+            # MuJoCo reads the content later. Opening the file here finds a missing one while its MJCF is known.
             with check_regular(file).open("rb"):
                 mesh_paths[str(file)] = MeshPath(os.fsencode(file))
         except OSError as error:
@@ -149,6 +170,7 @@ def _meshes_in_place(root: ET.Element, path: Path) -> dict[str, MeshPath]:
 
 
 def _is_plain(element: ET.Element) -> bool:
+    """Whether an element and all below it are geoms with a class and bodies with a name."""
     return all(
         part.tag in _PLAIN
         and part.get("childclass") is None

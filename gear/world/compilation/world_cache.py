@@ -1,7 +1,8 @@
-"""Compiled worlds on disk: whoever needs one next loads it in a second, and never has the memory that compiling takes.
+"""A cache of compiled worlds on disk: a cached world loads in about a second, without the memory that compiling takes.
 
-A world is compiled in a process of its own and kept under a hash of everything that decides it: gear's code, versions,
-the content of every MJCF file, mesh and texture, scene and weather. An edit of any of them is another world.
+A world that is not cached is compiled in a subprocess, which keeps the memory out of this one, and stored under a hash
+of everything that decides it: gear's code, versions, the content of every MJCF file, mesh and texture, scene and
+weather. A change to any of them makes another entry.
 """
 
 from __future__ import annotations
@@ -27,20 +28,21 @@ from gear.values.serial import Json, to_json
 from gear.world.assets.asset_hash import asset_files, assets_digest
 from gear.world.assets.library import AssetLibrary
 from gear.world.compilation.compiled_world import CompiledWorld, compile_world
+from gear.world.compilation.world_plan import WorldPlan, plan_world
 from gear.world.scene_spec import SceneSpec
 from gear.world.world import World
 
 CACHE_BYTES = 3 << 30
-"""Worlds that were used last are kept up to this, about sixteen towns."""
+"""Size that the cache is kept below, about sixteen towns. The entries that were not used for longest are removed."""
 
 NOT_CACHED_BELOW_BYTES = 4 << 20
-"""A town with fewer bytes of assets compiles sooner than a process starts."""
+"""A town with fewer bytes of assets compiles in less time than a subprocess takes to start, so it is not cached."""
 
 MAY_CACHE = "may-cache"
-"""Name of the file by which the compiling process says that the hash covers all that it read."""
+"""Name of the file by which the subprocess reports that the key covers every file that it read."""
 
 DONE = b"done"
-"""What the compiling process says when all is written."""
+"""What the subprocess writes to its standard output when the world is saved."""
 
 _ROOMS = ("values", "contracts", "camera", "world")
 _SCRATCH = ".making-"
@@ -50,31 +52,29 @@ _ABANDONED_S = 3600.0
 def load_or_compile(
     *, town: str | Path, scene_name: str, scene: SceneSpec, weather: Weather, cache_dir: Path | None = None
 ) -> World:
-    """As `World.build`, from the shelf where the same world lies there.
+    """Returns a world as `World.build` does, out of the cache where it is there.
 
     Args:
         town, scene_name, scene, weather: as for `World.build`.
-        cache_dir: folder that worlds are kept in; the user's cache unless given.
+        cache_dir: folder of the cache; None for `gear/worlds` in the user's cache folder.
 
     Raises:
         UnknownNameError: there is no such town, board or truck.
         TownError: a file breaks the conventions.
     """
-    library = AssetLibrary.for_town(town)
-    if (
-        cache_dir is None
-        and sum(path.stat().st_size for path in asset_files(library).values()) < NOT_CACHED_BELOW_BYTES
-    ):
-        compiled = compile_world(library, scene, weather)
+    plan = plan_world(AssetLibrary.for_town(town), scene, weather)
+    asset_bytes = sum(path.stat().st_size for path in asset_files(plan.assets.library).values())
+    if cache_dir is None and asset_bytes < NOT_CACHED_BELOW_BYTES:
+        compiled = compile_world(plan)
     else:
         with _folder(cache_dir) as folder:
-            compiled = _from_cache(folder, library, scene, weather)
-    return World.of(library, scene_name, scene, weather, compiled)
+            compiled = _from_cache(folder, plan)
+    return World.of(plan, scene_name, compiled)
 
 
 @contextlib.contextmanager
 def _folder(cache_dir: Path | None) -> Iterator[Path]:
-    """The shelf; one that is gone afterwards where the user's cache cannot be written."""
+    """The cache's folder; a temporary one where the user's cache folder cannot be written."""
     try:
         folder = cache_dir or Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gear" / "worlds"
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -84,46 +84,47 @@ def _folder(cache_dir: Path | None) -> Iterator[Path]:
     if usable:
         yield folder
     else:
-        with tempfile.TemporaryDirectory(prefix="gear-") as passing:
-            yield Path(passing)
+        with tempfile.TemporaryDirectory(prefix="gear-") as temporary:
+            yield Path(temporary)
 
 
-def _from_cache(cache_dir: Path, library: AssetLibrary, scene: SceneSpec, weather: Weather) -> CompiledWorld:
-    order = world_key(library, scene, weather)
-    entry = cache_dir / hashlib.sha256(json.dumps(order, sort_keys=True).encode()).hexdigest()[:32]
-    compiled = _load(entry, library, scene)
+def _from_cache(cache_dir: Path, plan: WorldPlan) -> CompiledWorld:
+    """Loads a world, or compiles it in a subprocess and stores it."""
+    key = world_key(plan)
+    entry = cache_dir / hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:32]
+    compiled = _load(entry, plan)
     if compiled is not None:
         return compiled
-    with contextlib.suppress(OSError), _locked(entry):  # a disk that takes no more files must stand in nobody's way
-        compiled = _load(entry, library, scene)
+    with contextlib.suppress(OSError), _locked(entry):  # a full disk must not keep a world from being compiled
+        compiled = _load(entry, plan)
         if compiled is not None:
             return compiled
         with tempfile.TemporaryDirectory(prefix=_SCRATCH, dir=cache_dir, ignore_cleanup_errors=True) as name:
             scratch = Path(name) / "world"
             scratch.mkdir()
-            with _compiled_in_subprocess(order, scratch) as is_done:
+            with _compiled_in_subprocess(key, scratch) as is_done:
                 if is_done:
-                    compiled = _load(scratch, library, scene)
+                    compiled = _load(scratch, plan)
                     if (scratch / MAY_CACHE).exists():
                         _store(scratch, entry)
-    # Where it failed, it fails here too, and says why.
-    return compiled or compile_world(library, scene, weather)
+    # What failed in the subprocess fails here too, with an error that says why.
+    return compiled or compile_world(plan)
 
 
-def world_key(library: AssetLibrary, scene: SceneSpec, weather: Weather) -> dict[str, Json]:
+def world_key(plan: WorldPlan) -> dict[str, Json]:
     """Everything that decides a compiled world, as JSON."""
     return {
-        "town": str(library.town.resolve()),
-        "scene": to_json(scene),
-        "weather": to_json(weather),
-        "assets": assets_digest(library),
+        "town": str(plan.town.resolve()),
+        "scene": to_json(plan.scene),
+        "weather": to_json(plan.weather),
+        "assets": assets_digest(plan.assets.library),
         "code": _code_digest(),
         "versions": [mujoco.__version__, metadata.version("dm-control")],
     }
 
 
 def _code_digest() -> str:
-    """sha256 over the sources of what makes worlds: whoever edits that gets new ones."""
+    """sha256 over the source files of the packages that decide how a world is made."""
     package = Path(__file__).resolve().parents[2]
     digest = hashlib.sha256()
     for path in (path for room in _ROOMS for path in sorted((package / room).rglob("*.py"))):
@@ -133,9 +134,10 @@ def _code_digest() -> str:
     return digest.hexdigest()
 
 
-def _load(entry: Path, library: AssetLibrary, scene: SceneSpec) -> CompiledWorld | None:
+def _load(entry: Path, plan: WorldPlan) -> CompiledWorld | None:
+    """The world of an entry; None where there is none, or it is damaged."""
     try:
-        compiled = CompiledWorld.load(entry, library, scene)
+        compiled = CompiledWorld.load(entry, plan.slots)
         os.utime(entry)
     except (OSError, ValueError, KeyError, GearError, mujoco.FatalError):
         return None
@@ -143,27 +145,28 @@ def _load(entry: Path, library: AssetLibrary, scene: SceneSpec) -> CompiledWorld
 
 
 @contextlib.contextmanager
-def _compiled_in_subprocess(order: dict[str, Json], folder: Path) -> Iterator[bool]:
-    """Compiles into a folder, in another process; whether that went well.
+def _compiled_in_subprocess(key: dict[str, Json], folder: Path) -> Iterator[bool]:
+    """Compiles the world of a key into a folder, in a subprocess, and yields whether that succeeded.
 
-    That process says so before it ends: giving back its memory takes a tenth of a second, in which others can load.
+    The subprocess reports before it ends: it gives back its memory for a tenth of a second, in which this process can
+    load the world.
     """
-    # Without Python's own end, which would free half a million objects one by one.
+    # os._exit leaves out the end of the interpreter, which would free half a million objects one by one.
     code = "import os, sys; from gear.world.compilation.compile_worker import main; main(sys.argv[1]); os._exit(0)"
-    places = os.pathsep.join(path for path in sys.path if path)
+    search_path = os.pathsep.join(path for path in sys.path if path)
     with subprocess.Popen(
         [sys.executable, "-c", code, str(folder)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
-        # Nothing is drawn there, and what would draw takes its time to be imported.
-        env={**os.environ, "PYTHONPATH": places, "PYTHONSAFEPATH": "1", "MUJOCO_GL": "disabled"},
+        # The subprocess renders nothing, and MuJoCo's renderers take their time to be imported.
+        env={**os.environ, "PYTHONPATH": search_path, "PYTHONSAFEPATH": "1", "MUJOCO_GL": "disabled"},
     ) as compiler:
         assert compiler.stdin is not None and compiler.stdout is not None
         try:
             with contextlib.suppress(BrokenPipeError):
-                compiler.stdin.write(json.dumps(order).encode() + b"\n")
-                compiler.stdin.flush()  # and stays open: that it is closed is how the other sees this process end
+                compiler.stdin.write(json.dumps(key).encode() + b"\n")
+                compiler.stdin.flush()  # stays open: the subprocess ends when this process ends and so closes it
             yield compiler.stdout.read(len(DONE)) == DONE
         except BaseException:
             compiler.kill()
@@ -172,7 +175,7 @@ def _compiled_in_subprocess(order: dict[str, Json], folder: Path) -> Iterator[bo
 
 @contextlib.contextmanager
 def _locked(entry: Path) -> Iterator[None]:
-    """Of several workers that need a world one compiles it; without such locks each of them does."""
+    """Lets one process at a time compile an entry. Where files cannot be locked, each process compiles it."""
     if sys.platform == "win32":
         yield
         return
@@ -185,7 +188,7 @@ def _locked(entry: Path) -> Iterator[None]:
 
 
 def _store(scratch: Path, entry: Path) -> None:
-    """Puts a world on the shelf, and takes down those that were not used for longest."""
+    """Moves a compiled world into the cache and removes the entries that were not used for longest."""
     with contextlib.suppress(OSError):
         shutil.rmtree(entry, ignore_errors=True)
         scratch.rename(entry)

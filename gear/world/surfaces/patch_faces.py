@@ -57,8 +57,8 @@ class Face:
             height_m=round(self.height_m, 6),
         )
 
-    def show(self, albedo: SurfaceAlbedo) -> UInt8Image:
-        """The texture for what it is to show."""
+    def texture(self, albedo: SurfaceAlbedo) -> UInt8Image:
+        """The (H, W, 3) uint8 sRGB texture with which it shows an albedo."""
         if not isinstance(albedo, str):
             return face_from_patch(albedo)
         if albedo == "none":

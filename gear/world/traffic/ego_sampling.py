@@ -16,8 +16,8 @@ from gear.values.rig import Rig
 from gear.values.rng import derive_rng
 from gear.values.scene import Pose
 from gear.world.assets.actor_types import ActorType
-from gear.world.compilation.actor_pool import EGO_ASSET
-from gear.world.compilation.compose import Slot
+from gear.world.assets.scene_assets import EGO_ASSET
+from gear.world.compilation.actor_pool import Slot
 from gear.world.placement import PlacementSpace
 from gear.world.roads.regions import Region
 from gear.world.roads.routes import trace_back, vehicle_pose

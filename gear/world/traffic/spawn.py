@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from gear.values.scene import Role, Vec3
 from gear.world.assets.actor_types import ActorType
-from gear.world.compilation.compose import Slot
+from gear.world.compilation.actor_pool import Slot
 from gear.world.roads.lanes import LaneGraph, ParkingBay
 from gear.world.roads.regions import LineTable, Region
 from gear.world.roads.routes import vehicle_pose

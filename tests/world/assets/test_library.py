@@ -1,19 +1,16 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from gear.testing.tiny_town import CLEAR, TINY_TOWN, tiny_scenes
 from gear.values.errors import TownError, UnknownNameError
-from gear.values.resources import data_dir
 from gear.world.assets.asset_hash import _referred, asset_files, assets_digest
 from gear.world.assets.library import AssetLibrary, read_actor_facts
-from gear.world.compilation.actor_pool import plan_pool
-from gear.world.compilation.compiled_world import carrier_of
-from gear.world.scene_spec import NpcLimits, SceneSpec, TruckSpec, VehicleLimits
+from gear.world.assets.scene_assets import read_scene_assets
+from gear.world.scene_spec import SceneSpec, TruckSpec
 from gear.world.world import World
 
 
@@ -120,7 +117,7 @@ def test_an_asset_is_asked_for_by_a_plain_name(name: str) -> None:
     with pytest.raises(UnknownNameError, match="no vehicle named"):
         library.path("vehicle", name)
     with pytest.raises(UnknownNameError, match="no vehicle named"):
-        carrier_of(SceneSpec(truck=TruckSpec(asset=name)), library)
+        read_scene_assets(library, SceneSpec(truck=TruckSpec(asset=name)))
 
 
 @pytest.mark.parametrize("town", ["~nosuchuser/x.xml", "a" * 300, f"/{'a' * 300}/x.xml"])
@@ -187,7 +184,7 @@ def test_a_folder_of_ones_own_must_hold_the_ego_car(tmp_path: Path) -> None:
     (tmp_path / "towns" / "t.xml").write_text("<mujoco/>")
     actor(tmp_path / "vehicles", '<text name="actor.kind" data="car"/>')
     with pytest.raises(UnknownNameError, match=r"no vehicle named 'car_saloon'.*thing.*takes the place of gear"):
-        plan_pool(SceneSpec(), AssetLibrary.for_town(tmp_path / "towns" / "t.xml"))
+        read_scene_assets(AssetLibrary.for_town(tmp_path / "towns" / "t.xml"), SceneSpec())
 
 
 def test_a_vehicle_is_not_named_like_a_pedestrian(tmp_path: Path) -> None:
@@ -195,7 +192,7 @@ def test_a_vehicle_is_not_named_like_a_pedestrian(tmp_path: Path) -> None:
     shutil.copytree(TINY_TOWN.parents[1], tmp_path, dirs_exist_ok=True)
     shutil.copy(tmp_path / "vehicles" / "van_small.xml", tmp_path / "vehicles" / "adult_walk.xml")
     with pytest.raises(TownError, match=r"vehicles/adult_walk.xml: has the name of .*pedestrians/adult_walk.xml"):
-        plan_pool(SceneSpec(), AssetLibrary.for_town(tmp_path / "towns" / "tiny.xml"))
+        read_scene_assets(AssetLibrary.for_town(tmp_path / "towns" / "tiny.xml"), SceneSpec())
 
 
 def test_a_vehicle_is_not_named_like_the_boards(tmp_path: Path) -> None:
@@ -212,36 +209,6 @@ def test_an_asset_may_have_any_letters_in_its_name(tmp_path: Path, name: str) ->
     (tmp_path / "vehicles" / "van_small.xml").rename(tmp_path / "vehicles" / f"{name}.xml")
     town, scene = tmp_path / "towns" / "tiny.xml", tiny_scenes().scenes["board"]
     assert name in World.build(town=town, scene_name="board", scene=scene, weather=CLEAR).types
-
-
-def test_the_pool_is_enough_for_the_largest_crowd() -> None:
-    library = AssetLibrary.for_town(TINY_TOWN)
-    scene = SceneSpec(npc_vehicles=VehicleLimits(count=(0, 9)), pedestrians=NpcLimits(count=(0, 30)))
-    pool = plan_pool(scene, library)
-    assert pool[0] == (library.vehicles["car_saloon"], 1)
-    assert sum(count for facts, count in pool[1:] if facts.kind != "person") >= 9
-    assert sum(count for facts, count in pool if facts.kind == "person") >= 30
-    nobody = SceneSpec(npc_vehicles=VehicleLimits(count=(0, 0)), pedestrians=NpcLimits(count=(0, 0)))
-    assert plan_pool(nobody, library) == [(library.vehicles["car_saloon"], 1)]
-
-
-def test_a_mix_makes_kinds_more_common_wherever_a_vehicle_is_drawn() -> None:
-    library = AssetLibrary.for_town(data_dir("mjcf") / "towns" / "town10.xml")
-    mix = {"bus": 4.0, "car": 0.0}
-    scene = SceneSpec(
-        npc_vehicles=VehicleLimits(count=(0, 12), mix=mix), pedestrians=NpcLimits(count=(0, 0)), truck=TruckSpec()
-    )
-    pool = plan_pool(scene, library)
-    usual = dict(plan_pool(replace(scene, npc_vehicles=VehicleLimits(count=(0, 12))), library)[1:])
-    carrier = carrier_of(scene, library)
-    assert carrier is not None
-    for facts in (*(facts for facts, _ in pool), carrier):
-        assert facts.weight == library.vehicles[facts.name].weight * mix.get(facts.kind, 1.0)
-    mixed = dict(pool[1:])
-    assert {facts.kind for facts in mixed} == {"van", "truck", "bus", "motorcycle", "bicycle"}
-    (bus,) = (facts for facts in mixed if facts.kind == "bus")
-    assert mixed[bus] > 2 * usual[library.vehicles[bus.name]]
-    assert pool[0][0].name == "car_saloon", "the ego car is there, whatever the mix"
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,7 @@ from gear.world.compilation.asset_prefetch import asset_prefetcher
 from gear.world.compilation.compiled_world import compile_world
 from gear.world.compilation.compose import Composition
 from gear.world.compilation.model_compilation import render_model
+from gear.world.compilation.world_plan import plan_world
 
 SCENE = tiny_scenes().scenes["board"]
 MESHES = 6
@@ -54,9 +55,9 @@ def kept_bytes() -> int:
 
 def test_a_world_that_was_read_ahead_is_the_same(town: Path) -> None:
     library = AssetLibrary.for_town(town)
-    plain, prefetcher = (compile_world(library, SCENE, CLEAR, readers=readers) for readers in (0, 3))
-    assert (plain.classes.label_code == prefetcher.classes.label_code).all() and plain.faces == prefetcher.faces
-    for one, other in ((plain.model, prefetcher.model), (plain.placement_model, prefetcher.placement_model)):
+    plain, prefetched = (compile_world(plan_world(library, SCENE, CLEAR), readers=readers) for readers in (0, 3))
+    assert (plain.classes.label_code == prefetched.classes.label_code).all() and plain.faces == prefetched.faces
+    for one, other in ((plain.model, prefetched.model), (plain.placement_model, prefetched.placement_model)):
         others = arrays(other)
         different = [name for name, value in arrays(one).items() if not np.array_equal(value, others[name])]
         # The folder that textures are laid out in has another name each time.
@@ -74,11 +75,11 @@ def test_nothing_is_read_twice_and_nothing_is_kept(town: Path, monkeypatch: pyte
         return both
 
     monkeypatch.setattr(compiled_world, "render_model", compile_there)
-    compile_world(AssetLibrary.for_town(town), SCENE, CLEAR, readers=2)
+    compile_world(plan_world(AssetLibrary.for_town(town), SCENE, CLEAR), readers=2)
     assert 0 < sizes[0] == sizes[1], "whatever is not there yet is put there when it is read"
     assert kept_bytes() == 0 == mujoco.mj_getCacheCapacity(mujoco.mj_getCache())
     sizes.clear()
-    compile_world(AssetLibrary.for_town(town), SCENE, CLEAR)
+    compile_world(plan_world(AssetLibrary.for_town(town), SCENE, CLEAR))
     assert sizes == [0, 0], "without readers nothing is in memory twice"
 
 
@@ -88,14 +89,14 @@ def test_a_broken_mesh_is_named_as_without(town: Path) -> None:
     told = []
     for readers in (0, 2):
         with pytest.raises(TownError) as caught:
-            compile_world(library, SCENE, CLEAR, readers=readers)
+            compile_world(plan_world(library, SCENE, CLEAR), readers=readers)
         told.append(str(caught.value))
     assert told[0] == told[1] and "rock_3" in told[0]
     assert kept_bytes() == 0
 
 
 def test_what_nobody_waits_for_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(prefetch_module, "_SHARE_BYTES", 1)
+    monkeypatch.setattr(prefetch_module, "_BATCH_BYTES", 1)
     first_ends, read = threading.Event(), []
 
     def slow(files: list[str]) -> None:

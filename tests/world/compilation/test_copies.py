@@ -14,6 +14,7 @@ from gear.world.assets.library import AssetLibrary
 from gear.world.compilation.compiled_world import CompiledWorld, compile_world
 from gear.world.compilation.copies import Copy, put_copies_into
 from gear.world.compilation.instances import AssetInstances
+from gear.world.compilation.world_plan import plan_world
 
 
 def content(model: mujoco.MjModel) -> bytes:
@@ -32,7 +33,7 @@ def test_a_world_of_copies_is_the_same(scene: str, monkeypatch: pytest.MonkeyPat
         made(parts, *details)  # type: ignore[arg-type]
 
     def build() -> CompiledWorld:
-        return compile_world(AssetLibrary.for_town(TINY_TOWN), tiny_scenes().scenes[scene], CLEAR)
+        return compile_world(plan_world(AssetLibrary.for_town(TINY_TOWN), tiny_scenes().scenes[scene], CLEAR))
 
     monkeypatch.setattr(AssetInstances, "copy_instance", copy)
     world = build()

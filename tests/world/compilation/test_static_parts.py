@@ -13,9 +13,10 @@ import pytest
 from gear.testing.tiny_town import CLEAR, TINY_TOWN, tiny_scenes
 from gear.values.errors import TownError
 from gear.world.assets.library import AssetLibrary
-from gear.world.compilation import compose, instances
+from gear.world.compilation import scene_mjcf
 from gear.world.compilation.compiled_world import CompiledWorld, compile_world
-from gear.world.compilation.static_parts import MeshPath, SplitAsset, StaticParts, split_asset, split_town
+from gear.world.compilation.static_parts import MeshPath, SplitAsset, SplitTown, StaticParts, split_asset, split_town
+from gear.world.compilation.world_plan import plan_world
 
 WET = dataclasses.replace(CLEAR, wetness=100.0)
 FIELDS = (
@@ -38,19 +39,20 @@ def alike(one: mujoco.MjModel, other: mujoco.MjModel) -> bool:
 def compiled(monkeypatch: pytest.MonkeyPatch, town: Path, *, is_whole: bool) -> CompiledWorld:
     with monkeypatch.context() as patch:
         if is_whole:
-            patch.setattr(compose, "split_town", lambda path: (None, StaticParts()))
-            patch.setattr(instances, "split_asset", lambda path: SplitAsset())
-        return compile_world(AssetLibrary.for_town(town), tiny_scenes().scenes["board"], WET)
+            patch.setattr(scene_mjcf, "split_town", lambda path: SplitTown(path=path, text=None, statics=StaticParts()))
+            patch.setattr(scene_mjcf, "split_asset", lambda path: SplitAsset())
+        return compile_world(plan_world(AssetLibrary.for_town(town), tiny_scenes().scenes["board"], WET))
 
 
 def test_the_compiled_world_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    text, statics = split_town(TINY_TOWN)
+    split = split_town(TINY_TOWN)
+    text, statics = split.text, split.statics
     assert text is not None
     assert "<geom" in statics.xml and "<geom" not in text.partition("<worldbody>")[2] and "<numeric" in text
     quick, whole = (compiled(monkeypatch, TINY_TOWN, is_whole=is_whole) for is_whole in (False, True))
     assert alike(quick.model, whole.model) and alike(quick.placement_model, whole.placement_model)
     assert np.array_equal(quick.classes.label_code, whole.classes.label_code) and quick.faces == whole.faces
-    dry = compile_world(AssetLibrary.for_town(TINY_TOWN), tiny_scenes().scenes["board"], CLEAR)
+    dry = compile_world(plan_world(AssetLibrary.for_town(TINY_TOWN), tiny_scenes().scenes["board"], CLEAR))
     assert not np.array_equal(dry.model.mat_rgba, quick.model.mat_rgba)
 
 
@@ -71,9 +73,9 @@ def test_a_town_with_anything_else_is_left_whole(thing: str, tmp_path: Path) -> 
     town = tmp_path / "town.xml"
     text = TINY_TOWN.read_text().replace("<worldbody>", f"<worldbody>{thing}", 1)
     town.write_text(text)
-    left, statics = split_town(town)
-    assert left is None and statics == StaticParts()
-    assert statics.put_into("<worldbody><light/></worldbody>") == "<worldbody><light/></worldbody>"
+    split = split_town(town)
+    assert split.text is None and split.statics == StaticParts() and not split.mesh_paths
+    assert split.statics.insert_into("<worldbody><light/></worldbody>") == "<worldbody><light/></worldbody>"
 
 
 @pytest.mark.parametrize(
@@ -86,7 +88,7 @@ def test_defaults_may_have_the_name_that_mujoco_writes(more: str, tmp_path: Path
     for start in ("<default>", '<default class="main">'):
         text = TINY_TOWN.read_text().replace("<default>", start, 1).replace("<worldbody>", f"<worldbody>{more}", 1)
         town.write_text(text)
-        worlds.append(compile_world(AssetLibrary.for_town(town), tiny_scenes().scenes["board"], CLEAR))
+        worlds.append(compile_world(plan_world(AssetLibrary.for_town(town), tiny_scenes().scenes["board"], CLEAR)))
     assert alike(worlds[0].model, worlds[1].model)
 
 
@@ -95,9 +97,9 @@ def test_nothing_is_compiled_away(setting: str, tmp_path: Path) -> None:
     shutil.copytree(TINY_TOWN.parents[1], tmp_path, dirs_exist_ok=True)
     town = tmp_path / "towns" / "tiny.xml"
     scene = tiny_scenes().scenes["board"]
-    plain = compile_world(AssetLibrary.for_town(town), scene, CLEAR)
+    plain = compile_world(plan_world(AssetLibrary.for_town(town), scene, CLEAR))
     town.write_text(TINY_TOWN.read_text().replace('angle="degree"', f'angle="degree" {setting}="true"', 1))
-    thinned = compile_world(AssetLibrary.for_town(town), scene, CLEAR)
+    thinned = compile_world(plan_world(AssetLibrary.for_town(town), scene, CLEAR))
     assert alike(plain.model, thinned.model) and alike(plain.placement_model, thinned.placement_model)
 
 

@@ -22,6 +22,7 @@ from gear.world.assets.library import AssetLibrary
 from gear.world.compilation import world_cache
 from gear.world.compilation.drop_bvh import without_mesh_bvh
 from gear.world.compilation.world_cache import load_or_compile
+from gear.world.compilation.world_plan import plan_world
 from gear.world.world import World
 
 SCENE = "truck"
@@ -133,19 +134,19 @@ def test_half_a_world_is_made_anew(tmp_path: Path) -> None:
 
 def test_who_compiles_for_others_ends_with_them(tmp_path: Path) -> None:
     """A batch system kills workers; what they had begun would take the memory of the next ones."""
-    order = world_cache.world_key(AssetLibrary.for_town(TINY_TOWN), tiny_scenes().scenes[SCENE], CLEAR)
+    order = world_cache.world_key(plan_world(AssetLibrary.for_town(TINY_TOWN), tiny_scenes().scenes[SCENE], CLEAR))
     endless = (
         "import sys, time; from gear.world.compilation import compile_worker; "
         "compile_worker.compile_world = lambda *_, **__: time.sleep(40); "
         "compile_worker.main(sys.argv[1])"
     )
-    customer = (
+    parent = (
         "import subprocess, sys, time; "
         f"made = subprocess.Popen([sys.executable, '-c', {endless!r}, {str(tmp_path)!r}], stdin=subprocess.PIPE); "
         f"made.stdin.write({json.dumps(order).encode()!r} + b'\\n'); made.stdin.flush(); "
         "print('begun', flush=True); time.sleep(40)"
     )
-    with subprocess.Popen([sys.executable, "-c", customer], stdout=subprocess.PIPE) as process:
+    with subprocess.Popen([sys.executable, "-c", parent], stdout=subprocess.PIPE) as process:
         assert process.stdout is not None and process.stdout.readline() == b"begun\n"
         process.kill()
         began_s = time.monotonic()

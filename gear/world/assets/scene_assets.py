@@ -1,0 +1,62 @@
+"""The asset facts that one scene needs, read once before its world is planned."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from gear.values.errors import TownError
+from gear.world.assets.library import ActorFacts, AssetLibrary
+from gear.world.scene_spec import SceneSpec
+
+EGO_ASSET = "car_saloon"
+"""Name of the MJCF of the ego car, in `mjcf/vehicles`."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SceneAssets:
+    """The assets of one scene: their paths, and what their files say of themselves.
+
+    Attributes:
+        library: the town's MJCF and the folders that belong to it.
+        boards: path of the MJCF of each board, in patch order.
+        vehicles: vehicles by name, in alphabetical order, with their weights multiplied by the scene's mix.
+        pedestrians: people by name, in alphabetical order.
+        ego: the ego car.
+        carrier: the vehicle that carries the patch; None in a scene without a truck.
+    """
+
+    library: AssetLibrary
+    boards: tuple[Path, ...]
+    vehicles: Mapping[str, ActorFacts]
+    pedestrians: Mapping[str, ActorFacts]
+    ego: ActorFacts
+    carrier: ActorFacts | None
+
+
+def read_scene_assets(library: AssetLibrary, scene: SceneSpec) -> SceneAssets:
+    """Finds the assets of a scene and reads their facts.
+
+    Raises:
+        UnknownNameError: the town has no such board or truck, or no ego car.
+        TownError: an actor's file breaks the conventions, or a vehicle and a pedestrian have the same name.
+    """
+    for name in library.vehicles.keys() & library.pedestrians.keys():
+        problem = f"has the name of {library.pedestrians[name].path}, so records could not tell them apart; rename one"
+        raise TownError(library.vehicles[name].path, problem)
+    library.path("vehicle", EGO_ASSET)
+    if scene.truck is not None:
+        library.path("vehicle", scene.truck.asset)
+    mix = scene.npc_vehicles.mix
+    vehicles = {
+        name: replace(facts, weight=facts.weight * mix.get(facts.kind, 1.0)) for name, facts in library.vehicles.items()
+    }
+    return SceneAssets(
+        library=library,
+        boards=tuple(library.path("surface", board.asset) for board in scene.boards),
+        vehicles=vehicles,
+        pedestrians=library.pedestrians,
+        ego=vehicles[EGO_ASSET],
+        carrier=None if scene.truck is None else vehicles[scene.truck.asset],
+    )

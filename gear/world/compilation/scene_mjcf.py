@@ -1,0 +1,44 @@
+"""The MJCF files of a planned world, each read once, before dm_control composes them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from gear.world.compilation.asset_prefetch import AssetPrefetcher
+from gear.world.compilation.static_parts import SplitAsset, SplitTown, split_asset, split_town
+from gear.world.compilation.world_plan import WorldPlan
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SceneMjcf:
+    """The MJCF of a town, its boards and its actors, split into what dm_control reads and what goes around it.
+
+    Attributes:
+        town: the town's file.
+        assets: the files of boards and actors, by path.
+    """
+
+    town: SplitTown
+    assets: Mapping[Path, SplitAsset]
+
+
+def read_scene_mjcf(plan: WorldPlan, prefetcher: AssetPrefetcher) -> SceneMjcf:
+    """Reads the MJCF files of a planned world.
+
+    Args:
+        plan: names the files.
+        prefetcher: begins to read the meshes of a file as soon as that file is read.
+
+    Raises:
+        TownError: a file is no XML or cannot be read, or one of its meshes cannot be read.
+    """
+    town = split_town(plan.town)
+    prefetcher.prefetch(map(os.fsdecode, town.mesh_paths.values()))
+    assets: dict[Path, SplitAsset] = {}
+    for path in dict.fromkeys([*plan.assets.boards, *(slot.actor.path for slot in plan.slots)]):
+        assets[path] = split_asset(path)
+        prefetcher.prefetch(map(os.fsdecode, assets[path].mesh_paths.values()))
+    return SceneMjcf(town=town, assets=assets)

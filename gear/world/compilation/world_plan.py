@@ -1,0 +1,49 @@
+"""Everything that decides a world, before anything is composed or compiled.
+
+A world is made in one direction: its assets are read, its pool of actors is decided (both here), and then it is
+composed and compiled from this plan alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from gear.values.scene import Weather
+from gear.world.assets.library import AssetLibrary
+from gear.world.assets.scene_assets import SceneAssets, read_scene_assets
+from gear.world.compilation.actor_pool import Slot, plan_slots
+from gear.world.scene_spec import SceneSpec
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorldPlan:
+    """The decided contents of a world.
+
+    Attributes:
+        assets: the assets of the scene.
+        scene: boards or truck, and limits.
+        weather: light and air.
+        slots: the pool of actors.
+    """
+
+    assets: SceneAssets
+    scene: SceneSpec
+    weather: Weather
+    slots: tuple[Slot, ...]
+
+    @property
+    def town(self) -> Path:
+        """Path of the town's MJCF."""
+        return self.assets.library.town
+
+
+def plan_world(library: AssetLibrary, scene: SceneSpec, weather: Weather) -> WorldPlan:
+    """Reads the assets of a scene and decides its pool of actors.
+
+    Raises:
+        UnknownNameError: the town has no such board or truck, or no ego car.
+        TownError: an actor's file breaks the conventions.
+    """
+    assets = read_scene_assets(library, scene)
+    return WorldPlan(assets=assets, scene=scene, weather=weather, slots=plan_slots(scene, assets))
