@@ -18,6 +18,9 @@ Range = tuple[float, float]
 CountRange = tuple[int, int]
 
 
+FACE_SIDE_M = (0.1, 100.0)
+"""Least and most width and height of a face: smaller shows no patch, larger was meant in other units."""
+
 FARTHEST_M = 10_000.0
 """From the origin or the first board: the 32-bit numbers of models and renderers are a millimetre coarse there."""
 
@@ -40,12 +43,15 @@ class BoardSpec:
         position_m: ground point under the middle of its face, in the world.
         facing_deg: where its face looks, counter-clockwise from east.
         asset: name of its MJCF in `mjcf/surfaces`.
+        size_m: width and height of its face; None for the size in the asset's file. The whole board is scaled about its
+            foot, so a higher face also hangs higher.
         places: where a file gives what, by key.
     """
 
     position_m: Vec3
     facing_deg: float
     asset: str = "billboard"
+    size_m: tuple[float, float] | None = None
     places: dict[str, Place] = field(default_factory=dict, compare=False, repr=False, metadata=PLACES)
 
     def __post_init__(self) -> None:
@@ -56,6 +62,10 @@ class BoardSpec:
             raise FieldError("facing_deg", f"must be -360 to 360 degrees, got {self.facing_deg:g}")
         if not self.asset:
             raise FieldError("asset", "must be the name of a surface's MJCF")
+        least_m, most_m = FACE_SIDE_M
+        if self.size_m is not None and not all(least_m <= side_m <= most_m for side_m in self.size_m):
+            given = " x ".join(f"{side_m:g}" for side_m in self.size_m)
+            raise FieldError("size_m", f"must be a width and a height of {least_m:g} to {most_m:g} m, got {given}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

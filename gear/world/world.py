@@ -93,9 +93,7 @@ class World:
     lanes: LaneGraph
     _data: mujoco.MjData = field(init=False, repr=False)
     _slot_geoms: tuple[_SlotGeoms, ...] = field(init=False, repr=False)
-    _face_textures: OrderedDict[tuple[str, str], UInt8Image] = field(
-        init=False, repr=False, default_factory=OrderedDict
-    )
+    _textures: OrderedDict[tuple[str, str], UInt8Image] = field(init=False, repr=False, default_factory=OrderedDict)
 
     def __post_init__(self) -> None:
         self._data = mujoco.MjData(self.model)

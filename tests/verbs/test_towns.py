@@ -23,7 +23,6 @@ from gear.verbs.towns import ground_layer, scene_layer, town_map, traffic_layer
 from gear.verbs.towns.canvas import Canvas, round_step_m
 from gear.verbs.towns.facts import Town, read_town
 from gear.verbs.towns.sheet import SheetOptions, draw_sheet
-from gear.world.assets.library import AssetLibrary
 from gear.world.roads.lanes import LaneGraph
 from gear.world.roads.regions import Region
 from gear.world.scene_spec import BoardSpec
@@ -204,11 +203,6 @@ def test_steps_are_round_and_few(span: float, most: int) -> None:
     assert span / step <= most * (1 + 1e-9)
     assert f"{step:.0e}"[0] in "125"
     assert span / step > most / 2.6 or most == 1
-
-
-def test_a_face_is_as_wide_as_its_file_says() -> None:
-    assert scene_layer.face_width_m(AssetLibrary.for_town(TINY_TOWN), "billboard") == pytest.approx(7.4, abs=0.01)
-    assert scene_layer.face_width_m(AssetLibrary.for_town("town10"), "billboard") == pytest.approx(7.4, abs=0.01)
 
 
 def test_dashes_cover_their_share() -> None:

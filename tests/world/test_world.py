@@ -19,9 +19,10 @@ from gear.values.frames import STATIC_OBJECT_BASE
 from gear.values.labels import GROUND_CODES, LABEL_BY_NAME
 from gear.values.scene import ActorRecord, Pose, SceneRecord, Weather
 from gear.world.assets.geom_classes import HIDDEN_CODE
-from gear.world.compilation.asset_prefetch import AssetPrefetcher
+from gear.world.assets.scene_assets import AssetFile
 from gear.world.compilation.instances import AssetInstances
 from gear.world.compilation.quiet_mjcf import mjcf
+from gear.world.compilation.static_parts import split_asset
 from gear.world.surfaces.face_texture import FACE_SIZE_PX
 from gear.world.weather.air import camera_pipeline
 from gear.world.weather.presets import PRESETS
@@ -75,13 +76,14 @@ def test_instances_share_meshes_and_materials() -> None:
 
 def test_instances_wear_number_plates_by_turns() -> None:
     root = mjcf.RootElement(model="town")
-    parts = AssetInstances(root, AssetPrefetcher(None))
-    worn = []
+    car = AssetFile(MJCF / "vehicles" / "car_city.xml")
+    parts = AssetInstances(root, {car: split_asset(car)})
+    plates = []
     for k in range(8):
         body = root.worldbody.add("body", name=f"car_{k}")
-        parts.add_instance(MJCF / "vehicles" / "car_city.xml", body)
-        worn += [geom.mesh.name for geom in body.find_all("geom") if geom.mesh and geom.mesh.name.startswith("plate")]
-    assert worn == ["plate", *(f"plate_{k}" for k in range(1, 6)), "plate", "plate_1"]
+        parts.add_instance(car, body)
+        plates += [geom.mesh.name for geom in body.find_all("geom") if geom.mesh and geom.mesh.name.startswith("plate")]
+    assert plates == ["plate", *(f"plate_{k}" for k in range(1, 6)), "plate", "plate_1"]
 
 
 def test_every_board_has_a_material_and_a_texture_of_its_own() -> None:

@@ -5,17 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-import mujoco
 import numpy as np
 
-from gear.values.errors import TownError
 from gear.values.geometry import Array
 from gear.verbs.towns.canvas import Canvas, Colour
-from gear.world.assets.geom_classes import unprefixed_class
-from gear.world.assets.geom_triangles import geom_triangles
 from gear.world.assets.library import AssetLibrary
-from gear.world.assets.mjspec import read_spec
 from gear.world.scene_spec import BoardSpec, NpcLimits, Range, SceneSpec
+from gear.world.surfaces.face_size import asset_face_size_m
 
 PALETTE: tuple[Colour, ...] = (
     (200, 30, 60), (20, 110, 190), (20, 140, 70), (150, 60, 170), (225, 110, 0), (0, 140, 150), (165, 85, 30),
@@ -65,7 +61,7 @@ def draw_boards(canvas: Canvas, library: AssetLibrary, scene: SceneSpec, colour:
         turns = facing + np.radians(np.linspace(-WEDGE_HALF_DEG, WEDGE_HALF_DEG, 13))
         rim = centre + WEDGE_M * canvas.px_per_m * np.stack([np.cos(turns), -np.sin(turns)], axis=1)
         canvas.fill(np.concatenate([centre[None], rim]), colour, 0.35)
-        half = face_width_m(library, board.asset) / 2 * np.array([-math.sin(facing), math.cos(facing)])
+        half = _face_width_m(library, board) / 2 * np.array([-math.sin(facing), math.cos(facing)])
         ends = canvas.to_px(np.array(board.position_m[:2]) + np.stack([half, -half]))
         canvas.line(ends, INK, BOARD_PX + 2.0)
         canvas.line(ends, colour, BOARD_PX)
@@ -130,22 +126,12 @@ def board_rectangle_m(board: BoardSpec, ahead_m: Range, lateral_m: Range) -> Arr
     return np.array([np.array(board.position_m[:2]) + ahead_m[a] * along + lateral_m[b] * left for a, b in corners])
 
 
-def face_width_m(library: AssetLibrary, asset: str) -> float:
-    """How wide the face of a board is.
+def _face_width_m(library: AssetLibrary, board: BoardSpec) -> float:
+    """Width of a board's face: what its scene says, or the size in its file.
 
     Raises:
         TownError: the board's file cannot be compiled or has no face.
     """
-    path = library.path("surface", asset)
-    try:
-        spec = read_spec(path)
-        model = spec.compile()
-    except ValueError as error:
-        raise TownError(path, f"MuJoCo cannot compile it: {' '.join(str(error).split())}") from error
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    for geom in spec.geoms:
-        if unprefixed_class(geom.classname.name).endswith(".face"):
-            vertices = geom_triangles(model, geom.id)[0] @ data.geom_xmat[geom.id].reshape(3, 3).T
-            return float(np.ptp(vertices[:, 1]))
-    raise TownError(path, "has no geom of a class ending in `.face`")
+    if board.size_m is not None:
+        return board.size_m[0]
+    return asset_face_size_m(library.path("surface", board.asset))[0]

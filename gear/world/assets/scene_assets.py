@@ -14,13 +14,33 @@ EGO_ASSET = "car_saloon"
 """Name of the MJCF of the ego car, in `mjcf/vehicles`."""
 
 
+@dataclass(frozen=True, slots=True)
+class AssetFile:
+    """An MJCF file as one world uses it.
+
+    Attributes:
+        path: of the file.
+        face_size_m: width and height that its face is scaled to; None for the size in the file.
+    """
+
+    path: Path
+    face_size_m: tuple[float, float] | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of its model in a composed world: the file's stem, and the size where it is scaled."""
+        if self.face_size_m is None:
+            return self.path.stem
+        return "{}_{:g}x{:g}m".format(self.path.stem, *self.face_size_m)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SceneAssets:
     """The assets of one scene: their paths, and what their files say of themselves.
 
     Attributes:
         library: the town's MJCF and the folders that belong to it.
-        boards: path of the MJCF of each board, in patch order.
+        boards: the file of each board, in patch order.
         vehicles: vehicles by name, in alphabetical order, with their weights multiplied by the scene's mix.
         pedestrians: people by name, in alphabetical order.
         ego: the ego car.
@@ -28,7 +48,7 @@ class SceneAssets:
     """
 
     library: AssetLibrary
-    boards: tuple[Path, ...]
+    boards: tuple[AssetFile, ...]
     vehicles: Mapping[str, ActorFacts]
     pedestrians: Mapping[str, ActorFacts]
     ego: ActorFacts
@@ -54,7 +74,7 @@ def read_scene_assets(library: AssetLibrary, scene: SceneSpec) -> SceneAssets:
     }
     return SceneAssets(
         library=library,
-        boards=tuple(library.path("surface", board.asset) for board in scene.boards),
+        boards=tuple(AssetFile(library.path("surface", board.asset), board.size_m) for board in scene.boards),
         vehicles=vehicles,
         pedestrians=library.pedestrians,
         ego=vehicles[EGO_ASSET],

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from gear.values.errors import TownError
+from gear.world.assets.scene_assets import AssetFile
 from gear.world.compilation.actor_pool import Slot
 from gear.world.compilation.instances import AssetInstances, FaceNames, load_mjcf
 from gear.world.compilation.quiet_mjcf import mjcf
@@ -124,25 +125,25 @@ class _Filling:
         """Adds a body for every board and every slot, and returns the faces that take patches."""
         plan, instances = self.plan, self.instances
         faces: list[FaceNames] = []
-        for index, (board, path) in enumerate(zip(plan.scene.boards, plan.assets.boards, strict=True)):
+        for index, (board, file) in enumerate(zip(plan.scene.boards, plan.assets.boards, strict=True)):
             body = self._new_body(f"board_{index}", **_pose(board))
-            faces.append(instances.add_surface_instance(path, body, is_carried=False))
+            faces.append(instances.add_surface_instance(file, body, is_carried=False))
         for slot in plan.slots:
-            path = slot.actor.path
+            file = AssetFile(slot.actor.path)
             if slot.body in {face.owner for face in faces}:
                 problem = (
                     f"is called {slot.actor.name!r}, so its instances would have the names of the boards; rename it"
                 )
-                raise TownError(path, problem)
-            if not slot.carries_surface and instances.has_instance(path):
+                raise TownError(file.path, problem)
+            if not slot.carries_surface and instances.has_instance(file):
                 self._check_free(slot.body)
-                instances.copy_instance(path, slot.body)
+                instances.copy_instance(file, slot.body)
                 continue
             body = self._new_body(slot.body, mocap=True)
             if slot.carries_surface:
-                faces.append(instances.add_surface_instance(path, body, is_carried=True))
+                faces.append(instances.add_surface_instance(file, body, is_carried=True))
             else:
-                instances.add_instance(path, body)
+                instances.add_instance(file, body)
         instances.drop_templates()
         return tuple(faces)
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from gear.values.errors import TownError
+from gear.world.assets.scene_assets import AssetFile
 from gear.world.compilation.copies import Copy, put_copies_into
 from gear.world.compilation.mujoco_errors import compile_problem, without_breaks
 from gear.world.compilation.quiet_mjcf import mjcf
@@ -41,14 +42,15 @@ class FaceNames:
 
 
 def load_mjcf(
-    path: Path, text: str | None = None, mesh_paths: Mapping[str, MeshPath] | None = None
+    path: Path, text: str | None = None, mesh_paths: Mapping[str, MeshPath] | None = None, name: str | None = None
 ) -> mjcf.RootElement:
-    """Reads one MJCF file into dm_control. Its model is named after the file, and every element gets a name.
+    """Reads one MJCF file into dm_control, and gives every element a name.
 
     Args:
         path: of the file.
         text: an MJCF text that is read in place of the file's content.
         mesh_paths: path of each mesh file, by the name that `text` gives it.
+        name: of the model; the file's stem if None.
 
     Raises:
         TownError: dm_control cannot read it.
@@ -71,7 +73,7 @@ def load_mjcf(
         else:
             what = without_breaks(error)
         raise TownError(path, f"cannot be read as MJCF: {what}") from error
-    root.model = path.stem
+    root.model = name or path.stem
     # For each element without a name dm_control would count all elements in front of it, in quadratic time.
     for tag in ("geom", "site", "body"):
         for index, element in enumerate(root.find_all(tag)):
@@ -99,30 +101,30 @@ def free_name(root: mjcf.RootElement, kind: str, name: str) -> str:
 class AssetInstances:
     """The assets of a composition: attaches each file once and makes its instances."""
 
-    def __init__(self, root: mjcf.RootElement, files: Mapping[Path, SplitAsset]) -> None:
+    def __init__(self, root: mjcf.RootElement, files: Mapping[AssetFile, SplitAsset]) -> None:
         """Makes instances in the tree of a town.
 
         Args:
             root: the tree.
-            files: the assets' MJCF by path.
+            files: the assets' MJCF.
         """
         self._root = root
         self._files = files
         self._angles = _angle_settings(root)
-        self._models: dict[Path, mjcf.RootElement] = {}
+        self._models: dict[AssetFile, mjcf.RootElement] = {}
         self._textures: dict[tuple[str, ...], Any] = {}
         self._defaults: dict[str, str] = {}
-        self._plates: dict[Path, list[tuple[str, list[Any]]]] = {}
-        self._instances: Counter[Path] = Counter()
-        self._originals: dict[Path, str] = {}
+        self._plates: dict[AssetFile, list[tuple[str, list[Any]]]] = {}
+        self._instances: Counter[AssetFile] = Counter()
+        self._originals: dict[AssetFile, str] = {}
         self._copies: defaultdict[str, list[Copy]] = defaultdict(list)
 
     @property
     def files(self) -> tuple[Path, ...]:
         """Paths of the attached files, in the order in which they were attached."""
-        return tuple(self._models)
+        return tuple(file.path for file in self._models)
 
-    def add_instance(self, path: Path, body: Any) -> None:
+    def add_instance(self, file: AssetFile, body: Any) -> None:
         """Fills a body with an instance of an asset that shares everything with the asset's other instances.
 
         The number plates that the file holds go round among the instances.
@@ -130,56 +132,58 @@ class AssetInstances:
         Raises:
             TownError: the file cannot be attached, or the instance would have the name of another element.
         """
-        self._fill(path, body)
-        self._originals.setdefault(path, body.name)
+        self._fill(file, body)
+        self._originals.setdefault(file, body.name)
 
-    def has_instance(self, path: Path) -> bool:
+    def has_instance(self, file: AssetFile) -> bool:
         """Whether `add_instance` has made an instance of the asset, which `copy_instance` can copy."""
-        return path in self._originals
+        return file in self._originals
 
-    def copy_instance(self, path: Path, name: str) -> None:
+    def copy_instance(self, file: AssetFile, name: str) -> None:
         """Makes another instance, in a body of that name, without dm_control: `put_copies_into` writes it later."""
-        plates = {geom: plate.full_identifier for geom, plate in self._next_plates(path).items()}
-        frame = self._model(path).full_identifier  # of the empty body that dm_control puts behind the first instance
-        self._copies[frame].append(Copy(name=name, original=self._originals[path], plates=plates))
+        plates = {geom: plate.full_identifier for geom, plate in self._next_plates(file).items()}
+        frame = self._model(file).full_identifier  # of the empty body that dm_control puts behind the first instance
+        self._copies[frame].append(Copy(name=name, original=self._originals[file], plates=plates))
 
-    def _fill(self, path: Path, body: Any) -> None:
-        model = self._model(path)
+    def _fill(self, file: AssetFile, body: Any) -> None:
+        model = self._model(file)
         try:
             for child in model.worldbody.all_children():
                 _copy(child, body, body.name)
         except ValueError as error:
             problem = f"cannot be put into one world with the town as {body.name!r}: {without_breaks(error)}"
-            raise TownError(path, problem) from error
-        for geom, plate in self._next_plates(path).items():
+            raise TownError(file.path, problem) from error
+        for geom, plate in self._next_plates(file).items():
             self._root.find("geom", f"{body.name}_{geom}").mesh = plate
 
-    def _next_plates(self, path: Path) -> dict[str, Any]:
+    def _next_plates(self, file: AssetFile) -> dict[str, Any]:
         """Meshes of the next instance's number plates, by the name of the geom."""
-        number = self._instances[path]
-        self._instances[path] += 1
-        return {geom: plates[number % len(plates)] for geom, plates in self._plates[path]}
+        number = self._instances[file]
+        self._instances[file] += 1
+        return {geom: plates[number % len(plates)] for geom, plates in self._plates[file]}
 
-    def add_surface_instance(self, path: Path, body: Any, *, is_carried: bool) -> FaceNames:
+    def add_surface_instance(self, file: AssetFile, body: Any, *, is_carried: bool) -> FaceNames:
         """Fills a body with an instance whose face has a texture of its own, which can show a patch.
 
         Raises:
             TownError: the asset has not exactly one face, or the face has no material or no `surface` site.
         """
-        self._fill(path, body)
-        model = self._model(path)
+        self._fill(file, body)
+        model = self._model(file)
         faces = [geom for geom in model.find_all("geom") if class_name(geom.dclass).endswith(".face")]
         if len(faces) != 1:
-            raise TownError(path, f"must have one geom of a class ending in `.face` to show a patch, has {len(faces)}")
+            raise TownError(
+                file.path, f"must have one geom of a class ending in `.face` to show a patch, has {len(faces)}"
+            )
         face = faces[0]
         if model.find("site", "surface") is None or face.material is None:
-            raise TownError(path, f"face {face.name!r} needs a material, and a site `surface` in its middle")
+            raise TownError(file.path, f"face {face.name!r} needs a material, and a site `surface` in its middle")
         if isinstance(face.material, str):  # dm_control leaves what it does not find as it is written
-            raise TownError(path, f"face {face.name!r} has the material {face.material!r}, which is not there")
+            raise TownError(file.path, f"face {face.name!r} has the material {face.material!r}, which is not there")
         geom = self._root.find("geom", f"{body.name}_{face.name}")
         geom.material = self._own_material(face.material, geom.name)
         return FaceNames(
-            asset=path.stem,
+            asset=file.path.stem,
             owner=body.name,
             is_carried=is_carried,
             geom=geom.name,
@@ -206,27 +210,28 @@ class AssetInstances:
             xml = before + defaults + after
         return xml
 
-    def _model(self, path: Path) -> mjcf.RootElement:
+    def _model(self, file: AssetFile) -> mjcf.RootElement:
         """The asset's file, attached at the first call."""
-        if path not in self._models:
+        if file not in self._models:
             for other in self._models:
-                if other.stem == path.stem:
-                    raise TownError(path, f"has the name of {other}, which is in the same world; rename one of them")
-            split = self._files[path]
-            model = load_mjcf(path, split.text, split.mesh_paths)
+                if other.name == file.name:
+                    problem = f"has the name of {other.path}, which is in the same world; rename one of them"
+                    raise TownError(file.path, problem)
+            split = self._files[file]
+            model = load_mjcf(file.path, split.text, split.mesh_paths, file.name)
             if _angle_settings(model) != self._angles:
                 problem = "turns geoms by {} and the town by {}; write both with the same compiler setting"
-                raise TownError(path, problem.format(_angle_settings(model), self._angles))
+                raise TownError(file.path, problem.format(_angle_settings(model), self._angles))
             if split.text is not None:
                 self._defaults[model.model] = split.defaults
             try:
                 self._root.attach(model)
             except ValueError as error:
-                raise TownError(path, f"cannot be put into one world with the town: {error}") from error
+                raise TownError(file.path, f"cannot be put into one world with the town: {error}") from error
             self._share_textures(model)
-            self._models[path] = model
-            self._plates[path] = list(_plates_of(model))
-        return self._models[path]
+            self._models[file] = model
+            self._plates[file] = list(_plates_of(model))
+        return self._models[file]
 
     def _share_textures(self, model: mjcf.RootElement) -> None:
         """Replaces textures of a file by equal ones that another file has brought: same image, same attributes."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
+from gear.world.assets.scene_assets import AssetFile
 from gear.world.compilation.asset_prefetch import AssetPrefetcher
 from gear.world.compilation.static_parts import SplitAsset, SplitTown, split_asset, split_town
 from gear.world.compilation.world_plan import WorldPlan
@@ -18,11 +18,11 @@ class SceneMjcf:
 
     Attributes:
         town: the town's file.
-        assets: the files of boards and actors, by path.
+        assets: the files of boards and actors.
     """
 
     town: SplitTown
-    assets: Mapping[Path, SplitAsset]
+    assets: Mapping[AssetFile, SplitAsset]
 
 
 def read_scene_mjcf(plan: WorldPlan, prefetcher: AssetPrefetcher) -> SceneMjcf:
@@ -37,8 +37,8 @@ def read_scene_mjcf(plan: WorldPlan, prefetcher: AssetPrefetcher) -> SceneMjcf:
     """
     town = split_town(plan.town)
     prefetcher.prefetch(map(os.fsdecode, town.mesh_paths.values()))
-    assets: dict[Path, SplitAsset] = {}
-    for path in dict.fromkeys([*plan.assets.boards, *(slot.actor.path for slot in plan.slots)]):
-        assets[path] = split_asset(path)
-        prefetcher.prefetch(map(os.fsdecode, assets[path].mesh_paths.values()))
+    assets: dict[AssetFile, SplitAsset] = {}
+    for file in dict.fromkeys([*plan.assets.boards, *(AssetFile(slot.actor.path) for slot in plan.slots)]):
+        assets[file] = split_asset(file)
+        prefetcher.prefetch(map(os.fsdecode, assets[file].mesh_paths.values()))
     return SceneMjcf(town=town, assets=assets)

@@ -17,6 +17,8 @@ from pathlib import Path
 from gear.values.errors import TownError
 from gear.values.regular_file import check_regular
 from gear.world.assets.library import read_numbers
+from gear.world.assets.scene_assets import AssetFile
+from gear.world.compilation.board_scaling import scale_board
 
 UNNAMED = "unnamed_"
 """Prefix of the names that gear gives to elements without one."""
@@ -122,28 +124,31 @@ class SplitAsset:
     mesh_paths: Mapping[str, MeshPath] = field(default_factory=dict)
 
 
-def split_asset(path: Path) -> SplitAsset:
-    """Separates the default classes of an asset from the rest of its MJCF.
+def split_asset(file: AssetFile) -> SplitAsset:
+    """Separates the default classes of an asset from the rest of its MJCF, scaled to the size of its face.
 
     A file stays whole if its default classes refer to anything, such as a material, or apply to more than geoms and
     meshes, and if it includes other files.
 
     Raises:
-        TownError: the file is no XML, cannot be read, or holds a NaN.
+        TownError: the file is no XML, cannot be read, holds a NaN, or cannot be scaled.
     """
+    path = file.path
     root = read_numbers(path)
+    if file.face_size_m is not None:
+        scale_board(root, path, file.face_size_m)
     sections = root.findall("default")
     if (
         len(sections) != 1
         or sections[0].attrib
         or next(root.iter("include"), None) is not None
-        or not _PLAIN_STEM.fullmatch(path.stem)
+        or not _PLAIN_STEM.fullmatch(file.name)
         or not all(part.tag in _PLAIN_DEFAULTS and _REFERENCES.isdisjoint(part.keys()) for part in sections[0].iter())
     ):
-        return SplitAsset()
+        return SplitAsset(text=None if file.face_size_m is None else ET.tostring(root, encoding="unicode"))
     root.remove(sections[0])
     for default in sections[0].iter("default"):
-        default.set("class", f"{path.stem}/{default.get('class', '')}")
+        default.set("class", f"{file.name}/{default.get('class', '')}")
     mesh_paths = _replace_mesh_names(root, path)
     return SplitAsset(
         text=ET.tostring(root, encoding="unicode"),

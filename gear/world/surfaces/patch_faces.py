@@ -15,12 +15,11 @@ from gear.values.geometry import RigidTransform
 from gear.values.scene import Pose, SurfaceRecord
 from gear.world.assets.geom_triangles import geom_triangles
 from gear.world.compilation.instances import FaceNames
+from gear.world.scene_spec import FACE_SIDE_M
 from gear.world.surfaces.face_texture import SurfaceAlbedo, face_from_patch, srgb_from_linear, uniform_face
 from gear.world.surfaces.upright import texture_problem
 
 FLATNESS_M = 0.01
-FACE_SIDE_M = (0.1, 100.0)
-"""Least and most of a face's sides: smaller shows no patch, larger was meant in other units."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

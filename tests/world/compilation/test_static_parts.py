@@ -13,6 +13,7 @@ import pytest
 from gear.testing.tiny_town import CLEAR, TINY_TOWN, tiny_scenes
 from gear.values.errors import TownError
 from gear.world.assets.library import AssetLibrary
+from gear.world.assets.scene_assets import AssetFile
 from gear.world.compilation import scene_mjcf
 from gear.world.compilation.compiled_world import CompiledWorld, compile_world
 from gear.world.compilation.static_parts import MeshPath, SplitAsset, SplitTown, StaticParts, split_asset, split_town
@@ -145,4 +146,4 @@ def test_an_asset_with_anything_else_is_left_whole(found: str, put: str, tmp_pat
 def test_a_mesh_that_is_not_there_is_named(tmp_path: Path) -> None:
     path = asset(tmp_path, ASSET.replace("box.obj", "ball.obj"))
     with pytest.raises(TownError, match=r"ball\.obj"):
-        split_asset(path)
+        split_asset(AssetFile(path))
