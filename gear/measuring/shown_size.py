@@ -15,7 +15,7 @@ from gear.config.reader import read_node
 from gear.contracts.specs import ModelSpec, TaskSpec
 from gear.dataset.reading import Dataset
 from gear.measuring.plugin_selection import Chosen
-from gear.networks.input_scale import OPTION
+from gear.networks.input_scale import OPTION, width_share
 from gear.networks.options import NONE
 from gear.networks.shipped import trained_option
 from gear.plugins.build import find, name_of_task
@@ -37,7 +37,7 @@ def size_note(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> str
     task = find("task", name_of_task(dataset.plan.task)).spec
     assert isinstance(task, TaskSpec)
     width_px, usual_px = dataset.plan.options.get("width_px"), getattr(task.config(), "width_px", None)
-    if getattr(config, OPTION, 1.0) is not None or not width_px or not usual_px or width_px == usual_px:
+    if getattr(config, OPTION, 1.0) is not None or not width_px or not usual_px or width_share(width_px, usual_px) == 1:
         return None
     weights = getattr(config, "weights", NONE)
     said = trained_option(weights, spec.name, OPTION)

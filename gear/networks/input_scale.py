@@ -11,6 +11,15 @@ from gear.values.errors import GearError
 
 OPTION = "input_scale"
 
+NEGLIGIBLE = 0.02
+"""Pictures whose widths differ by at most this share count as equally large."""
+
+
+def width_share(width_px: int, usual_px: int) -> float:
+    """Width of pictures as a share of the task's default width; 1 where the difference is negligible."""
+    share = width_px / usual_px
+    return 1.0 if abs(share - 1) <= NEGLIGIBLE else share
+
 
 class Scaled(Protocol):
     """Options of a network that has such a size."""

@@ -1,5 +1,6 @@
 """What `camera_billboard_info.json` makes the original loaders compute; their arithmetic is done again here."""
 
+import json
 import math
 from dataclasses import replace
 from typing import Any
@@ -11,7 +12,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from gear.formats.billboard_info import billboard_info, world_from_board, xyzrpy
+from gear.formats.jsontext import dump
 from gear.groundtruth.surfaces import observe_surfaces
+from gear.plugins.build import build_task
 from gear.testing.synthetic import synthetic_frame
 from gear.testing.things import Thing, board
 from gear.values.geometry import RigidTransform
@@ -69,6 +72,49 @@ def test_the_loaders_paste_the_patch_where_the_board_is(yaw_rad: float, camera: 
     # The loaders' pixels are half a pixel off from index pixels, by their own principal point.
     np.testing.assert_allclose(pasted - 0.5, truth.corners_px, atol=0.01)
     assert info["info"]["level"] is True
+
+
+LOADER_CROPS = {"depth": (1216, 352)}
+"""Width and height that PatchAttackTool's loaders cut out: the middle columns and the lowest rows."""
+
+FOCAL_FROM_FOV = ("3dod", "depth")
+"""Tasks whose loaders compute the focal length from the field of view and the width of what they cut."""
+
+
+def loaders_error_px(task: str, **options: Any) -> float:
+    """How far the corners of the patch lie from where PatchAttackTool puts them, at most, in a task's pictures."""
+    spec, _ = build_task(task)
+    rig = spec.build(spec.config(**options)).rig()
+    small = Rig(cameras=tuple(replace(mount, width_px=32, height_px=16) for mount in rig.cameras))
+    world_from_ego = RigidTransform.from_yaw("world", "ego", (31.0, -7.0, 0.0), 0.7)
+    turned = Thing(parts=board(20.0).parts, position_m=(20.0, 3.0, 0.0), yaw_rad=0.25)
+    _, record = synthetic_frame(small, [turned], world_from_ego=world_from_ego)
+    record = replace(record, cameras=tuple(rig.place(world_from_ego)))
+    name, camera = spec.original_name, record.cameras[0]
+    info = json.loads(dump(billboard_info([record], task=name, patch_label="none", reference=camera.name)))
+    (entry,), params = info["camera_billboard_positions"], info["camera_params"]
+    width, height = LOADER_CROPS.get(name, (params["width"], params["height"]))
+    left, top = (params["width"] - width) / 2, params["height"] - height
+    focal = width / (2 * math.tan(params["fov"] / 2)) if name in FOCAL_FROM_FOV else params["focal"]
+    seen = {"width": width, "height": height, "focal": focal}
+    corners = [(0, 0), (300, 0), (300, 150), (0, 150)]
+    pasted = loader_pixels(entry["camera_xyzrpy"], entry["billboard_xyzrpy"], seen, corners) + (left, top)
+    (surface,) = record.surfaces
+    x, y = surface.width_m / 2, surface.height_m / 2
+    corners_m = record.world_from_surface(surface).apply([[-x, -y, 0], [x, -y, 0], [x, y, 0], [-x, y, 0]])
+    true = camera.intrinsics.project(camera.world_from_camera_transform.inverse().apply(corners_m))
+    # The loaders' pixels are half a pixel off from index pixels, by their own principal point.
+    return float(np.abs(pasted - 0.5 - true).max())
+
+
+@pytest.mark.parametrize("task", ["semseg", "detect2d", "stereo3d", "depth"])
+def test_the_loaders_paste_the_patch_right_in_every_tasks_default_pictures(task: str) -> None:
+    assert loaders_error_px(task) < 0.01
+
+
+def test_pictures_of_another_size_are_cut_by_the_loader_for_depth() -> None:
+    """CARLA-GeAR's own 1224 x 370: the loader takes the middle of the lowest 352 rows for the camera's axis."""
+    assert 8 < loaders_error_px("depth", width_px=1224, height_px=370) < 11
 
 
 def test_the_boards_frame_looks_into_the_board() -> None:

@@ -18,6 +18,7 @@ from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
 from gear.contracts.evaluation import Maskable
 from gear.contracts.specs import ModelSpec, TaskSpec
+from gear.networks.input_scale import width_share
 from gear.networks.options import SHIPPED
 from gear.networks.shipped import trained_option
 from gear.plugins.build import NO_OPTIONS, build, find
@@ -278,7 +279,7 @@ def picture_share(task: str, settings: Iterable[str]) -> float:
     assert isinstance(spec, TaskSpec)
     own = [text.removeprefix("options.") for text in settings if text.startswith("options.")]
     config, usual = read_node(spec.config, with_overrides(NO_OPTIONS, own), ""), spec.config()
-    return float(config.width_px / usual.width_px)
+    return width_share(config.width_px, usual.width_px)
 
 
 def _step(command: str, *words: object, name: str = "") -> Step:

@@ -44,14 +44,17 @@ PREVIEW_MAX_DEPTH_M = 80.0
 class DepthConfig(CameraOptions):
     """Options of monocular depth.
 
+    Pictures have the size that loaders of KITTI depth crop them to, 1216 x 352. CARLA-GeAR's loader keeps the lowest
+    352 rows and takes their middle for the camera's axis, so it places patches right in pictures of this size alone.
+
     Attributes:
         max_depth_m: what lies farther has no ground truth.
         eval_max_depth_m: what lies farther is not evaluated by the `eigen_` metrics; 80 m is customary.
         eval_crop: part of the picture that the `eigen_` metrics look at.
     """
 
-    width_px: int = 1224
-    height_px: int = 370
+    width_px: int = 1216
+    height_px: int = 352
     max_depth_m: float = 1000.0
     eval_max_depth_m: float = 80.0
     eval_crop: Crop = "none"

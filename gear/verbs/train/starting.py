@@ -10,6 +10,7 @@ from gear.config.nodes import Mapping, Place, Scalar
 from gear.config.overrides import with_value
 from gear.contracts.specs import ModelSpec, TaskSpec
 from gear.networks.efficientnet_lite0 import freeze_trunks
+from gear.networks.input_scale import width_share
 from gear.networks.options import NONE, SHIPPED
 from gear.networks.runtime import device_of, is_quick_in_half, seeded
 from gear.networks.shipped import resolve, shipped, shipped_networks, trained_option
@@ -60,7 +61,7 @@ def picture_share(samples: Samples, spec: TaskSpec[Any]) -> float:
     """Width of the pictures as a share of the width that the task has by itself; 1 where there is no saying."""
     usual = getattr(spec.config(), "width_px", None)
     widths_px = _widths_px(samples)
-    return widths_px.pop() / usual if usual and len(widths_px) == 1 else 1.0
+    return width_share(widths_px.pop(), usual) if usual and len(widths_px) == 1 else 1.0
 
 
 def _widths_px(samples: Samples) -> set[int]:
