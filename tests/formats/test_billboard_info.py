@@ -98,7 +98,7 @@ def loaders_error_px(task: str, **options: Any) -> float:
     focal = width / (2 * math.tan(params["fov"] / 2)) if name in FOCAL_FROM_FOV else params["focal"]
     seen = {"width": width, "height": height, "focal": focal}
     corners = [(0, 0), (300, 0), (300, 150), (0, 150)]
-    pasted = loader_pixels(entry["camera_xyzrpy"], entry["billboard_xyzrpy"], seen, corners) + (left, top)
+    pasted = np.add(loader_pixels(entry["camera_xyzrpy"], entry["billboard_xyzrpy"], seen, corners), (left, top))
     (surface,) = record.surfaces
     x, y = surface.width_m / 2, surface.height_m / 2
     corners_m = record.world_from_surface(surface).apply([[-x, -y, 0], [x, -y, 0], [x, y, 0], [-x, y, 0]])
