@@ -1,1 +1,1 @@
-"""What collects samples: jobs, patch sources, sessions (one world and renderer a worker), workers."""
+"""Collecting samples: jobs, patch sources, and workers with one world and one renderer each."""

@@ -1,4 +1,4 @@
-"""One run of `collect`, resolved: everything a worker needs, as data."""
+"""A collection with all names resolved: plain data with everything that a worker needs."""
 
 from __future__ import annotations
 
@@ -37,15 +37,15 @@ class Job:
     """A resolved collection.
 
     Attributes:
-        config: as the user wrote it, defaults filled in.
-        split: seeds and counts.
+        config: the collection config with all defaults filled in.
+        split: seed and number of samples of the split.
         scene: boards, truck and limits, capped by the simulation config.
-        weather: every parameter.
-        patch: pictures of this run.
+        weather: all parameters of the weather.
+        patch: patches of this run.
         root: folder of the dataset.
-        plan: what decides the bytes.
-        renderer: what renders, on which device.
-        task_notes: what the user may not have meant by the task's options.
+        plan: everything that decides the bytes of the samples.
+        renderer: renderer, device and driver.
+        task_notes: notes on task options that may be unintended.
     """
 
     config: CollectionConfig
@@ -60,7 +60,7 @@ class Job:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the user may not have meant, one line each: options of the task, and patches of another scene."""
+        """Notes on what may be unintended, one line each: options of the task, and patches of another scene."""
         here = f"{self.plan.info.town}/{self.plan.info.scene}"
         if not self.patch.made_for or here in self.patch.made_for:
             return self.task_notes
@@ -69,17 +69,17 @@ class Job:
 
     @property
     def frames(self) -> int:
-        """Samples of the whole split."""
+        """Number of samples of the whole split."""
         return self.split.samples * self.split.frames
 
 
 def resolve(config: CollectionConfig) -> Job:
-    """Looks up every name in a config and asks for the renderer, before anything is rendered.
+    """Looks up every name in a config and probes the renderer, before anything is rendered.
 
     Raises:
         UnknownNameError, PatchError: as `look_up`.
-        ConfigError: likewise, or the lens folds its pictures over.
-        BackendError: the renderer cannot start here.
+        ConfigError: as `look_up`, or the lens folds its pictures over.
+        BackendError: the renderer cannot start on this machine.
     """
     named = look_up(config)
     spec, owner = named.task.spec, named.task.owner
@@ -131,7 +131,7 @@ def resolve(config: CollectionConfig) -> Job:
 
 
 def _scene_content(scene: SceneSpec) -> Json:
-    """Of a scene; a mix only where there is one, so that datasets from before there were any go on."""
+    """The scene as part of the plan; a vehicle mix only where there is one, so that older datasets can be continued."""
     content: Json = to_json(scene)
     if not scene.npc_vehicles.mix:
         del content["npc_vehicles"]["mix"]
@@ -162,7 +162,7 @@ def _check_effects(config: CollectionConfig, task: PluginEntry) -> None:
 
 
 def dataset_root(config: CollectionConfig, info: SplitInfo, weather: Weather) -> Path:
-    """Where the dataset goes: what the user said, or `data/<task>/<town>-<scene>-<weather>/<patch>`."""
+    """The dataset's folder: the given one, or `data/<task>/<town>-<scene>-<weather>/<patch>`."""
     if config.root:
         return Path(config.root)
     name = weather.name
@@ -173,7 +173,7 @@ def dataset_root(config: CollectionConfig, info: SplitInfo, weather: Weather) ->
 
 
 def versions() -> dict[str, str]:
-    """Of what decides the bytes of pictures and labels."""
+    """Versions of the packages that decide the bytes of pictures and labels."""
     return {
         "gear": _version("mujoco-gear"),
         "mujoco": mujoco.__version__,

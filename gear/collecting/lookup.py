@@ -1,4 +1,4 @@
-"""Everything that a collection config names, looked up: before anything is rendered, and without a renderer."""
+"""Looks up everything that a collection config names, before anything is rendered and without a renderer."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ from gear.world.surfaces.surface_carriers import check_scene_assets
 from gear.world.weather.presets import PRESETS
 
 ROOMY_FACTOR = 100
-"""Scenes without a board take so many times the vehicles, as in the original: they are not bound to one corner."""
+"""Factor on the vehicles of scenes without a board, as in CARLA-GeAR: they use the whole town instead of one corner."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Named:
-    """What the names in a collection config stand for.
+    """The objects that the names of a collection config refer to.
 
     Attributes:
-        config: with a scene that was given as a file taken apart.
-        task: its plugin.
-        options: the task's own, read.
-        library: the town.
+        config: the config, with a scene given as a file split into library and name.
+        task: plugin of the task.
+        options: options of the task.
+        library: assets of the town.
         scene: boards, truck and limits, capped by the simulation config.
-        split: seeds and counts.
-        weather: every parameter.
-        patch: pictures of the run.
+        split: seed and number of samples of the split.
+        weather: all parameters of the weather.
+        patch: patches of the run.
     """
 
     config: CollectionConfig
@@ -56,8 +56,8 @@ def look_up(config: CollectionConfig) -> Named:
     """Looks up every name in a config.
 
     Raises:
-        UnknownNameError: a task, town, scene, split or weather is not known; says what may have been meant.
-        ConfigError: likewise, of a name that a file has; or a scene library or the task's options cannot be read.
+        UnknownNameError: a task, town, scene, split or weather is unknown; suggests a close name.
+        ConfigError: the same, for a name in a file; or a scene library or the options of the task cannot be read.
         PatchError: the patch cannot be used.
     """
     with told_at(config.places, "scene"):
@@ -102,10 +102,10 @@ def look_up(config: CollectionConfig) -> Named:
 
 
 def _mixed(scene: SceneSpec, config: CollectionConfig) -> SceneSpec:
-    """A scene with the config's mix on top of its own.
+    """A scene whose vehicle mix is the product of its own mix and the config's.
 
     Raises:
-        ConfigError: both together are too much, or leave nothing.
+        ConfigError: the product is out of range, or leaves no vehicle.
     """
     try:
         return scene.mixed(config.mix)
@@ -115,7 +115,7 @@ def _mixed(scene: SceneSpec, config: CollectionConfig) -> SceneSpec:
 
 
 def with_scene_file(config: CollectionConfig) -> CollectionConfig:
-    """Takes a scene given as a file apart: `my.yml:corner`, or `my.yml` where it holds only one.
+    """Splits a scene given as a file: `my.yml:corner`, or `my.yml` where the file holds only one scene.
 
     Raises:
         UnknownNameError: the file holds several scenes and none was named.
@@ -130,11 +130,11 @@ def with_scene_file(config: CollectionConfig) -> CollectionConfig:
 
 
 def find_scenes(town: AssetLibrary, scenes: str = "") -> SceneLibrary:
-    """The scene library of that name or path, or the town's own.
+    """The scene library of a name or path, or the town's own.
 
     Raises:
-        UnknownNameError: there is none.
-        ConfigError: it cannot be read, or is another town's.
+        UnknownNameError: there is no such library.
+        ConfigError: the library cannot be read, or is for another town.
     """
     library = scene_library(scenes or town.town_name)
     if scenes and library.town != town.town_name:
@@ -144,17 +144,17 @@ def find_scenes(town: AssetLibrary, scenes: str = "") -> SceneLibrary:
 
 
 def find_scene(config: CollectionConfig, library: SceneLibrary) -> SceneSpec:
-    """The scene by name."""
+    """The scene of a given name in a library."""
     if config.scene not in library.scenes:
         raise UnknownNameError(f"scene of {library.town}", config.scene, library.scenes)
     return library.scenes[config.scene]
 
 
 def scene_library(name: str) -> SceneLibrary:
-    """A scene library by the name of its town, or by path.
+    """Reads a scene library by the name of its town, or by path.
 
     Raises:
-        UnknownNameError: there is none.
+        UnknownNameError: there is no such library.
         ConfigError: it cannot be read.
     """
     folder, is_path = data_dir("configs") / "scenes", Path(name).suffix in (".yml", ".yaml")
@@ -172,7 +172,7 @@ def scene_library(name: str) -> SceneLibrary:
 
 
 def find_weather(config: WeatherConfig) -> Weather:
-    """The preset with what the config changes in it.
+    """The weather preset, with the fields that the config changes.
 
     Raises:
         UnknownNameError: there is no such preset.

@@ -1,4 +1,4 @@
-"""From what the user calls a patch to one picture a surface."""
+"""Finds the patches that `--patch` refers to: one picture per surface."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ class PatchSet:
     """The patches of one run.
 
     Attributes:
-        label: `none`, `random`, or name and hash: the name of its folder in a dataset.
-        images: sRGB pictures, (H, W, 3) uint8, in surface order: none, or one for each surface.
+        label: `none`, `random`, or a name with a hash; the name of the patches' folder in a dataset.
+        images: sRGB pictures, (H, W, 3) uint8, in the order of the surfaces; empty for none.
         digest: sha256 of the pictures.
-        files: what is copied into the dataset, by name.
-        source: what the user said.
-        made_for: `town/scene` of the scenes that the pictures were optimised in, where an `attack.json` says so.
+        files: files to copy into the dataset, content by name.
+        source: the value of `--patch`.
+        made_for: `town/scene` of the scenes that the patches were optimised in, where an `attack.json` records them.
     """
 
     label: str
@@ -52,22 +52,22 @@ class PatchSet:
     made_for: tuple[str, ...] = ()
 
     def by_surface(self, names: tuple[str, ...]) -> dict[str, UInt8Image]:
-        """The picture of each surface; nothing where there is no patch."""
+        """The picture of each surface by its name; empty without patches."""
         return dict(zip(names, self.images, strict=True)) if self.images else {}
 
 
 def resolve_patch(patch: str, *, surfaces: int, seed: int) -> PatchSet:
-    """Finds the patches that `--patch` asks for.
+    """Finds the patches that `--patch` refers to.
 
     Args:
         patch: `none`, `random`, a picture, a folder with `patch_0.png`, `patch_1.png`, … (or `<anything>_0.png`), or
             the name of a pre-computed patch of an installed weights package.
-        surfaces: how many the scene has.
-        seed: of random patches.
+        surfaces: number of surfaces in the scene.
+        seed: seed of random patches.
 
     Raises:
-        PatchError: it is not there, cannot be read, is not a picture, of an absurd size, or numbered with a gap; or
-            the scene has nothing to show it on, or more surfaces than there are pictures.
+        PatchError: a picture is missing, cannot be read, has an impossible size, or the numbering has a gap; or the
+            scene has no surface, or more surfaces than there are pictures.
     """
     try:
         found = _resolved(patch, surfaces, seed)
@@ -104,7 +104,7 @@ def _resolved(patch: str, surfaces: int, seed: int) -> PatchSet:
 
 
 def random_patch(seed: int, index: int) -> UInt8Image:
-    """Every pixel and channel drawn evenly from 0..255."""
+    """A patch whose pixels and channels are drawn uniformly from 0..255."""
     width, height = RANDOM_SIZE_PX
     rng = derive_rng(seed, "patch", "random", index)
     return rng.integers(0, 256, (height, width, 3), dtype=np.uint8)
@@ -146,7 +146,7 @@ def read_patch(path: Path) -> UInt8Image:
 
 
 def _eight_bits(picture: npt.NDArray[np.uint16]) -> UInt8Image:
-    """The nearest of 256 levels; row by row, so that a large picture does not need several times its memory."""
+    """Rounds 16-bit values to 8 bits, row by row to save memory."""
     levels = np.empty(picture.shape, np.uint8)
     for row, values in zip(levels, picture, strict=True):
         row[:] = (values.astype(np.uint32) * 255 + 32767) // 65535
@@ -154,7 +154,7 @@ def _eight_bits(picture: npt.NDArray[np.uint16]) -> UInt8Image:
 
 
 def digest_of(images: Iterable[UInt8Image]) -> str:
-    """Hex sha256 of patches: sizes and pixels, in surface order."""
+    """Hexadecimal sha256 of patches: sizes and pixels, in the order of the surfaces."""
     digest = hashlib.sha256()
     for image in images:
         digest.update(repr(image.shape).encode() + image.tobytes())
@@ -162,7 +162,7 @@ def digest_of(images: Iterable[UInt8Image]) -> str:
 
 
 def _numbered(folder: Path) -> list[Path]:
-    """`patch_0.png`, `patch_1.png`, … of a folder, or the original tool's `<anything>_0.png`, or its only picture."""
+    """The pictures `patch_0.png`, `patch_1.png`, … of a folder, or `<anything>_0.png`, or its only picture."""
     pictures = sorted(p for p in folder.iterdir() if p.suffix.lower() == ".png" and p.is_file())
     own = [p for p in pictures if re.fullmatch(r"patch_\d+\.(?i:png)", p.name)]
     if len(pictures) == 1 and not own:
@@ -183,7 +183,7 @@ def _numbered(folder: Path) -> list[Path]:
 
 
 def _scenes(notes: Path) -> tuple[str, ...]:
-    """Where an attack's patches were made; nothing without its notes, or where somebody changed them."""
+    """The scenes that the patches were optimised in; empty without a record, or where a picture was changed since."""
     try:
         return tuple(sorted({str(one["scene"]) for one in load_json(notes)["data"]}))
     except (DatasetError, KeyError, TypeError):

@@ -1,4 +1,4 @@
-"""One worker's loop: the next scene is rendered while the last one is measured, encoded and written."""
+"""The loop of one worker: the next scene is rendered while the last one is measured, encoded and written."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from gear.collecting.session import Session, Shot
 from gear.dataset.store import Store
 
 IN_FLIGHT = 2
-"""Frames that may wait for the writer; more would only cost memory."""
+"""Frames that may wait for the writer; more would cost memory and save no time."""
 
 
 def collect_samples(session: Session, store: Store, indices: Iterable[int], done: Callable[[int], None]) -> None:
-    """Makes and writes the samples; `done` hears of each one when its last file is in place.
+    """Makes and writes samples; `done` is called when the last file of a sample is in place.
 
     Raises:
-        GearError: the first one that comes up; what was finished before it stays. Of two at once, the earlier sample's.
+        GearError: the first error; finished samples stay. Of two errors at once, that of the earlier sample.
     """
     waiting: deque[tuple[int, Future[None]]] = deque()
 

@@ -1,7 +1,7 @@
-"""Probes while collecting: the placed scene once more with black and with white surfaces.
+"""Renders probes while collecting: the placed scene once more with black and with white surfaces.
 
-A white surface that a low sun shines on full in the face is brighter than full scale, and a frame ends there: what it
-says of white says too little of every patch. Such a surface is seen in grey as well, and white worked out from that.
+A white surface in full low sun is brighter than full scale, so that its pixels are clipped and underestimate every
+patch. Such a surface is also rendered in grey, and white is extrapolated from that.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ UNSURE = 8
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ProbeShot:
-    """What the renderer saw.
+    """The renders of one scene for its probes.
 
     Attributes:
-        black: with all surfaces black.
-        white: by surface, with that one white and the others black.
-        grey: by surface, the same in grey, of those whose white reaches full scale.
-        grey_weight: what that grey weighs beside white.
+        black: views with all surfaces black.
+        white: views by surface, with that surface white and the others black.
+        grey: views by surface with that surface grey, for surfaces whose white is clipped.
+        grey_weight: linear albedo of that grey as a share of white.
     """
 
     black: Raws
@@ -45,14 +45,14 @@ class ProbeShot:
 
 
 def shoot_probes(world: World, renderer: Renderer, placed: PlacedStage, record: SceneRecord, shapes: Raws) -> ProbeShot:
-    """Renders what was placed last, once with all surfaces black and once a surface with it white.
+    """Renders the scene placed last, once with all surfaces black and once per surface with it white.
 
     Args:
-        world: that it was placed in.
-        renderer: of that world.
-        placed: the sample.
-        record: who looks, and at which surfaces.
-        shapes: the views of the sample itself, whose depth and ids are the same.
+        world: world of the scene.
+        renderer: renderer of that world.
+        placed: the placed scene.
+        record: scene record with cameras and surfaces.
+        shapes: views of the sample itself, which have the same depth and ids.
     """
     names = [surface.name for surface in record.surfaces]
     weights = face_light(renderer.info.name, np.arange(256, dtype=np.uint8))
@@ -86,14 +86,14 @@ def compute_probes(
     geoms: GeomTable,
     reflections: Sequence[Reflection | None],
 ) -> list[Probe]:
-    """Probes of all surfaces and cameras.
+    """Computes the probes of all surfaces and cameras.
 
     Args:
-        pipeline: the camera pipeline of the sample; its noise is left out.
-        shot: the probe renders.
-        record: the scene.
-        geoms: what each geom is.
-        reflections: what wet ground mirrors in the sample itself, one per camera.
+        pipeline: camera pipeline of the sample; its noise is left out.
+        shot: the renders.
+        record: the scene record.
+        geoms: classes of the geoms.
+        reflections: reflections of wet ground in the sample, one per camera.
     """
     quiet = replace(pipeline, effects=pipeline.effects.linear())
     probes = []
@@ -113,6 +113,6 @@ def compute_probes(
 
 
 def _unclipped(black: UInt16Image, white: UInt16Image, grey: UInt16Image, grey_weight: float) -> UInt16Image:
-    """White as it would be without an end of the scale; as it was seen, where that is all the same."""
+    """White without clipping; the rendered white where nothing is clipped."""
     reckoned = black + (grey.astype(np.float32) - black) / np.float32(grey_weight)
     return np.where(reckoned > white + np.float32(UNSURE), reckoned + np.float32(0.5), white).astype(np.uint16)

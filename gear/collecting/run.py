@@ -1,4 +1,4 @@
-"""One collection job from its missing samples to the closed split."""
+"""Runs one collection job from its missing samples to the closed split."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from gear.values.serial import Json, to_json
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CollectReport:
-    """What a run did.
+    """The result of a collection.
 
     Attributes:
         root: folder of the dataset.
-        split: its name.
-        samples: how many the split holds now.
-        made: how many of them this run made.
+        split: name of the split.
+        samples: number of samples in the split.
+        made: number of samples made by this run.
     """
 
     root: Path
@@ -38,14 +38,16 @@ class CollectReport:
     made: int
 
     def summary(self) -> str:
-        """One line for a person."""
+        """The result in one line."""
         kept = self.samples - self.made
         resumed = f" ({kept} were there already)" if kept else ""
         return f"{self.root}: {counted(self.samples, 'sample')} in split {self.split!r}{resumed}"
 
 
 def executor_of(job: Job, workers: int, *, in_subprocess: bool) -> Executor:
-    """The engine for a number of workers; a single one is this process, unless it shall be a process of its own."""
+    """The executor for a number of workers; a single worker is this process, unless a process of its own is
+    requested.
+    """
     if workers == 1 and not in_subprocess:
         return InThisProcess()
     return Processes(workers=workers, backend=job.config.renderer)
@@ -54,13 +56,13 @@ def executor_of(job: Job, workers: int, *, in_subprocess: bool) -> Executor:
 def run_job(
     job: Job, *, executor: Executor | None = None, force: bool = False, callbacks: Callbacks | None = None
 ) -> CollectReport:
-    """Collects what is missing of a resolved job and closes the split.
+    """Collects the missing samples of a resolved job and closes the split.
 
     Args:
-        job: what to collect.
-        executor: the engine that makes the samples; this process by default.
-        force: replaces a split that was made with another configuration.
-        callbacks: receive the progress.
+        job: the job.
+        executor: executor that makes the samples; this process by default.
+        force: whether a split made with another configuration is replaced.
+        callbacks: callbacks that receive the progress.
 
     Raises:
         GearError: a sample cannot be made or written.
@@ -91,13 +93,13 @@ def _collect_missing(job: Job, store: Store, executor: Executor, callbacks: Call
 
 
 def _make_samples(job: Job, indices: Iterator[int], done: Done) -> None:
-    """One worker: a world and a renderer, opened once for all of its samples."""
+    """The work of one worker: a world and a renderer, opened once for all of its samples."""
     with open_session(job) as session:
         collect_samples(session, Store(job.root, job.plan), indices, done)
 
 
 def manifest_facts(job: Job) -> dict[str, Json]:
-    """What the manifest says beside hashes: nothing in it depends on the machine's paths, the clock or the workers."""
+    """The facts of the manifest beside hashes; none depends on paths of the machine, the clock or the workers."""
     config: dict[str, Any] = to_plain(job.config)
     for name in ("root", "patch", "town", "scenes", "simulation", *(() if job.config.probes else ("probes",))):
         config.pop(name)

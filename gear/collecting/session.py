@@ -1,4 +1,4 @@
-"""One worker's world: compiled once, then one sample after another."""
+"""A worker's session: a world compiled once, and a renderer, for one sample after another."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ from gear.world.world import World
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Shot:
-    """What the renderer saw of one scene.
+    """The renders of one scene.
 
     Attributes:
-        record: the scene.
-        raw: one view a camera, in the record's order.
-        below: what wet ground mirrors, one a camera; None for dry ground.
-        geoms, objects: the tables to read it, as in `Frame`.
-        probes: the same scene with black and with white surfaces, where that was asked for.
+        record: the scene record.
+        raw: one view per camera, in the order of the record.
+        below: reflections of wet ground, one per camera; None for dry ground.
+        geoms, objects: tables of geoms and objects, as in `Frame`.
+        probes: renders with black and white surfaces, where probes are collected.
     """
 
     record: SceneRecord
@@ -51,7 +51,7 @@ class Shot:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Session:
-    """Everything that makes samples of one job."""
+    """Everything that makes the samples of one job."""
 
     job: Job
     plugin: PluginEntry
@@ -62,11 +62,11 @@ class Session:
     pipeline: CameraPipeline
 
     def record(self, index: int) -> SceneRecord:
-        """The scene of one sample: a pure function of the job and the index."""
+        """The scene record of one sample: a pure function of the job and the index."""
         return self.pipeline.with_effects(self.planner.plan(index))
 
     def shoot(self, record: SceneRecord) -> Shot:
-        """Places the scene with the run's patch in it and renders it."""
+        """Places the scene with the run's patches and renders it."""
         names = tuple(surface.name for surface in record.surfaces)
         placed = self.world.place(record, self.job.patch.by_surface(names))
         raw = self.renderer.render(placed.stage, record.cameras)
@@ -76,7 +76,7 @@ class Session:
         return Shot(record=record, raw=raw, below=below, geoms=placed.geoms, objects=placed.objects, probes=probes)
 
     def to_frame(self, shot: Shot) -> Frame:
-        """Turns what the renderer saw into pictures; needs neither world nor renderer, so it can run beside them."""
+        """Turns renders into pictures. Needs neither world nor renderer, so that it can run beside them."""
         return self._frame(shot, self._reflections(shot))
 
     def _reflections(self, shot: Shot) -> list[Reflection | None]:
@@ -104,7 +104,7 @@ class Session:
 
 @contextlib.contextmanager
 def open_session(job: Job) -> Iterator[Session]:
-    """Builds a worker's world and renderer, and closes the renderer at the end."""
+    """Opens a worker's world and renderer, and closes the renderer at the end."""
     map_large_buffers()
     plugin = find("task", job.config.task)
     task: Task[Any, Any] = build(plugin, job.config.options)

@@ -47,7 +47,7 @@ class DoctorReport:
         return any(check.works for check in self.renderers)
 
     def as_json(self) -> Json:
-        """As JSON."""
+        """The report as JSON."""
         checks = {check.name: {"works": check.works, **check.facts} for check in self.renderers}
         return {**self.machine, "renderers": checks}
 

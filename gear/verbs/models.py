@@ -1,4 +1,4 @@
-"""`gear.list_models`: the installed networks, with what is published for them and what is shipped."""
+"""`gear.list_models`: the installed networks with their published and their shipped weights."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from gear.values.serial import Json, to_json
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShippedWeights:
-    """A network's reference weights.
+    """The reference weights of a network.
 
     Attributes:
-        file: its header.
-        stale: what of the look that they were trained on has changed since; None where the file does not say.
+        file: metadata of the file.
+        stale: parts of the appearance that changed since the training; None where the file does not record it.
     """
 
     file: WeightsFile
     stale: tuple[str, ...] | None
 
     def to_json(self) -> Json:
-        """As JSON."""
+        """All facts as JSON."""
         facts = self.file.facts()
         return {
             "path": str(self.file.path),
@@ -45,7 +45,7 @@ class ModelFacts:
     """One installed network.
 
     Attributes:
-        found: the plugin.
+        found: its plugin.
         missing: modules that it needs and that are not installed.
         shipped: its reference weights, if an installed package has them.
     """
@@ -56,12 +56,12 @@ class ModelFacts:
 
     @property
     def spec(self) -> ModelSpec[Any]:
-        """The plugin's spec."""
+        """The spec of the model plugin."""
         assert isinstance(self.found.spec, ModelSpec)
         return self.found.spec
 
     def to_json(self) -> Json:
-        """As JSON."""
+        """All facts as JSON."""
         spec = self.spec
         return {
             "name": spec.name,
@@ -86,7 +86,7 @@ def list_models(task: str | None = None) -> list[ModelFacts]:
     """Every installed network, by name; torch is not imported.
 
     Args:
-        task: only those that can do it.
+        task: name of a task; only networks for this task are listed.
 
     Raises:
         UnknownNameError: there is no such task.

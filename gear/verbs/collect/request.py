@@ -41,7 +41,7 @@ class CollectRequest:
             raise GearError(f"workers must be at least 1, got {self.workers}")
 
     def loaded(self) -> CollectionConfig:
-        """The collection's config: the file, with the other values before what it says.
+        """The collection config: the values of a file, overridden by the request's.
 
         Raises:
             ConfigError: a value cannot be read.

@@ -1,1 +1,1 @@
-"""The verb `defend`: the pictures of a dataset as a defense cleans them."""
+"""The verb `defend`: writes the pictures of a dataset after a defense has cleaned them."""

@@ -1,4 +1,4 @@
-"""`gear.defend`: a dataset's pictures, cleaned by a defense."""
+"""`gear.defend`: cleans a dataset's pictures with a defense."""
 
 from __future__ import annotations
 
@@ -30,15 +30,14 @@ from gear.verbs.defend.request import DefendRequest
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DefendReport:
-    """What a run did.
+    """The result of a run.
 
     Attributes:
         root: folder of the cleaned pictures.
-        split: its name.
-        samples: how many of the split are cleaned now.
-        made: how many of them this run cleaned.
-        outdated: how many of these had been cleaned before, of pictures that are others now, or into files that are
-            damaged.
+        split: name of the split.
+        samples: number of cleaned samples of the split.
+        made: number of samples cleaned by this run.
+        outdated: how many of these replace earlier results, because the source pictures changed or files were damaged.
     """
 
     root: Path
@@ -48,7 +47,7 @@ class DefendReport:
     outdated: int = 0
 
     def summary(self) -> str:
-        """One line for a person."""
+        """The result in one line."""
         kept = self.samples - self.made
         resumed = f" ({kept} were there already)" if kept else ""
         again = f"; {self.outdated} were cleaned again: their pictures or files had changed" if self.outdated else ""
@@ -130,10 +129,10 @@ def run_defend(request: DefendRequest, callbacks: Callbacks) -> DefendReport:
 
 
 def suitable(found: PluginEntry, task: str) -> DefenseSpec[Any]:
-    """The defense's spec, if it can do this job, which has pictures alone.
+    """The spec of a defense that needs pictures only.
 
     Raises:
-        GearError: it is not made for the task, or needs a model or samples to learn from.
+        GearError: the defense is not for the task, or needs a model or calibration data.
     """
     spec = found.spec
     assert isinstance(spec, DefenseSpec)
@@ -147,10 +146,10 @@ def suitable(found: PluginEntry, task: str) -> DefenseSpec[Any]:
 
 
 def begin(root: Path, split: str, plan: Json) -> None:
-    """Writes what the run is made of, or checks that what is there was made of the same, as far as a sample was.
+    """Records what the run consists of, or checks that an existing record agrees in all that decides a sample.
 
     Raises:
-        DatasetError: it was made otherwise, or the disk refuses.
+        DatasetError: the record differs, or the disk refuses to write.
     """
     relative = f"{FOLDER}/{split}/plan.json"
     with explained(root):
