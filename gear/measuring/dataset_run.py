@@ -48,16 +48,16 @@ def evaluate_row(
     pictures are decoded, and predictions measured and written, in threads beside the model. What waits is bounded, so
     memory does not grow with the dataset.
     """
-    desk = _Desk(2 * batch + workers, done)
     items = TorchDataset(dataset)
     with ThreadPoolExecutor(workers) as scorers:
-        notes, damaged = _taken_up(scorer, scorers, desk)
+        desk = _Desk(scorers, 2 * batch + workers, done)
+        notes, damaged = _taken_up(scorer, desk)
         every = [range(begin, min(begin + batch, len(dataset))) for begin in range(0, len(dataset), batch)]
         blocks = [block for block in every if not notes.keys() >= set(block)]
         made = len(dataset) - len(notes)
         count = min(player.lanes, len(every))
         if count > 1:
-            scored = _in_lanes(items, scorer, player, blocks, notes.keys(), count, desk, scorers)
+            scored = _in_lanes(items, scorer, player, blocks, notes.keys(), count, desk)
         else:
             scored = {}
             with contextlib.closing(read_ahead(items, blocks, workers=workers)) as reading:
@@ -65,7 +65,7 @@ def evaluate_row(
                     answers = player.play([item.sample.images for item in found], [item.index for item in found])
                     for item, answer in zip(found, answers, strict=True):
                         if item.index not in notes:
-                            scored[item.index] = desk.submit(scorers, scorer.first, item.index, item.sample, answer)
+                            scored[item.index] = desk.submit(scorer.first, item.index, item.sample, answer)
                     desk.check()
         notes |= {index: future.result() for index, future in scored.items()}
     desk.check()  # looked at again now that every callback has ended: that of the last sample may fail too
@@ -80,7 +80,6 @@ def _in_lanes(
     finished: Set[int],
     count: int,
     desk: _Desk,
-    writers: ThreadPoolExecutor,
 ) -> dict[int, Future[Note]]:
     """Batches side by side, each in one thread until there is nothing left to do but to wait for the disk."""
 
@@ -88,7 +87,7 @@ def _in_lanes(
         found = [items[index] for index in indices]
         answers = player.play([item.sample.images for item in found], indices)
         return {
-            item.index: desk.submit(writers, scorer.write, scorer.measured(item.index, item.sample, answer))
+            item.index: desk.submit(scorer.write, scorer.measured(item.index, item.sample, answer))
             for item, answer in zip(found, answers, strict=True)
             if item.index not in finished
         }
@@ -108,14 +107,20 @@ def _in_lanes(
 class _Desk:
     """Where samples wait to be measured: so many at a time, and the first failure is remembered."""
 
-    def __init__(self, most: int, done: SampleDone) -> None:
+    def __init__(self, pool: ThreadPoolExecutor, most: int, done: SampleDone) -> None:
+        """Args:
+        pool: threads that measure and write.
+        most: jobs that may wait for one of them.
+        done: called after every sample whose files are all written.
+        """
+        self._pool = pool
         self._waiting, self._reporting, self._done = threading.Semaphore(most), threading.Lock(), done
         self._failed = list[BaseException]()
 
-    def submit(self, pool: ThreadPoolExecutor, job: Callable[..., Any], *arguments: Any) -> Future[Any]:
+    def submit(self, job: Callable[..., Any], *arguments: Any) -> Future[Any]:
         """Waits for a place."""
         self._waiting.acquire()
-        future = pool.submit(job, *arguments)
+        future = self._pool.submit(job, *arguments)
         future.add_done_callback(self._tell)
         return future
 
@@ -137,11 +142,11 @@ class _Desk:
             self._failed.append(error)
 
 
-def _taken_up(scorer: Scorer, scorers: ThreadPoolExecutor, desk: _Desk) -> tuple[dict[int, Note], list[DatasetError]]:
+def _taken_up(scorer: Scorer, desk: _Desk) -> tuple[dict[int, Note], list[DatasetError]]:
     """What a former run finished, and what of it cannot be read."""
     futures: dict[int, Future[Note | DatasetError]] = {}
     for index in sorted(scorer.kept()):
-        futures[index] = desk.submit(scorers, scorer.again, index)
+        futures[index] = desk.submit(scorer.again, index)
         desk.check()
     notes: dict[int, Note] = {}
     damaged: list[DatasetError] = []

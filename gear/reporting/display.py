@@ -167,7 +167,8 @@ class _Lines:
 
     def write(self, line: str) -> None:
         with self._lock:
-            print(line, file=self._stream, flush=True)
+            self._stream.write(f"{line}\n")
+            self._stream.flush()
 
     def begin(self, title: str) -> None:
         with self._lock:
