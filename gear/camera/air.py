@@ -141,9 +141,10 @@ class Air:
         """
         width, height = camera.width_px, camera.height_px
         columns, rows = -(-width // _COARSE_PX), -(-height // _COARSE_PX)
+        pinhole = camera.intrinsics
         x, y = np.meshgrid(
-            (((np.arange(columns) + 0.5) * width / columns) - width / 2) / camera.focal_px,
-            (((np.arange(rows) + 0.5) * height / rows) - height / 2) / camera.focal_px,
+            (((np.arange(columns) + 0.5) * width / columns) - (pinhole.cx_px + 0.5)) / pinhole.fx_px,
+            (((np.arange(rows) + 0.5) * height / rows) - (pinhole.cy_px + 0.5)) / pinhole.fy_px,
         )
         towards = np.stack([x, y, np.ones_like(x)], axis=-1) @ camera.world_from_camera_transform.rotation.T
         azimuth = np.arctan2(towards[..., 1], towards[..., 0]) / (2 * np.pi) * len(self.ring)
@@ -155,8 +156,9 @@ class Air:
 
     @staticmethod
     def _exact_rays(camera: CameraRecord) -> FloatImage:
-        x = ((np.arange(camera.width_px) + 0.5 - camera.width_px / 2) / camera.focal_px).astype(np.float32)
-        y = ((np.arange(camera.height_px) + 0.5 - camera.height_px / 2) / camera.focal_px).astype(np.float32)[:, None]
+        pinhole = camera.intrinsics
+        x = ((np.arange(camera.width_px) - pinhole.cx_px) / pinhole.fx_px).astype(np.float32)
+        y = ((np.arange(camera.height_px) - pinhole.cy_px) / pinhole.fy_px).astype(np.float32)[:, None]
         up = camera.world_from_camera_transform.rotation[2].astype(np.float32)
         rays = np.empty((2, camera.height_px, camera.width_px), np.float32)
         np.sqrt(x * x + (y * y + 1), out=rays[0])

@@ -155,8 +155,10 @@ class Shine:
 
 def _pixels(inside: Array, camera: CameraRecord) -> Array:
     """(N, 2) index pixels of (N, 3) places in the camera's frame; the middle of the first pixel is (0, 0)."""
-    middle = np.array([camera.width_px, camera.height_px]) / 2 - 0.5
-    return np.asarray(inside[..., :2] / inside[..., 2:] * camera.focal_px + middle)
+    pinhole = camera.intrinsics
+    return np.asarray(
+        inside[..., :2] / inside[..., 2:] * (pinhole.fx_px, pinhole.fy_px) + (pinhole.cx_px, pinhole.cy_px)
+    )
 
 
 def _add_spot(picture: FloatImage, place: Array, sigma: tuple[float, float], peak: float) -> None:

@@ -222,8 +222,9 @@ class GroundShade:
         turn = actor_from_camera.rotation.astype(np.float32)
         place = actor_from_camera.translation_m.astype(np.float32)
         z = depth_m[box]
-        x = _rays(camera.width_px, box[1], camera) * z
-        y = _rays(camera.height_px, box[0], camera)[:, None] * z
+        pinhole = camera.intrinsics
+        x = _slopes_of(box[1], pinhole.cx_px, pinhole.fx_px) * z
+        y = _slopes_of(box[0], pinhole.cy_px, pinhole.fy_px)[:, None] * z
         ahead, left, up = (turn[i, 0] * x + turn[i, 1] * y + turn[i, 2] * z + place[i] for i in range(3))
         scale, (rows, columns) = np.float32(sky.cells_per_m), sky.share.shape
         hidden = cv2.remap(
@@ -240,9 +241,9 @@ def worth_beside(even_share: float) -> float:
     return (1 + even_share) / 2
 
 
-def _rays(size_px: int, part: slice, camera: CameraRecord) -> FloatImage:
-    """Slopes of the rays through columns or rows."""
-    return ((np.arange(part.start, part.stop) + 0.5 - size_px / 2) / camera.focal_px).astype(np.float32)
+def _slopes_of(part: slice, centre_px: float, focal_px: float) -> FloatImage:
+    """(n,) tangents of the rays through some columns or rows, index pixels."""
+    return ((np.arange(part.start, part.stop) - centre_px) / focal_px).astype(np.float32)
 
 
 def _box_in_picture(actor: ActorRecord, shape: Shape, camera: CameraRecord) -> tuple[slice, slice] | None:
@@ -258,8 +259,13 @@ def _box_in_picture(actor: ActorRecord, shape: Shape, camera: CameraRecord) -> t
     if not len(seen) or seen[:, 2].min() > _FARTHEST_M:
         return None
     box = []
-    for axis, size in ((1, camera.height_px), (0, camera.width_px)):
-        places = seen[:, axis] / seen[:, 2] * camera.focal_px + size / 2
+    pinhole = camera.intrinsics
+    of_axes = (
+        (0, pinhole.width_px, pinhole.fx_px, pinhole.cx_px),
+        (1, pinhole.height_px, pinhole.fy_px, pinhole.cy_px),
+    )
+    for axis, size, focal_px, centre_px in reversed(of_axes):
+        places = seen[:, axis] / seen[:, 2] * focal_px + (centre_px + 0.5)
         low, high = (min(max(end, 0), size) for end in (math.floor(places.min()), math.ceil(places.max())))
         if low >= high:
             return None

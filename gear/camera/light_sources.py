@@ -100,6 +100,7 @@ def places(
     """(N, 3) where pixels lie in the world."""
     pose = camera.world_from_camera_transform
     z = depth_m[rows, columns].astype(np.float64)
-    x = (columns + 0.5 - camera.width_px / 2) / camera.focal_px * z
-    y = (rows + 0.5 - camera.height_px / 2) / camera.focal_px * z
+    pinhole = camera.intrinsics
+    x = (columns - pinhole.cx_px) / pinhole.fx_px * z
+    y = (rows - pinhole.cy_px) / pinhole.fy_px * z
     return np.asarray(np.stack([x, y, z], axis=1) @ pose.rotation.T + pose.translation_m)

@@ -44,8 +44,9 @@ def strips_of(depth_m: FloatImage, camera: CameraRecord) -> Iterator[Strip]:
         camera: who looks.
     """
     height, width = depth_m.shape
-    x = ((np.arange(width) + 0.5 - width / 2) / camera.focal_px).astype(np.float32)
-    y = ((np.arange(height) + 0.5 - height / 2) / camera.focal_px).astype(np.float32)[:, None]
+    pinhole = camera.intrinsics
+    x = ((np.arange(width) - pinhole.cx_px) / pinhole.fx_px).astype(np.float32)
+    y = ((np.arange(height) - pinhole.cy_px) / pinhole.fy_px).astype(np.float32)[:, None]
     rotation = camera.world_from_camera_transform.rotation.astype(np.float32)
     for top in range(0, height, STRIP_ROWS):
         bottom = min(top + STRIP_ROWS, height)

@@ -99,13 +99,21 @@ class Rain:
         self, camera: CameraRecord, near_m: float, far_m: float, motion: Array, rng: np.random.Generator
     ) -> npt.NDArray[np.uint8]:
         """(H, W) uint8 cover of the drops between two depths."""
-        half_x, half_y = camera.width_px / (2 * camera.focal_px), camera.height_px / (2 * camera.focal_px)
+        pinhole = camera.intrinsics
+        half_x, half_y = camera.width_px / (2 * pinhole.fx_px), camera.height_px / (2 * pinhole.fy_px)
+        # Tangents of the view's middle: 0 unless the principal point lies elsewhere.
+        aside = ((camera.width_px - 1) / 2 - pinhole.cx_px) / pinhole.fx_px
+        down = ((camera.height_px - 1) / 2 - pinhole.cy_px) / pinhole.fy_px
         volume = 4 * half_x * half_y * (far_m**3 - near_m**3) / 3
         count = int(rng.poisson(min(volume * DROPS_PER_M3 * self.intensity, 6000)))
         # Evenly in the volume of the pyramid between the two depths.
         depth = np.cbrt(near_m**3 + rng.random(count) * (far_m**3 - near_m**3))
         start = np.column_stack(
-            [depth * half_x * rng.uniform(-1.1, 1.1, count), depth * half_y * rng.uniform(-1.3, 1.1, count), depth]
+            [
+                depth * half_x * rng.uniform(-1.1, 1.1, count) + depth * aside,
+                depth * half_y * rng.uniform(-1.3, 1.1, count) + depth * down,
+                depth,
+            ]
         )
         strength = rng.uniform(0.35, 1.0, count)
         end = start + motion
@@ -134,7 +142,6 @@ class Rain:
 
     @staticmethod
     def _pixels(points_m: Array, camera: CameraRecord) -> Array:
-        pixels = camera.focal_px * points_m[:, :2] / points_m[:, 2:]
-        return np.asarray(
-            np.clip(pixels + np.array([(camera.width_px - 1) / 2, (camera.height_px - 1) / 2]), -3e4, 3e4)
-        )
+        pinhole = camera.intrinsics
+        pixels = np.array([pinhole.fx_px, pinhole.fy_px]) * points_m[:, :2] / points_m[:, 2:]
+        return np.asarray(np.clip(pixels + np.array([pinhole.cx_px, pinhole.cy_px]), -3e4, 3e4))

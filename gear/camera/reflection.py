@@ -80,8 +80,9 @@ class Reflection:
             for axis in self.camera.world_from_camera_transform.rotation.T.astype(np.float32)
         )
         z = np.maximum(z, np.float32(1e-6))
-        column = x / z * np.float32(self.camera.focal_px) + np.float32((self.camera.width_px - 1) / 2)
-        row = y / z * np.float32(self.camera.focal_px) + np.float32((self.camera.height_px - 1) / 2)
+        pinhole = self.camera.intrinsics
+        column = x / z * np.float32(pinhole.fx_px) + np.float32(pinhole.cx_px)
+        row = y / z * np.float32(pinhole.fy_px) + np.float32(pinhole.cy_px)
         return sampled(picture, column, row, is_periodic=False)
 
 
@@ -93,13 +94,17 @@ def mirror_camera(camera: CameraRecord, height_m: float) -> CameraRecord | None:
         height_m: of the mirror in the world.
     """
     world_from_camera = camera.world_from_camera_transform
+    pinhole = camera.intrinsics
     columns, rows = np.meshgrid(
-        np.linspace(-0.5, 0.5, _RAYS[0]) * camera.width_px, np.linspace(-0.5, 0.5, _RAYS[1]) * camera.height_px
+        np.linspace(-0.5, 0.5, _RAYS[0]) * camera.width_px + ((camera.width_px - 1) / 2 - pinhole.cx_px),
+        np.linspace(-0.5, 0.5, _RAYS[1]) * camera.height_px + ((camera.height_px - 1) / 2 - pinhole.cy_px),
     )
-    rays = np.stack([columns.ravel(), rows.ravel(), np.full(columns.size, camera.focal_px)])
+    rays = np.stack(
+        [columns.ravel(), rows.ravel() * (pinhole.fx_px / pinhole.fy_px), np.full(columns.size, pinhole.fx_px)]
+    )
     rays = (world_from_camera.rotation @ (rays / np.linalg.norm(rays, axis=0))).T
     # Up to the horizon itself, which lies between two rays.
-    step = max(camera.width_px / (_RAYS[0] - 1), camera.height_px / (_RAYS[1] - 1)) / camera.focal_px
+    step = max(camera.width_px / (_RAYS[0] - 1) / pinhole.fx_px, camera.height_px / (_RAYS[1] - 1) / pinhole.fy_px)
     seen = rays[rays[:, 2] < step]
     if not (rays[:, 2] < 0).any() or world_from_camera.translation_m[2] <= height_m:
         return None
@@ -112,7 +117,13 @@ def mirror_camera(camera: CameraRecord, height_m: float) -> CameraRecord | None:
     position_m = world_from_camera.translation_m * (1, 1, -1) + (0, 0, 2 * height_m)
     pose = RigidTransform.from_parts("world", "camera", rotation, position_m)
     return replace(
-        camera, width_px=width_px, height_px=height_px, focal_px=focal_px, world_from_camera=Pose.from_transform(pose)
+        camera,
+        width_px=width_px,
+        height_px=height_px,
+        focal_px=focal_px,
+        focal_y_px=None,
+        principal_px=None,
+        world_from_camera=Pose.from_transform(pose),
     )
 
 
@@ -126,8 +137,9 @@ def beyond_mirror(depth_m: FloatImage, camera: CameraRecord, height_m: float) ->
 
 def _climb(camera: CameraRecord) -> _Floats:
     """(h, w) by how much rays climb a metre of depth."""
-    x = (np.arange(camera.width_px, dtype=np.float32) + 0.5 - camera.width_px / 2) / camera.focal_px
-    y = (np.arange(camera.height_px, dtype=np.float32)[:, None] + 0.5 - camera.height_px / 2) / camera.focal_px
+    pinhole = camera.intrinsics
+    x = (np.arange(camera.width_px, dtype=np.float32) - pinhole.cx_px) / pinhole.fx_px
+    y = (np.arange(camera.height_px, dtype=np.float32)[:, None] - pinhole.cy_px) / pinhole.fy_px
     up = camera.world_from_camera_transform.rotation[2]
     return np.asarray(up[0] * x + up[1] * y + up[2], dtype=np.float32)
 

@@ -43,7 +43,9 @@ class Spots:
         inside = (lamps.position_m[:, None] + corners - pose.translation_m) @ pose.rotation
         size = np.array([camera.width_px, camera.height_px])
         z = inside[..., 2:]
-        places = inside[..., :2] / np.maximum(z, _NEAREST_M) * camera.focal_px + size / 2
+        pinhole = camera.intrinsics
+        middle = np.array([pinhole.cx_px, pinhole.cy_px]) + 0.5
+        places = inside[..., :2] / np.maximum(z, _NEAREST_M) * (pinhole.fx_px, pinhole.fy_px) + middle
         low, high = np.floor(places.min(axis=1)), np.ceil(places.max(axis=1))
         # What reaches behind the camera may be anywhere in the picture.
         behind = z.min(axis=1) <= _NEAREST_M

@@ -179,8 +179,9 @@ def _towards(
     rows: npt.NDArray[np.intp], columns: npt.NDArray[np.intp], depth_m: _Floats, camera: CameraRecord
 ) -> list[_Floats]:
     """East, north and up, (N,) each in metres, from the camera to what pixels show."""
-    x = (columns.astype(np.float32) - np.float32((camera.width_px - 1) / 2)) * depth_m * np.float32(1 / camera.focal_px)
-    y = (rows.astype(np.float32) - np.float32((camera.height_px - 1) / 2)) * depth_m * np.float32(1 / camera.focal_px)
+    pinhole = camera.intrinsics
+    x = (columns.astype(np.float32) - np.float32(pinhole.cx_px)) * depth_m * np.float32(1 / pinhole.fx_px)
+    y = (rows.astype(np.float32) - np.float32(pinhole.cy_px)) * depth_m * np.float32(1 / pinhole.fy_px)
     rotation = camera.world_from_camera_transform.rotation.astype(np.float32)
     return [row[0] * x + row[1] * y + row[2] * depth_m for row in rotation]
 

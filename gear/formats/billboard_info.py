@@ -49,6 +49,9 @@ def billboard_info(
         "net": None,
         "creator": "gear",
         "level": all(_is_level(record, (reference, second)) for record in records),
+        "symmetric": all(
+            record.camera(name).intrinsics.is_symmetric for record in records for name in {reference, second}
+        ),
     }
     return {
         "info": info,

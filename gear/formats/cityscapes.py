@@ -166,8 +166,8 @@ def camera_json(camera: CameraRecord, world_from_vehicle: RigidTransform, baseli
             "z": z,
         },
         "intrinsic": {
-            "fx": intrinsics.focal_px,
-            "fy": intrinsics.focal_px,
+            "fx": intrinsics.fx_px,
+            "fy": intrinsics.fy_px,
             "u0": intrinsics.cx_px,
             "v0": intrinsics.cy_px,
         },

@@ -160,10 +160,10 @@ class ClassicRenderer:
             gl_camera.pos[:] = frustum.position_world_m
             gl_camera.forward[:] = frustum.forward_world
             gl_camera.up[:] = frustum.up_world
-            gl_camera.frustum_center = 0.0
+            gl_camera.frustum_center = frustum.centre_right_m
             gl_camera.frustum_width = frustum.half_width_m
-            gl_camera.frustum_bottom = -frustum.half_height_m
-            gl_camera.frustum_top = frustum.half_height_m
+            gl_camera.frustum_bottom = frustum.centre_up_m - frustum.half_height_m
+            gl_camera.frustum_top = frustum.centre_up_m + frustum.half_height_m
             gl_camera.frustum_near = NEAR_M
             gl_camera.frustum_far = FAR_M
         for light in self._scene.lights[: self._scene.nlight]:

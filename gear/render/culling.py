@@ -28,10 +28,13 @@ def in_frustum(frustum: Frustum, centres_m: Array, radii_m: Array) -> Mask:
     towards = centres_m - frustum.position_world_m
     ahead = towards @ frustum.forward_world
     seen = ahead + radii_m > 0
-    for axis, half_size_m in ((right, frustum.half_width_m), (frustum.up_world, frustum.half_height_m)):
-        slope = half_size_m / NEAR_M
-        # Distance beyond the side's plane, measured along its normal; both sides at once.
-        beyond = (np.abs(towards @ axis) - slope * ahead) / np.hypot(1.0, slope)
+    for axis, half_size_m, centre_m in (
+        (right, frustum.half_width_m, frustum.centre_right_m),
+        (frustum.up_world, frustum.half_height_m, frustum.centre_up_m),
+    ):
+        slope, middle = half_size_m / NEAR_M, centre_m / NEAR_M
+        # Distance beyond the side's plane, measured along its normal; both sides at once, with the longer normal.
+        beyond = (np.abs(towards @ axis - middle * ahead) - slope * ahead) / np.hypot(1.0, slope + abs(middle))
         seen &= beyond < radii_m
     return np.asarray(seen)
 

@@ -220,10 +220,10 @@ class FilamentRenderer:
             pos=frustum.position_world_m.astype(np.float32),
             forward=frustum.forward_world.astype(np.float32),
             up=frustum.up_world.astype(np.float32),
-            frustum_bottom=-frustum.half_height_m,
-            frustum_top=frustum.half_height_m,
+            frustum_bottom=frustum.centre_up_m - frustum.half_height_m,
+            frustum_top=frustum.centre_up_m + frustum.half_height_m,
             frustum_width=frustum.half_width_m,
-            frustum_center=0.0,
+            frustum_center=frustum.centre_right_m,
             frustum_near=NEAR_M,
             frustum_far=FAR_M,
         )

@@ -18,11 +18,14 @@ FAR_M = 2000.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frustum:
-    """A symmetric view volume in the world.
+    """The view volume of a pinhole in the world.
 
     Attributes:
-        position_world_m, forward_world, up_world: (3,) each, the latter two of unit length.
-        half_width_m, half_height_m: half the size of the picture on the near plane.
+        position_world_m: (3,) the camera's centre.
+        forward_world, up_world: (3,) unit vectors.
+        half_width_m, half_height_m: half the size of the picture on the near plane, `NEAR_M` ahead.
+        centre_right_m, centre_up_m: the picture's middle on the near plane, to the right of and above the optical
+            axis; 0 where the principal point is the middle of the picture.
     """
 
     position_world_m: Array
@@ -30,17 +33,21 @@ class Frustum:
     up_world: Array
     half_width_m: float
     half_height_m: float
+    centre_right_m: float = 0.0
+    centre_up_m: float = 0.0
 
     @staticmethod
     def of(camera: CameraRecord) -> Frustum:
-        """The frustum whose W x H raster has its first pixel's centre at index (0, 0), so that cx = (W - 1) / 2."""
-        world_from_camera = camera.world_from_camera_transform
+        """The frustum of a camera's pinhole; the centre of the picture's first pixel is at index (0, 0)."""
+        world_from_camera, pinhole = camera.world_from_camera_transform, camera.intrinsics
         return Frustum(
             position_world_m=world_from_camera.translation_m,
             forward_world=world_from_camera.rotation[:, 2],
             up_world=-world_from_camera.rotation[:, 1],
-            half_width_m=NEAR_M * camera.width_px / (2 * camera.focal_px),
-            half_height_m=NEAR_M * camera.height_px / (2 * camera.focal_px),
+            half_width_m=NEAR_M * camera.width_px / (2 * pinhole.fx_px),
+            half_height_m=NEAR_M * camera.height_px / (2 * pinhole.fy_px),
+            centre_right_m=NEAR_M * ((camera.width_px - 1) / 2 - pinhole.cx_px) / pinhole.fx_px,
+            centre_up_m=NEAR_M * (pinhole.cy_px - (camera.height_px - 1) / 2) / pinhole.fy_px,
         )
 
 

@@ -11,6 +11,9 @@ from gear.values.errors import FieldError
 from gear.values.geometry import CAMERA_FROM_ACTOR_AXES, Intrinsics, RigidTransform
 from gear.values.scene import CameraRecord, Pose, Vec3
 
+LEAST_FOCAL, MOST_FOCAL = 0.043, 58.0
+"""Focal lengths in sizes of the picture: of fields of view of 170 and of 1 degree."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraMount:
@@ -18,16 +21,23 @@ class CameraMount:
 
     Attributes:
         name: key of its view: `left`, `right`, ….
-        width_px, height_px: picture size.
-        hfov_deg: horizontal field of view.
-        position_m: in the ego frame, x forward, y left, z up.
-        yaw_deg, pitch_deg, roll_deg: turned to the left, downwards, to the right; 0 is straight ahead and level.
+        width_px, height_px: size of the picture.
+        hfov_deg: horizontal field of view, 1 to 170 degrees; not used where `focal_px` is given.
+        focal_px: horizontal focal length fx; None for the one of `hfov_deg`.
+        focal_y_px: vertical focal length fy; None for the same as the horizontal one.
+        principal_px: principal point (cx, cy) in index pixels; None for the middle of the picture.
+        position_m: in the ego frame: x forward, y left, z up, the origin on the ground.
+        yaw_deg, pitch_deg, roll_deg: turned to the left, downwards, and clockwise as seen from behind the camera; 0 is
+            straight ahead and level.
     """
 
     name: str
     width_px: int
     height_px: int
     hfov_deg: float = 90.0
+    focal_px: float | None = None
+    focal_y_px: float | None = None
+    principal_px: tuple[float, float] | None = None
     position_m: Vec3 = (1.5, 0.0, 1.65)
     yaw_deg: float = 0.0
     pitch_deg: float = 0.0
@@ -38,11 +48,25 @@ class CameraMount:
             raise FieldError("width_px", f"pictures are 16 to 8192 px a side, got {self.width_px} x {self.height_px}")
         if not 1 <= self.hfov_deg <= 170:
             raise FieldError("hfov_deg", f"must be 1 to 170 degrees, got {self.hfov_deg}")
+        for name, size_px in (("focal_px", self.width_px), ("focal_y_px", self.height_px)):
+            focal_px, low, high = getattr(self, name), size_px * LEAST_FOCAL, size_px * MOST_FOCAL
+            if focal_px is not None and not low <= focal_px <= high:
+                raise FieldError(name, f"must be {low:.4g} to {high:.4g} px for {size_px} px, got {focal_px:g}")
+        if self.principal_px is not None:
+            u, v = self.principal_px
+            if not (-0.5 <= u <= self.width_px - 0.5 and -0.5 <= v <= self.height_px - 0.5):
+                raise FieldError("principal_px", f"must lie in the picture, got [{u:g}, {v:g}]")
+        for name, most in (("yaw_deg", 180), ("pitch_deg", 90), ("roll_deg", 180)):
+            if not -most <= getattr(self, name) <= most:
+                raise FieldError(name, f"must be -{most} to {most} degrees, got {getattr(self, name):g}")
 
     @property
     def intrinsics(self) -> Intrinsics:
         """The pinhole."""
-        return Intrinsics.from_hfov(self.width_px, self.height_px, math.radians(self.hfov_deg))
+        focal_px = self.focal_px
+        if focal_px is None:
+            focal_px = Intrinsics.from_hfov(self.width_px, self.height_px, math.radians(self.hfov_deg)).focal_px
+        return Intrinsics(self.width_px, self.height_px, focal_px, self.focal_y_px, self.principal_px)
 
     @property
     def ego_from_camera(self) -> RigidTransform:
@@ -88,6 +112,8 @@ class Rig:
                 width_px=mount.width_px,
                 height_px=mount.height_px,
                 focal_px=mount.intrinsics.focal_px,
+                focal_y_px=mount.focal_y_px,
+                principal_px=mount.principal_px,
                 world_from_camera=Pose.from_transform(base @ mount.ego_from_camera),
             )
             for mount in self.cameras

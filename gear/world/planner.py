@@ -10,6 +10,8 @@ from gear.values.frames import STATIC_OBJECT_BASE
 from gear.values.geometry import RigidTransform
 from gear.values.rig import Rig
 from gear.values.scene import POSE_DIGITS, ActorRecord, Pose, SceneRecord, Vec3
+from gear.world.camera_position import check_outside
+from gear.world.compilation.actor_pool import EGO_ASSET
 from gear.world.placement import PlacementSpace
 from gear.world.surfaces.view_limits import reference_camera
 from gear.world.traffic.crowd import Crowd, OcclusionTest, RoadUsers
@@ -32,7 +34,11 @@ class ScenePlanner:
             rig: cameras on the ego car; the first one must have the boards in view.
             split: seed, and length of its sequences.
             split_name: what records call it. Draws do not depend on it, so `test_night` shows the scenes of `test`.
+
+        Raises:
+            PlacementError: a camera is inside the ego car.
         """
+        check_outside(rig, world.types[EGO_ASSET].shape, world.scene_name)
         self._world = world
         self._rig = rig
         self._split = split

@@ -55,6 +55,8 @@ def test_composed_and_rendered_pictures_are_the_same(
         ("camera.shot_noise=1.5", "camera.read_noise=0.3"),
         ("camera.lens.k1=-0.12",),
         ("camera.shutter_s=0.02",),
+        ("options.roll_deg=12", "options.principal_px=[150,70]", "options.focal_px=170", "options.focal_y_px=150"),
+        ("options.principal_px=[150,70]", "options.focal_y_px=150", "camera.lens.k1=-0.1", "camera.shutter_s=0.02"),
         ("weather=HardRainNoon",),
         ("weather=WetNoon",),
     ],

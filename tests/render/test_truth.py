@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import mujoco
 import numpy as np
 import pytest
 
 from gear.contracts.rendering import Renderer, Stage
 from gear.render import RENDERERS, open_renderer
+from gear.values.geometry import RigidTransform
+from gear.values.rig import CameraMount, Rig
 from gear.values.scene import CameraRecord
 from tests.render.conftest import camera, geom
 
@@ -51,6 +56,31 @@ def test_ids_and_depth_are_those_of_rays_through_pixel_centres(
     assert view.linear_rgb is None
     assert view.geom_id.dtype == np.int32 and view.depth_m.dtype == np.float32
     assert agreement(view.geom_id, view.depth_m, *rays) > 0.995
+
+
+@pytest.mark.parametrize(
+    "pinhole",
+    [
+        {"principal_px": (50.0, 62.5)},
+        {"principal_px": (110.0, 30.0), "focal_y_px": 130.0},
+    ],
+)
+def test_pinholes_of_any_principal_point_and_focal_lengths_that_are_rolled(
+    renderer: Renderer, stage: Stage, pinhole: dict[str, Any]
+) -> None:
+    mount = CameraMount(
+        name="front", width_px=160, height_px=96, hfov_deg=80, position_m=(0, 0, 1.6), roll_deg=25, **pinhole
+    )
+    rig = Rig(cameras=(mount,))
+    (record,) = rig.place(RigidTransform.from_yaw("world", "ego", (0, 0.3, 0), math.radians(4)))
+    (view,) = renderer.render(stage, (record,))
+    assert agreement(view.geom_id, view.depth_m, *cast_rays(stage, record)) > 0.995
+    # The sky is drawn by rays of its own: beside a silhouette it meets the scene, and colour is where its geom is.
+    assert view.linear_rgb is not None
+    car = view.geom_id == geom(stage.model, "car")
+    assert car.sum() > 30
+    red = view.linear_rgb[car].astype(float).mean(axis=0)
+    assert red[0] > 2 * red[1]
 
 
 def test_a_wrong_picture_would_be_noticed(

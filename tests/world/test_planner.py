@@ -17,6 +17,7 @@ from gear.config.collection import SplitConfig
 from gear.testing.tiny_town import CLEAR, SMALL_RIG, TINY_TOWN, tiny_scenes, tiny_world
 from gear.values.errors import PlacementError
 from gear.values.geometry import wrap_angle_rad
+from gear.values.rig import Rig
 from gear.values.scene import ActorRecord, SceneRecord
 from gear.values.serial import from_json, to_json
 from gear.world.planner import ScenePlanner
@@ -406,3 +407,13 @@ def test_a_frame_alone_is_the_frame_in_its_sequence() -> None:
     assert frames[3].frame == 15
     assert planner("board", DRIVE, "video").plan(75) == frames[3]
     assert planner("board", DRIVE, "video").plan(59) == frames[1]
+
+
+@pytest.mark.parametrize("scene", ["board", "truck"])
+@pytest.mark.parametrize("camera", [{"pitch_deg": 60.0}, {"hfov_deg": 1.0}])
+def test_cameras_that_see_no_face_are_blamed_and_not_the_scene(scene: str, camera: dict[str, float]) -> None:
+    mount = dataclasses.replace(SMALL_RIG.cameras[0], **camera)
+    plans = ScenePlanner(tiny_world(scene), Rig(cameras=(mount,)), STILL, split_name="test")
+    with pytest.raises(PlacementError, match="change options.pitch_deg, options.roll_deg, options.hfov_deg") as caught:
+        plans.plan(0)
+    assert "widen" not in str(caught.value)

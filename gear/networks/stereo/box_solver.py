@@ -143,7 +143,7 @@ class _Problem:
             baseline_m=calibration.baseline_m,
             depth_m=depth_m,
             sides=(np.array([left, right]) - lens.cx_px) / focal,
-            rows=(np.array([top, bottom]) - lens.cy_px) / focal,
+            rows=(np.array([top, bottom]) - lens.cy_px) / lens.fy_px,
             right_sides=(np.array(measured.right_sides_px) - lens.cx_px) / focal,
             corner=(measured.corner_px - lens.cx_px) / focal,
             # A car that the picture cuts shows no share to be trusted.

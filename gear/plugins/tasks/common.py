@@ -34,12 +34,17 @@ class CameraOptions:
     """The camera of a task, on the ego car.
 
     Attributes:
-        width_px, height_px: picture size.
-        hfov_deg: horizontal field of view.
+        width_px, height_px: size of the picture.
+        hfov_deg: horizontal field of view, 1 to 170; not used where `focal_px` is given.
         position_m: in the ego frame: x forward, y left, z up, the origin on the ground.
-        pitch_deg: turned downwards.
+        pitch_deg: turned downwards, -90 to 90.
+        roll_deg: turned clockwise as seen from behind the camera, -180 to 180.
         follows_road: False keeps the camera level, as the original's loaders demand; True takes the car's pitch and
             roll.
+        focal_px: horizontal focal length, instead of `hfov_deg`.
+        focal_y_px: vertical focal length; without it the same as the horizontal one.
+        principal_px: principal point (column, row), the centre of the first pixel is (0, 0); without it the middle of
+            the picture.
     """
 
     width_px: int
@@ -47,29 +52,49 @@ class CameraOptions:
     hfov_deg: float = 90.0
     position_m: Vec3 = (1.5, 0.0, 1.65)
     pitch_deg: float = 0.0
+    roll_deg: float = 0.0
     follows_road: bool = False
+    focal_px: float | None = None
+    focal_y_px: float | None = None
+    principal_px: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         self.mount("left")
+        if self.position_m[2] <= 0:
+            raise FieldError(
+                "position_m",
+                f"puts the camera under the ground: the third number is its height, got {self.position_m[2]:g} m",
+            )
         if not all(math.isfinite(v) and abs(v) < 100 for v in self.position_m):
             raise FieldError("position_m", f"must lie within 100 m of the car, got {self.position_m}")
 
     @property
     def is_level(self) -> bool:
         """Whether the camera's vertical axis is the world's in every sample."""
-        return self.pitch_deg == 0 and not self.follows_road
+        return self.pitch_deg == 0 and self.roll_deg == 0 and not self.follows_road
 
     def mount(self, name: str, right_m: float = 0.0) -> CameraMount:
-        """The camera under a name, moved to the right."""
-        x, y, z = self.position_m
+        """The camera under a name, moved along its own horizontal axis by so many metres to the right."""
         return CameraMount(
             name=name,
             width_px=self.width_px,
             height_px=self.height_px,
             hfov_deg=self.hfov_deg,
-            position_m=(x, y - right_m, z),
+            position_m=self._moved_right(right_m),
             pitch_deg=self.pitch_deg,
+            roll_deg=self.roll_deg,
+            focal_px=self.focal_px,
+            focal_y_px=self.focal_y_px,
+            principal_px=self.principal_px,
         )
+
+    def _moved_right(self, right_m: float) -> Vec3:
+        """The position, moved along the picture's horizontal axis: pitch leaves that level, roll turns it."""
+        x, y, z = self.position_m
+        pitch_rad, roll_rad = math.radians(self.pitch_deg), math.radians(self.roll_deg)
+        down_m = right_m * math.sin(roll_rad)
+        aside_m = right_m * math.cos(roll_rad)
+        return (x - down_m * math.sin(pitch_rad), y - aside_m, z - down_m * math.cos(pitch_rad))
 
 
 def surfaces_of(frame: Frame, record: SceneRecord) -> tuple[SurfaceTruth, ...]:

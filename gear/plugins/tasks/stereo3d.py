@@ -294,8 +294,8 @@ def _notes(config: Stereo3dConfig) -> tuple[str, ...]:
     if config.is_level:
         return ()
     return (
-        "the camera is tilted (options.pitch_deg, options.follows_road), and KITTI describes a 3D box by one angle "
-        "about the camera's vertical axis: 3D boxes stand upright in the camera's frame and not on the road, while 2D "
+        "the camera is tilted (options.pitch_deg, options.roll_deg, options.follows_road), and KITTI describes a 3D "
+        "box by one angle about the camera's vertical axis: 3D boxes stand upright in the camera's frame and not on the road, while 2D "
         "boxes, truncation and occlusion are exact",
     )
 
@@ -322,8 +322,16 @@ def flip(sample: Stereo3dSample) -> Stereo3dSample:
         sample,
         images={LEFT: flip_array(sample.images[RIGHT]), RIGHT: flip_array(sample.images[LEFT])},
         surfaces=(),
+        calibration=Calibration(intrinsics=mirrored(intrinsics), baseline_m=baseline_m),
         objects=tuple(thing for thing in moved if thing is not None),
     )
+
+
+def mirrored(pinhole: Intrinsics) -> Intrinsics:
+    """The pinhole of pictures that are mirrored left to right."""
+    if pinhole.principal_px is None:
+        return pinhole
+    return replace(pinhole, principal_px=(pinhole.width_px - 1 - pinhole.cx_px, pinhole.cy_px))
 
 
 def _mirrored(thing: Object3d, baseline_m: float, intrinsics: Intrinsics) -> Object3d | None:
@@ -331,15 +339,15 @@ def _mirrored(thing: Object3d, baseline_m: float, intrinsics: Intrinsics) -> Obj
     x, y, z = thing.box.bottom_m
     turned = wrap_angle_rad(math.pi - thing.box.rotation_y_rad)
     box = replace(thing.box, bottom_m=(baseline_m - x, y, z), rotation_y_rad=turned)
-    before, after = project_box(thing.box.corners_m, intrinsics), project_box(box.corners_m, intrinsics)
+    before, after = project_box(thing.box.corners_m, intrinsics), project_box(box.corners_m, mirrored(intrinsics))
     if before is None or after is None:
         return None
     last = intrinsics.width_px - 1.0
-    mirrored = [(last - b[2], b[1], last - b[0], b[3]) for b in (before, thing.box_px, thing.amodal_box_px)]
-    shift = np.subtract(after, mirrored[0])
-    tight, whole = np.add(mirrored[1], shift), np.add(mirrored[2], shift)
+    boxes = [(last - b[2], b[1], last - b[0], b[3]) for b in (before, thing.box_px, thing.amodal_box_px)]
+    shift = np.subtract(after, boxes[0])
+    tight, whole = np.add(boxes[1], shift), np.add(boxes[2], shift)
     # Where the border cut the box, more of the silhouette may lie in the other picture.
-    was_cut = np.equal(mirrored[1], (0.0, 0.0, last, intrinsics.height_px - 1.0))
+    was_cut = np.equal(boxes[1], (0.0, 0.0, last, intrinsics.height_px - 1.0))
     frame = _frame(intrinsics.width_px, intrinsics.height_px)
     return _placed(thing, box, _box(np.where(was_cut, whole, tight)), _box(whole), frame, frame)
 
@@ -356,7 +364,7 @@ def cut(sample: Stereo3dSample, window: Window) -> Stereo3dSample:
     if 2 * window.left_px + window.width_px != width or 2 * window.top_px + window.height_px != height:
         raise ValueError(f"a window of a stereo pair must share the picture's centre, got {window}")
     before = sample.calibration.intrinsics
-    intrinsics = Intrinsics(window.out_width_px, window.out_height_px, before.focal_px * window.scale_x)
+    intrinsics = _windowed(before, window)
     # The rest of the window is padding.
     frame = _frame(width, height)
     shown = clipped(_in_window(frame, window), _frame(window.out_width_px, window.out_height_px))
@@ -379,6 +387,17 @@ def cut(sample: Stereo3dSample, window: Window) -> Stereo3dSample:
         calibration=Calibration(intrinsics=intrinsics, baseline_m=sample.calibration.baseline_m),
         objects=tuple(thing for thing in moved if thing is not None),
     )
+
+
+def _windowed(pinhole: Intrinsics, window: Window) -> Intrinsics:
+    """The pinhole of a window's picture."""
+    focal_y_px = None if pinhole.focal_y_px is None else pinhole.focal_y_px * window.scale_y
+    principal_px = None
+    if pinhole.principal_px is not None:
+        left, top, _, _ = _in_window((pinhole.cx_px, pinhole.cy_px, pinhole.cx_px, pinhole.cy_px), window)
+        principal_px = (left, top)
+    focal_px = pinhole.focal_px * window.scale_x
+    return Intrinsics(window.out_width_px, window.out_height_px, focal_px, focal_y_px, principal_px)
 
 
 def _in_window(box_px: BoxPx, window: Window) -> BoxPx:

@@ -197,7 +197,8 @@ class RasterRenderer:
         GL.glBindTextureUnit(0, self._scene.sky)
         right = np.cross(frustum.forward_world, frustum.up_world)
         axes = np.stack([right, frustum.up_world, frustum.forward_world], axis=1)
-        corner = np.array([frustum.half_width_m / NEAR_M, frustum.half_height_m / NEAR_M, 0.0, 0.0])
+        half_m = (frustum.half_width_m, frustum.half_height_m)
+        corner = np.array([*half_m, frustum.centre_right_m, frustum.centre_up_m]) / NEAR_M
         self._sky_program.use(camera_axes=axes, corner=corner)
         GL.glDrawArrays(GL.GL_TRIANGLES, 0, 3)
 
@@ -242,8 +243,9 @@ def _clip_matrix(frustum: Frustum) -> Array:
     right = np.cross(frustum.forward_world, frustum.up_world)
     span_m = FAR_M - NEAR_M
     matrix = np.zeros((4, 4))
-    matrix[0, :3] = right * NEAR_M / frustum.half_width_m
-    matrix[1, :3] = frustum.up_world * NEAR_M / frustum.half_height_m
+    forward = frustum.forward_world
+    matrix[0, :3] = (right * NEAR_M - forward * frustum.centre_right_m) / frustum.half_width_m
+    matrix[1, :3] = (frustum.up_world * NEAR_M - forward * frustum.centre_up_m) / frustum.half_height_m
     matrix[2, :3] = -frustum.forward_world * NEAR_M / span_m
     matrix[2, 3] = NEAR_M * FAR_M / span_m
     matrix[3, :3] = frustum.forward_world

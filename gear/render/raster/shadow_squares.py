@@ -93,7 +93,9 @@ def squares_before(frustum: Frustum, towards_sun: Array) -> tuple[Square, ...]:
     axes = _axes(towards_sun)
     made = []
     begin_m = NEAR_M
-    slope2 = (frustum.half_width_m**2 + frustum.half_height_m**2) / NEAR_M**2
+    width_m = frustum.half_width_m + abs(frustum.centre_right_m)
+    height_m = frustum.half_height_m + abs(frustum.centre_up_m)
+    slope2 = (width_m**2 + height_m**2) / NEAR_M**2
     for end_m in ENDS_M:
         # The smallest sphere about the part of the view between its two distances.
         middle_m = min((begin_m + end_m) / 2 * (1 + slope2), end_m)

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from gear.values.errors import PlacementError
 from gear.values.geometry import RigidTransform
-from gear.values.rig import Rig
+from gear.values.rig import CameraMount, Rig
 from gear.values.rng import derive_rng
 from gear.values.scene import Pose
 from gear.world.assets.actor_types import ActorType
@@ -32,6 +32,12 @@ EGO_TRIES = 60
 LONGEST_WAY_M = 40.0
 USUAL_MPS = 5.0
 """A driving ego car starts at most so far before its limits, and no further than it comes at this speed."""
+
+CAMERA_ADVICE = (
+    "a level camera with a field of view of 90 degrees would have it in view: change options.pitch_deg,"
+    " options.roll_deg, options.hfov_deg, options.focal_px, options.principal_px or options.position_m"
+)
+"""What to do where the camera's options, and not the scene's limits, keep the faces out of the picture."""
 
 CORRIDOR_M = 1.3
 """Half the width of the strip between the ego car and its truck that others keep out of."""
@@ -71,6 +77,7 @@ class EgoSampler:
             PlacementError: no place keeps the limits; says which is too tight.
         """
         problems: Counter[str] = Counter()
+        camera_is_cause = 0
         for attempt in range(EGO_TRIES):
             road_users = self.empty()
             # Failures bring the start nearer to the limits, so that the last tries begin where the board is in view.
@@ -79,8 +86,11 @@ class EgoSampler:
             if problem is None:
                 return road_users
             problems[problem] += 1
+            if problem == "with a face out of the picture":
+                camera_is_cause += self.judge(road_users, self._level_rig) != "out of the picture"
         told = ", ".join(f"{count} {what}" for what, count in problems.most_common())
-        raise PlacementError(self.scene_name, f"no place for the ego car in {EGO_TRIES} tries ({told}); {self._advice}")
+        advice = CAMERA_ADVICE if camera_is_cause > EGO_TRIES // 2 else self._advice
+        raise PlacementError(self.scene_name, f"no place for the ego car in {EGO_TRIES} tries ({told}); {advice}")
 
     def empty(self) -> RoadUsers:
         """Nobody yet."""
@@ -104,10 +114,12 @@ class EgoSampler:
             return "overlapping the town or a board"
         return None
 
-    def judge(self, road_users: RoadUsers) -> Verdict:
-        """Whether the ego car of a cast sees every face."""
+    def judge(self, road_users: RoadUsers, rig: Rig | None = None) -> Verdict:
+        """Whether the reference camera of the ego car sees every face; with another rig than its own, where given."""
         ego = next(iter(road_users.spawns))
-        mount, camera = reference_camera(self.rig, Pose.from_transform(road_users.poses[ego]).transform("world", "ego"))
+        mount, camera = reference_camera(
+            rig or self.rig, Pose.from_transform(road_users.poses[ego]).transform("world", "ego")
+        )
         return self.limits.judge(self.space, self.faces_in_world(road_users), mount, camera)
 
     def faces_in_world(self, road_users: RoadUsers) -> list[FaceInWorld]:
@@ -220,16 +232,24 @@ class EgoSampler:
         seen = inside[[verdict == "seen" for verdict in verdicts]]
         if not len(seen):
             told = ", ".join(f"{count} have a face {what}" for what, count in Counter(verdicts).most_common())
+            with_level = [self._judge_piece(int(piece), self._level_rig) for piece in inside]
+            advice = CAMERA_ADVICE if "seen" in with_level else self._advice
             raise PlacementError(
-                self.scene_name, f"of {len(inside)} m of lanes within the ego car's limits {told}; {self._advice}"
+                self.scene_name, f"of {len(inside)} m of lanes within the ego car's limits {told}; {advice}"
             )
         return seen
 
-    def _judge_piece(self, piece: int) -> Verdict:
+    @cached_property
+    def _level_rig(self) -> Rig:
+        """A usual camera in the place of the reference camera: level, with a field of view of 90 degrees."""
+        mount = self.rig.cameras[0]
+        return Rig(cameras=(CameraMount(name=mount.name, width_px=mount.width_px, height_px=mount.height_px),))
+
+    def _judge_piece(self, piece: int, rig: Rig | None = None) -> Verdict:
         table = self.spawner.lane_table
         line = self.spawner.lanes.lanes[table.names[piece]].line
         point, yaw_rad = vehicle_pose(line, float(table.s_m[piece]), self.ego_type.half_length_m)
-        mount, camera = reference_camera(self.rig, RigidTransform.from_yaw("world", "ego", point, yaw_rad))
+        mount, camera = reference_camera(rig or self.rig, RigidTransform.from_yaw("world", "ego", point, yaw_rad))
         faces = [FaceInWorld.of(face, face.parent_from_surface) for face in self.faces]
         return self.limits.judge(self.space, faces, mount, camera)
 

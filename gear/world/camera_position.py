@@ -1,0 +1,66 @@
+"""Whether a camera is inside the ego car, where it would see nothing but the car."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gear.values.errors import PlacementError
+from gear.values.frames import Shape
+from gear.values.geometry import Array
+from gear.values.rig import Rig
+
+DIRECTIONS = 96
+CLOSED_SHARE = 0.9
+"""Share of directions in which a camera's view ends at the car from where on it is inside of it."""
+
+
+def check_outside(rig: Rig, car: Shape, scene_name: str) -> None:
+    """Refuses a rig with a camera inside the ego car.
+
+    Args:
+        rig: the cameras, in the car's frame.
+        car: triangles of the ego car, in its frame.
+        scene_name: for the error.
+
+    Raises:
+        PlacementError: names the camera and its position.
+    """
+    for mount in rig.cameras:
+        x, y, z = mount.position_m
+        if enclosed_share(car, np.array(mount.position_m)) >= CLOSED_SHARE:
+            where = f"camera {mount.name!r} at [{x:g}, {y:g}, {z:g}] m is inside the ego car"
+            raise PlacementError(scene_name, f"{where}; change options.position_m, such as [1.5, 0, 1.65]")
+
+
+def enclosed_share(shape: Shape, point_m: Array) -> float:
+    """Share of directions, 0..1, in which a ray from a point meets a shape (Möller and Trumbore 1997).
+
+    Args:
+        shape: triangles.
+        point_m: (3,) in the shape's frame.
+    """
+    if (np.abs(point_m - shape.box_centre_m) > shape.box_size_m / 2).any():
+        return 0.0
+    corners = shape.vertices_m[shape.faces]
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    away = point_m - corners[:, 0]
+    across = np.cross(away, first)
+    hits = 0
+    for direction in _directions():
+        normal = np.cross(direction, second)
+        area = np.einsum("nd,nd->n", first, normal)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            u = np.einsum("nd,nd->n", away, normal) / area
+            v = across @ direction / area
+            distance = np.einsum("nd,nd->n", second, across) / area
+        hits += bool(((u >= 0) & (v >= 0) & (u + v <= 1) & (distance > 0)).any())
+    return hits / DIRECTIONS
+
+
+def _directions() -> Array:
+    """(N, 3) unit vectors, evenly over the sphere: a Fibonacci lattice."""
+    number = np.arange(DIRECTIONS) + 0.5
+    z = 1 - 2 * number / DIRECTIONS
+    turn = number * np.pi * (3 - np.sqrt(5))
+    radius = np.sqrt(1 - z * z)
+    return np.column_stack([radius * np.cos(turn), radius * np.sin(turn), z])
