@@ -414,6 +414,6 @@ def test_a_frame_alone_is_the_frame_in_its_sequence() -> None:
 def test_cameras_that_see_no_face_are_blamed_and_not_the_scene(scene: str, camera: dict[str, float]) -> None:
     mount = dataclasses.replace(SMALL_RIG.cameras[0], **camera)
     plans = ScenePlanner(tiny_world(scene), Rig(cameras=(mount,)), STILL, split_name="test")
-    with pytest.raises(PlacementError, match="change options.pitch_deg, options.roll_deg, options.hfov_deg") as caught:
+    with pytest.raises(PlacementError, match=r"change options.pitch_deg, options.roll_deg, options.hfov_deg") as caught:
         plans.plan(0)
     assert "widen" not in str(caught.value)
