@@ -295,8 +295,8 @@ def _notes(config: Stereo3dConfig) -> tuple[str, ...]:
         return ()
     return (
         "the camera is tilted (options.pitch_deg, options.roll_deg, options.follows_road), and KITTI describes a 3D "
-        "box by one angle about the camera's vertical axis: 3D boxes stand upright in the camera's frame and not on the road, while 2D "
-        "boxes, truncation and occlusion are exact",
+        "box by one angle about the camera's vertical axis: 3D boxes stand upright in the camera's frame and not on "
+        "the road, while 2D boxes, truncation and occlusion are exact",
     )
 
 
