@@ -197,9 +197,11 @@ def _summed(truth_m: FloatImage, found_m: FloatImage) -> _Sums:
 
 
 def _sums_of_piece(truth_m: FloatImage, found_m: FloatImage) -> _Sums:
-    """Single precision pixel by pixel, as depths are kept, but sums in double, as OpenCV makes them without a copy.
+    """Single precision for each pixel, as depths are kept, and sums in double precision by NumPy.
 
-    So the variance in `silog` stays right where it is the small difference of large means.
+    Double precision keeps the variance in `silog` right where it is the small difference of large means. NumPy adds in
+    an order that depends on the number of values alone; OpenCV's `sumElems` adds float32 in an order that depends on
+    where the array lies in memory, so that one picture had several results.
     """
     most, least = max(truth_m.max(), found_m.max()), min(truth_m.min(), found_m.min())
     if most > EVERYDAY_M or least < 1 / EVERYDAY_M:  # their squares and quotients may leave single precision's range
@@ -212,21 +214,29 @@ def _sums_of_piece(truth_m: FloatImage, found_m: FloatImage) -> _Sums:
     return _Sums(
         {
             "pixels": truth_m.size,
-            "error": cv2.norm(error_m, cv2.NORM_L1),
-            "error_square": cv2.norm(error_m, cv2.NORM_L2SQR),
-            "inverse": cv2.norm(inverse, cv2.NORM_L1),
-            "inverse_square": cv2.norm(inverse, cv2.NORM_L2SQR),
-            "log": cv2.sumElems(log)[0],
-            "log_size": cv2.sumElems(log_size)[0],
-            "log_square": cv2.norm(log, cv2.NORM_L2SQR),
-            "relative": cv2.norm(relative, cv2.NORM_L1),
-            "relative_square": cv2.norm(relative, cv2.NORM_L2SQR),
-            "error_relative": cv2.sumElems(error_m * relative)[0],
+            "error": _sum(np.abs(error_m)),
+            "error_square": _sum_of_squares(error_m),
+            "inverse": _sum(np.abs(inverse)),
+            "inverse_square": _sum_of_squares(inverse),
+            "log": _sum(log),
+            "log_size": _sum(log_size),
+            "log_square": _sum_of_squares(log),
+            "relative": _sum(np.abs(relative)),
+            "relative_square": _sum_of_squares(relative),
+            "error_relative": _sum(error_m * relative),
             "d1": _count_within(1.25, log_size, truth_m, found_m),
             "d2": _count_within(1.25**2, log_size, truth_m, found_m),
             "d3": _count_within(1.25**3, log_size, truth_m, found_m),
         }
     )
+
+
+def _sum(values: Array) -> float:
+    return float(np.add.reduce(values, dtype=np.float64))
+
+
+def _sum_of_squares(values: Array) -> float:
+    return float(np.add.reduce(np.square(values, dtype=np.float64)))
 
 
 def _count_within(ratio: float, log_size: Array, truth_m: FloatImage, found_m: FloatImage) -> int:

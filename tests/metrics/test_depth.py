@@ -203,3 +203,24 @@ def test_predictions_of_other_types_are_measured_as_they_are_kept(kind: type) ->
 def test_a_scale_alone_is_no_error_of_scale_invariant_metrics() -> None:
     truth = np.linspace(2, 200, 5000, dtype=np.float32)[None]
     assert DepthEvaluator().update(Deep(truth), truth * np.float32(1.25))["silog"] < 1e-4
+
+
+@pytest.mark.parametrize("count", [PIECE, 40_001, 1000])
+def test_no_metric_depends_on_where_memory_lies(count: int) -> None:
+    """OpenCV's sums of float32 differ in the last digits with the alignment of an array."""
+    rng = np.random.default_rng(3)
+    truth = rng.uniform(2, 79, (1, count)).astype(np.float32)
+    found = (truth * rng.lognormal(0, 1, truth.shape)).astype(np.float32).clip(0.1, 79)
+
+    def moved(values: np.ndarray, offset: int) -> np.ndarray:
+        room = np.zeros(values.nbytes + 128, np.uint8)
+        start = -room.ctypes.data % 64 + offset
+        there = room[start : start + values.nbytes].view(values.dtype).reshape(values.shape)
+        there[...] = values
+        return there
+
+    results = {
+        tuple(DepthEvaluator().update(Deep(moved(truth, offset)), moved(found, 60 - offset)).values())
+        for offset in range(0, 64, 4)
+    }
+    assert len(results) == 1
