@@ -10,7 +10,7 @@ from typing import Any
 from gear.collecting.patch_sources import PatchSet, resolve_patch
 from gear.config.collection import CollectionConfig, SplitConfig, WeatherConfig
 from gear.config.load import load_simulation, split_of
-from gear.config.nodes import Place, parse_file
+from gear.config.nodes import Place
 from gear.config.reader import read_node, told_at
 from gear.plugins.build import find
 from gear.plugins.catalogue import PluginEntry
@@ -19,7 +19,8 @@ from gear.values.resources import data_dir
 from gear.values.scene import Weather
 from gear.values.serial import holds_places
 from gear.world.assets.library import AssetLibrary
-from gear.world.scene_spec import SceneLibrary, SceneSpec
+from gear.world.scene_library import SceneFile, read_scene_file
+from gear.world.scene_spec import SceneSpec
 from gear.world.surfaces.surface_carriers import check_scene_assets
 from gear.world.weather.presets import PRESETS
 
@@ -72,7 +73,7 @@ def look_up(config: CollectionConfig) -> Named:
     with told_at(config.places, "scenes" if config.scenes else "town"):
         scenes = find_scenes(library, config.scenes)
     with told_at(config.places, "scene"):
-        scene = find_scene(config, scenes)
+        scene = scenes.scene(config.scene)
         check_scene_assets(library, scene, f"scenes.{config.scene}")
     roomy = 1 if scene.boards else ROOMY_FACTOR
     scene = scene.capped(simulation.max_vehicles * roomy, simulation.max_pedestrians)
@@ -123,34 +124,28 @@ def with_scene_file(config: CollectionConfig) -> CollectionConfig:
     path, _, name = config.scene.rpartition(":") if ":" in config.scene else (config.scene, "", "")
     if not path.endswith((".yml", ".yaml")):
         return config
-    scenes = scene_library(path).scenes
-    if not name and len(scenes) > 1:
-        raise UnknownNameError("scene", config.scene, scenes, f"(say which: --scene {path}:{next(iter(scenes))})")
-    return dataclasses.replace(config, scenes=path, scene=name or next(iter(scenes)))
+    names = scene_library(path).names
+    if not name and len(names) > 1:
+        raise UnknownNameError("scene", config.scene, names, f"(say which: --scene {path}:{names[0]})")
+    return dataclasses.replace(config, scenes=path, scene=name or names[0])
 
 
-def find_scenes(town: AssetLibrary, scenes: str = "") -> SceneLibrary:
-    """The scene library of a name or path, or the town's own.
+def find_scenes(town: AssetLibrary, scenes: str = "") -> SceneFile:
+    """The scene library of a name or path, or the town's own. A faulty scene of it raises when it is asked for.
 
     Raises:
         UnknownNameError: there is no such library.
         ConfigError: the library cannot be read, or is for another town.
     """
-    library = scene_library(scenes or town.town_name)
+    file = scene_library(scenes or town.town_name)
+    library = file.library
     if scenes and library.town != town.town_name:
         problem = f"its boards stand in {library.town}, not in {town.town_name}; name that town, or scenes of this one"
         raise library.places.get("town", Place(scenes)).error("town", problem)
-    return library
+    return file
 
 
-def find_scene(config: CollectionConfig, library: SceneLibrary) -> SceneSpec:
-    """The scene of a given name in a library."""
-    if config.scene not in library.scenes:
-        raise UnknownNameError(f"scene of {library.town}", config.scene, library.scenes)
-    return library.scenes[config.scene]
-
-
-def scene_library(name: str) -> SceneLibrary:
+def scene_library(name: str) -> SceneFile:
     """Reads a scene library by the name of its town, or by path.
 
     Raises:
@@ -168,7 +163,7 @@ def scene_library(name: str) -> SceneLibrary:
     if not is_there:
         hint = "(write one and give its file, FILE.yml)"
         raise UnknownNameError("scene library for town", name, (p.stem for p in folder.glob("*.yml")), hint)
-    return read_node(SceneLibrary, parse_file(path))
+    return read_scene_file(path)
 
 
 def find_weather(config: WeatherConfig) -> Weather:

@@ -261,6 +261,36 @@ def test_the_command_draws(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["tiny_map.png", "tiny_scenes.png"]
 
 
+def test_faulty_scenes_do_not_stop_the_others(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """One that cannot be read, one whose board is not there, and one whose board cannot be compiled."""
+    shutil.copytree(TINY_TOWN.parents[1], tmp_path / "mjcf")
+    town, scenes = tmp_path / "mjcf" / "towns" / "tiny.xml", tmp_path / "my.yml"
+    (tmp_path / "mjcf" / "surfaces" / "broken.xml").write_text("<mujoco><worldbody/></mujoco>")
+    nobody = "npc_vehicles: {count: [0, 0]}, pedestrians: {count: [0, 0]}"
+    board = "ego: {ahead_m: [12, 45], lateral_m: [-12, 12]}, boards: [{position_m: [55, -8.5, 0], facing_deg: 175"
+    scenes.write_text(
+        "town: tiny\nscenes:\n"
+        f"  plain: {{{nobody}}}\n"
+        f"  unread: {{{nobody}, trucks: 1}}\n"
+        f"  absent: {{{nobody}, {board}, asset: nowhere}}]}}\n"
+        f"  broken: {{{nobody}, {board}, asset: broken}}]}}\n"
+    )
+    words = ["towns", str(town), "--scenes", str(scenes)]
+    assert main(words) == 2
+    shown = capsys.readouterr()
+    assert "plain" in shown.out and "broken" in shown.out
+    errors = shown.err.splitlines()
+    assert len(errors) == 2 and "scenes.unread.trucks: unknown key" in errors[0] and "nowhere" in errors[1]
+    assert main([*words, "--json"]) == 2
+    (listed,) = json.loads(capsys.readouterr().out)["towns"]
+    assert sorted(listed["faulty_scenes"]) == ["absent", "unread"]
+    assert main([*words, "--out", str(tmp_path / "out")]) == 2
+    shown = capsys.readouterr()
+    assert "tiny with 1 scene" in shown.out
+    assert len(shown.err.splitlines()) == 3 and "has no geom of a class ending in `.face`" in shown.err
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"tiny_map.png", "tiny_scenes.png"}
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [

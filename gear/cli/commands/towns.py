@@ -8,6 +8,9 @@ import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from gear.values.errors import GearError
     from gear.verbs.towns.facts import Town
 
 EXAMPLE = """examples:
@@ -47,10 +50,10 @@ def run(args: argparse.Namespace) -> int:
     found = [read_town(name, args.scenes) for name in names]
     if args.json:
         print(json.dumps({"towns": [town.to_json() for town in found]}, indent=1))
-        return 0
-    for town in found:
-        show(town)
-    return 0
+    else:
+        for town in found:
+            show(town)
+    return _report(error for town in found for error in town.faulty.values())
 
 
 def draw(args: argparse.Namespace) -> int:
@@ -71,9 +74,16 @@ def draw(args: argparse.Namespace) -> int:
         )
     print(json.dumps({"map": str(report.map), "sheet": report.sheet and str(report.sheet)}) if args.json
           else report.summary())  # fmt: skip
-    for problem in report.problems:
+    return _report(report.problems)
+
+
+def _report(problems: Iterable[GearError]) -> int:
+    """Prints the errors of scenes that cannot be used, and returns the exit code."""
+    code = 0
+    for problem in problems:
         print(f"gear: {problem}", file=sys.stderr)
-    return 2 if report.problems else 0
+        code = 2
+    return code
 
 
 def show(town: Town) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from gear.collecting.lookup import find_scenes
 from gear.config.nodes import Mapping, Node, Place
-from gear.values.errors import ConfigError, GearError, UnknownNameError
+from gear.values.errors import ConfigError, GearError
 from gear.verbs.bench.config import BenchConfig
 from gear.world.assets.library import AssetLibrary
 from gear.world.scene_spec import SceneSpec
@@ -78,16 +78,18 @@ def calibration_scene(config: BenchConfig, node: Node, measured: tuple[Scene, ..
 def _named(town: str, names: tuple[str, ...]) -> Iterator[Scene]:
     """Yields the named scenes of a town; if none is named, all of its scenes with surfaces for patches."""
     library = AssetLibrary.for_town(town)
-    own = None if all(":" in name for name in names) and names else find_scenes(library).scenes
-    for name in names or [name for name, scene in (own or {}).items() if _surfaces(scene)]:
+    if not names:
+        own = find_scenes(library)
+        for error in own.faulty.values():
+            raise error
+        names = tuple(name for name, scene in own.scenes.items() if _surfaces(scene))
+    for name in names:
         path, _, bare = name.rpartition(":")
-        known = find_scenes(library, path).scenes if path else own or {}
-        if bare not in known:
-            raise UnknownNameError(f"scene of {path or town}", bare, known)
-        if not _surfaces(known[bare]):
+        scene = find_scenes(library, path).scene(bare)
+        if not _surfaces(scene):
             raise GearError(f"scene {bare!r} has neither a board nor the truck, so no patch would be seen")
-        check_scene_assets(library, known[bare], f"scenes.{bare}")
-        yield Scene(town=town, name=name, surfaces=_surfaces(known[bare]))
+        check_scene_assets(library, scene, f"scenes.{bare}")
+        yield Scene(town=town, name=name, surfaces=_surfaces(scene))
 
 
 def _surfaces(scene: SceneSpec) -> int:

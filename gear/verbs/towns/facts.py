@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import mujoco
 
 from gear.collecting.lookup import find_scenes
-from gear.values.errors import TownError, UnknownNameError
+from gear.values.errors import GearError, TownError, UnknownNameError
 from gear.values.resources import data_dir
 from gear.values.serial import Json, to_json
 from gear.world.assets.library import AssetLibrary, read_numbers
@@ -23,14 +24,16 @@ class Town:
     """A town with its scenes.
 
     Attributes:
-        library: its MJCF and the assets that go with it.
-        lanes: where road users may be.
-        scenes: its scene library; None where it has none.
+        library: its MJCF and the folders of its assets.
+        lanes: its lanes, walks and parking bays.
+        scenes: the scenes of its library that can be used; None where it has no library.
+        faulty: the error of each other scene of the library, by the scene's name.
     """
 
     library: AssetLibrary
     lanes: LaneGraph
     scenes: SceneLibrary | None
+    faulty: Mapping[str, GearError] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -61,6 +64,7 @@ class Town:
             "walks": len(self.lanes.walks),
             "parking_bays": len(self.lanes.bays),
             "scenes": {name: to_json(scene) for name, scene in scenes.items()},
+            "faulty_scenes": {name: str(error) for name, error in self.faulty.items()},
         }
 
 
@@ -82,12 +86,13 @@ def read_town(town: str | Path, scenes: str | Path | None = None) -> Town:
         scenes: its scene library, as collections name it; gear's own for that town if left out.
 
     Raises:
-        UnknownNameError: there is no such town or file, or a scene names a board or a truck that is not there.
+        UnknownNameError: there is no such town or file.
         TownError: the town breaks the conventions.
-        ConfigError: likewise, with its place; or the scene library cannot be read, or is another town's.
+        ConfigError: no scene of the library can be used, or the library is another town's.
     """
     library = AssetLibrary.for_town(town)
-    return Town(library=library, lanes=read_lanes(library.town), scenes=_scenes(library, scenes))
+    usable, faulty = _scenes(library, scenes)
+    return Town(library=library, lanes=read_lanes(library.town), scenes=usable, faulty=faulty)
 
 
 def read_lanes(path: Path) -> LaneGraph:
@@ -109,13 +114,21 @@ def read_lanes(path: Path) -> LaneGraph:
     return LaneGraph.from_model(model, path)
 
 
-def _scenes(library: AssetLibrary, given: str | Path | None) -> SceneLibrary | None:
+def _scenes(library: AssetLibrary, given: str | Path | None) -> tuple[SceneLibrary | None, dict[str, GearError]]:
+    """The scenes that can be used, and the errors of those that cannot be read or name assets that are not there."""
     try:
-        scenes = find_scenes(library, "" if given is None else str(given))
+        file = find_scenes(library, "" if given is None else str(given))
     except UnknownNameError:
         if given is None:
-            return None
+            return None, {}
         raise
-    for name, scene in scenes.scenes.items():
-        check_scene_assets(library, scene, f"scenes.{name}")
-    return scenes
+    faulty: dict[str, GearError] = dict(file.faulty)
+    for name, scene in file.scenes.items():
+        try:
+            check_scene_assets(library, scene, f"scenes.{name}")
+        except GearError as error:
+            faulty[name] = error
+    if len(faulty) == len(file.names):
+        raise next(iter(faulty.values()))
+    usable = {name: scene for name, scene in file.scenes.items() if name not in faulty}
+    return replace(file.library, scenes=usable), faulty

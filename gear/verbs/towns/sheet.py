@@ -10,7 +10,7 @@ import numpy as np
 from gear.config.collection import SplitConfig
 from gear.contracts.rendering import Quality
 from gear.render.registry import open_renderer
-from gear.values.errors import PlacementError
+from gear.values.errors import GearError, PlacementError, TownError
 from gear.values.frames import UInt8Image
 from gear.values.progress import Progress
 from gear.values.rig import CameraMount, Rig
@@ -50,7 +50,7 @@ class SheetOptions:
 
 def draw_sheet(
     town: Town, options: SheetOptions, on_progress: Progress | None = None
-) -> tuple[UInt8Image, list[PlacementError]]:
+) -> tuple[UInt8Image, list[GearError]]:
     """Renders one sample of every scene and puts them side by side.
 
     Returns:
@@ -61,15 +61,16 @@ def draw_sheet(
     """
     assert town.scenes is not None  # the caller has made sure
     cells: list[UInt8Image] = []
-    problems: list[PlacementError] = []
+    problems: list[GearError] = []
     for number, (name, scene) in enumerate(town.scenes.scenes.items()):
         if on_progress is not None:
             on_progress(number, len(town.scenes.scenes))
         try:
             cells.append(_cell(*thumbnail(town, name, scene, options), name))
-        except PlacementError as error:
+        except (PlacementError, TownError) as error:
             problems.append(error)
-            cells.append(_cell(_complaint(error, options), "cannot be planned", name))
+            note = "cannot be planned" if isinstance(error, PlacementError) else "cannot be composed"
+            cells.append(_cell(_complaint(error.problem, options), note, name))
     if on_progress is not None:
         on_progress(len(cells), len(cells))
     return _grid(cells), problems
@@ -99,9 +100,9 @@ def thumbnail(town: Town, name: str, scene: SceneSpec, options: SheetOptions) ->
     return shown.rgb, "; ".join([*seen, f"{others} other road users"])
 
 
-def _complaint(error: PlacementError, options: SheetOptions) -> UInt8Image:
+def _complaint(problem: str, options: SheetOptions) -> UInt8Image:
     canvas = Canvas((options.width_px, options.height_px), (244, 240, 238))
-    for number, line in enumerate(textwrap.wrap(error.problem, options.width_px // 9)):
+    for number, line in enumerate(textwrap.wrap(problem, options.width_px // 9)):
         canvas.text((24, 48 + 24 * number), line, 11, (170, 40, 40))
     return canvas.picture()
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -11,13 +11,14 @@ import cv2
 from gear.contracts.rendering import Quality
 from gear.dataset.files import explained, write_alone
 from gear.render.registry import describe
-from gear.values.errors import GearError, PlacementError, UnknownNameError
+from gear.values.errors import GearError, TownError, UnknownNameError
 from gear.values.frames import UInt8Image
 from gear.values.progress import Progress
 from gear.verbs.towns.facts import Town, read_town
 from gear.verbs.towns.ground_layer import TownGeometry
 from gear.verbs.towns.sheet import SheetOptions, draw_sheet
 from gear.verbs.towns.town_map import draw_map
+from gear.world.surfaces.face_size import asset_face_size_m
 from gear.world.weather.presets import PRESETS
 
 QUALITIES: tuple[Quality, ...] = ("film", "fast")
@@ -31,13 +32,13 @@ class TownReport:
         town: of which town.
         map: path of the map.
         sheet: path of the thumbnails; None where the town has no scenes.
-        problems: scenes that cannot be planned.
+        problems: errors of the scenes that cannot be read, composed or planned.
     """
 
     town: Town
     map: Path
     sheet: Path | None
-    problems: tuple[PlacementError, ...] = ()
+    problems: tuple[GearError, ...] = ()
 
     def summary(self) -> str:
         """One line."""
@@ -75,7 +76,7 @@ def write_town(
         DatasetError: `out` cannot be written.
     """
     check_pictures(renderer=renderer, quality=quality, weather=weather, seed=seed)
-    found = read_town(town, scenes)
+    found = _drawable(read_town(town, scenes))
     if on_progress is not None and found.scenes is not None:
         on_progress(0, len(found.scenes.scenes))
     folder = Path(out)
@@ -84,14 +85,34 @@ def write_town(
         tempfile.TemporaryFile(dir=folder).close()
     map_path = _write(folder / f"{found.name}_map.png", draw_map(found, TownGeometry.of(found.library.town)))
     sheet_path: Path | None = None
-    problems: list[PlacementError] = []
+    problems: list[GearError] = []
     if found.scenes is not None:
         options = SheetOptions(
             renderer=renderer, quality="film" if quality == "film" else "fast", weather=PRESETS[weather], seed=seed
         )
         picture, problems = draw_sheet(found, options, on_progress)
         sheet_path = _write(folder / f"{found.name}_scenes.png", picture)
+    problems = [*found.faulty.values(), *problems]
     return TownReport(town=found, map=map_path, sheet=sheet_path, problems=tuple(problems))
+
+
+def _drawable(town: Town) -> Town:
+    """The town without the scenes whose boards cannot be compiled; these are among its faulty scenes."""
+    if town.scenes is None:
+        return town
+    faulty: dict[str, GearError] = {}
+    for name, scene in town.scenes.scenes.items():
+        try:
+            for board in scene.boards:
+                asset_face_size_m(town.library.path("surface", board.asset))
+        except TownError as error:
+            faulty[name] = error
+    if not faulty:
+        return town
+    if len(faulty) == len(town.scenes.scenes):
+        raise next(iter(faulty.values()))
+    usable = {name: scene for name, scene in town.scenes.scenes.items() if name not in faulty}
+    return replace(town, scenes=replace(town.scenes, scenes=usable), faulty={**town.faulty, **faulty})
 
 
 def check_pictures(*, renderer: str, quality: str, weather: str, seed: int) -> None:

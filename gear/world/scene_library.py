@@ -1,0 +1,78 @@
+"""Reading a scene library so that one faulty scene does not stop the others."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping as MappingType
+from dataclasses import dataclass
+from pathlib import Path
+
+from gear.config.nodes import Mapping, Node, parse_file
+from gear.config.reader import read_node
+from gear.values.errors import ConfigError, UnknownNameError
+from gear.world.scene_spec import SceneLibrary, SceneSpec
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class SceneFile:
+    """The scenes of one file: those that could be read, and the errors of the others.
+
+    Attributes:
+        library: the scenes that could be read; at least one.
+        faulty: the error of each other scene, by the scene's name.
+    """
+
+    library: SceneLibrary
+    faulty: MappingType[str, ConfigError]
+
+    @property
+    def scenes(self) -> MappingType[str, SceneSpec]:
+        """The scenes that could be read, by name."""
+        return self.library.scenes
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all scenes of the file, the faulty ones last."""
+        return (*self.library.scenes, *self.faulty)
+
+    def scene(self, name: str) -> SceneSpec:
+        """The scene of that name.
+
+        Raises:
+            ConfigError: that scene is faulty.
+            UnknownNameError: there is none of that name.
+        """
+        if name in self.faulty:
+            raise self.faulty[name]
+        if name not in self.library.scenes:
+            raise UnknownNameError(f"scene of {self.library.town}", name, self.names)
+        return self.library.scenes[name]
+
+
+def read_scene_file(path: Path) -> SceneFile:
+    """Reads a scene library.
+
+    Raises:
+        ConfigError: it is no YAML, breaks the form of a library, or none of its scenes can be read.
+    """
+    root = parse_file(path)
+    faulty: dict[str, ConfigError] = {}
+    if isinstance(root, Mapping) and "scenes" in root.entries:
+        place, scenes = root.entries["scenes"]
+        if isinstance(scenes, Mapping):
+            for name, (_, node) in scenes.entries.items():
+                if (error := _fault(name, node)) is not None:
+                    faulty[name] = error
+            if faulty and len(faulty) == len(scenes.entries):
+                raise next(iter(faulty.values()))
+            good = {name: entry for name, entry in scenes.entries.items() if name not in faulty}
+            root = Mapping({**root.entries, "scenes": (place, dataclasses.replace(scenes, entries=good))}, root.place)
+    return SceneFile(library=read_node(SceneLibrary, root), faulty=faulty)
+
+
+def _fault(name: str, node: Node) -> ConfigError | None:
+    try:
+        read_node(SceneSpec, node, f"scenes.{name}")
+    except ConfigError as error:
+        return error
+    return None
