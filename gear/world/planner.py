@@ -10,8 +10,8 @@ from gear.values.frames import STATIC_OBJECT_BASE
 from gear.values.geometry import RigidTransform
 from gear.values.rig import Rig
 from gear.values.scene import POSE_DIGITS, ActorRecord, Pose, SceneRecord, Vec3
+from gear.world.assets.scene_assets import EGO_ASSET
 from gear.world.camera_position import check_outside
-from gear.world.compilation.actor_pool import EGO_ASSET
 from gear.world.placement import PlacementSpace
 from gear.world.surfaces.view_limits import reference_camera
 from gear.world.traffic.crowd import Crowd, OcclusionTest, RoadUsers
