@@ -86,6 +86,10 @@ def test_all_are_found_and_the_broken_ones_are_named(home: Path) -> None:
         "broken-hook": "hook gear_defenses",
         "broken-rubbish": "spec",
         "broken-protocol": "spec",
+        "broken-end": "import",
+        "broken-interrupt": "import",
+        "broken-endless": "hook gear_defenses",
+        "broken-mute": "import",
     }
     assert facts["clashes"] == [
         {"kind": "defense", "name": "median", "choices": ["gear-broken/median", "mujoco-gear/median"]}

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import ast
 import os
+import re
 import subprocess
 import sys
+import sysconfig
+import venv
 from pathlib import Path
 
 import pytest
@@ -14,6 +17,8 @@ from gear.cli.main import main
 from gear.contracts.specs import KINDS
 from gear.values.errors import GearError, UnknownNameError
 from gear.verbs.scaffold.write import new_package
+
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -110,23 +115,71 @@ def test_out_that_cannot_be_written(tmp_path: Path) -> None:
         new_package("defense", "my_blur", out=tmp_path / "file")
 
 
-def call(*command: str, cwd: Path, env: dict[str, str] | None = None) -> str:
-    done = subprocess.run(command, cwd=cwd, env=env, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
+def call(*command: str | Path, cwd: Path, env: dict[str, str] | None = None) -> str:
+    words = [str(word) for word in command]
+    done = subprocess.run(words, cwd=cwd, env=env, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"{words}\n{done.stdout}\n{done.stderr}"
     return done.stdout
+
+
+BLOCK = re.compile(r"```(?:sh run)?\n(.*?)```", re.DOTALL)
+
+
+def instructions(text: str) -> str:
+    """The first code block of a page that installs a package."""
+    return next(block for block in BLOCK.findall(text) if "pip install" in block)
+
+
+PAGES = {
+    "defense": "tutorials/defense-package.md",
+    "task": "how-to/write-a-task.md",
+    "model": "how-to/write-a-model.md",
+    "attack": "how-to/write-an-attack.md",
+    "metric": "how-to/write-a-metric.md",
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_instructions_agree_wherever_they_stand(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["new", kind, "my_thing", "--out", str(tmp_path)]) == 0
+    printed = [line.strip() for line in capsys.readouterr().out.splitlines()[1:]]
+    steps = ["python -m pip install -e '.[dev]'", "python -m pytest"]
+    assert printed[1:] == steps and printed[0].startswith("cd ")
+    examples = [path.read_text() for path in sorted((ROOT / "examples").glob("gear-*/README.md"))]
+    pages = [(ROOT / "docs" / PAGES[kind]).read_text(), (tmp_path / f"gear-{kind}-my-thing/README.md").read_text()]
+    for text in (*pages, *(text for text in examples if "pip install" in text)):
+        lines = [line for block in BLOCK.findall(text) for line in block.splitlines()]
+        assert [line for line in lines if "pip install" in line or "-m pytest" in line] == steps
+
+
+@pytest.fixture(scope="module")
+def environment(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A fresh environment that has gear and everything that the tests' own environment has, and nothing else."""
+    folder = tmp_path_factory.mktemp("fresh") / "env"
+    venv.create(folder, with_pip=True)
+    (site,) = (folder / "lib").glob("python*/site-packages")
+    (site / "parent.pth").write_text(f"{sysconfig.get_path('purelib')}\n")
+    (folder / "bin/gear").write_text(f'#!/bin/sh\nexec {folder}/bin/python -m gear.cli.main "$@"\n')
+    (folder / "bin/gear").chmod(0o755)
+    (folder / "bin/ruff").symlink_to(Path(sysconfig.get_path("scripts")) / "ruff")
+    return folder
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
-def test_what_it_writes_installs_and_passes_everything(kind: str, tmp_path: Path, mypy_cache: Path) -> None:
+def test_its_readme_works_as_printed(kind: str, tmp_path: Path, mypy_cache: Path, environment: Path) -> None:
     folder = new_package(kind, "my_thing", out=tmp_path)
-    site = tmp_path / "site"
-    python = sys.executable
-    call(python, "-m", "pip", "install", "-q", "--no-deps", "--target", str(site), str(folder), cwd=tmp_path)
-    env = os.environ | {"PYTHONPATH": str(site), "MYPY_CACHE_DIR": str(mypy_cache)}
-    listed = call(python, "-m", "gear.cli.main", "plugins", "--kind", kind, "--strict-plugins", cwd=tmp_path, env=env)
-    assert f"gear-{kind}-my-thing 0.1.0" in listed
-    call(python, "-m", "pytest", "-q", "-p", "no:cacheprovider", cwd=folder, env=env)
-    call(python, "-m", "ruff", "check", ".", cwd=folder)
-    call(python, "-m", "ruff", "format", "--check", ".", cwd=folder)
-    call(python, "-m", "mypy", "src", "tests", cwd=folder, env=env)
+    env = os.environ | {
+        "PATH": f"{environment}/bin:{os.environ['PATH']}",
+        "PYTHONPATH": str(ROOT),
+        "PIP_CONSTRAINT": str(ROOT / "constraints.txt"),
+        "MYPY_CACHE_DIR": str(mypy_cache),
+        "XDG_CACHE_HOME": str(tmp_path / "cache"),
+    }
+    env.pop("VIRTUAL_ENV", None)
+    said = call("sh", "-eu", "-c", instructions((folder / "README.md").read_text()), cwd=folder, env=env)
+    assert f"{kind} my_thing (gear-{kind}-my-thing 0.1.0)" in said and " passed" in said
+    call("gear", "plugins", "--strict-plugins", cwd=tmp_path, env=env)
+    call(sys.executable, "-m", "ruff", "format", "--check", ".", cwd=folder)
+    call("python", "-m", "mypy", "tests", cwd=folder, env=env)
+    call("python", "-m", "pip", "uninstall", "-q", "-y", folder.name, cwd=tmp_path, env=env)

@@ -22,8 +22,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Writes the package and prints the next steps."""
+    import shlex
+
     from gear.verbs.scaffold.write import new_package
 
     folder = new_package(args.kind, args.name, out=args.out)
-    print(f"{folder}: a package that works as it is; next: pip install -e '{folder}[dev]' && pytest {folder}")
+    print(f"{folder}: a package that works as it is; next:")
+    print(f"  cd {shlex.quote(str(folder))}\n  python -m pip install -e '.[dev]'\n  python -m pytest")
     return 0
