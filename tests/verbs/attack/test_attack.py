@@ -114,8 +114,8 @@ def test_a_patch_folder_is_whole(small: Small, install: Install, tmp_path: Path)
     assert notes["steps_done"] == 4 and all(len(curve) == 4 for curve in notes["curves"].values())
     assert notes["gradient"]["least"] > 0 and notes["gradient"]["zero_steps"] == 0
     assert notes["masking"]["kept"] == pytest.approx(notes["masking"]["promised"], rel=0.5)
-    assert cv2.imread(str(out / "metrics" / "curves.png")).shape[0] > 100
-    assert cv2.imread(str(out / "metrics" / "samples.png")).shape == (2 * 160, 2 * 320, 3)
+    assert cv2.imread(str(out / "figures" / "curves.png")).shape[0] > 100
+    assert cv2.imread(str(out / "figures" / "samples.png")).shape == (2 * 160, 2 * 320, 3)
     assert not (out / CHECKPOINT).exists()
     assert "4 steps" in report.summary()
 
@@ -316,7 +316,7 @@ def test_on_the_command_line(
 def test_what_knows_no_scene_needs_no_probes(small: Small, install: Install, tmp_path: Path, name: str) -> None:
     data = small(probes=False)
     report = attack(data, model="tiny_segmenter", out=tmp_path / "a", attack=name, steps=1, settings=SMALL[:2])
-    assert report.facts["compositor"] == "homography" and (tmp_path / "a" / "metrics" / "samples.png").is_file()
+    assert report.facts["compositor"] == "homography" and (tmp_path / "a" / "figures" / "samples.png").is_file()
     with pytest.raises(DatasetError, match="has no probes; collect it with --probes, or attack with --compositor"):
         attack(data, model="tiny_segmenter", out=tmp_path / "b", steps=1)
     assert not (tmp_path / "b").exists()
