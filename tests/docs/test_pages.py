@@ -82,3 +82,11 @@ def test_the_map_of_rooms_is_what_the_code_is() -> None:
     hint = "run: python docs/make_map.py"
     assert made["PICTURE"].read_text(encoding="utf-8") == made["picture"](), hint
     assert made["PAGE"].read_text(encoding="utf-8") == made["page"](), hint
+
+
+@pytest.mark.parametrize("page", pages(), ids=lambda page: str(page.relative_to(ROOT)))
+def test_files_that_a_page_names_exist(page: Path) -> None:
+    """Paths of this repository, such as `gear/values/scene.py`, without those that have a placeholder in brackets."""
+    tops = "gear|tests|docs|mjcf|configs|authoring|benchmarks|examples|weights"
+    named = re.findall(rf"`((?:{tops})/[\w./-]+?)/?`", page.read_text())
+    assert [path for path in named if not (ROOT / path).exists()] == []
