@@ -25,7 +25,7 @@ from gear.contracts.tasks import Sidecar
 from gear.dataset.reading import Dataset
 from gear.measuring.dataset_run import evaluate_row
 from gear.measuring.guard import Guard, open_guard
-from gear.measuring.guarded_model import Player
+from gear.measuring.guarded_model import GuardedModel
 from gear.measuring.intervals import leave_one_out
 from gear.measuring.plugin_selection import chosen_model
 from gear.measuring.reports import TASK
@@ -63,11 +63,11 @@ def main() -> None:
     Part.wanted = args.samples
     dataset = Part(root=opened.root, plan=opened.plan, task=opened.task, manifest=opened.manifest)
     model = chosen_model(args.model, args.settings)
-    player = Player(model, open_guard(Guard.of(args.defense), [model], opened.plan.task["name"]))
+    guarded = GuardedModel(model, open_guard(Guard.of(args.defense), [model], opened.plan.task["name"]))
     pictures = [sample.images for sample in dataset[:]]
-    step, batch = args.batch or 1, args.batch or player.usual_batch(dataset)
+    step, batch = args.batch or 1, args.batch or guarded.usual_batch(dataset)
     groups = [range(i, min(i + step, len(pictures))) for i in range(0, len(pictures), step)]
-    player.play([pictures[i] for i in groups[0]], groups[0])
+    guarded.predict([pictures[i] for i in groups[0]], groups[0])
     print(f"{os.cpu_count()} cores, {len(pictures)} samples of {pictures[0]['left'].shape}, {batch} at a time")
     spent: dict[str, list[float]] = {"bare": [], "predict": [], "evaluate": []}
     batches = [as_batch([pictures[i] for i in group], tuple(pictures[0])) for group in groups]
@@ -75,16 +75,16 @@ def main() -> None:
         begun = time.perf_counter()
         with torch.inference_mode():
             for one in batches:
-                player.model.forward(one)
+                guarded.model.forward(one)
         spent["bare"].append((time.perf_counter() - begun) / len(pictures))
         begun = time.perf_counter()
         for group in groups:
-            player.play([pictures[i] for i in group], group)
+            guarded.predict([pictures[i] for i in group], group)
         spent["predict"].append((time.perf_counter() - begun) / len(pictures))
         with tempfile.TemporaryDirectory() as folder:
             scorer = Scorer(dataset, Path(folder), "row", (), model.found)
             begun = time.perf_counter()
-            notes = evaluate_row(dataset, scorer, player, batch=batch, workers=args.workers, done=lambda: None).notes
+            notes = evaluate_row(dataset, scorer, guarded, batch=batch, workers=args.workers, done=lambda: None).notes
             scorer.finish(notes)
             spent["evaluate"].append((time.perf_counter() - begun) / len(pictures))
         print(", ".join(f"{name} {seconds[-1]:.3f} s" for name, seconds in spent.items()), flush=True)

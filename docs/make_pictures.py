@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 import gear
 from gear.formats import cityscapes
-from gear.measuring.guarded_model import Player
+from gear.measuring.guarded_model import GuardedModel
 from gear.measuring.plugin_selection import chosen_model
 from gear.plugins.build import NO_OPTIONS, build, find
 
@@ -99,8 +99,8 @@ def night(root: Path) -> Picture:
 def patch(root: Path) -> Picture:
     """A street without and with patches, and the depth that the network sees in each."""
     samples = [PATCHED.taken(root), replace(PATCHED, patch=DEPTH_PATCH).taken(root)]
-    player = Player(chosen_model(DEPTH_MODEL, ()))
-    answers = player.play([sample.images for sample in samples], range(len(samples)))
+    guarded = GuardedModel(chosen_model(DEPTH_MODEL, ()))
+    answers = guarded.predict([sample.images for sample in samples], range(len(samples)))
     task = build(find("task", "depth"), NO_OPTIONS)
     seen = [
         task.preview(replace(sample, depth_m=answer.prediction))["depth"]

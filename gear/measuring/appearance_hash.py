@@ -1,7 +1,7 @@
-"""What the pictures of a dataset look like, as far as weights trained on them can tell: assets, light, renderer.
+"""The appearance of pictures, as far as trained weights depend on it: assets, light and renderer.
 
-Weights say which look they were trained on; when towns, light, camera or renderer change, they may have to be trained
-again, and `gear models` says so.
+Weights record the appearance (the *look*) that they were trained on. When towns, light, camera or renderer change, the
+networks may have to be trained again, and `gear models` says so.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ RAMP = (0.01, 0.05, 0.2, 0.5, 0.8)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Look:
-    """What decides how pictures look, seeds and scenes aside.
+    """Everything that decides how pictures look, apart from seeds and scenes.
 
     Attributes:
-        assets: sha256 of all that a town's pictures can show, by the town's name.
-        renderers: their names, sorted; one name for those that look alike.
-        light: sha256 of what the weather presets make of sun and sky, and of the camera's response to them.
-        mujoco: its minor release; renderers change with it.
+        assets: sha256 of all assets that the pictures of a town can show, by name of the town.
+        renderers: names of the renderers, sorted; renderers with the same look share one name.
+        light: sha256 of the sun and sky of all weather presets, and of the camera's response to them.
+        mujoco: minor release of MuJoCo, with which renderers change.
     """
 
     assets: dict[str, str]
@@ -60,11 +60,11 @@ class Look:
 
     @property
     def hash(self) -> str:
-        """16 hexadecimal digits; equal looks have equal ones."""
+        """16 hexadecimal digits; equal looks have equal hashes."""
         return _digest(to_json(self))[:HASH_LENGTH]
 
     def differences(self, other: Look) -> list[str]:
-        """What changed, in words; empty for equal looks."""
+        """What differs between two looks, in words; empty for equal looks."""
         towns = sorted(
             town for town in self.assets.keys() | other.assets.keys() if self.assets.get(town) != other.assets.get(town)
         )
@@ -75,9 +75,9 @@ class Look:
 
 
 def look_of(plans: Iterable[Plan]) -> Look:
-    """The look of datasets, by what they were collected with.
+    """The look of datasets, from the plans that they were collected with.
 
-    Their light is that of this version of gear: the plans do not say more of it than the version's name.
+    The light is that of the installed version of gear, because plans record only the version's name.
     """
     contents = [plan.content for plan in plans]
     return Look(
@@ -88,12 +88,12 @@ def look_of(plans: Iterable[Plan]) -> Look:
     )
 
 
-def look_now(trained: Look, digests: dict[str, str] | None = None) -> Look:
-    """What the same towns would look like if they were collected now; towns that are not installed are left out.
+def current_look(trained: Look, digests: dict[str, str] | None = None) -> Look:
+    """The look that the same towns have in the installed version; towns that are not installed are left out.
 
     Args:
-        trained: what is to be compared.
-        digests: of the assets of towns that were read already; gets those that are read now.
+        trained: look to compare with.
+        digests: asset hashes of towns that were read before; hashes that are computed are added.
     """
     known = {} if digests is None else digests
     for town in trained.assets.keys() - known.keys():
@@ -108,7 +108,7 @@ def look_now(trained: Look, digests: dict[str, str] | None = None) -> Look:
 
 
 def read_look(value: Json) -> Look | None:
-    """A look from JSON; None where it is none."""
+    """A look from JSON; None where the JSON is none."""
     try:
         return from_json(Look, value, "look")
     except FieldError:
@@ -117,10 +117,11 @@ def read_look(value: Json) -> Look | None:
 
 @cache
 def light_digest() -> str:
-    """sha256 of every preset by day with the light that follows from it, what road users keep of it from the ground,
-    what wet ground mirrors, and the camera's response to a ramp.
+    """sha256 of the light of every preset by day: sun and sky, the ambient occlusion of road users, the
+    reflections of wet
+    ground, and the camera's response to a ramp.
 
-    No shipped weights know nights.
+    Shipped weights are not trained on nights, so nights are left out.
     """
     presets: dict[str, Any] = {}
     for name, weather in PRESETS.items():

@@ -1,4 +1,4 @@
-"""What a defense learns from before it guards a model."""
+"""The data that a defense is calibrated on."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ Views = Mapping[str, UInt8Image]
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Calibration:
-    """Datasets to learn from.
+    """The calibration data of a defense.
 
     Attributes:
-        clean: without patches; None where nothing was given.
-        patched: with them.
-        told: of (samples read for the first time, samples of both).
+        clean: dataset without patches; None where none was given.
+        patched: the same dataset with patches; None where none was given.
+        told: called with (samples read for the first time, samples of both datasets).
     """
 
     clean: Dataset[Any] | None = None
@@ -60,22 +60,22 @@ class Calibration:
             return product.fit(clean, patched, model, derive_rng(seed, "calibrate", defense.found.spec.name))
 
     def facts(self) -> list[str | None]:
-        """Content keys of both."""
+        """Content keys of both datasets."""
         return [None if one is None else one.plan.content_key for one in (self.clean, self.patched)]
 
     def counted(self) -> Json:
-        """How many samples they have, which their keys do not say; nothing where nothing was given."""
+        """Number of samples of both datasets, which the keys do not contain; empty without data."""
         if self.clean is None:
             return {}
         return {"calibration_samples": [None if one is None else len(one) for one in (self.clean, self.patched)]}
 
     @property
     def shows_patch(self) -> bool:
-        """Whether the pictures that are to be clean show one."""
+        """Whether the pictures that should be clean show a patch."""
         return self.clean is not None and _label(self.clean) != NO_PATCH
 
     def doubts(self) -> list[str]:
-        """A line for whatever the user may not have meant."""
+        """One line per property of the data that may be unintended."""
         clean, patched, lines = self.clean, self.patched, []
         if clean is not None and self.shows_patch:
             lines.append(f"{clean.root}: shows the patch {_label(clean)}, which the defense takes for clean")
@@ -84,7 +84,7 @@ class Calibration:
         return lines
 
     def note(self, measured: Dataset[Any]) -> str | None:
-        """One line where a defense is measured on scenes that it learnt from."""
+        """One line where a defense is measured on scenes that it was calibrated on; otherwise None."""
         if self.clean is None or scenes_of(self.clean) != scenes_of(measured):
             return None
         return f"{measured.root}: the defense learnt from scenes that it is measured on; other scenes are harder for it"
@@ -137,7 +137,7 @@ def _label(dataset: Dataset[Any]) -> str:
 
 
 class CalibrationViews(Sequence[Views]):
-    """The pictures of a dataset, read when they are looked at; `took` is told which."""
+    """The pictures of a dataset, read when they are used; `took` is called with the index of each."""
 
     def __init__(self, dataset: Dataset[Any], names: Sequence[str], took: Callable[[int], None]) -> None:
         self._dataset, self._names, self._took = dataset, tuple(names), took

@@ -1,4 +1,4 @@
-"""A defense at work: built from its options, held to its contract at each sample."""
+"""A defense in use: built from its options, its results checked against the contract at every sample."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NUMBERS = (int, float, np.floating, np.integer)
 
 
 class CheckedDefense:
-    """A third party's defense, whose failures say whose they are."""
+    """A defense whose failures name its plugin."""
 
     def __init__(
         self,
@@ -40,14 +40,14 @@ class CheckedDefense:
 
     @functools.cached_property
     def state(self) -> Any:
-        """What the defense has learnt. Learning takes minutes, and what is finished needs none of it."""
+        """The result of calibration. It is computed when it is first needed, because calibration takes minutes."""
         return self._learn()
 
     def apply(self, views: Mapping[str, UInt8Image], rng: np.random.Generator, index: int) -> DefenseResult:
         """Cleans one sample.
 
         Raises:
-            PluginError: the defense fails, or returns something else than it promises.
+            PluginError: the defense fails, or returns something that its contract does not allow.
         """
         for picture in views.values():
             picture.setflags(write=False)
@@ -60,7 +60,7 @@ class CheckedDefense:
         return result if result.score is None else dataclasses.replace(result, score=float(result.score))
 
     def _problem(self, result: Any, views: Mapping[str, UInt8Image]) -> str:
-        """What is wrong with a result, or nothing."""
+        """The problem of a result as text; empty where there is none."""
         if not isinstance(result, DefenseResult):
             return f"apply returns a DefenseResult, got {type(result).__name__}"
         sizes = {name: picture.shape[:2] for name, picture in views.items()}
@@ -90,7 +90,7 @@ class CheckedDefense:
 
 
 def _of_camera(given: object, name: str) -> Any:
-    """What a defense says of a camera; None where it does not say it by name."""
+    """A defense's result for one camera; None where the result has no entry of that name."""
     return given.get(name) if isinstance(given, Mapping) else None
 
 

@@ -1,4 +1,6 @@
-"""One dataset through the model: read ahead, predicted in batches, measured and written beside the next batch."""
+"""Runs a model over one dataset: samples are read ahead, predicted in batches, measured and written beside the
+next batch.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gear.dataset.reading import Dataset
-from gear.measuring.guarded_model import Player
+from gear.measuring.guarded_model import GuardedModel
 from gear.measuring.parallel_batches import lanes
 from gear.measuring.scoring import Note, Scorer
 from gear.readers import TorchDataset, read_ahead
@@ -23,12 +25,12 @@ SampleDone = Callable[[], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """What became of one dataset.
+    """The result for one dataset.
 
     Attributes:
-        notes: of every sample, in order.
-        made: how many of them were predicted now.
-        damaged: what a former run kept and could not be read: these samples were predicted again.
+        notes: stored scores of every sample, in order.
+        made: number of samples predicted in this run.
+        damaged: one line per stored prediction that could not be read and was made again.
     """
 
     notes: list[Note]
@@ -37,7 +39,7 @@ class Row:
 
 
 def evaluate_row(
-    dataset: Dataset[Any], scorer: Scorer, player: Player, *, batch: int, workers: int, done: SampleDone
+    dataset: Dataset[Any], scorer: Scorer, guarded: GuardedModel, *, batch: int, workers: int, done: SampleDone
 ) -> Row:
     """Takes up what is kept and predicts the rest.
 
@@ -50,19 +52,19 @@ def evaluate_row(
     """
     items = TorchDataset(dataset)
     with ThreadPoolExecutor(workers) as scorers:
-        desk = _Desk(scorers, 2 * batch + workers, done)
+        desk = _BoundedQueue(scorers, 2 * batch + workers, done)
         notes, damaged = _taken_up(scorer, desk)
         every = [range(begin, min(begin + batch, len(dataset))) for begin in range(0, len(dataset), batch)]
         blocks = [block for block in every if not notes.keys() >= set(block)]
         made = len(dataset) - len(notes)
-        count = min(player.lanes, len(every))
+        count = min(guarded.lanes, len(every))
         if count > 1:
-            scored = _in_lanes(items, scorer, player, blocks, notes.keys(), count, desk)
+            scored = _in_lanes(items, scorer, guarded, blocks, notes.keys(), count, desk)
         else:
             scored = {}
             with contextlib.closing(read_ahead(items, blocks, workers=workers)) as reading:
                 for found in reading:
-                    answers = player.play([item.sample.images for item in found], [item.index for item in found])
+                    answers = guarded.predict([item.sample.images for item in found], [item.index for item in found])
                     for item, answer in zip(found, answers, strict=True):
                         if item.index not in notes:
                             scored[item.index] = desk.submit(scorer.first, item.index, item.sample, answer)
@@ -75,17 +77,17 @@ def evaluate_row(
 def _in_lanes(
     items: TorchDataset,
     scorer: Scorer,
-    player: Player,
+    guarded: GuardedModel,
     blocks: Sequence[range],
     finished: Set[int],
     count: int,
-    desk: _Desk,
+    desk: _BoundedQueue,
 ) -> dict[int, Future[Note]]:
-    """Batches side by side, each in one thread until there is nothing left to do but to wait for the disk."""
+    """Several batches side by side, each in one thread up to the writing of its files."""
 
     def worked_out(indices: Sequence[int]) -> dict[int, Future[Note]]:
         found = [items[index] for index in indices]
-        answers = player.play([item.sample.images for item in found], indices)
+        answers = guarded.predict([item.sample.images for item in found], indices)
         return {
             item.index: desk.submit(scorer.write, scorer.measured(item.index, item.sample, answer))
             for item, answer in zip(found, answers, strict=True)
@@ -104,8 +106,8 @@ def _in_lanes(
     return written
 
 
-class _Desk:
-    """Where samples wait to be measured: so many at a time, and the first failure is remembered."""
+class _BoundedQueue:
+    """A bounded queue of samples to measure, which remembers the first failure."""
 
     def __init__(self, pool: ThreadPoolExecutor, most: int, done: SampleDone) -> None:
         """Args:
@@ -118,14 +120,14 @@ class _Desk:
         self._failed = list[BaseException]()
 
     def submit(self, job: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Waits for a place."""
+        """Adds a job, after waiting for a free place."""
         self._waiting.acquire()
         future = self._pool.submit(job, *arguments)
         future.add_done_callback(self._tell)
         return future
 
     def check(self) -> None:
-        """A sample that failed stops the run now, not at its end."""
+        """Raises the first failure of a job, so that the run stops at once."""
         if self._failed:
             raise self._failed[0]
 
@@ -142,8 +144,8 @@ class _Desk:
             self._failed.append(error)
 
 
-def _taken_up(scorer: Scorer, desk: _Desk) -> tuple[dict[int, Note], list[DatasetError]]:
-    """What a former run finished, and what of it cannot be read."""
+def _taken_up(scorer: Scorer, desk: _BoundedQueue) -> tuple[dict[int, Note], list[DatasetError]]:
+    """The samples that an earlier run finished, and a line per stored prediction that cannot be read."""
     futures: dict[int, Future[Note | DatasetError]] = {}
     for index in sorted(scorer.kept()):
         futures[index] = desk.submit(scorer.again, index)

@@ -1,4 +1,4 @@
-"""A defense as the user asks for it: name, options and calibration data, as one value that every verb passes on."""
+"""A defense as the user requests it: name, options and calibration data, as one value that every verb passes on."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class Guard:
     Attributes:
         defense: name of a defense plugin.
         settings: `KEY=VALUE` texts for its options.
-        calibration: root of the dataset from which the defense learns; None for none.
-        calibration_patched: root of the same pictures with patches; None for none.
+        calibration: root of the clean calibration dataset; None for none.
+        calibration_patched: root of the same dataset with patches; None for none.
     """
 
     defense: str
@@ -58,7 +58,7 @@ class OpenedGuard:
 
     Attributes:
         defense: the plugin with its options; None without a defense.
-        calibration: what the defense learns from.
+        calibration: the calibration data.
     """
 
     defense: Chosen | None = None

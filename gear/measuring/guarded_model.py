@@ -1,4 +1,4 @@
-"""The model behind its defense: pictures in, answers with their cost out."""
+"""A model guarded by its defense: pictures in, predictions and their cost out."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ SMALL_PX, MOST_TOGETHER = 1_400_000, 4
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Answer:
-    """What comes of one sample.
+    """The result for one sample.
 
     Attributes:
-        prediction: the task's.
-        model_s, defense_s: wall time; of a batch its share, also of the batches that went through beside it.
-        mask: where the defense sees the patch, (H, W) float32 in 0..1 by camera name.
-        score: how sure it is of an attack.
+        prediction: prediction in the task's format.
+        model_s, defense_s: wall time in seconds; a batch's time is shared among its samples and the batches beside it.
+        mask: the defense's patch mask by camera name, (H, W) float32 in 0..1.
+        score: the defense's score for "the sample shows a patch".
     """
 
     prediction: Any
@@ -53,14 +53,14 @@ class Answer:
     score: float | None
 
 
-class Player:
-    """A built model with its defense, fitted where it must be.
+class GuardedModel:
+    """A built model with its defense, which is calibrated where it needs that.
 
     Attributes:
-        plugin: the model's.
-        model: behind its defense, if there is one.
-        weights_sha256: of the bare model; None for what is no torch model.
-        lanes: how many threads may `play` at a time. Defenses and models of third parties are never asked to.
+        plugin: plugin of the model.
+        model: the model, wrapped by its defense if there is one.
+        weights_sha256: hash of the bare model's weights; None for a model that is no torch module.
+        lanes: number of threads that may call `predict` at a time; 1 for defenses and models of third parties.
     """
 
     def __init__(
@@ -104,8 +104,9 @@ class Player:
         return CheckedDefense(found, product, bare if spec.needs_model or spec.taps else None, learn), wrapped
 
     def usual_batch(self, dataset: Dataset[Any]) -> int:
-        """How many of a dataset's samples go through one of gear's own models together unless somebody says: as many
-        small ones as make `SMALL_PX`, at most `MOST_TOGETHER`. Third parties' models and defended ones take one.
+        """Default batch size of a dataset: for gear's own models as many small samples as make `SMALL_PX` pixels,
+        at most
+        `MOST_TOGETHER`; one for third parties' models and guarded ones.
         """
         if not self._is_ours or self._many is None or not len(dataset):
             return 1
@@ -113,8 +114,8 @@ class Player:
         pixels = sum(camera.width_px * camera.height_px for camera in cameras)
         return max(1, min(MOST_TOGETHER, SMALL_PX // max(pixels, 1)))
 
-    def play(self, pictures: Sequence[Views], indices: Sequence[int]) -> list[Answer]:
-        """Cleans and predicts a batch of samples, of which each has its number in the split.
+    def predict(self, pictures: Sequence[Views], indices: Sequence[int]) -> list[Answer]:
+        """Cleans and predicts a batch of samples.
 
         Raises:
             PluginError: a third party's model or defense fails.
@@ -154,7 +155,7 @@ class Player:
         ]
 
     def _count(self, change: int) -> int:
-        """Takes note of who comes and goes; returns how many there are."""
+        """Counts the threads that enter and leave; returns their number."""
         with self._counting:
             self._at_work += change
             return self._at_work
@@ -166,17 +167,17 @@ class Player:
                 return [self.model.predict(views) for views in shown]
             answers = list(self._many(list(shown)))
         if len(answers) != len(shown):
-            raise accusation(self.plugin, stage, f"predict_many gave {len(answers)} answers to {len(shown)} samples")
+            raise plugin_error(self.plugin, stage, f"predict_many gave {len(answers)} answers to {len(shown)} samples")
         return answers
 
 
-def accusation(found: PluginEntry, stage: str, problem: str) -> PluginError:
-    """An error that says whose plugin it is."""
+def plugin_error(found: PluginEntry, stage: str, problem: str) -> PluginError:
+    """An error that names the plugin."""
     return PluginError(f"{found.spec.name} ({found.owner.package} {found.owner.version})", stage, problem)
 
 
 def weights_digest(model: Any) -> str | None:
-    """sha256 over names and bytes of a torch model's parameters and buffers; None for what is no torch model."""
+    """sha256 over names and bytes of a torch module's parameters and buffers; None for anything else."""
     torch = sys.modules.get("torch")
     if torch is None:
         return None

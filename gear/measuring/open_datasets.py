@@ -1,4 +1,4 @@
-"""The datasets of an evaluation: opened, of one task, each given once."""
+"""Opens the datasets of an evaluation: all of one task, each given once."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from gear.values.errors import DatasetError, GearError
 
 
 def opened(paths: Sequence[str | Path], split: str | None, model: Chosen, reports: Sequence[str]) -> list[Dataset[Any]]:
-    """Opens them.
+    """Opens the datasets of an evaluation.
 
     Args:
         paths: roots, folders of roots, or `DIR:SPLIT`.
-        split: of those that do not say theirs; None where each has only one.
-        model: that must suit them.
-        reports: that must be there for them.
+        split: split of paths that name none; None where each has only one.
+        model: model that must suit the datasets.
+        reports: names of reports that must be available for them.
 
     Raises:
-        GearError: there is none, one is empty or of another task, or the model or a report does not suit it.
+        GearError: there is no dataset, one is empty or of another task, or the model or a report does not suit it.
     """
     if not paths:
         raise GearError("there is nothing to evaluate on; give at least one dataset")
@@ -44,7 +44,7 @@ def opened(paths: Sequence[str | Path], split: str | None, model: Chosen, report
 
 
 def row_names(datasets: Sequence[Dataset[Any]]) -> list[str]:
-    """Folders that stay the same however datasets are ordered.
+    """Names of the datasets' folders in the evaluation, which do not depend on the order of the datasets.
 
     Raises:
         GearError: a dataset was given twice.

@@ -1,4 +1,4 @@
-"""Several batches through one network at a time: on a CPU that is faster than one batch on all of its cores."""
+"""Several batches through one network at a time: on a CPU faster than one batch on all cores."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ MOST = 4
 
 
 def lanes_of(model: Any) -> int:
-    """How many batches a model of gear's own may work on at a time: 1 for a GPU's, and for what is no network of ours.
-
-    The threads that torch would use, at most `MOST`.
+    """Number of batches that a model may process at a time: torch's number of threads, at most `MOST`, for gear's
+    own models on a
+    CPU; 1 on a GPU and for other models.
     """
     torch, network = sys.modules.get("torch"), sys.modules.get("gear.networks.network")
     if torch is None or network is None or not isinstance(model, network.Network) or model.device.type != "cpu":
@@ -29,9 +29,9 @@ def lanes_of(model: Any) -> int:
 
 @contextlib.contextmanager
 def lanes(count: int) -> Iterator[Submit]:
-    """Runs what is submitted in so many threads, which share torch's cores.
+    """Runs submitted functions in a number of threads that share torch's cores.
 
-    What is printed meanwhile goes to stderr, as it does wherever a plugin works.
+    Output printed meanwhile goes to stderr, as everywhere where a plugin runs.
     """
     import torch
 

@@ -1,4 +1,4 @@
-"""The true patch in a sample: where it is seen, and how well a defense's mask finds it."""
+"""The true patch area of a sample, and how well a defense's mask agrees with it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SURE = 0.5
 
 
 def patch_masks(sample: Sample) -> dict[str, Mask]:
-    """(H, W) of the visible pixels of every surface, by camera name."""
+    """(H, W) bool masks of the visible pixels of all surfaces, by camera name."""
     masks: dict[str, Mask] = {name: np.zeros(image.shape[:2], dtype=np.bool_) for name, image in sample.images.items()}
     for surface in sample.surfaces:
         if surface.visible_px:
@@ -35,16 +35,16 @@ def patch_masks(sample: Sample) -> dict[str, Mask]:
 
 
 def widened(masks: Mapping[str, Mask], margin_px: int = MARGIN_PX) -> dict[str, Mask]:
-    """Each mask and all within a distance of it."""
+    """Each mask, dilated by a distance in pixels."""
     size = 2 * margin_px + 1
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
     return {name: cv2.dilate(mask.astype(np.uint8), disc).astype(np.bool_) for name, mask in masks.items()}
 
 
 def mask_metrics(sample: Sample, found: Mapping[str, Any]) -> dict[str, float]:
-    """How a defense's mask lies on the true patch: over all of its cameras together.
-
-    `MASK_METRICS`, NaN where nothing is to be compared.
+    """Agreement of a defense's mask with the true patch area, over all cameras together: the metrics
+    `MASK_METRICS`, NaN where
+    there is nothing to compare.
     """
     truth = patch_masks(sample)
     real = np.concatenate([truth[name].reshape(-1) for name in found])

@@ -1,4 +1,4 @@
-"""Who is evaluated: names and options to specs, and whether they suit each other, before anything is loaded."""
+"""Looks up models and defenses by name, and checks that they suit the data, before anything is loaded."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Chosen:
     options: Node
 
     def facts(self) -> Json:
-        """Name, package, version and options, defaults filled in."""
+        """Name, package, version and options with all defaults; JSON."""
         owner = self.found.owner
         config = read_node(self.found.spec.config, self.options, "")
         named = {"name": self.found.spec.name, "package": owner.package, "version": owner.version}
@@ -53,10 +53,10 @@ def chosen_model(name: str, settings: Iterable[str], flag: str = "--set") -> Cho
 
 
 def chosen_defense(name: str | None, settings: Iterable[str]) -> Chosen | None:
-    """A defense by name, or none.
+    """Looks up a defense by name.
 
     Raises:
-        GearError: there is no such defense, an option does not fit, or options are given for none.
+        GearError: there is no such defense, an option does not fit, or options are given without a defense.
     """
     settings = tuple(settings)
     if not name:
@@ -69,12 +69,12 @@ def chosen_defense(name: str | None, settings: Iterable[str]) -> Chosen | None:
 
 
 def check_model(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> None:
-    """Whether the model can do the dataset's task and sees its cameras.
+    """Checks that the model can do the dataset's task and sees its cameras.
 
     Args:
-        model: with its options.
-        dataset: whose pictures it is shown.
-        flag: how the user sets one of the model's options.
+        model: the model with its options.
+        dataset: dataset whose pictures the model is shown.
+        flag: flag of the model's options, for messages.
 
     Raises:
         GearError: it cannot.
@@ -91,24 +91,25 @@ def check_model(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> N
 
 
 def check_camera(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> None:
-    """Whether the model reckons with the camera that took the pictures: with another one, metres come out wrong.
+    """Checks that the model assumes the camera that took the pictures; with another one, its distances would be
+    wrong.
 
     Args:
-        model: with its options.
-        dataset: whose options say how it was collected.
-        flag: how the user sets one of the model's options.
+        model: the model with its options.
+        dataset: dataset whose task options describe the camera.
+        flag: flag of the model's options, for messages.
 
     Raises:
-        GearError: it does not.
+        GearError: the model assumes another camera.
     """
     check_optics(model, dataset.plan.options, f"{dataset.root} was collected", flag)
 
 
 def check_optics(model: Chosen, options: Json, collected: str, flag: str) -> None:
-    """As `check_camera`, of a task's options.
+    """As `check_camera`, for the options of a task.
 
     Raises:
-        GearError: the model reckons with another camera.
+        GearError: the model assumes another camera.
     """
     config = read_node(model.found.spec.config, model.options, "")
     for name in CAMERA:
@@ -121,10 +122,10 @@ def check_optics(model: Chosen, options: Json, collected: str, flag: str) -> Non
 
 
 def check_defense(defense: Chosen, model: Chosen, task: str, *, is_calibrated: bool) -> None:
-    """Whether the defense guards the task, finds its feature maps and has what it learns from.
+    """Checks that the defense is for the task, finds its feature maps, and has the calibration data that it needs.
 
     Raises:
-        GearError: it does not.
+        GearError: one of these does not hold.
     """
     spec, guarded = defense.found.spec, model.found.spec
     assert isinstance(spec, DefenseSpec) and isinstance(guarded, ModelSpec)

@@ -21,7 +21,7 @@ from gear.contracts.tasks import Evaluator
 from gear.dataset.output_checks import check_metrics
 from gear.dataset.plan import Plan
 from gear.dataset.reading import Dataset
-from gear.measuring.guarded_model import accusation
+from gear.measuring.guarded_model import plugin_error
 from gear.measuring.plugin_selection import Chosen
 from gear.plugins.build import NO_OPTIONS, broken_hint, find, name_of_task, plugins_of_kind
 from gear.plugins.manager import DISTRIBUTION
@@ -64,7 +64,7 @@ class Report:
             return check_metrics(given, method)
         except TypeError as error:
             found = find("task", name_of_task(self.plan.task)) if self.plugin is None else self.plugin.found
-            raise accusation(found, "its evaluator", str(error)) from error
+            raise plugin_error(found, "its evaluator", str(error)) from error
 
     @contextlib.contextmanager
     def blamed(self, method: str) -> Iterator[None]:
@@ -80,7 +80,7 @@ class Report:
         except BaseException as error:
             if self.plugin is None or self.plugin.found.owner.package == DISTRIBUTION:
                 raise
-            raise accusation(self.plugin.found, f"{method} of its evaluator", one_line(error)) from error
+            raise plugin_error(self.plugin.found, f"{method} of its evaluator", one_line(error)) from error
 
     def facts(self) -> Json:
         """What a plugin's metric is, for the results; None for the task's own."""

@@ -1,4 +1,4 @@
-"""What is made of one answer: metrics, result files, and the note that says that the sample is finished."""
+"""Scores predictions: metrics, result files, and a note per sample that marks it as finished."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from gear.dataset.files import explained, inside, read_bytes, sha256, write_whol
 from gear.dataset.output_checks import check_encoded
 from gear.dataset.reading import Dataset
 from gear.dataset.sidecar import dump_json, load_json
-from gear.measuring.guarded_model import Answer, accusation
+from gear.measuring.guarded_model import Answer, plugin_error
 from gear.measuring.metric_json import known_json
 from gear.measuring.patch_area import MASK_METRICS, mask_metrics, patch_masks, widened
 from gear.measuring.reports import OUTSIDE_PATCH, Report, reports_of
@@ -36,17 +36,17 @@ KEPT: Any = {
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Note:
-    """One finished sample.
+    """The stored score of one finished sample.
 
     Attributes:
-        index: its number in the split.
-        metrics: of this sample, by report.
-        parts: evaluators that have seen it alone, by report.
-        cost: `model_s` and `defense_s`.
-        score: of the defense, or None.
-        mask: how its mask lies on the patch, or None.
-        facts: what the task must know to read the prediction back; JSON.
-        sha256: of the prediction's files, by name.
+        index: index of the sample in the split.
+        metrics: metrics of this sample, by report.
+        parts: evaluators that have seen only this sample, by report.
+        cost: `model_s` and `defense_s` in seconds.
+        score: the defense's score, or None.
+        mask: agreement of the defense's mask with the patch, or None.
+        facts: facts that the task needs to read the prediction back; JSON.
+        sha256: hashes of the prediction's files, by name.
     """
 
     index: int
@@ -73,11 +73,11 @@ class Note:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Unwritten:
-    """A sample that is measured and not yet on the disk.
+    """A measured sample whose files are not written yet.
 
     Attributes:
-        note: what will be said of it.
-        files: its prediction, content by name.
+        note: its note.
+        files: files of the prediction, content by name.
     """
 
     note: Note
@@ -85,7 +85,7 @@ class Unwritten:
 
 
 class Scorer:
-    """Measures and keeps the samples of one dataset; its methods may run in several threads."""
+    """Measures the samples of one dataset and stores the results; its methods may run in several threads."""
 
     def __init__(
         self, dataset: Dataset[Any], root: Path, folder: str, reports: tuple[str, ...], model: PluginEntry
@@ -103,14 +103,14 @@ class Scorer:
         self.reports: dict[str, Report] = reports_of(reports, dataset)
 
     def kept(self) -> set[int]:
-        """Samples that are finished: their predictions need not be made again."""
+        """The finished samples, whose predictions are not made again."""
         folder = inside(self._root, f"{self._folder}/samples")
         if self._keeper is None or not folder.is_dir():
             return set()
         return {int(p.stem) for p in folder.glob("*.json") if p.stem.isdecimal() and int(p.stem) < len(self._dataset)}
 
     def measured(self, index: int, sample: Sample, answer: Answer) -> Unwritten:
-        """What there is to say of an answer, with the files that say it."""
+        """Measures a prediction; returns its note and files."""
         with self._blamed(index):
             metrics, parts = self._measure(sample, answer.prediction)
             encoded = self._keeper and check_encoded(
@@ -130,7 +130,7 @@ class Scorer:
         return Unwritten(note=note, files=files)
 
     def write(self, unwritten: Unwritten) -> Note:
-        """Puts the prediction's files on the disk, the note last."""
+        """Writes a prediction's files, the note last."""
         note = unwritten.note
         for relative, data in unwritten.files.items():
             write_whole(self._root, f"{self._folder}/{PREDICTIONS}/{relative}", data)
@@ -138,11 +138,11 @@ class Scorer:
         return note
 
     def first(self, index: int, sample: Sample, answer: Answer) -> Note:
-        """Measures an answer and writes it."""
+        """Measures a prediction and writes it."""
         return self.write(self.measured(index, sample, answer))
 
     def again(self, index: int) -> Note | DatasetError:
-        """Measures what a former run predicted; or what is wrong with its note or its prediction.
+        """Measures the stored prediction of an earlier run; or returns the problem of its note or its files.
 
         Raises:
             DatasetError: the sample itself cannot be read.
@@ -207,7 +207,7 @@ class Scorer:
             raise
         except Exception as error:
             if self._model.owner.package != DISTRIBUTION:
-                raise accusation(self._model, f"prediction of sample {index}", one_line(error)) from error
+                raise plugin_error(self._model, f"prediction of sample {index}", one_line(error)) from error
             if isinstance(error, ValueError):
                 said = f"what {self._model.spec.name} says of sample {index}"
                 raise GearError(f"{said} cannot be measured ({one_line(error)}); see to its weights") from error

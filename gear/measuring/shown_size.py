@@ -1,8 +1,9 @@
-"""Whether a network sees things as large as it learnt them: what to say where pictures are not of the task's own size.
+"""Notes on pictures whose size is not the task's default, on which a network sees objects at another size than in
+training.
 
-Weights say at which share of the task's own pictures they work. A network applies that share to any picture, so one
-that learnt from small pictures sees small pictures smaller still. Weights that say nothing learnt from the task's own
-pictures, at the share that their network has by itself.
+Weights record the input scale for pictures of the task's default size. A network applies this scale to any picture, so
+objects in smaller pictures become smaller still. Weights without a record were trained on the default size, at the
+network's default scale.
 """
 
 from __future__ import annotations

@@ -120,7 +120,7 @@ def _changes(file: WeightsFile, digests: dict[str, str]) -> tuple[str, ...] | No
     if value is None:
         return None
     # Comparing looks reads the towns' assets; nobody pays for it who has no shipped weights.
-    from gear.measuring.appearance_hash import look_now, read_look
+    from gear.measuring.appearance_hash import current_look, read_look
 
     look = read_look(value)
-    return None if look is None else tuple(look.differences(look_now(look, digests)))
+    return None if look is None else tuple(look.differences(current_look(look, digests)))

@@ -6,7 +6,7 @@ from typing import Any
 
 from gear.contracts.tasks import SplitInfo
 from gear.dataset.plan import Plan
-from gear.measuring.appearance_hash import Look, light_digest, look_now, look_of, read_look
+from gear.measuring.appearance_hash import Look, current_look, light_digest, look_of, read_look
 from gear.values.serial import to_json
 from gear.world.assets.asset_hash import assets_digest
 from gear.world.assets.library import AssetLibrary
@@ -52,6 +52,6 @@ def test_looks_survive_json_and_rubbish_is_none() -> None:
 
 
 def test_the_look_of_now_is_that_of_what_is_installed() -> None:
-    now = look_now(dataclasses.replace(LOOK, assets={"town10": "1", "atlantis": "2"}))
+    now = current_look(dataclasses.replace(LOOK, assets={"town10": "1", "atlantis": "2"}))
     assert now.assets == {"town10": assets_digest(AssetLibrary.for_town("town10"))}
     assert now.light == light_digest() and now.mujoco == "4.0"

@@ -11,7 +11,7 @@ import torch
 
 from gear.cli.main import main
 from gear.contracts.specs import ModelSpec
-from gear.measuring.appearance_hash import Look, look_now
+from gear.measuring.appearance_hash import Look, current_look
 from gear.networks import shipped
 from gear.networks.weights import write
 from gear.plugins.manager import catalogue
@@ -66,7 +66,7 @@ def test_reference_weights_are_shown_and_marked_when_the_look_changed(
     packages: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     blank = Look(assets={"town10": ""}, renderers=("filament",), light="", mujoco="")
-    now = look_now(blank)
+    now = current_look(blank)
     old = dataclasses.replace(now, assets={"town10": "0" * 64})
     facts = {"metrics": {"miou": 0.625}, "data": {"training": [{"scene": "billboard01"}]}}
     ship(packages, "ddrnet23_slim", look=to_json(now), look_hash=now.hash, **facts)

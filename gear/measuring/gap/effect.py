@@ -13,7 +13,7 @@ from gear.dataset.plan import Plan
 from gear.dataset.reading import Dataset
 from gear.measuring.gap.request import GapRequest
 from gear.measuring.guard import open_guard
-from gear.measuring.guarded_model import Player
+from gear.measuring.guarded_model import GuardedModel
 from gear.measuring.metric_checks import said_of
 from gear.measuring.plugin_selection import check_model, chosen_model
 from gear.measuring.shown_size import size_note
@@ -46,14 +46,14 @@ class Effect:
     """The task's metric on clean, composed and rendered pictures of the same samples.
 
     Attributes:
-        player: the model, guarded by its defense if there is one.
+        guarded: the model, guarded by its defense if there is one.
         plan: plan of the dataset.
         evaluators: evaluators by `clean`, name of the compositor, or `rendered`.
         metric: the task's main metric.
         samples: effects of the samples so far.
     """
 
-    player: Player
+    guarded: GuardedModel
     plan: Plan
     evaluators: Mapping[str, Evaluator[Any, Any]]
     metric: str
@@ -83,7 +83,7 @@ class Effect:
         assert isinstance(spec, TaskSpec)
         names = (CLEAN, *request.compositors, RENDERED)
         return Effect(
-            player=Player(chosen, guard, seed=request.seed),
+            guarded=GuardedModel(chosen, guard, seed=request.seed),
             plan=dataset.plan,
             evaluators={name: dataset.task.evaluator() for name in names},
             metric=spec.metric.rpartition(".")[2],
@@ -93,7 +93,7 @@ class Effect:
         """Adds one sample: its clean picture, the composed ones and the rendered one."""
         alone: dict[str, Metrics] = {}
         for name, sample in {CLEAN: clean, **shown}.items():
-            (answer,) = self.player.play([sample.images], [index])
+            (answer,) = self.guarded.predict([sample.images], [index])
             alone[name] = said_of(self.plan, self.evaluators[name].update(sample, answer.prediction), "update")
         before = alone.pop(CLEAN)
         change = {

@@ -18,7 +18,7 @@ from gear.dataset.sidecar import dump_json, load_json
 from gear.dataset.store import check_output
 from gear.measuring.dataset_run import evaluate_row
 from gear.measuring.guard import Guard, open_guard
-from gear.measuring.guarded_model import Player
+from gear.measuring.guarded_model import GuardedModel
 from gear.measuring.notes import grouped
 from gear.measuring.open_datasets import opened, row_names
 from gear.measuring.plugin_selection import chosen_model
@@ -129,10 +129,10 @@ def run_evaluate(request: EvaluateRequest, callbacks: Callbacks) -> EvaluateRepo
     guard = open_guard(request.guard, [chosen], task, on_fit_progress=callbacks.on_fit_progress)
     root, learnt = request.folder(task), guard.calibration
     check_output(root, "write the evaluation into a folder of its own")
-    player = Player(chosen, guard, seed=request.seed)
+    guarded = GuardedModel(chosen, guard, seed=request.seed)
     facts = {
         "task": datasets[0].plan.task,
-        "model": chosen.facts() | {"weights_sha256": player.weights_sha256},
+        "model": chosen.facts() | {"weights_sha256": guarded.weights_sha256},
         "defense": None if guard.defense is None else guard.defense.facts(),
         "calibration": learnt.facts(),
         **learnt.counted(),
@@ -140,7 +140,7 @@ def run_evaluate(request: EvaluateRequest, callbacks: Callbacks) -> EvaluateRepo
     }
     with alone_at_work(root):
         _begin(root, facts)
-        rows = _measured(request, datasets, names, player, callbacks)
+        rows = _measured(request, datasets, names, guarded, callbacks)
         said = [note for one in datasets for note in (size_note(chosen, one), drive_note(one), learnt.note(one))]
         more = {
             "reports": list(request.reports),
@@ -148,7 +148,7 @@ def run_evaluate(request: EvaluateRequest, callbacks: Callbacks) -> EvaluateRepo
                 name: one.facts() for name, one in rows[0].scorer.reports.items() if one.plugin is not None
             },
             "intervals": INTERVALS,
-            "versions": _versions(player),
+            "versions": _versions(guarded),
             "notes": grouped([*learnt.doubts(), *said]),
         }
         found = EvaluateReport(
@@ -167,16 +167,16 @@ def _measured(
     request: EvaluateRequest,
     datasets: Sequence[Dataset[Any]],
     names: Sequence[str],
-    player: Player,
+    guarded: GuardedModel,
     callbacks: Callbacks,
 ) -> list[Measured]:
     """Runs the model over the datasets, one after the other."""
     done = _counter(callbacks.on_progress, sum(len(one) for one in datasets))
     rows = []
     for dataset, name in zip(datasets, names, strict=True):
-        scorer = Scorer(dataset, request.folder(dataset.plan.task["name"]), name, request.reports, player.plugin)
-        batch = request.batch or player.usual_batch(dataset)
-        row = evaluate_row(dataset, scorer, player, batch=batch, workers=request.workers, done=done)
+        scorer = Scorer(dataset, request.folder(dataset.plan.task["name"]), name, request.reports, guarded.plugin)
+        batch = request.batch or guarded.usual_batch(dataset)
+        row = evaluate_row(dataset, scorer, guarded, batch=batch, workers=request.workers, done=done)
         scorer.finish(row.notes)
         for problem in row.damaged:
             callbacks.on_warning(f"{problem}; the sample was predicted again")
@@ -238,9 +238,9 @@ def _counter(on_progress: Progress, total: int) -> Callable[[], None]:
     return done
 
 
-def _versions(player: Player) -> Json:
+def _versions(guarded: GuardedModel) -> Json:
     packages = {"mujoco-gear": "gear", "numpy": "numpy"}
     versions = {name: importlib.metadata.version(package) for package, name in packages.items()}
     if "torch" in sys.modules:
         versions["torch"] = str(sys.modules["torch"].__version__)
-    return versions | {"python": platform.python_version(), "device": str(getattr(player.model, "device", "cpu"))}
+    return versions | {"python": platform.python_version(), "device": str(getattr(guarded.model, "device", "cpu"))}
