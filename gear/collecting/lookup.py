@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from gear.collecting.patch_sources import PatchSet, resolve_patch
 from gear.config.collection import CollectionConfig, SplitConfig, WeatherConfig
@@ -176,7 +176,7 @@ def find_weather(config: WeatherConfig) -> Weather:
         raise UnknownNameError("weather", config.preset, PRESETS)
     changes: dict[str, Any] = {
         field.name: getattr(config, field.name)
-        for field in dataclasses.fields(config)
+        for field in dataclasses.fields(cast(Any, config))  # mypy sees no dataclass behind its decorator
         if field.name != "preset" and not holds_places(field) and getattr(config, field.name) is not None
     }
     preset = PRESETS[config.preset]

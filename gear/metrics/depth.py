@@ -231,11 +231,11 @@ def _sums_of_piece(truth_m: FloatImage, found_m: FloatImage) -> _Sums:
     )
 
 
-def _sum(values: Array) -> float:
+def _sum(values: npt.NDArray[np.floating[Any]]) -> float:
     return float(np.add.reduce(values, dtype=np.float64))
 
 
-def _sum_of_squares(values: Array) -> float:
+def _sum_of_squares(values: npt.NDArray[np.floating[Any]]) -> float:
     return float(np.add.reduce(np.square(values, dtype=np.float64)))
 
 
