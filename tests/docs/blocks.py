@@ -51,8 +51,9 @@ class Block:
 
 
 def pages() -> list[Path]:
-    """Every document that a user reads: README, CONTRIBUTING, the README of `authoring`, the pages of the site."""
-    own = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "authoring/README.md"]
+    """Every document that a user reads: the READMEs, CONTRIBUTING, the pages of the site."""
+    own = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "authoring/README.md", ROOT / "weights/README.md"]
+    own += [*sorted(ROOT.glob("examples/*/README.md")), ROOT / "weights/gear_weights/patches/README.md"]
     site = [path for path in DOCS.rglob("*.md") if not {"generated", "_build"} & set(path.relative_to(DOCS).parts)]
     return [*(path for path in own if path.is_file()), *sorted(site)]
 
