@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Patch:
-    """One printed patch.
+    """One optimised patch.
 
     Attributes:
-        name: `patch_0`, `patch_1`, …, for the surface of the same number.
+        name: `patch_0`, `patch_1`, …; the number is that of its surface.
         rgb: (H, W, 3) float32, sRGB in 0..1.
     """
 
@@ -29,7 +29,9 @@ class Patch:
 
 
 def surface_of(name: str) -> int:
-    """The surface that a patch's name says, by which patches are in order: 10 for `patch_10`; -1 if it says none."""
+    """The number of the surface in a patch's name: 10 for `patch_10`; -1 where the name has no number. Patches are
+    sorted by it.
+    """
     number = name.rpartition("_")[2]
     return int(number) if number.isdecimal() else -1
 
@@ -40,7 +42,7 @@ class Budget:
 
     Attributes:
         steps: optimisation steps.
-        queries: forward passes, for attacks without gradients.
+        queries: forward passes of black-box attacks; None for no limit.
     """
 
     steps: int
@@ -48,12 +50,19 @@ class Budget:
 
 
 class Compositor(Protocol):
-    """Puts patches into pictures, differentiably."""
+    """Puts patches into the pictures of samples, differentiably with respect to the patches."""
 
     def compose(self, patches: Sequence[Tensor], samples: Sequence[int], view: str) -> Tensor:
-        """(B, 3, H, W) pictures in 0..1 of the samples with the patches on their surfaces.
+        """Pictures of some samples with the patches on their surfaces.
 
-        A patch is (3, h, w) for all samples, or (B, 3, h, w) with one look for each; values in 0..1.
+        Args:
+            patches: one for each surface, values in 0..1: (3, h, w), or (B, 3, h, w) with another appearance for each
+                sample.
+            samples: B numbers of samples in the dataset.
+            view: name of the camera.
+
+        Returns:
+            (B, 3, H, W) pictures in 0..1.
         """
         ...
 
@@ -63,10 +72,10 @@ State = Mapping[str, npt.NDArray[Any]]
 
 
 class Watch(Protocol):
-    """Looks on while an attack works: progress, curves, checkpoints, early stopping."""
+    """Observes an attack while it works, for progress, curves, checkpoints and early stopping."""
 
     def resume(self) -> State | None:
-        """The last state that an earlier run of the same attack left behind; None for a fresh start."""
+        """The last state that an interrupted run of the same attack reported; None for a fresh start."""
         ...
 
     def step(
@@ -76,13 +85,16 @@ class Watch(Protocol):
         patches: Callable[[], tuple[Patch, ...]],
         state: Callable[[], State],
     ) -> bool:
-        """Told after every step; True asks the attack to end now.
+        """Called after every step.
 
         Args:
             done: steps so far.
-            values: what is worth a curve: terms, losses, norms.
-            patches: gives the patches as they are now; called only when they are wanted.
-            state: gives the state to resume from, likewise; empty where the attack cannot be resumed.
+            values: scalars for curves, by name: terms, losses, norms.
+            patches: returns the current patches; called when they are needed.
+            state: returns the state to resume from; an empty mapping where the attack cannot be resumed.
+
+        Returns:
+            Whether the attack should stop now.
         """
         ...
 

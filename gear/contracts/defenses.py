@@ -1,4 +1,4 @@
-"""The defense protocol."""
+"""The defense protocol: a defense cleans pictures, detects patches, or both, in front of a model."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class DefenseResult:
-    """What a defense makes of one sample.
+    """What a defense returns for one sample.
 
     Attributes:
-        views: cleaned pictures by camera name, shapes and dtypes as they came.
-        mask: where the patch is believed to be, by camera name, (H, W) float32 in 0..1, or None.
-        score: how sure the defense is that there is an attack, in 0..1, or None.
+        views: cleaned (H, W, 3) uint8 pictures by camera name, of the shapes that came in.
+        mask: (H, W) float32 probabilities in 0..1 that a pixel belongs to a patch, by camera name; None where the
+            defense finds no patches.
+        score: confidence in 0..1 that the sample is attacked; None where the defense gives none.
     """
 
     views: Mapping[str, UInt8Image]
@@ -32,7 +33,7 @@ class DefenseResult:
 
 
 class Defense(Protocol):
-    """Guards a model. Holds no state between calls but what `fit` returns."""
+    """Guards a model. A defense holds no state between calls; what it learns is what `fit` returns."""
 
     def fit(
         self,
@@ -41,41 +42,61 @@ class Defense(Protocol):
         model: Model | None,
         rng: np.random.Generator,
     ) -> Any:
-        """Calibrates on samples; returns the state for `apply`, None where there is nothing to learn."""
+        """Learns from calibration samples.
+
+        Args:
+            clean: samples without a patch, (H, W, 3) uint8 pictures by camera name.
+            patched: the same scenes with a patch; empty where the user gave none.
+            model: the guarded model; None where the spec needs none.
+            rng: of all random choices.
+
+        Returns:
+            The state that `apply` receives; None where there is nothing to learn.
+        """
         ...
 
     def apply(
         self, views: Mapping[str, UInt8Image], model: Model | None, state: Any, rng: np.random.Generator
     ) -> DefenseResult:
-        """Cleans one sample; never writes to its input."""
+        """Cleans one sample.
+
+        Args:
+            views: (H, W, 3) uint8 pictures by camera name; never written to.
+            model: the guarded model; None where the spec needs none.
+            state: what `fit` returned.
+            rng: of all random choices.
+        """
         ...
 
     def forward(self, views: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The cleaning in torch, for attacks that know of the defense.
+        """The cleaning in torch, for attacks that take the defense into account.
 
-        (B, 3, H, W) float pictures in 0..1 to the same. Its values are those of `apply` up to rounding; its gradient is
-        exact where the spec says `differentiable`, a stand-in where it says `surrogate`.
+        Takes and returns (B, 3, H, W) float pictures in 0..1 by camera name. Values are those of `apply` up to
+        rounding. The gradient is exact where the spec declares `differentiable`, a declared substitute where it
+        declares `surrogate`.
 
         Raises:
-            ValueError: the spec says `none`, or the defense is `Taught`.
+            ValueError: the spec declares `none`, or the defense is `Taught`.
         """
         ...
 
     def wrap(self, model: Model) -> Model:
-        """The model inside the defense, for defenses of several passes; others return it as it is."""
+        """A model that runs the given one inside, for defenses of several passes; other defenses return the model
+        itself.
+        """
         ...
 
 
 @runtime_checkable
 class Taught(Protocol):
-    """A defense whose cleaning in torch needs the model, or what `fit` made of it."""
+    """A defense whose cleaning in torch depends on the model, or on what `fit` learnt."""
 
     def forward_taught(self, views: Mapping[str, Tensor], model: Model, state: Any) -> Mapping[str, Tensor]:
-        """As `Defense.forward`, which attacks do not call where there is this.
+        """As `Defense.forward`; attacks call this method of a `Taught` defense in its place.
 
         Args:
             views: (B, 3, H, W) float pictures in 0..1 by camera name.
-            model: that is guarded; its parameters may need no gradient.
+            model: the guarded model; its parameters need no gradient.
             state: what `fit` returned for this model.
         """
         ...

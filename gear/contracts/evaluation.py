@@ -1,6 +1,6 @@
-"""What a task may offer beyond `Task`, so that evaluations of it can be taken up again, masked and reported on.
+"""Optional protocols of tasks and evaluators: kept predictions, masked ground truth, reports, quick intervals.
 
-Each protocol is optional and looked for by its methods; gear's own tasks come in by the same door as everybody's.
+`isinstance` with these runtime-checkable protocols decides what a task or an evaluator can do.
 """
 
 from __future__ import annotations
@@ -27,84 +27,99 @@ Spread = Mapping[str, npt.NDArray[np.float64]]
 
 @runtime_checkable
 class KeepsPredictions(Protocol):
-    """A task whose predictions become files, in its format's own result layout.
+    """A task whose predictions are stored as files, in the result layout of its format.
 
-    Without it an evaluation writes metrics alone, and one that was stopped predicts every sample anew.
+    An evaluation of another task stores metrics alone, and one that was interrupted predicts every sample again.
     """
 
     def encode_prediction(self, sample: Any, prediction: Any, info: SplitInfo) -> Encoded:
-        """One sample's own result files, relative to the folder of predictions, and facts (JSON)."""
+        """The result files of one sample, by path relative to the folder of predictions, with facts as JSON."""
         ...
 
     def decode_prediction(self, root: Path, sample: Any, facts: Json, info: SplitInfo) -> Any:
-        """The inverse of `encode_prediction`, to the last bit."""
+        """Reads a prediction back: the exact inverse of `encode_prediction`."""
         ...
 
     def finalise_predictions(self, facts: Sequence[tuple[Any, Json]], info: SplitInfo) -> Mapping[str, bytes]:
-        """The split's result files, from each sample's record and facts, in order of index."""
+        """The result files of a split, such as COCO's list of detections.
+
+        Args:
+            facts: scene record and facts of each sample, in order of index.
+            info: names and seed of the split.
+        """
         ...
 
 
 @runtime_checkable
 class Maskable(Protocol):
-    """A task whose ground truth can be made silent in a part of the picture."""
+    """A task whose ground truth can be removed from a part of the picture, such as the patch."""
 
     def without(self, sample: Any, masks: Masks) -> Any:
-        """The sample, whose ground truth says nothing where the masks of its cameras are true.
+        """The sample without ground truth where the masks are True; its evaluator ignores predictions there.
 
-        The evaluator then ignores what is predicted there.
+        Args:
+            sample: of the task; not changed.
+            masks: (H, W) bool by camera name.
         """
         ...
 
 
 @runtime_checkable
 class Reports(Protocol):
-    """A task with further metrics beside its evaluator."""
+    """A task that has further metrics in addition to its evaluator."""
 
     def reports(self) -> Mapping[str, Evaluator[Any, Any]]:
-        """Fresh ones by name; `reference` is what a shipped network is held to."""
+        """Fresh, empty evaluators by name. `reference` holds the metrics that the cards of shipped weights state."""
         ...
 
 
 @runtime_checkable
 class Resampled(Protocol):
-    """An evaluator that has a quicker way to its metrics over chosen samples than merging one evaluator each."""
+    """An evaluator that computes its metrics over chosen samples faster than by merging one evaluator for each
+    sample.
+    """
 
     def resampled(self, draws: Draws) -> Spread:
-        """Metrics as if the chosen samples had been gathered, numbered in order of `update` from 0; NaN where nothing
-        counts.
+        """Metrics as if the chosen samples had been gathered; samples are numbered from 0 in the order of `update`.
 
-        May leave metrics out: these get no interval.
+        NaN where nothing counts. Metrics that are left out get no interval.
         """
         ...
 
 
 @runtime_checkable
 class Additive(Protocol):
-    """An evaluator whose metrics follow from sums over pictures: merging is adding."""
+    """An evaluator whose metrics are functions of sums over pictures, so that merging is addition."""
 
     def totals(self) -> Mapping[str, npt.NDArray[Any]]:
-        """The sums, by names and with shapes that are always the same."""
+        """The sums by name; names and shapes are the same for all evaluators of a class."""
         ...
 
     def metrics(self, totals: Mapping[str, npt.NDArray[Any]]) -> Spread:
-        """What `result` would say of sums with an axis of length R in front: (R,) each, NaN where nothing counts."""
+        """The metrics of R sets of sums at once.
+
+        Args:
+            totals: sums by name, as `totals` gives them, with an additional first axis of length R.
+
+        Returns:
+            (R,) values by metric, equal to those of `result`; NaN where nothing counts.
+        """
         ...
 
 
 @runtime_checkable
 class Limited(Protocol):
-    """An evaluator some of whose metrics stay below 1 on few samples, however good the predictions are."""
+    """An evaluator with metrics that stay below 1 for few samples even if all predictions are perfect."""
 
     def ceilings(self) -> Mapping[str, float]:
-        """What perfect predictions of everything gathered would come to, for the metrics where that is less than 1."""
+        """The metrics that perfect predictions of the gathered samples would reach, for those below 1."""
         ...
 
 
 @runtime_checkable
 class Ranged(Protocol):
-    """An evaluator that says between which values its metrics lie, so that intervals end there."""
+    """An evaluator that states the ranges of its metrics; intervals are cut at their ends."""
 
     def range_of(self, metric: str) -> tuple[float, float]:
-        """Least and largest value that a metric can have; infinite where there is no such end."""
+        """Least and largest possible value of a metric; infinite where there is none."""
         ...

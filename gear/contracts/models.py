@@ -1,9 +1,9 @@
-"""The model protocol. torch appears in types alone.
+"""The model protocol. torch is imported for type checkers alone.
 
-What `forward` gives without targets is named the same for every network of a task, so that losses and attacks need not
-know networks: `logits` (B, C, H, W) for semantic segmentation, at the picture's size, C = 19 Cityscapes train ids or 34
-label ids; `depth_m` (B, H, W) for depth, metres, at the picture's size. Detectors and stereo networks give their heads'
-raw outputs, one tensor a name with the batch in front. Their losses are what attacks work on.
+Outputs of `forward` without targets have the same names for every network of a task, so that losses and attacks need
+not know networks. Semantic segmentation: `logits` (B, C, H, W) at the picture's size, C = 19 Cityscapes train ids or 34
+label ids. Depth: `depth_m` (B, H, W) in metres at the picture's size. Detectors and stereo networks give the raw
+outputs of their heads by name, batch first; attacks maximise their losses.
 """
 
 from __future__ import annotations
@@ -19,24 +19,30 @@ if TYPE_CHECKING:
 
 
 class Model(Protocol):
-    """A network behind one face."""
+    """A network that predicts, gives losses and gradients, and exposes feature maps."""
 
     def predict(self, views: Mapping[str, UInt8Image]) -> Any:
-        """The task's prediction for one sample.
+        """The task's prediction for one sample. Ground truth is never passed in.
 
-        (H, W, 3) uint8 sRGB pictures by camera name. Never sees ground truth.
+        Args:
+            views: (H, W, 3) uint8 sRGB pictures by camera name.
         """
         ...
 
     def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
-        """Outputs of a batch, or losses where `targets` are given.
+        """Outputs of a batch, or its losses where targets are given; differentiable with respect to the pictures.
 
-        `views` holds (B, 3, H, W) float pictures in 0..1 by camera name; everything is differentiable to them.
+        Args:
+            views: (B, 3, H, W) float pictures in 0..1 by camera name.
+            targets: the batch's samples; None for outputs.
+
+        Returns:
+            Tensors with the batch first, by name; or scalar losses by name.
         """
         ...
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """Modules whose outputs are the named feature maps."""
+        """Modules whose outputs are feature maps, by the names that the spec declares."""
         ...
 
 
@@ -63,17 +69,17 @@ class BatchPredictor(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recipe:
-    """How a network is trained unless one says otherwise.
+    """Defaults for training a network.
 
     Attributes:
         optimiser: AdamW, or SGD with momentum 0.9.
-        learning_rate: at its highest; it warms up and then falls with a cosine.
+        learning_rate: its maximum; it rises at the start and falls along a cosine.
         weight_decay: of weights; biases and normalisation have none.
-        batch: samples a step.
+        batch: samples per step.
         epochs: passes over the data.
         crop_px: height and width of random crops; None trains on whole pictures.
         scales: range of random resizing before the crop; (1, 1) for none.
-        gradient_norm: gradients are clipped to this; 0 for not at all.
+        gradient_norm: limit of the gradient's norm; 0 for none.
     """
 
     optimiser: Literal["adamw", "sgd"] = "adamw"
@@ -88,13 +94,13 @@ class Recipe:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PublishedWeights:
-    """Weights that others publish; nothing is downloaded.
+    """Weights that their authors publish; gear downloads nothing.
 
     Attributes:
-        data: what they were trained on.
-        source: where a user finds them.
-        licence: of the weights, as far as their authors say.
-        size_mb: of the file.
+        data: training data.
+        source: where a user finds the file.
+        licence: of the weights, as far as their authors state it.
+        size_mb: of the file, 10^6 bytes.
     """
 
     data: str

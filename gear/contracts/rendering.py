@@ -1,4 +1,4 @@
-"""What a renderer is given and what it gives back."""
+"""The renderer protocol: what a renderer is given and what it returns."""
 
 from __future__ import annotations
 
@@ -44,13 +44,13 @@ class Stage:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RendererInfo:
-    """Who renders. Written into every manifest.
+    """Renderer, graphics driver and device, as every manifest notes them.
 
     Attributes:
         name: `raster`, `filament` or `classic`.
         backend: graphics interface: `vulkan`, `osmesa`, `egl`.
-        driver: what the driver calls itself, with version.
-        device: what the device calls itself.
+        driver: name and version that the driver reports.
+        device: name that the device reports.
         is_software: whether the CPU renders.
     """
 
@@ -63,13 +63,13 @@ class RendererInfo:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RawView:
-    """What a renderer returns for one camera; aligned arrays, row 0 at the top.
+    """What a renderer returns for one camera: aligned arrays, row 0 at the top.
 
     Attributes:
-        linear_rgb: (H, W, 3) uint16, 0..`LINEAR_FULL_SCALE`, linear in every surface's albedo; None where colour was
-            not asked for.
-        depth_m: (H, W) float32 planar z, NaN for nothing.
-        geom_id: (H, W) int32, -1 for nothing.
+        linear_rgb: (H, W, 3) uint16, 0..`LINEAR_FULL_SCALE`, linear in the albedo of every surface; None where no
+            colour was requested.
+        depth_m: (H, W) float32 distance along the optical axis; NaN where there is nothing.
+        geom_id: (H, W) int32 MuJoCo geom ids; -1 where there is nothing.
     """
 
     linear_rgb: UInt16Image | None
@@ -78,20 +78,17 @@ class RawView:
 
 
 def has_own_colour(model: mujoco.MjModel) -> npt.NDArray[np.bool_]:
-    """(ngeom,) whether a geom's own rgba colours it, and not its material's: as MuJoCo draws them."""
+    """(ngeom,) bool: whether a geom's own rgba colours it in MuJoCo, and not that of its material."""
     is_said = (model.geom_rgba != np.array(NO_OWN_RGBA, np.float32)).any(axis=1)
     return np.asarray(is_said | (model.geom_matid < 0), np.bool_)
 
 
 class Renderer(Protocol):
-    """One renderer for one compiled model.
-
-    Frames depend on the stage and the camera alone, never on what was rendered before.
-    """
+    """One renderer of one compiled model. A frame depends on stage and camera alone, never on earlier frames."""
 
     @property
     def info(self) -> RendererInfo:
-        """Who renders."""
+        """Renderer, graphics driver and device."""
         ...
 
     def render(
@@ -102,17 +99,17 @@ class Renderer(Protocol):
         colour: bool = True,
         shapes: Sequence[RawView] | None = None,
     ) -> tuple[RawView, ...]:
-        """One raw view a camera, in order, all of the same moment.
+        """One raw view for each camera, in order, all of the same moment.
 
         Args:
-            stage: what is seen.
-            cameras: who looks.
-            colour: whether it is asked for.
-            shapes: views of these cameras of a stage that differs in paint and faces alone: their depth and ids are
-                taken over, which saves two passes.
+            stage: the posed model.
+            cameras: resolved cameras of the scene.
+            colour: whether `linear_rgb` is rendered.
+            shapes: views of these cameras of a stage that differs in paint and faces alone; their depth and ids are
+                reused, which saves two passes.
         """
         ...
 
     def close(self) -> None:
-        """Frees the context; safe to call twice."""
+        """Releases the graphics context; may be called twice."""
         ...

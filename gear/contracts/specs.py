@@ -1,4 +1,4 @@
-"""Specs: what a plugin offers, as data. Cheap to make, nothing heavy imported; `build` imports what it needs."""
+"""Specs: what a plugin offers, as data. A spec is quick to make and imports nothing heavy; `build` imports the rest."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ Gradient = Literal["differentiable", "surrogate", "none"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spec(Generic[ConfigT, ProductT]):
-    """What every plugin says of itself.
+    """What every plugin declares.
 
     Attributes:
-        name: lower case, `[a-z][a-z0-9_]*`; how users ask for it.
+        name: by which users ask for it; matches `[a-z][a-z0-9_]*`.
         summary: one line.
-        config: frozen dataclass of its options, every one with a default.
-        build: makes the product from the options; heavy imports belong inside it.
-        protocol: the protocol version that it was written for.
+        config: frozen dataclass of the options, all with defaults.
+        build: makes the product from the options; imports what is heavy.
+        protocol: version of the plugin protocol that it was written for.
     """
 
     name: str
@@ -47,16 +47,15 @@ def no_notes(_options: Any) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TaskSpec(Spec[ConfigT, Task[Any, Any]]):
-    """A task: a dataset format with its ground truth.
+    """A task: a dataset format with its ground truth and metric.
 
     Attributes:
-        views: names of the cameras of its default rig, the reference first.
+        views: camera names of the default rig, the reference camera first.
         layout: one line on the files that it writes.
-        original_name: what CARLA-GeAR calls it in its configs and JSON, or "" if it does not know it.
+        original_name: name in CARLA-GeAR's configuration files and JSON; "" where CARLA-GeAR does not have the task.
         metric: the evaluator's metric by which training chooses among checkpoints, or one of a report's as
             `<report>.<metric>`; "" chooses by the loss.
         less_is_better: whether that metric is an error.
-        notes: from the options, what the user may not have meant: lines that are shown once when collecting begins.
     """
 
     views: tuple[str, ...]
@@ -72,23 +71,23 @@ class ModelSpec(Spec[ConfigT, Model]):
     """A network.
 
     Attributes:
-        tasks: names of the tasks that it can do.
-        views: names of the cameras that it looks at.
+        tasks: names of its tasks.
+        views: names of the cameras whose pictures it takes.
         taps: names of the feature maps that it exposes.
-        has_gradients: whether `forward` is differentiable to the pixels.
-        recipe: how it is trained; None where `gear train` cannot.
-        published: weights that others publish for it.
-        normalisation: one line on what its graph wants of a picture in 0..1.
-        parameters: how many its graph has with default options; 0 where nobody counted.
-        input_scale: of networks with an option of this name: share of the picture's size that they run at where neither
-            the option nor the weights say.
-        needs: modules that `build` imports beside what gear itself depends on, such as `torchvision`.
-        convert: makes of a published file's tensors, by key, those of `module().state_dict()`; `gear weights convert`
-            calls it after it has taken the state out of the checkpoint and `module.` off its keys, and checks the
-            result strictly. None where published files hold the network's own keys. Imports torch inside, if at all.
-        starts: what `gear train --init NAME` can begin with beside random weights and files: by name (`imagenet` is the
-            customary one), a function that is given the built model and puts the weights into it. It raises a
-            GearError that says which package to install where they are not there. Imports torch inside.
+        has_gradients: whether `forward` is differentiable with respect to the pixels.
+        recipe: training defaults; None where `gear train` cannot train it.
+        published: weights that its authors publish.
+        normalisation: one line on how its graph normalises a picture in 0..1.
+        parameters: number of its parameters with default options; 0 for unknown.
+        input_scale: for networks with an option of this name: the factor by which pictures are resized before the
+            network where neither the option nor the weights state one.
+        needs: modules that `build` imports and that are no dependencies of gear, such as `torchvision`.
+        convert: function from the tensors of a published file, by key, to those of `module().state_dict()`. `gear
+            weights convert` calls it on each candidate state of a checkpoint and checks the result strictly. None where
+            published files have the network's own keys. Imports torch inside, if at all.
+        starts: further choices of `gear train --init NAME`, in addition to random weights and files: by name (usually
+            `imagenet`), a function that loads weights into the built model. It raises a GearError that names the
+            package to install where the weights are missing. Imports torch inside.
     """
 
     tasks: tuple[str, ...]
@@ -110,11 +109,11 @@ class AttackSpec(Spec[ConfigT, Attack]):
     """An attack.
 
     Attributes:
-        tasks: tasks that it can attack; empty for any.
+        tasks: names of the tasks that it can attack; empty for any.
         needs_gradients: whether the model must have gradients.
-        needs_probes: whether the dataset must carry the probes of the exact compositor.
-        max_surfaces: how many surfaces it can optimise jointly.
-        is_control: whether it looks at no model: attacks are measured against it.
+        needs_probes: whether the dataset must have the probes of the exact compositor.
+        max_surfaces: number of surfaces that it can optimise jointly.
+        is_control: whether it uses no model, so that attacks are compared with it.
     """
 
     tasks: tuple[str, ...] = ()
@@ -129,12 +128,12 @@ class DefenseSpec(Spec[ConfigT, Defense]):
     """A defense.
 
     Attributes:
-        tasks: tasks that it can guard; empty for any.
-        outputs: what it gives: cleaned images, a mask of the patch, a score of being attacked.
+        tasks: names of the tasks that it can guard; empty for any.
+        outputs: what it returns: cleaned `images`, a `mask` of the patch, a `score` of being attacked.
         gradient: how gradients pass it.
-        taps: feature maps that it needs of the model.
+        taps: names of the model's feature maps that it needs.
         needs_calibration: whether `fit` must be called before `apply`.
-        needs_model: whether `apply` must be given the model; so it is where `taps` are asked for.
+        needs_model: whether `apply` needs the model; defenses with `taps` do.
     """
 
     tasks: tuple[str, ...] = ()

@@ -1,4 +1,4 @@
-"""The task protocol: a rig, a ground truth, files and back, a metric."""
+"""The task protocol: a task places cameras, measures ground truth, writes and reads files, and brings a metric."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from gear.values.serial import Json
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Sample:
-    """What every task's sample has; tasks add their own fields.
+    """What the samples of every task have; a task adds fields of its own in a subclass.
 
     Attributes:
-        record: the scene, in full.
-        images: by camera name, (H, W, 3) uint8, RGB in sRGB, row 0 at the top.
-        surfaces: each surface in each view.
+        record: the complete scene.
+        images: (H, W, 3) uint8 pictures in sRGB by camera name, row 0 at the top.
+        surfaces: visibility and corners of each patch surface in each view.
     """
 
     record: SceneRecord
@@ -41,13 +41,14 @@ CONTROLS = (NO_PATCH, RANDOM_PATCH)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SplitInfo:
-    """The split that a sample belongs to.
+    """Names and seed of the split that a sample belongs to.
 
     Attributes:
         town, scene, split: names.
         seed: of the split.
-        patch_label: `none`, `random`, or the patch's name and hash.
-        created: date of the dataset's format text (ISO, fixed by the config, never the clock).
+        patch_label: `none`, `random`, or name and hash of the patch.
+        created: ISO date that the dataset's format text states; the configuration fixes it, so that the same
+            configuration gives the same bytes.
     """
 
     town: str
@@ -60,12 +61,11 @@ class SplitInfo:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Encoded:
-    """A sample as files.
+    """A sample, or a prediction, as files.
 
     Attributes:
-        files: bytes by path relative to the dataset's root, `/` between folders.
-        facts: what of the sample goes into the sidecar, so that `decode` and `finalise` need no second computation;
-            JSON.
+        files: bytes by path relative to the dataset's root, with `/` between folders.
+        facts: JSON that `decode` and `finalise` need later, so that nothing is computed twice; stored in the sidecar.
     """
 
     files: Mapping[str, bytes]
@@ -74,11 +74,11 @@ class Encoded:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Auxiliary:
-    """A file that a sample owns beside its task's, such as a probe.
+    """A file that a sample owns in addition to those of its task, such as a probe.
 
     Attributes:
-        path: relative to the dataset's root; its hash is among the sidecar's `files`.
-        facts: what is needed to read it; JSON.
+        path: relative to the dataset's root; the file's hash is among `files` of the sidecar.
+        facts: JSON that is needed to read the file.
     """
 
     path: str
@@ -87,14 +87,14 @@ class Auxiliary:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Sidecar:
-    """What is kept beside each sample: `gear/<split>/samples/<index>.json`.
+    """What gear stores about each sample in `gear/<split>/samples/<index>.json`.
 
     Attributes:
-        record: the scene.
-        surfaces: measured surfaces.
-        facts: the task's own.
-        files: sha256 by relative path.
-        auxiliary: further files by name; empty unless they were asked for.
+        record: the complete scene.
+        surfaces: visibility and corners of each patch surface in each view.
+        facts: what the task's `encode` returned.
+        files: sha256 of each of the sample's files, by path relative to the dataset's root.
+        auxiliary: further files by name; empty unless the collection asked for them.
     """
 
     record: SceneRecord
@@ -105,59 +105,75 @@ class Sidecar:
 
 
 class Evaluator(Protocol[SampleT_contra, PredictionT_contra]):
-    """A metric over a data set, gathered sample by sample."""
+    """A metric over a dataset that gathers samples one by one."""
 
     def update(self, sample: SampleT_contra, prediction: PredictionT_contra) -> Mapping[str, float]:
-        """Takes one sample in; returns its own metrics where the metric has any for a single sample."""
+        """Takes one sample in.
+
+        Returns:
+            Metrics of this sample alone, by name; empty where a single sample has none.
+        """
         ...
 
     def merge(self, other: Any) -> None:
-        """Takes in what another evaluator of the same kind has gathered."""
+        """Takes in what another evaluator of the same class has gathered."""
         ...
 
     def result(self) -> Mapping[str, float]:
-        """The metrics over everything gathered; NaN where nothing counts."""
+        """The metrics over all gathered samples, by name; NaN where nothing counts."""
         ...
 
 
 class Task(Protocol[SampleT, PredictionT]):
-    """A dataset format with its ground truth. Holds options only, no state between calls.
+    """A dataset format with its ground truth. A task holds its options and no state between calls.
 
-    `encode` and `finalise` are pure: they return bytes, and the dataset room writes them atomically, hashes and
-    resumes.
+    `encode` and `finalise` return bytes and write nothing: `gear.dataset` writes, hashes and resumes.
     """
 
     def rig(self) -> Rig:
-        """The cameras, on the ego car."""
+        """The cameras and where they are mounted on the ego car."""
         ...
 
     def ground_truth(self, frame: Frame, record: SceneRecord) -> SampleT:
-        """Measures one frame."""
+        """Measures the ground truth of one rendered frame.
+
+        Args:
+            frame: colour, depth, ids and objects of all views.
+            record: the scene that the frame shows.
+        """
         ...
 
     def encode(self, sample: SampleT, info: SplitInfo) -> Encoded:
-        """The sample's own files."""
+        """The files of one sample, without index files that several samples share."""
         ...
 
     def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
-        """The split's index files, by path relative to the root, from the sidecars in order of index."""
+        """The index files of a split, such as COCO's JSON, by path relative to the dataset's root.
+
+        Args:
+            sidecars: of all samples of the split, in order of index.
+            info: names and seed of the split.
+        """
         ...
 
     def decode(self, root: Path, sidecar: Sidecar, info: SplitInfo) -> SampleT:
-        """Reads one sample back from its files; the inverse of `encode`."""
+        """Reads one sample back from its files: the exact inverse of `encode`.
+
+        Args:
+            root: of the dataset.
+            sidecar: of the sample.
+            info: names and seed of the split.
+        """
         ...
 
     def as_prediction(self, sample: SampleT) -> PredictionT:
-        """The ground truth as a perfect prediction, so that every evaluator can be held against itself."""
+        """The ground truth as a perfect prediction, with which evaluators are tested."""
         ...
 
     def evaluator(self) -> Evaluator[SampleT, PredictionT]:
-        """A fresh metric."""
+        """A fresh, empty evaluator of the task's metric."""
         ...
 
     def preview(self, sample: SampleT) -> Mapping[str, UInt8Image]:
-        """Pictures a person would look at, by name.
-
-        The image with its labels, boxes, depth drawn in; (H, W, 3) uint8 each.
-        """
+        """Pictures of a sample for people, with labels, boxes or depth drawn in: (H, W, 3) uint8 by name."""
         ...
