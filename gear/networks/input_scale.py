@@ -1,4 +1,4 @@
-"""The size at which networks look at pictures: what the user says, or what the weights were trained for."""
+"""The factor by which pictures are resized before a network: from the user's options, or from the weights."""
 
 from __future__ import annotations
 
@@ -22,29 +22,29 @@ def width_share(width_px: int, usual_px: int) -> float:
 
 
 class Scaled(Protocol):
-    """Options of a network that has such a size."""
+    """Options of a network with an `input_scale`."""
 
     @property
     def weights(self) -> str:
-        """See `gear.networks.options.NetworkOptions`."""
+        """As `gear.networks.options.NetworkOptions.weights`."""
         ...
 
     @property
     def input_scale(self) -> float | None:
-        """Share of the picture's width and height; None for what the weights say."""
+        """Factor by which pictures are resized before the network; None for the one of the weights."""
         ...
 
 
 def input_scale_of(options: Scaled, name: str, habit: float = 1.0) -> float:
-    """Share of the picture's width and height that network `name` looks at, above 0 and at most `LARGEST_SCALE`.
+    """The factor by which pictures are resized before network `name`: above 0 and at most `LARGEST_SCALE`.
 
     Args:
         options: of the network.
         name: of the model plugin, for the shipped weights.
-        habit: where neither the options nor the weights say.
+        habit: where neither the options nor the weights state one.
 
     Raises:
-        GearError: there are no such weights, or what they say is no such share.
+        GearError: the weights do not exist, or what they state is no such factor.
     """
     if options.input_scale is not None:
         return options.input_scale

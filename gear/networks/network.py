@@ -25,15 +25,14 @@ IMAGENET_STD = (0.229, 0.224, 0.225)
 
 
 class Network(nn.Module, ABC):
-    """A graph with its normalisation, losses and answers.
+    """A torch graph with its normalisation, losses and predictions.
 
     Attributes:
-        graph: the network itself, under official key names.
-        options: as given.
-        device: where it runs.
-        has_quick_copy: whether predictions on a CPU come from a copy of the graph that
-            `gear.networks.fused_inference` makes. Only for graphs in which nothing but its normalisation takes what a
-            convolution gives.
+        graph: the network itself, with official key names.
+        options: as the user gave them.
+        device: on which the graph runs.
+        has_quick_copy: whether predictions on a CPU use a copy of the graph that `gear.networks.fused_inference` makes.
+            Only for graphs in which the output of each convolution goes to its normalisation alone.
     """
 
     has_quick_copy: ClassVar[bool] = False
@@ -50,13 +49,13 @@ class Network(nn.Module, ABC):
         self.eval()
 
     def module(self) -> nn.Module:
-        """The graph."""
+        """The graph, whose state dict is what weights files hold."""
         return self.graph
 
     def forward(self, views: Mapping[str, Tensor], targets: Sequence[Any] | None = None) -> Mapping[str, Tensor]:
         """Outputs of a batch of (B, 3, H, W) pictures in 0..1, or its losses where the batch's samples are given.
 
-        Inputs may lie on any device; what comes out lies on the network's, in float32.
+        Inputs may be on any device; outputs are on the network's device, in float32.
         """
         if targets is None:
             return self._outputs(self.run, views)
@@ -69,7 +68,7 @@ class Network(nn.Module, ABC):
         return {name: tensor.float() for name, tensor in raw.items()}
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """Named feature maps; none unless a network says so."""
+        """Feature maps by name; none unless a subclass declares some."""
         return {}
 
     def predict(self, views: Mapping[str, UInt8Image]) -> Any:
@@ -77,7 +76,7 @@ class Network(nn.Module, ABC):
         return self.predict_many([views])[0]
 
     def predict_many(self, samples: Sequence[Mapping[str, UInt8Image]]) -> list[Any]:
-        """The task's predictions; pictures of one size go through the graph together."""
+        """The task's predictions of several samples; pictures of one size go through the graph together."""
         sizes = [sample[self._views[0]].shape[:2] for sample in samples]
         answers: list[Any] = [None] * len(samples)
         for size in dict.fromkeys(sizes):
@@ -91,10 +90,11 @@ class Network(nn.Module, ABC):
         return answers
 
     def for_predictions(self, batch: Mapping[str, Tensor]) -> Network:
-        """What says the same to rounding, sooner: on a CPU this network with a quick copy of its graph.
+        """A network that predicts the same up to rounding and faster: on a CPU, this one with a quick copy of its
+        graph.
 
         Args:
-            batch: as for `forward`; a new copy sees the first of it.
+            batch: as for `forward`; a new copy is traced with its first sample.
         """
         if not self.has_quick_copy or self.device.type != "cpu":
             return self
@@ -105,35 +105,34 @@ class Network(nn.Module, ABC):
         )
 
     def _with(self, graph: nn.Module) -> Network:
-        """This network on another graph; they share everything else."""
+        """This network with another graph; everything else is shared."""
         other = copy.copy(self)
         other._modules = self._modules | {"graph": graph}
         return other
 
     @abstractmethod
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """Named outputs of a batch of pictures in 0..1 on the network's device."""
+        """Outputs by name for pictures in 0..1 on the network's device."""
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """What `losses` is given: the outputs, unless a network has heads that only training looks at."""
+        """What `losses` takes: the outputs, or more for networks with heads that are used in training alone."""
         return self.run(pictures)
 
     def run_for_answers(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """What `answers` is given for predictions: the outputs, unless a network answers sooner from something else."""
+        """What `answers` takes: the outputs, or less for networks that predict faster from something else."""
         return self.run(pictures)
 
     @abstractmethod
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """Named numbers without dimensions, to be minimised in training."""
+        """Scalar losses by name, which training minimises."""
 
     @abstractmethod
     def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
-        """The task's predictions from the outputs of a batch of pictures of (height, width), or from what
-        `run_for_answers` gives."""
+        """The task's predictions from what `run_for_answers` returns, for pictures of (height, width)."""
 
 
 class Normalise(nn.Module):
-    """(x - mean) / std by channel; its numbers are not part of the saved state."""
+    """(x - mean) / std by channel; mean and std are not part of the saved state."""
 
     mean: Tensor
     std: Tensor
@@ -153,14 +152,16 @@ def as_batch(
 ) -> dict[str, Tensor]:
     """Pictures of one size as `Model.forward` takes them: (B, 3, H, W) float32 in 0..1 by camera name.
 
-    They go to the device, if there is one, as bytes, and become numbers there.
+    They are copied to the device, if one is given, as bytes and converted there.
     """
     stacked = {name: _channels_first([sample[name] for sample in samples]) for name in views}
     return {name: torch.from_numpy(one).to(device).float().div_(255) for name, one in stacked.items()}
 
 
 def _channels_first(pictures: Sequence[UInt8Image]) -> npt.NDArray[np.uint8]:
-    """(B, 3, H, W) in memory too: torch's CPU backward pass of small strided convolutions fails on channels last."""
+    """(B, 3, H, W) in this memory order: torch's CPU backward pass of small strided convolutions fails with channels
+    last.
+    """
     height, width, channels = size = pictures[0].shape
     stacked = np.empty((len(pictures), channels, height, width), np.uint8)
     for planes, picture in zip(stacked, pictures, strict=True):

@@ -1,4 +1,4 @@
-"""Options that every network of gear's has. No torch here: specs are cheap."""
+"""Options of all of gear's networks. torch is not imported, so that specs are quick to make."""
 
 from __future__ import annotations
 
@@ -16,15 +16,14 @@ CIRCUMSTANCES = ("weights", "device", "precision", "seed")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NetworkOptions:
-    """Where the weights come from and where the network runs.
+    """Source of the weights, device and precision.
 
     Attributes:
-        weights: `shipped` are the reference weights of the package mujoco-gear-weights, `none` are random ones from
-            `seed`; anything else is the path of a safetensors file (gear weights convert makes one of a published
-            file).
+        weights: `shipped` for the reference weights of the package mujoco-gear-weights, `none` for random ones from
+            `seed`, or the path of a safetensors file (`gear weights convert` makes one of a published file).
         device: `auto` takes a GPU where there is one.
-        precision: `bfloat16` runs what may be run so at half the precision: faster, and good enough to optimise
-            patches with; scores are reported in `float32`.
+        precision: `bfloat16` runs suitable operations at half precision, which is faster and accurate enough to
+            optimise patches; reported metrics use `float32`.
         seed: of random weights.
     """
 
@@ -39,12 +38,12 @@ LARGEST_SCALE = 4.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SegmentationOptions(NetworkOptions):
-    """Options of networks that label pixels.
+    """Options of networks for semantic segmentation.
 
     Attributes:
-        input_scale: the network runs at this share of the picture's width and height, and its logits are interpolated
-            to the picture's size. null takes what the weights were trained for, or 1 where they do not say.
-        auxiliary: whether the graph has the heads that only training looks at, as the published files do.
+        input_scale: factor by which pictures are resized before the network; logits are interpolated to the picture's
+            size. null takes the factor that the weights were trained for, or 1 where they state none.
+        auxiliary: whether the graph has the heads that are used in training alone, as published files do.
     """
 
     input_scale: float | None = None

@@ -1,4 +1,4 @@
-"""The CPU's and the GPU's habits, in one place: allocator, threads, devices, precision, random weights."""
+"""Settings of CPU and GPU in one place: allocator, threads, devices, precision, seeds of random weights."""
 
 from __future__ import annotations
 
@@ -20,15 +20,14 @@ TOP_PAD_BYTES = 256 << 20
 
 @functools.cache
 def prepare(threads: int = 0) -> None:
-    """Sets the allocator and the number of threads, once a process.
+    """Sets the allocator and the number of threads, once per process.
 
-    glibc gives large activations back to the kernel after every step and fetches them again; keeping them makes an
-    attack's step up to twice as fast. Only memory is managed otherwise, no number changes. Elsewhere than on glibc
-    nothing is done.
+    glibc returns large activations to the kernel after every step and fetches them again; keeping them makes an
+    attack's step up to twice as fast. Only memory management changes, no result. Without glibc nothing is done.
 
     Args:
-        threads: of torch's own; 0 for as many as torch would take (`OMP_NUM_THREADS`, or what was set before), but no
-            more than one a core that this process may use.
+        threads: of torch; 0 for torch's own choice (`OMP_NUM_THREADS`, or what was set earlier), but at most one for
+            each core that this process may use.
     """
     torch.set_num_threads(threads or min(torch.get_num_threads(), cores()))
     if not sys.platform.startswith("linux"):
@@ -41,7 +40,7 @@ def prepare(threads: int = 0) -> None:
 
 
 def device_of(wish: Literal["auto", "cpu", "cuda"]) -> torch.device:
-    """The device that was asked for.
+    """The torch device that an option names.
 
     Raises:
         GearError: there is no such device.
@@ -54,7 +53,7 @@ def device_of(wish: Literal["auto", "cpu", "cuda"]) -> torch.device:
 
 
 def is_quick_in_half(device: torch.device) -> bool:
-    """Whether a device has instructions for bfloat16; where it has none, it is slower than float32."""
+    """Whether a device has instructions for bfloat16; without them bfloat16 is slower than float32."""
     if device.type == "cuda":
         return bool(torch.cuda.is_bf16_supported(including_emulation=False))
     known = ("_is_avx512_bf16_supported", "_is_amx_tile_supported")
@@ -62,16 +61,16 @@ def is_quick_in_half(device: torch.device) -> bool:
 
 
 def autocast(device: torch.device, precision: Literal["auto", "float32", "bfloat16"]) -> torch.autocast:
-    """A context in which the graph runs at the precision; `auto` is torch's own."""
+    """A context in which the graph runs at a precision; `auto` leaves the choice to torch."""
     return torch.autocast(device.type, torch.bfloat16, enabled=precision == "bfloat16")
 
 
 @contextlib.contextmanager
 def seeded(seed: int) -> Iterator[None]:
-    """Layers made inside draw their first weights from `seed`; torch's own generators are as before afterwards.
+    """Inside, layers draw their first weights from `seed`; the generators of torch are restored afterwards.
 
     Raises:
-        GearError: torch has no such seed.
+        GearError: torch accepts no such seed.
     """
     if not -(2**63) <= seed < 2**64:
         raise GearError(f"seed {seed} is beyond what torch takes (-2^63 to 2^64 - 1); take a smaller one")

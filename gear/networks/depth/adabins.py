@@ -1,8 +1,9 @@
-"""AdaBins behind the model protocol.
+"""AdaBins as a gear network.
 
-Its transformer has a position encoding for at most 500 patches of 32 x 32 pixels, and needs one token more than it has
-queries. Pictures of more patches (2048 x 1024 has 2048) are made smaller, those of fewer larger, at their aspect ratio;
-the answer is brought back. KITTI's 1216 x 352 has 418 and is left alone.
+The position encoding of its transformer has room for at most 500 patches of 32 x 32 pixels, and the transformer needs
+one token more than it has queries. A picture with more patches (2048 x 1024 has 2048) is reduced, one with fewer is
+enlarged, at its aspect ratio; the depth is then resized to the picture. KITTI's 1216 x 352 has 418 patches and is not
+resized.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ OLD_NAMES = (
 
 
 class AdaBins(DepthNetwork):
-    """AdaBins: says `bin_centres_m` (B, bins) beside `depth_m`."""
+    """AdaBins (Bhat et al., CVPR 2021). Its outputs are `depth_m` and `bin_centres_m` (B, bins), in metres."""
 
     options: AdaBinsOptions
 
@@ -42,7 +43,7 @@ class AdaBins(DepthNetwork):
         self._normalise = Normalise().to(self.device).eval()
 
     def estimate(self, picture: Tensor) -> Mapping[str, Tensor]:
-        """Depth at the picture's size, and the picture's bins."""
+        """Depth at the picture's size and the picture's bins, in metres."""
         height, width = (int(side) for side in picture.shape[2:])
         seen = resized(picture, *fitting(height, width, least=self.options.queries + 1))
         half_m, centres_m = self.graph(self._normalise(seen))
@@ -50,7 +51,7 @@ class AdaBins(DepthNetwork):
         return {DEPTH: depth_m[:, 0], BINS: centres_m}
 
     def depth_losses(self, outputs: Mapping[str, Tensor], depth_m: Tensor) -> Mapping[str, Tensor]:
-        """The paper's two: scale-invariant error of the pixels, and how well the bins lie among the depths."""
+        """The paper's two losses: scale-invariant error of the pixels, and Chamfer distance between bins and depths."""
         cap_m = self.options.max_depth_m
         return {
             "silog": adabins_silog(outputs[DEPTH], depth_m, cap_m=cap_m),
@@ -67,7 +68,7 @@ class AdaBins(DepthNetwork):
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """A published state under the names of the graph."""
+    """A published state with the key names of the graph."""
     renamed = {}
     for key, tensor in state.items():
         for old, new in OLD_NAMES:

@@ -30,7 +30,7 @@ LEAST_WIDTH = 0.1
 
 
 class AdaBinsGraph(nn.Module):
-    """Encoder, decoder, and a small transformer that divides the range of depths into bins, picture by picture."""
+    """Encoder, decoder, and a small transformer that divides the depth range into bins anew for each picture."""
 
     def __init__(self, options: AdaBinsOptions) -> None:
         super().__init__()
@@ -44,10 +44,10 @@ class AdaBinsGraph(nn.Module):
         """Depth and bins.
 
         Args:
-            pictures: (B, 3, H, W), normalised, of `patches(H, W)` between queries + 1 and 500.
+            pictures: (B, 3, H, W), normalised; `patches(H, W)` must lie between queries + 1 and 500.
 
         Returns:
-            (B, 1, ceil(H / 2), ceil(W / 2)) metres, and the (B, bins) ascending centres of the bins in metres.
+            (B, 1, ceil(H / 2), ceil(W / 2)) depth in metres, and (B, bins) ascending bin centres in metres.
         """
         widths, maps = self.adaptive_bins_layer(self.decoder(self.encoder(pictures)))
         shares = self.conv_out(maps)
@@ -58,7 +58,7 @@ class AdaBinsGraph(nn.Module):
 
 
 class Encoder(nn.Module):
-    """An EfficientNet of timm's without its classifier."""
+    """An EfficientNet of timm without its classifier."""
 
     original_model: Any
 
@@ -72,12 +72,14 @@ class Encoder(nn.Module):
         self.original_model.classifier = nn.Identity()
 
     def widths(self) -> list[int]:
-        """Channels of what `forward` gives."""
+        """Channels of the five feature maps."""
         channels = {entry["module"]: entry["num_chs"] for entry in self.original_model.feature_info}
         return [*(channels[f"blocks.{index}"] for index in TAPPED), self.original_model.conv_head.out_channels]
 
     def forward(self, pictures: Tensor) -> list[Tensor]:
-        """Maps at 1/2, 1/4, 1/8, 1/16 and 1/32 of the sides; the last one before its normalisation."""
+        """Feature maps at 1/2, 1/4, 1/8, 1/16 and 1/32 of the picture's sides; the last one is taken before its
+        normalisation.
+        """
         network = self.original_model
         found = network.bn1(network.conv_stem(pictures))
         maps = []
@@ -89,7 +91,7 @@ class Encoder(nn.Module):
 
 
 class Decoder(nn.Module):
-    """Four steps up, each with a map of the encoder beside it."""
+    """Four upsampling steps; each also receives a feature map of the encoder."""
 
     def __init__(self, widths: Sequence[int], features: int) -> None:
         super().__init__()
@@ -113,7 +115,7 @@ class Decoder(nn.Module):
 
 
 class Up(nn.Module):
-    """Interpolation to the size of the encoder's map, then two convolutions over both."""
+    """Interpolation to the size of the encoder's map, then two convolutions over both maps."""
 
     def __init__(self, inputs: int, outputs: int) -> None:
         super().__init__()
@@ -130,7 +132,7 @@ class Up(nn.Module):
 
 
 class AdaptiveBins(nn.Module):
-    """The paper's mini-ViT."""
+    """mini-ViT (Bhat et al., section 3.2): a transformer that gives the widths of the bins and attention maps."""
 
     def __init__(self, queries: int, bins: int) -> None:
         super().__init__()
@@ -168,13 +170,13 @@ class PatchTransformer(nn.Module):
 
 
 def patches(height: int, width: int) -> int:
-    """How many tokens a picture of this size gives."""
+    """Number of transformer tokens for a feature map of this size."""
     rows, columns = (-(-side // 2) // PATCH_PX for side in (height, width))
     return rows * columns
 
 
 def fitting(height: int, width: int, least: int, most: int = MOST_PATCHES) -> tuple[int, int]:
-    """The size nearest to a picture's, at its aspect ratio, that gives `least` to `most` patches."""
+    """The size nearest to a picture's, at its aspect ratio, that has `least` to `most` patches."""
     count = patches(height, width)
     if least <= count <= most:
         return height, width

@@ -1,4 +1,4 @@
-"""A depth network on DDRNet-23-slim's trunk: one channel, the logarithm of the depth."""
+"""A depth network on the trunk of DDRNet-23-slim with one output channel: the logarithm of depth."""
 
 from __future__ import annotations
 
@@ -27,14 +27,16 @@ RMS_UNIT_M = 20.0
 
 
 def ddrnet_depth_graph() -> DDRNet23Slim:
-    """The trunk with one channel and random weights; its last layer's are small, so that it begins near 10 m."""
+    """The trunk with one output channel and random weights; the last layer has small weights, so that training starts
+    near 10 m.
+    """
     graph = DDRNet23Slim(1, auxiliary=False)
     nn.init.normal_(graph.final_layer.conv2.weight, std=LAST_STD)
     return graph
 
 
 class DdrnetDepth(DepthNetwork):
-    """The fast one: depth = 10 m * exp(channel), interpolated before the exponential."""
+    """gear's fast depth network: depth = 10 m * exp(channel), with the channel interpolated before the exponential."""
 
     multiple_px: ClassVar[int] = 8
     graph: DDRNet23Slim
@@ -44,14 +46,16 @@ class DdrnetDepth(DepthNetwork):
         self._normalise = Normalise().to(self.device).eval()
 
     def estimate(self, picture: Tensor) -> Mapping[str, Tensor]:
-        """`depth_m` at the size of the picture that it is shown."""
+        """`depth_m` (B, h, w) in metres at the size of the input."""
         height, width = (int(side) for side in picture.shape[2:])
         (channel,) = self.graph(self._normalise(picture))
         least, most = (math.log(limit_m / MIDDLE_M) for limit_m in RANGE_M)
         return {DEPTH: MIDDLE_M * resized(channel.float(), height, width)[:, 0].clamp(least, most).exp()}
 
     def depth_losses(self, outputs: Mapping[str, Tensor], depth_m: Tensor) -> Mapping[str, Tensor]:
-        """Scale-invariant error, which outliers rule, the mean relative one, which they do not, and that in metres."""
+        """Scale-invariant error (dominated by outliers), mean relative error (robust), and root mean square in
+        metres.
+        """
         cap_m = self.options.max_depth_m
         return {
             "silog": silog(outputs[DEPTH], depth_m, cap_m=cap_m),
@@ -60,5 +64,5 @@ class DdrnetDepth(DepthNetwork):
         }
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """Those of the trunk."""
+        """The feature maps of the trunk, by the names of `gear.networks.segmentation.ddrnet`."""
         return self.graph.taps()

@@ -1,9 +1,9 @@
-"""GLPDepth (Kim et al., arXiv 2201.07436): a mix transformer and a light decoder, in the graph of transformers.
+"""GLPDepth (Kim et al., arXiv 2201.07436): a mix transformer and a light decoder, as the graph of transformers.
 
-Pictures go in as RGB in 0..1, without mean and deviation. The graph wants sides that are multiples of 32. Others are
-mirrored outwards at the top and, evenly, at the sides, and the answer is cut back: no pixel is resampled, which would
-make everything look nearer or farther than it is, and the picture stays aligned at the bottom and the middle, as the
-KITTI crops are on which the published weights were trained.
+Pictures go in as RGB in 0..1, without subtraction of a mean. The graph needs sides that are multiples of 32. Other
+pictures are extended by reflection at the top and evenly at the left and right, and the depth is cut back: resampling
+would change apparent sizes and therefore depths. The picture stays aligned at the bottom and the middle, as in the
+KITTI crops on which the published weights were trained.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ LEAST_PX = MULTIPLE_PX // 2 + 1
 
 
 class Glpn(DepthNetwork):
-    """GLPDepth; `graph` is a `GLPNForDepthEstimation` whose answers are shares of the greatest depth."""
+    """GLPDepth; `graph` is a `GLPNForDepthEstimation` whose output is a share, 0..1, of the maximum depth."""
 
     options: GlpnOptions
     least_px: ClassVar[int] = LEAST_PX
 
     def estimate(self, picture: Tensor) -> Mapping[str, Tensor]:
-        """`depth_m` at the picture's size; its sides must be above 16 pixels."""
+        """`depth_m` (B, H, W) in metres at the picture's size; both sides must be above 16 pixels."""
         height, width = (int(side) for side in picture.shape[2:])
         top, left = -height % MULTIPLE_PX, -width % MULTIPLE_PX // 2
         shares = self.graph(mirrored(picture, MULTIPLE_PX)).predicted_depth
         return {DEPTH: self.options.max_depth_m * shares[:, top : top + height, left : left + width].float()}
 
     def depth_losses(self, outputs: Mapping[str, Tensor], depth_m: Tensor) -> Mapping[str, Tensor]:
-        """The paper's scale-invariant loss."""
+        """The scale-invariant logarithmic loss of the paper (equation 3)."""
         return {"silog": silog(outputs[DEPTH], depth_m, cap_m=self.options.max_depth_m)}
 
     def taps(self) -> Mapping[str, nn.Module]:
@@ -54,11 +54,11 @@ class Glpn(DepthNetwork):
 
 
 def glpn_graph(options: GlpnOptions) -> nn.Module:
-    """transformers' graph with random weights.
+    """The graph of transformers with random weights.
 
-    The encoder's are drawn as SegFormer's (Xie et al., NeurIPS 2021), the decoder's as torch draws convolutions.
-    transformers' own deviation of 0.02 for everything leaves depth-wise convolutions, which have nine inputs, almost
-    without signal.
+    The encoder is initialised as SegFormer (Xie et al., NeurIPS 2021), the decoder as torch initialises convolutions.
+    The standard deviation of 0.02 that transformers uses for all layers leaves depth-wise convolutions, which have nine
+    inputs, almost without signal.
     """
     need_transformers()
     from transformers import GLPNConfig, GLPNForDepthEstimation

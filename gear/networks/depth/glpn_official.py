@@ -1,4 +1,4 @@
-"""Names of GLPDepth's published checkpoints, and those of transformers' graph for the same tensors."""
+"""Key names of GLPDepth's published checkpoints, and those of the graph of transformers for the same tensors."""
 
 from __future__ import annotations
 
@@ -35,7 +35,9 @@ JOINT = ".attn.kv."
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """A published state under transformers' names. Files of transformers pass as they are, and so do keys not known."""
+    """A published state with the key names of transformers. Keys that are those of transformers, or unknown, are
+    kept.
+    """
     renamed: dict[str, Tensor] = {}
     for key, tensor in state.items():
         if not key.startswith(("encoder.", "decoder.", "last_layer_depth.")):

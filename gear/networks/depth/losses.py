@@ -1,7 +1,7 @@
-"""Losses of monocular depth. What has no ground truth, sky among it, is NaN and counts for nothing.
+"""Losses of monocular depth. Pixels without ground truth, such as the sky, are NaN and do not count.
 
-Depths are (B, H, W) planar z in metres. Means are taken over the known pixels of the whole batch; a batch without any
-has loss 0, through which no gradient flows.
+Depths are (B, H, W) distances along the optical axis in metres. Means are over the known pixels of the whole batch; a
+batch without known pixels has loss 0 without gradient.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ CAP_M = 80.0
 
 
 def known(depth_m: Tensor, cap_m: float | None = CAP_M) -> Tensor:
-    """Boolean mask of the pixels that have a ground truth of at most `cap_m` (None for any)."""
+    """Boolean mask of the pixels that have ground truth of at most `cap_m` (None for no limit)."""
     is_known = torch.isfinite(depth_m) & (depth_m > LEAST_M)
     return is_known if cap_m is None else is_known & (depth_m <= cap_m)
 
@@ -29,17 +29,18 @@ def known(depth_m: Tensor, cap_m: float | None = CAP_M) -> Tensor:
 def silog(
     predicted_m: Tensor, depth_m: Tensor, *, balance: float = 0.5, scale: float = 1.0, cap_m: float | None = CAP_M
 ) -> Tensor:
-    """Scale-invariant logarithmic error: scale * sqrt(mean(g^2) - balance * mean(g)^2), g the difference of logarithms.
+    """Scale-invariant logarithmic error: scale * sqrt(mean(g^2) - balance * mean(g)^2), where g is the difference of
+    logarithms.
 
-    Eigen et al., NeurIPS 2014, eq. 3, under a root; GLPDepth (arXiv 2201.07436, eq. 3) has balance 0.5. AdaBins (CVPR
-    2021, eq. 4) has balance 0.85 and scale 10: see `adabins_silog`.
+    Eigen et al., NeurIPS 2014, equation 3, under a root. GLPDepth (arXiv 2201.07436, equation 3) uses balance 0.5,
+    AdaBins (CVPR 2021, equation 4) balance 0.85 and scale 10: see `adabins_silog`.
 
     Args:
-        predicted_m: above 0.
-        depth_m: ground truth, NaN where unknown.
-        balance: 0 is the plain root mean square, 1 does not care for a wrong scale at all.
-        scale: a factor.
-        cap_m: what lies farther is not learnt.
+        predicted_m: (B, H, W), above 0.
+        depth_m: (B, H, W) ground truth, NaN where unknown.
+        balance: 0 gives the root mean square of g; 1 ignores a wrong scale.
+        scale: factor of the result.
+        cap_m: greatest ground-truth depth that counts; None for no limit.
     """
     mask = known(depth_m, cap_m)
     count = mask.sum().clamp_min(1)
@@ -56,15 +57,15 @@ def adabins_silog(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float | None =
 
 
 def log_l1(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float | None = CAP_M) -> Tensor:
-    """Mean absolute difference of logarithms: relative errors, with little care for outliers."""
+    """Mean absolute difference of logarithms: a relative error that is robust to outliers."""
     mask = known(depth_m, cap_m)
     return _log_errors(predicted_m, depth_m, mask).abs().sum() / mask.sum().clamp_min(1)
 
 
 def root_mean_square(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float = CAP_M) -> Tensor:
-    """The root of the mean squared error, in metres; an answer beyond `cap_m` counts as one of `cap_m`, as in reports.
+    """Root mean square error in metres; predictions beyond `cap_m` are cut to `cap_m`, as in the evaluation.
 
-    Eigen et al., NeurIPS 2014, report it; logarithms care for what is near, this for what is far.
+    Reported by Eigen et al., NeurIPS 2014. Logarithmic errors weigh near pixels most, this error far ones.
     """
     mask = known(depth_m, cap_m)
     errors = torch.where(mask, predicted_m.clamp_max(cap_m) - torch.where(mask, depth_m, 0.0), 0.0)
@@ -81,16 +82,16 @@ def smooth_l1(predicted_m: Tensor, depth_m: Tensor, *, beta_m: float = 1.0, cap_
 
 
 def bins_chamfer(centres_m: Tensor, depth_m: Tensor, *, cap_m: float | None = CAP_M) -> Tensor:
-    """How far bins lie from depths and depths from bins (Fan et al., CVPR 2017; AdaBins, CVPR 2021, eq. 5).
+    """Chamfer distance between bin centres and depths (Fan et al., CVPR 2017; AdaBins, CVPR 2021, equation 5).
 
-    For each picture the mean over its known pixels of the squared distance to the nearest bin, plus the mean over the
-    bins of the squared distance to the nearest known depth; then the mean over the pictures that have known pixels. On
-    a line, neighbours are found by sorting, so no table of pixels times bins is ever made.
+    For each picture: the mean over its known pixels of the squared distance to the nearest bin, plus the mean over the
+    bins of the squared distance to the nearest known depth; then the mean over pictures with known pixels. In one
+    dimension nearest neighbours are found by sorting, so no table of pixels by bins is made.
 
     Args:
         centres_m: (B, bins) centres in any order.
         depth_m: (B, H, W) ground truth, NaN where unknown.
-        cap_m: what lies farther does not count.
+        cap_m: greatest ground-truth depth that counts; None for no limit.
     """
     terms = []
     for centres, picture, mask in zip(centres_m, depth_m, known(depth_m, cap_m), strict=True):

@@ -1,4 +1,4 @@
-"""What gear's depth networks share: the picture's size, ground truth, answers."""
+"""What gear's depth networks have in common: input size, ground truth, predictions."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ DEPTH = "depth_m"
 
 
 class DepthNetwork(Network):
-    """A network that says `depth_m` (B, H, W), planar z in metres at the picture's size.
+    """A network with the output `depth_m` (B, H, W): distance along the optical axis in metres, at the picture's size.
 
     Attributes:
-        input_scale: share of the picture's size that the network sees.
-        multiple_px: what the sides of the picture that the network sees are multiples of.
-        least_px: as many pixels, at least, each of those sides has.
+        input_scale: factor by which pictures are resized before the network.
+        multiple_px: the sides of the network's input are multiples of this.
+        least_px: smallest side of the network's input.
     """
 
     options: DepthOptions
@@ -37,15 +37,15 @@ class DepthNetwork(Network):
         """Wraps a graph.
 
         Args:
-            graph: as the network wants it.
-            options: as given by the user.
-            input_scale: used where the options leave it open.
+            graph: torch module.
+            options: as the user gave them.
+            input_scale: used where neither the options nor the weights state one.
         """
         super().__init__(graph, options, views=(VIEW,))
         self.input_scale = input_scale if options.input_scale is None else options.input_scale
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """`depth_m`, and what else the network says."""
+        """`depth_m` at the picture's size, and further outputs of the network."""
         picture = pictures[VIEW]
         height, width = (int(side) for side in picture.shape[2:])
         outputs = dict(self.estimate(resized(picture, self._seen(height), self._seen(width))))
@@ -53,12 +53,12 @@ class DepthNetwork(Network):
         return outputs
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """The network's losses against the samples' `depth_m`."""
+        """The network's losses against `depth_m` of the samples."""
         depth_m = torch.from_numpy(np.stack([target.depth_m for target in targets])).to(outputs[DEPTH])
         return self.depth_losses(outputs, depth_m)
 
     def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[FloatImage]:
-        """(H, W) float32 metres each."""
+        """(H, W) float32 depth in metres for each picture."""
         return [depth_m.cpu().numpy() for depth_m in outputs[DEPTH]]
 
     def _seen(self, side_px: int) -> int:
@@ -67,15 +67,17 @@ class DepthNetwork(Network):
 
     @abstractmethod
     def estimate(self, picture: Tensor) -> Mapping[str, Tensor]:
-        """`depth_m` (B, h, w) of any size for a (B, 3, H, W) picture in 0..1, and what the losses need beside it."""
+        """`depth_m` (B, h, w) of any size for (B, 3, H, W) pictures in 0..1, and what the losses need in addition."""
 
     @abstractmethod
     def depth_losses(self, outputs: Mapping[str, Tensor], depth_m: Tensor) -> Mapping[str, Tensor]:
-        """Named losses against (B, H, W) metres, NaN where unknown."""
+        """Losses by name against (B, H, W) depth in metres, NaN where unknown."""
 
 
 def resized(maps: Tensor, height: int, width: int) -> Tensor:
-    """(B, C, H, W) at another size: bilinear, averaging where it becomes smaller. The same tensor at the same size."""
+    """(B, C, H, W) resized bilinearly, with averaging where it gets smaller; the same tensor where the size is the
+    same.
+    """
     if tuple(maps.shape[2:]) == (height, width):
         return maps
     is_less = height < maps.shape[2] or width < maps.shape[3]  # elsewhere there is nothing to average, only more to do

@@ -1,4 +1,4 @@
-"""Options of the depth networks. No torch here: specs are cheap."""
+"""Options of the depth networks. torch is not imported, so that specs are quick to make."""
 
 from __future__ import annotations
 
@@ -17,13 +17,12 @@ HEADS = (1, 2, 5, 8)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DepthOptions(NetworkOptions):
-    """What every depth network can be told.
+    """Options of every depth network.
 
     Attributes:
-        max_depth_m: what lies farther is not learnt; networks that have a limit never say more.
-        input_scale: the network sees the picture at this share of its width and height, and its answer is brought
-            back to the picture's size. null takes what the weights were trained for, or the network's own habit where
-            they do not say.
+        max_depth_m: greatest depth that is trained on; networks with a bounded output predict no more.
+        input_scale: factor by which pictures are resized before the network; the depth is resized back. null takes the
+            factor that the weights were trained for, or the network's default where the weights state none.
     """
 
     max_depth_m: float = 80.0
@@ -74,11 +73,11 @@ class AdaBinsOptions(DepthOptions):
     """AdaBins, by default as published.
 
     Attributes:
-        encoder: which of timm's EfficientNets, `tf_efficientnet_b0` to `tf_efficientnet_b8`.
-        features: channels of the decoder's widest layer, divisible by 16; what follows has a half, a quarter and so on.
-        bins: into which the range of depths is divided, anew for each picture.
-        queries: how many of the transformer's tokens look for things in the feature map.
-        min_depth_m: where the bins begin.
+        encoder: an EfficientNet of timm, `tf_efficientnet_b0` to `tf_efficientnet_b8`.
+        features: channels of the decoder's widest layer, divisible by 16; each further layer has half as many.
+        bins: number of depth bins.
+        queries: number of transformer tokens that are compared with the feature map.
+        min_depth_m: lower end of the depth range.
     """
 
     encoder: str = "tf_efficientnet_b5"

@@ -1,4 +1,4 @@
-"""Packages that some depth networks are built with, and that gear itself does not depend on."""
+"""Optional packages of depth networks, imported with a clear error where they are missing."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from gear.values.errors import GearError
 
 
 def need_transformers() -> None:
-    """Makes transformers importable.
+    """Imports transformers.
 
     Raises:
         GearError: it is not installed.
@@ -19,10 +19,10 @@ def need_transformers() -> None:
 
 
 def need_timm() -> None:
-    """Makes timm importable.
+    """Imports timm.
 
     Raises:
-        GearError: it, or torchvision, which it imports, is not installed.
+        GearError: timm, or torchvision, which timm imports, is not installed.
     """
     torchvision_import.need()
     _need("timm")

@@ -35,21 +35,21 @@ SURE_BACKGROUND = 20.0
 
 
 class FasterRcnnDetector(Detector):
-    """Faster R-CNN behind the `Model` protocol.
+    """Faster R-CNN as a gear network.
 
     Outputs: `objectness` (B, N) and `rpn_bbox_regression` (B, N, 4) of the anchors `anchors_px` (B, N, 4);
-    `class_logits` (B, R, 91) and `box_regression` (B, R, 364) of the proposals `proposals_px` (B, R, 4). R is fixed;
-    where a picture has fewer proposals the last ones are empty boxes of background. Boxes are in the picture's edge
-    pixels. Losses: `loss_classifier`, `loss_box_reg`, `loss_objectness`, `loss_rpn_box_reg`.
+    `class_logits` (B, R, 91) and `box_regression` (B, R, 364) of the proposals `proposals_px` (B, R, 4). R is fixed; a
+    picture with fewer proposals is filled up with empty boxes of background. Boxes are left, top, right, bottom in edge
+    pixels of the picture. Losses: `loss_classifier`, `loss_box_reg`, `loss_objectness`, `loss_rpn_box_reg`.
     """
 
     generator = "rpn.anchor_generator"
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """What the proposals' head and the boxes' heads say.
+        """Outputs of the proposal network's head and of the box heads.
 
-        Pictures go through one by one: convolutions of a batch round otherwise than those of one picture, and the
-        least difference may change which proposals are kept, and so everything after them.
+        Pictures are processed one by one: convolutions over a batch round differently from those over one picture, and
+        the smallest difference may change which proposals are kept, and with them all further outputs.
         """
         each = [self._run_one(picture[None]) for picture in pictures[VIEW]]
         return {name: torch.cat([outputs[name] for outputs in each]) for name in each[0]}
@@ -73,7 +73,9 @@ class FasterRcnnDetector(Detector):
         }
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """Feature maps, what the proposals' head says of them, anchors in the graph's pixels, the picture's size."""
+        """Feature maps, outputs of the proposal network's head, anchors in the graph's pixels, and the picture's
+        size.
+        """
         from torchvision.models.detection.rpn import concat_box_prediction_layers
 
         graph: Any = self.graph
@@ -90,10 +92,10 @@ class FasterRcnnDetector(Detector):
         }
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """torchvision's; background that lies mostly in ignored objects is never sampled.
+        """The losses of torchvision; background that lies mostly in ignored objects is never sampled.
 
-        Which anchors and proposals take part is drawn: from `options.seed`, the same ones every time, unless the
-        network is in training mode, where torch's own generator draws.
+        Anchors and proposals are sampled with `options.seed`, so the same ones each time. In training mode the
+        generator of torch samples them.
         """
         wanted = [self.targets(sample, picture_size(outputs)) for sample in targets]
         graph: Any = self.graph
@@ -104,7 +106,7 @@ class FasterRcnnDetector(Detector):
             return self._box_losses(outputs, proposals, wanted) | proposal_losses
 
     def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[Detection, ...]]:
-        """Detections of each picture, surest first."""
+        """Detections of each picture, by falling score."""
         heads: Any = self.graph.get_submodule("roi_heads")
         answers = []
         for proposals, logits, deltas in zip(outputs[PROPOSALS], outputs[LOGITS], outputs[DELTAS], strict=True):
@@ -116,7 +118,7 @@ class FasterRcnnDetector(Detector):
         return answers
 
     def _proposals(self, outputs: Mapping[str, Tensor]) -> list[Tensor]:
-        """(R, 4) boxes of each picture in the graph's pixels, surest first; no gradient passes them."""
+        """(R, 4) boxes of each picture in the graph's pixels, by falling score; without gradient."""
         rpn: Any = self.graph.get_submodule("rpn")
         anchors = outputs[ANCHORS]
         boxes = rpn.box_coder.decode(outputs[RPN_DELTAS].detach(), list(anchors)).view(anchors.shape)
@@ -129,7 +131,7 @@ class FasterRcnnDetector(Detector):
         return proposals
 
     def _box_heads(self, outputs: Mapping[str, Tensor], proposals: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
-        """Class logits and box deltas of all proposals of all pictures, one after another, in float32."""
+        """Class logits and box deltas of the proposals of all pictures, concatenated, float32."""
         heads: Any = self.graph.get_submodule("roi_heads")
         sizes = [self.sizing.inner_px(picture_size(outputs))] * len(proposals)
         maps = {name: outputs[name] for name in MAPS}
@@ -168,9 +170,9 @@ class FasterRcnnDetector(Detector):
 
 
 def _without_ignored(labels: Sequence[Tensor], boxes: Sequence[Tensor], wanted: Sequence[Targets]) -> list[Tensor]:
-    """Labels in which background that lies mostly in ignored objects is -1: never sampled.
+    """Labels in which background that lies mostly in ignored objects is -1, which is never sampled.
 
-    A picture in which nothing would be left keeps its background.
+    A picture that would have nothing left keeps its background.
     """
     answers = []
     for label, box, target in zip(labels, boxes, wanted, strict=True):
@@ -182,7 +184,9 @@ def _without_ignored(labels: Sequence[Tensor], boxes: Sequence[Tensor], wanted: 
 
 @contextlib.contextmanager
 def _as_in_training(rpn: Any) -> Iterator[None]:
-    """Inside, torchvision's proposal network keeps as many proposals as in training; its layers are left alone."""
+    """Inside, the proposal network of torchvision keeps as many proposals as in training; its layers stay in their
+    modes.
+    """
     was, rpn.training = rpn.training, True
     try:
         yield

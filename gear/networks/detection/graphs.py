@@ -1,4 +1,4 @@
-"""The detectors' graphs, under torchvision's key names."""
+"""The graphs of the detectors, with the key names of torchvision."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ LITE0_HEAD_DEPTH = 2
 
 
 def fasterrcnn_r50_fpn(least_score: float) -> nn.Module:
-    """As published: FrozenBatchNorm2d with eps 0, 91 classes."""
+    """Faster R-CNN on ResNet-50 with a feature pyramid, as published: FrozenBatchNorm2d with eps 0, 91 classes."""
     torchvision_import.need()
     from torchvision.models.detection import FasterRCNN
     from torchvision.models.detection._utils import overwrite_eps
@@ -51,7 +51,7 @@ def fasterrcnn_r50_fpn(least_score: float) -> nn.Module:
 
 
 def retinanet_r50_fpn(least_score: float) -> nn.Module:
-    """As published: FrozenBatchNorm2d with eps 0, 91 classes."""
+    """RetinaNet on ResNet-50 with a feature pyramid, as published: FrozenBatchNorm2d with eps 0, 91 classes."""
     torchvision_import.need()
     from torchvision.models.detection import RetinaNet
     from torchvision.models.detection._utils import overwrite_eps
@@ -64,7 +64,7 @@ def retinanet_r50_fpn(least_score: float) -> nn.Module:
 
 
 def retinanet_r18_fpn(classes: int, least_score: float) -> nn.Module:
-    """ResNet-18, trainable throughout; see `reference_retinanet`."""
+    """RetinaNet on ResNet-18, all layers trainable; see `reference_retinanet`."""
     torchvision_import.need()
     from torchvision.models import resnet18
     from torchvision.models.detection.backbone_utils import BackboneWithFPN
@@ -81,7 +81,7 @@ def retinanet_r18_fpn(classes: int, least_score: float) -> nn.Module:
 
 
 def retinanet_lite0_fpn(classes: int, least_score: float) -> nn.Module:
-    """EfficientNet-Lite0, trainable throughout; see `reference_retinanet`."""
+    """RetinaNet on EfficientNet-Lite0, all layers trainable; see `reference_retinanet`."""
     graph = reference_retinanet(LitePyramid(), classes, least_score)
     heads: Any = graph.head
     for head in (heads.classification_head, heads.regression_head):
@@ -90,9 +90,9 @@ def retinanet_lite0_fpn(classes: int, least_score: float) -> nn.Module:
 
 
 def reference_retinanet(backbone: nn.Module, classes: int, least_score: float) -> nn.Module:
-    """torchvision's RetinaNet with narrower heads that are normalised by groups, and smaller anchors.
+    """RetinaNet of torchvision with narrower heads, group normalisation and smaller anchors.
 
-    The network looks at pictures at about half their size, where a person of 32 pixels is 16 high and 6 wide.
+    The network sees pictures at about half their size, where a person of 32 pixels is 16 high and 6 wide.
     """
     torchvision_import.need()
     from torchvision.models.detection import RetinaNet
@@ -111,7 +111,7 @@ def reference_retinanet(backbone: nn.Module, classes: int, least_score: float) -
 
 
 class LitePyramid(OnLite0):
-    """EfficientNet-Lite0 with a feature pyramid, as torchvision's `BackboneWithFPN`."""
+    """EfficientNet-Lite0 with a feature pyramid; takes the place of torchvision's `BackboneWithFPN`."""
 
     out_channels = CHANNELS
 
@@ -126,14 +126,14 @@ class LitePyramid(OnLite0):
         self.fpn = FeaturePyramidNetwork(channels, CHANNELS, extra_blocks=LastLevelP6P7(CHANNELS, CHANNELS))
 
     def lite0(self) -> nn.Module:
-        """The body."""
+        """The EfficientNet-Lite0."""
         return self.body
 
     def forward(self, pictures: Tensor) -> Mapping[str, Tensor]:
-        """Feature maps by number.
+        """Feature maps by level, as torchvision numbers them.
 
-        Their memory is ordered channels last: on the CPU, gradients of depthwise convolutions take up to ten times as
-        long in the other order, and a whole step of training a seventh longer.
+        Their memory format is channels last: on the CPU, gradients of depth-wise convolutions take up to ten times as
+        long in the other format, and a whole training step a seventh longer.
         """
         stages = self.body(pictures.contiguous(memory_format=torch.channels_last))
         maps: Mapping[str, Tensor] = self.fpn(OrderedDict((str(i), each) for i, each in enumerate(stages)))

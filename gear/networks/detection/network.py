@@ -1,8 +1,8 @@
-"""What gear's 2D detectors share: the picture's size, ground truth, answers.
+"""What gear's 2D detectors have in common: input size, ground truth, predictions.
 
-Their outputs are in the pictures' own pixels, whatever size the network runs at, so whoever uses them need not know it.
-Losses are in the graph's pixels, as torchvision's are: anchors that contain an object wholly tie there, and all of them
-learn it; in other units rounding would break the ties.
+Outputs are in pixels of the picture, whatever size the network runs at. Losses are in pixels of the graph's input, as
+those of torchvision: all anchors that contain an object completely tie there and learn it; in other units rounding
+would break the ties.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ Size = tuple[int, int]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sizing:
-    """How large the graph sees a picture.
+    """How the graph's input is made of a picture.
 
     Attributes:
-        inner_px: its height and width from the picture's.
-        smooth: whether to average where it becomes smaller; torchvision's detectors do not.
-        mean, std: of each channel, taken off before.
+        inner_px: function from height and width of the picture to those of the graph's input.
+        smooth: whether reducing averages; torchvision's detectors do not average.
+        mean, std: of each channel, for normalisation.
     """
 
     inner_px: Callable[[Size], Size]
@@ -51,12 +51,12 @@ class Sizing:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Targets:
-    """What there is to find in one picture, in the graph's pixels.
+    """Ground truth of one picture, in pixels of the graph's input.
 
     Attributes:
         boxes: (N, 4) float32 left, top, right, bottom.
-        labels: (N,) int64 numbers of the network's classes.
-        ignored: (M, 4) boxes of what is neither to be found nor background.
+        labels: (N,) int64 class numbers of the network.
+        ignored: (M, 4) boxes of regions that count neither as objects nor as background.
     """
 
     boxes: Tensor
@@ -64,12 +64,12 @@ class Targets:
     ignored: Tensor
 
     def as_torchvision(self) -> dict[str, Tensor]:
-        """What torchvision's losses take."""
+        """The dictionary that torchvision's losses take."""
         return {"boxes": self.boxes, "labels": self.labels}
 
 
 class Detector(Network):
-    """A torchvision graph that gives COCO detections."""
+    """A torchvision graph with COCO detections as predictions."""
 
     options: DetectorOptions
     has_quick_copy = True
@@ -82,10 +82,10 @@ class Detector(Network):
         """Wraps a graph.
 
         Args:
-            graph: of torchvision's detection models.
-            options: as given.
-            sizing: how large it sees pictures.
-            categories: COCO's id of each of its classes; None for what is no object.
+            graph: detection model of torchvision.
+            options: as the user gave them.
+            sizing: how the graph's input is made.
+            categories: COCO's category id of each class of the graph; None for classes that COCO does not have.
         """
         super().__init__(graph, options, views=(VIEW,))
         self.sizing = sizing
@@ -93,12 +93,12 @@ class Detector(Network):
         self.normalise = Normalise(sizing.mean, sizing.std).to(self.device).eval()
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """The backbone's stages, `layer1` (1/4 of what the graph sees) to `layer4` (1/32)."""
+        """The backbone's stages, `layer1` (1/4 of the graph's input) to `layer4` (1/32)."""
         body = self.graph.get_submodule("backbone.body")
         return {name: body.get_submodule(name) for name in ("layer1", "layer2", "layer3", "layer4")}
 
     def seen(self, pictures: Tensor) -> Tensor:
-        """(B, 3, h, w) as the graph takes it: normalised, resized, filled up with zeros below and on the right."""
+        """(B, 3, h, w) input of the graph: normalised, resized, padded with zeros at the bottom and on the right."""
         size = size_of(pictures)
         inner, (height, width) = self.sizing.inner_px(size), self.seen_px(size)
         pixels = self.normalise(pictures)
@@ -109,7 +109,7 @@ class Detector(Network):
         return functional.pad(pixels, (0, width - inner[1], 0, height - inner[0]))
 
     def seen_px(self, picture_px: Size) -> Size:
-        """Height and width of what the graph sees of a picture, zeros included."""
+        """Height and width of the graph's input for a picture, padding included."""
         height, width = self.sizing.inner_px(picture_px)
         return height + -height % DIVISOR_PX, width + -width % DIVISOR_PX
 
@@ -124,14 +124,15 @@ class Detector(Network):
         return found
 
     def shrinkage(self, picture_px: Size) -> Tensor:
-        """(4,): what coordinates in the picture are multiplied with for what the graph sees."""
+        """(4,) factors from box coordinates in the picture to those in the graph's input."""
         height, width = self.sizing.inner_px(picture_px)
         inner = torch.tensor([width, height] * 2, dtype=torch.float32, device=self.device)
         return inner / torch.tensor([picture_px[1], picture_px[0]] * 2, dtype=torch.float32, device=self.device)
 
     def targets(self, sample: Any, picture_px: Size) -> Targets:
-        """What a sample of 2D detection asks for; objects that the network has no class for count as ignored, and so do
-        boxes without an area, whose sides have no logarithm to learn."""
+        """Ground truth of a sample. Objects of classes that the network lacks are ignored, as are boxes without an
+        area, whose sides have no logarithm to learn.
+        """
         shrinkage = self.shrinkage(picture_px)
         number = {category: index for index, category in enumerate(self.categories) if category is not None}
         wanted: list[Any] = []
@@ -148,7 +149,7 @@ class Detector(Network):
         )
 
     def detections(self, found: Mapping[str, Tensor]) -> tuple[Detection, ...]:
-        """torchvision's answer for one picture; what COCO has no category for is left out."""
+        """The detections of one picture; classes that COCO has no category for are left out."""
         columns = (found["boxes"].tolist(), found["labels"].tolist(), found["scores"].tolist())
         return tuple(
             Detection(category_id=category, box_px=(left, top, right, bottom), score=score)
@@ -172,13 +173,13 @@ def size_of(pictures: Tensor) -> Size:
 
 
 def picture_size(outputs: Mapping[str, Tensor]) -> Size:
-    """The size of a batch's pictures, from what losses are given."""
+    """Height and width of a batch's pictures, from what `losses` is given."""
     height, width = outputs[PICTURE][0].tolist()
     return int(height), int(width)
 
 
 def fitted(min_size_px: int, max_size_px: int) -> Callable[[Size], Size]:
-    """torchvision's rule: the shorter side becomes `min_size_px` unless the longer would exceed `max_size_px`."""
+    """torchvision's rule: the shorter side becomes `min_size_px`, unless the longer side would exceed `max_size_px`."""
 
     def inner_px(size: Size) -> Size:
         scale = min(min_size_px / min(size), max_size_px / max(size))
@@ -188,12 +189,14 @@ def fitted(min_size_px: int, max_size_px: int) -> Callable[[Size], Size]:
 
 
 def scaled(scale: float) -> Callable[[Size], Size]:
-    """A share of both sides."""
+    """Both sides times a factor, rounded."""
     return lambda size: (max(1, round(size[0] * scale)), max(1, round(size[1] * scale)))
 
 
 def share_inside(boxes: Tensor, ignored: Tensor) -> Tensor:
-    """(N,): the largest share of each of (N, 4) boxes' areas that lies in one of (M, 4) ignored ones; 0 without any."""
+    """(N,) largest share, 0..1, of each of (N, 4) boxes' areas that lies in one of (M, 4) ignored boxes; 0 where M is
+    0.
+    """
     if not len(ignored):
         return boxes.new_zeros(len(boxes))
     low = torch.maximum(boxes[:, None, :2], ignored[None, :, :2])

@@ -1,4 +1,4 @@
-"""Published weights of detectors as gear's networks take them."""
+"""Published weights of detectors, with keys renamed for gear's networks."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ OLD_NAMES = (
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """torchvision's published detectors under the key names that torchvision has today."""
+    """The state of a published detector of torchvision with the key names of current torchvision versions."""
     return {_renamed(key): value for key, value in state.items() if not key.endswith("num_batches_tracked")}
 
 

@@ -1,4 +1,4 @@
-"""Options of the detectors. No torch here: specs are cheap."""
+"""Options of the detectors. torch is not imported, so that specs are quick to make."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from gear.values.errors import FieldError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DetectorOptions(NetworkOptions):
-    """What every detector can be told.
+    """Options of every detector.
 
     Attributes:
-        least_score: detections that are less sure are dropped.
+        least_score: smallest score, 0..1, of a detection that is reported.
     """
 
     least_score: float = 0.05
@@ -28,8 +28,8 @@ class OfficialDetectorOptions(DetectorOptions):
     """Options of the published detectors.
 
     Attributes:
-        min_size_px: pictures are resized until their shorter side has this many pixels ...
-        max_size_px: ... unless the longer one would have more than this many.
+        min_size_px: pictures are resized so that their shorter side has this many pixels.
+        max_size_px: limit of the longer side, which takes precedence.
     """
 
     min_size_px: int = 800
@@ -47,8 +47,8 @@ class ReferenceDetectorOptions(DetectorOptions):
     """Options of the detectors that gear trains.
 
     Attributes:
-        input_scale: the network runs at this share of the picture's width and height. null takes what the weights were
-            trained for, or 0.5 where they do not say.
+        input_scale: factor by which pictures are resized before the network. null takes the factor that the weights
+            were trained for, or 0.5 where they state none.
     """
 
     input_scale: float | None = None

@@ -31,20 +31,20 @@ LEVELS = 5
 
 
 class RetinaNetDetector(Detector):
-    """RetinaNet behind the `Model` protocol.
+    """RetinaNet as a gear network.
 
-    Outputs: `cls_logits` (B, N, classes), `bbox_regression` (B, N, 4) relative to `anchors_px` (B, N, 4), which are in
-    the picture's edge pixels. Losses: `classification` and `bbox_regression`.
+    Outputs: `cls_logits` (B, N, classes) and `bbox_regression` (B, N, 4) relative to `anchors_px` (B, N, 4), which are
+    left, top, right, bottom in edge pixels of the picture. Losses: `classification` and `bbox_regression`.
     """
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The heads' outputs, and where they stand."""
+        """Outputs of both heads, and the anchors in pixels of the picture."""
         outputs = self.run_for_losses(pictures)
         anchors_px = outputs[ANCHORS] / self.shrinkage(picture_size(outputs))
         return {LOGITS: outputs[LOGITS], DELTAS: outputs[DELTAS], ANCHORS_PX: anchors_px}
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The heads' outputs, the anchors in the graph's pixels, and the picture's size."""
+        """Outputs of both heads, the anchors in pixels of the graph's input, and the picture's size."""
         picture = pictures[VIEW]
         features = list(self.graph.get_submodule("backbone")(self.seen(picture)).values())
         outputs: dict[str, Tensor] = dict(self.graph.get_submodule("head")(features))
@@ -56,7 +56,7 @@ class RetinaNetDetector(Detector):
         }
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """torchvision's; anchors of background that lie mostly in ignored objects take no part in them."""
+        """The losses of torchvision, without background anchors that lie mostly in ignored objects."""
         wanted = [self.targets(sample, picture_size(outputs)) for sample in targets]
         graph: Any = self.graph
         matches = []
@@ -71,7 +71,7 @@ class RetinaNetDetector(Detector):
         return losses
 
     def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[Detection, ...]]:
-        """Detections of each picture, surest first."""
+        """Detections of each picture, by falling score."""
         graph: Any = self.graph
         size = (size_px[0], size_px[1])
         counts = self._counts(size)
@@ -91,7 +91,7 @@ class RetinaNetDetector(Detector):
         return matched
 
     def _counts(self, picture_px: Size) -> list[int]:
-        """Anchors of each feature map."""
+        """Number of anchors of each feature map."""
         graph: Any = self.graph
         each = graph.anchor_generator.num_anchors_per_location()
         height, width = (side // FIRST_STRIDE_PX for side in self.seen_px(picture_px))
@@ -103,9 +103,9 @@ class RetinaNetDetector(Detector):
 
 
 class LiteRetinaNetDetector(RetinaNetDetector):
-    """RetinaNet whose backbone is an EfficientNet of timm's."""
+    """RetinaNet with an EfficientNet of timm as backbone."""
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """The ends of the backbone's stages, `layer1` (1/4 of what the graph sees) to `layer4` (1/32)."""
+        """The ends of the backbone's stages, `layer1` (1/4 of the graph's input) to `layer4` (1/32)."""
         blocks = self.graph.get_submodule("backbone.body.blocks")
         return {f"layer{i}": blocks.get_submodule(str(stage)) for i, stage in enumerate(LITE_TAPS, start=1)}
