@@ -1,4 +1,4 @@
-"""Where weights lie and what their files say of themselves. No torch here, so that listing them costs nothing."""
+"""Where weights files are, and what their metadata state. torch is not imported, so that listing them is quick."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ JSON_KEYS = ("metrics", "intervals", "options", "data", "look", "averaged")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WeightsFile:
-    """A safetensors file, without its numbers.
+    """Header of a safetensors file.
 
     Attributes:
         path: of the file.
         size_mb: of the file, in 10^6 bytes.
-        shapes: by key.
-        metadata: as written, all texts. gear writes, as far as it knows: `model`, `task`, `gear` (version), `source`
-            and `source_sha256` (of a published file), `licence`, `command`, `seed`, `look_hash` (of the training),
-            `measured_look_hash` (of the metrics, where it is another), and as JSON `data` (what it was trained on),
-            `metrics` (values by name), `intervals` (their bounds of 95 %), `options` (of the model, such as
-            `input_scale`), `look` (`gear.measuring.appearance_hash.Look`) and `averaged`
-            (hashes of the two states whose mean it is).
+        shapes: of the tensors, by key.
+        metadata: all texts. gear writes, as far as known: `model`, `task`, `gear` (version), `source` and
+            `source_sha256` (of a published file), `licence`, `command`, `seed`, `look_hash` (appearance of the training
+            pictures), `measured_look_hash` (of the pictures behind the metrics, where it differs), and as JSON `data`
+            (training data), `metrics` (values by name), `intervals` (their bounds of 95 %), `options` (of the model,
+            such as `input_scale`), `look` (`gear.measuring.appearance_hash.Look`) and `averaged` (hashes of the two
+            averaged states).
     """
 
     path: Path
@@ -48,24 +48,24 @@ class WeightsFile:
 
     @property
     def numbers(self) -> int:
-        """How many it holds, statistics included."""
+        """How many numbers the file holds, statistics included."""
         return sum(math.prod(shape) for shape in self.shapes.values())
 
     def facts(self) -> dict[str, Json]:
-        """The metadata with its JSON texts read; a text that is none stays as it is."""
+        """The metadata with JSON texts decoded; other texts stay as they are."""
         return {key: _read(text) if key in JSON_KEYS else text for key, text in self.metadata.items()}
 
     def option(self, name: str) -> Json:
-        """What the file says of one of the model's options; None where it says nothing."""
+        """The value that the file states for an option of the model; None where it states none."""
         options = self.facts().get("options")
         return options.get(name) if isinstance(options, dict) else None
 
 
 def inspect(path: str | Path) -> WeightsFile:
-    """Reads a file's header.
+    """Reads the header of a file.
 
     Raises:
-        GearError: there is no such file, or it is no safetensors.
+        GearError: the file does not exist, or is not safetensors.
     """
     file = Path(path)
     check_file(file)
@@ -79,10 +79,10 @@ def inspect(path: str | Path) -> WeightsFile:
 
 
 def check_file(path: Path) -> None:
-    """Whether there is such a file.
+    """Checks that a weights file exists.
 
     Raises:
-        GearError: there is not.
+        GearError: it does not.
     """
     if path.is_dir():
         raise GearError(f"{path}: is a folder; name the file in it")
@@ -91,16 +91,16 @@ def check_file(path: Path) -> None:
 
 
 def not_safetensors(path: str | Path, error: Exception) -> GearError:
-    """What to say of a file that cannot be read."""
+    """The error for a file that cannot be read as safetensors."""
     reason = str(error).splitlines()[0]
     return GearError(f"{path}: not a safetensors file ({reason}); gear weights convert makes one of a published file")
 
 
 def resolve(weights: str, name: str) -> Path | None:
-    """The file that the option `weights` of network `name` means; None for random weights.
+    """The file that the option `weights` of network `name` refers to; None for random weights.
 
     Raises:
-        GearError: none is shipped.
+        GearError: `shipped` was asked for and no installed package has weights of this network.
     """
     if weights == NONE:
         return None
@@ -118,7 +118,12 @@ def resolve(weights: str, name: str) -> Path | None:
 
 
 def trained_option(weights: str, name: str, option: str) -> Json:
-    """What the weights that `weights` means say of one of network `name`'s options; None where they say nothing.
+    """The value that a network's weights state for one of its options; None where they state none.
+
+    Args:
+        weights: value of the option `weights`.
+        name: of the network.
+        option: name of the option.
 
     Raises:
         GearError: there are no such weights.
@@ -128,7 +133,7 @@ def trained_option(weights: str, name: str, option: str) -> Json:
 
 
 def shipped(name: str) -> Path | None:
-    """The reference weights of a network, where an installed package has them."""
+    """Path of the reference weights of a network; None where no installed package has them."""
     for folder in shipped_folders():
         path = folder / "models" / f"{name}.safetensors"
         if path.is_file():
@@ -137,16 +142,16 @@ def shipped(name: str) -> Path | None:
 
 
 def shipped_networks() -> list[str]:
-    """Names of the networks that installed packages have reference weights of."""
+    """Names of the networks whose reference weights are installed."""
     return sorted({path.stem for folder in shipped_folders() for path in (folder / "models").glob("*.safetensors")})
 
 
 @functools.cache
 def shipped_folders() -> tuple[Path, ...]:
-    """Folders of the installed weights packages, in the order of their names; in a checkout, last, the one beside gear.
+    """Folders of the installed weights packages, by name; in a checkout, the folder next to gear comes last.
 
     Raises:
-        GearError: a package of that kind cannot be imported, or has no folder.
+        GearError: a weights package cannot be imported, or has no folder.
     """
     folders = []
     for entry in sorted(installed_entry_points(GROUP)[0], key=lambda entry: (entry.name, entry.value)):
@@ -166,7 +171,7 @@ def _read(text: str) -> Json:
 
 
 def shipped_patches() -> dict[str, Path]:
-    """Pre-computed patch folders by name, of the installed weights packages."""
+    """Pre-computed patch folders of the installed weights packages, by name."""
     return {
         path.name: path
         for folder in reversed(shipped_folders())

@@ -1,9 +1,9 @@
-"""torchvision beside a torch that it was not built for.
+"""Imports torchvision next to a torch build that it was not compiled for.
 
-torchvision's wheels are linked with CUDA. Beside torch's CPU build their compiled operators do not load, and then
-nothing of torchvision imports, nor what imports torchvision: timm, and most of transformers. `prepare` defines the
-operators that detectors need and imports torchvision with them; where the pair fits, it does nothing. Whoever imports
-torchvision, timm or transformers calls it first.
+torchvision's wheels are linked with CUDA. With the CPU build of torch their compiled operators do not load; then
+torchvision does not import, nor do packages that import it: timm, and most of transformers. `prepare` defines the
+operators that detectors need and imports torchvision with them; where the builds fit, it does nothing. Call it before
+importing torchvision, timm or transformers.
 """
 
 from __future__ import annotations
@@ -34,9 +34,12 @@ _libraries: list[torch.library.Library] = []
 
 @functools.cache
 def prepare() -> bool:
-    """Makes torchvision importable, once a process; whether it is installed.
+    """Makes torchvision importable, once per process.
 
-    Deformable convolution and the position-sensitive pools stay undefined where the pair does not fit.
+    Deformable convolution and the position-sensitive pools stay undefined where the builds do not fit.
+
+    Returns:
+        Whether torchvision is installed.
 
     Raises:
         ImportError, RuntimeError: torchvision does not import for another reason.
@@ -54,7 +57,7 @@ def prepare() -> bool:
 
 
 def need() -> None:
-    """`prepare`, where nothing goes without torchvision.
+    """As `prepare`, for code that cannot run without torchvision.
 
     Raises:
         GearError: it is not installed.

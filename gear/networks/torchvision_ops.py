@@ -1,4 +1,4 @@
-"""torchvision's two operators that detectors need, in NumPy and plain torch, number for number as it defines them."""
+"""Two operators of torchvision that detectors need, in NumPy and plain torch, with the same results."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ def nms(boxes: Tensor, scores: Tensor, iou_threshold: float) -> Tensor:
 
     Args:
         boxes: (N, 4) left, top, right, bottom.
-        scores: (N,); of equal ones the first comes first.
-        iou_threshold: a box that overlaps a surer one by more than this is dropped.
+        scores: (N,); ties keep the order of the boxes.
+        iou_threshold: a box whose IoU with a kept box of higher score exceeds this is dropped.
 
     Returns:
-        (K,) int64, which boxes are kept, surest first.
+        (K,) int64 indices of the kept boxes, by falling score.
     """
     wide = torch.float64 if boxes.dtype == torch.float64 else torch.float32
     edges: Array = boxes.detach().to("cpu", wide).numpy()
@@ -41,20 +41,20 @@ def nms(boxes: Tensor, scores: Tensor, iou_threshold: float) -> Tensor:
 def roi_align(
     features: Tensor, rois: Tensor, spatial_scale: float, height: int, width: int, sampling_ratio: int, aligned: bool
 ) -> Tensor:
-    """Averages of bilinear samples in each cell of a grid laid over each region (He et al., Mask R-CNN, 2017).
+    """Averages of bilinear samples in each cell of a grid over each region (RoIAlign; He et al., Mask R-CNN, 2017).
 
-    Differentiable to the features; regions count as given, as in torchvision.
+    Differentiable with respect to the features. Regions are not rounded, as in torchvision.
 
     Args:
         features: (B, C, H, W).
-        rois: (K, 5): number of the picture, then left, top, right, bottom in the picture's pixels.
-        spatial_scale: of the features to the picture.
+        rois: (K, 5): index of the picture, then left, top, right, bottom in the picture's pixels.
+        spatial_scale: factor from the picture's to the features' coordinates.
         height, width: cells of the grid.
-        sampling_ratio: samples a cell and direction; 0 and less take as many as the cell spans feature pixels.
-        aligned: whether the centre of the first feature pixel is at 0.5 rather than at 0.
+        sampling_ratio: samples per cell and direction; 0 and less take as many as the cell spans feature pixels.
+        aligned: whether the centre of the first feature pixel is at 0.5 instead of 0.
 
     Returns:
-        (K, C, height, width) in the features' type.
+        (K, C, height, width) in the features' dtype.
     """
     wide = features.dtype if features.dtype in (torch.float32, torch.float64) else torch.float32
     with torch.autocast(features.device.type, enabled=False):
@@ -96,9 +96,9 @@ def _places(start: Tensor, size: Tensor, cells: int, samples: int) -> Tensor:
 
 
 def _bilinear(picture: Tensor, xs: Tensor, ys: Tensor) -> Tensor:
-    """(K, C, rows, columns) samples of a (1, C, H, W) picture at (K, columns) xs and (K, rows) ys.
+    """(K, C, rows, columns) samples of a (1, C, H, W) picture at (K, columns) x and (K, rows) y coordinates.
 
-    Between the outermost pixel centres and one pixel beyond, the border's value holds; further out there is nothing.
+    Up to one pixel beyond the outermost pixel centres the border's value is used; farther out the value is 0.
     """
     regions, columns, rows = len(xs), xs.shape[1], ys.shape[1]
     height, width = picture.shape[2:]

@@ -1,4 +1,4 @@
-"""Weights on disk: safetensors, strictly loaded."""
+"""Weights on disk: safetensors files, loaded strictly."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def build_graph(make: Callable[[], GraphT], options: NetworkOptions, name: str) 
         name: of the model plugin, for the shipped weights.
 
     Raises:
-        GearError: the weights are not there, or are of another network.
+        GearError: the weights do not exist, or belong to another network.
     """
     path = resolve(options.weights, name)
     with seeded(options.seed):
@@ -55,10 +55,10 @@ def build_graph(make: Callable[[], GraphT], options: NetworkOptions, name: str) 
 
 
 def load_into(network: nn.Module, path: str | Path) -> dict[str, str]:
-    """Loads a safetensors file into a network, strictly; returns the file's own metadata.
+    """Loads a safetensors file into a network, strictly; returns the file's metadata.
 
     Raises:
-        GearError: there is no such file, it is no safetensors, or it is of another network.
+        GearError: the file does not exist, is not safetensors, or belongs to another network.
     """
     state, metadata = read(path)
     problems = mismatches(network.state_dict(), state)
@@ -69,14 +69,14 @@ def load_into(network: nn.Module, path: str | Path) -> dict[str, str]:
 
 
 def load_trunk(network: nn.Module, path: str | Path) -> tuple[int, int]:
-    """Loads what a safetensors file of another network has under the same keys in the same shapes; the rest of the
-    network stays as it is.
+    """Loads the tensors of another network's safetensors file that have the same keys and shapes; other weights are
+    kept.
 
     Returns:
         How many of the network's numbers were loaded, and how many it has.
 
     Raises:
-        GearError: there is no such file, it is no safetensors, or it shares less than `LEAST_SHARED` of the network.
+        GearError: the file does not exist, is not safetensors, or shares less than `LEAST_SHARED` of the network.
     """
     given, _ = read(path)
     wanted = network.state_dict()
@@ -94,8 +94,9 @@ def load_trunk(network: nn.Module, path: str | Path) -> tuple[int, int]:
 
 
 def mismatches(wanted: Mapping[str, Tensor], given: Mapping[str, Tensor]) -> list[str]:
-    """What keeps a state from being loaded: keys that are missing or too many, other shapes or kinds of numbers, and
-    numbers that are none."""
+    """What keeps a state from being loaded: missing and unknown keys, other shapes or kinds of numbers, and numbers
+    that are not finite. Empty where it fits.
+    """
     missing = [key for key in wanted if key not in given and not key.endswith(OPTIONAL)]
     surplus = [key for key in given if key not in wanted]
     shared = [key for key in wanted if key in given]
@@ -121,10 +122,10 @@ def mismatches(wanted: Mapping[str, Tensor], given: Mapping[str, Tensor]) -> lis
 
 
 def read(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
-    """The tensors of a safetensors file, in float32 where they were stored shorter, and its metadata.
+    """The tensors of a safetensors file, in float32 where they are stored in fewer bits, and its metadata.
 
     Raises:
-        GearError: there is no such file, or it is no safetensors.
+        GearError: the file does not exist, or is not safetensors.
     """
     check_file(Path(path))
     try:
@@ -137,18 +138,18 @@ def read(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
 
 
 def write(path: str | Path, state: Mapping[str, Tensor], metadata: Mapping[str, str], *, halves: bool = False) -> None:
-    """Writes tensors whole or not at all; see `serialised`."""
+    """Writes a weights file whole or not at all; see `serialised`."""
     write_alone(Path(path), serialised(state, metadata, halves=halves))
 
 
 def serialised(state: Mapping[str, Tensor], metadata: Mapping[str, str], *, halves: bool = False) -> bytes:
-    """A safetensors file; the same tensors and texts give the same bytes.
+    """The bytes of a safetensors file; the same tensors and metadata give the same bytes.
 
     Args:
-        state: by key.
-        metadata: any texts; `gear.networks.shipped.WeightsFile` says which ones gear looks at.
-        halves: whether weights of two dimensions and more are stored in float16; statistics and biases never are, nor
-            are weights beyond its range.
+        state: tensors by key.
+        metadata: texts by key; `gear.networks.shipped.WeightsFile` lists those that gear reads.
+        halves: whether tensors of two and more dimensions are stored in float16; statistics, biases, and tensors beyond
+            its range are not.
     """
     tensors = {key: value.detach().cpu().clone().contiguous() for key, value in state.items()}
     if halves:
@@ -157,7 +158,7 @@ def serialised(state: Mapping[str, Tensor], metadata: Mapping[str, str], *, halv
 
 
 def _in_order(data: bytes) -> bytes:
-    """The same safetensors with its metadata sorted: the library writes them in another order every time."""
+    """The same safetensors file with sorted metadata: the library writes them in a random order."""
     length = int.from_bytes(data[:HEADER_AT], "little")
     header = json.loads(data[HEADER_AT : HEADER_AT + length])
     header["__metadata__"] = dict(sorted(header.get("__metadata__", {}).items()))
@@ -167,7 +168,7 @@ def _in_order(data: bytes) -> bytes:
 
 
 def _finite(tensor: Tensor) -> bool:
-    """Shapes without numbers, as lists of published keys have them, have none that are broken."""
+    """Whether all numbers are finite; tensors without storage, as in lists of published keys, count as finite."""
     return tensor.is_meta or bool(torch.isfinite(tensor).all())
 
 

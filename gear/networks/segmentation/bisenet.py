@@ -35,7 +35,7 @@ class SpatialPath(nn.Module):
 
 
 class AttentionRefinement(nn.Module):
-    """A 3x3 convolution whose channels are weighed by what they hold on average."""
+    """A 3x3 convolution whose output channels are weighted by their global averages (attention refinement module)."""
 
     def __init__(self, inputs: int) -> None:
         super().__init__()
@@ -52,7 +52,7 @@ class AttentionRefinement(nn.Module):
 
 
 class FeatureFusion(nn.Module):
-    """Joins both paths and lets each channel add a share of itself."""
+    """Joins both paths; each channel is re-weighted by channel attention (feature fusion module)."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -73,7 +73,7 @@ class FeatureFusion(nn.Module):
 
 
 class Head(nn.Module):
-    """From features to one map a class."""
+    """Convolutions from features to one logit map per class."""
 
     def __init__(self, inputs: int, planes: int, classes: int) -> None:
         super().__init__()
@@ -87,23 +87,23 @@ class Head(nn.Module):
 
 
 class BiSeNetX39(nn.Module):
-    """A spatial path at 1/8 and a context path down to 1/32, fused at 1/8.
+    """A spatial path at 1/8 and a context path down to 1/32 of the picture, fused at 1/8.
 
-    The original interpolates inside and gives logarithms of probabilities; here the caller interpolates, and what comes
-    out are logits, whose `log_softmax` those are.
+    The authors' code interpolates inside and returns log-probabilities. This graph returns logits, whose `log_softmax`
+    they are, and the caller interpolates.
 
     Attributes:
-        align_corners: of the interpolation that brings its maps to the picture's size.
+        align_corners: how the maps are interpolated to the picture's size.
     """
 
     align_corners = True
 
     def __init__(self, classes: int, *, auxiliary: bool = True) -> None:
-        """Makes the graph with random weights (He initialisation, by fan-in).
+        """Makes the graph with random weights (He initialisation, fan-in).
 
         Args:
-            classes: of the pictures.
-            auxiliary: whether it has the two heads that only training looks at.
+            classes: number of classes.
+            auxiliary: whether it has the two heads that are used in training alone.
         """
         super().__init__()
         self.context_path = Xception39()
@@ -125,10 +125,10 @@ class BiSeNetX39(nn.Module):
 
         Args:
             pictures: (B, 3, H, W), normalised.
-            auxiliary: whether to give the other heads' maps too, where there are any.
+            auxiliary: whether to return the maps of the training heads too.
 
         Returns:
-            (B, classes, h, w) each: the main head's at 1/8, then those at 1/16 and 1/8 that only training looks at.
+            (B, classes, h, w) each: the main head at 1/8, then the training heads at 1/16 and 1/8.
         """
         spatial = self.spatial_path(pictures)
         eighth, sixteenth, thirty_second = self.context_path(pictures)
@@ -160,5 +160,5 @@ class BiSeNetX39(nn.Module):
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """The network's own keys from a checkpoint's: the criteria go, the rest is as it is."""
+    """The network's own keys from a checkpoint: the criteria are dropped, the rest is kept."""
     return {key: value for key, value in state.items() if not key.startswith(("criterion.", "ohem_criterion."))}

@@ -21,17 +21,17 @@ class DDRNet23Slim(nn.Module):
     """Two branches, at 1/8 and down to 1/64 of the picture, that exchange features twice.
 
     Attributes:
-        align_corners: of the interpolation that brings its maps to the picture's size.
+        align_corners: how the maps are interpolated to the picture's size.
     """
 
     align_corners = False
 
     def __init__(self, channels: int, *, auxiliary: bool = True) -> None:
-        """Makes the graph with random weights (He initialisation, by fan-out).
+        """Makes the graph with random weights (He initialisation, fan-out).
 
         Args:
-            channels: of its output: classes, or 1 for a depth map.
-            auxiliary: whether it has the second head, which only training looks at.
+            channels: of the output: number of classes, or 1 for a depth map.
+            auxiliary: whether it has the second head, which is used in training alone.
         """
         super().__init__()
         high = PLANES * 2
@@ -62,14 +62,14 @@ class DDRNet23Slim(nn.Module):
                 nn.init.kaiming_normal_(module.weight, mode="fan_out", nonlinearity="relu")
 
     def forward(self, pictures: Tensor, *, auxiliary: bool = False) -> list[Tensor]:
-        """Maps at 1/8 of the picture's size.
+        """Output maps at 1/8 of the picture's size.
 
         Args:
             pictures: (B, 3, H, W), normalised; sides that are multiples of 8 keep both branches aligned.
-            auxiliary: whether to give the second head's map too, where there is one.
+            auxiliary: whether to return the second head's map too.
 
         Returns:
-            (B, channels, H / 8, W / 8) each: the main head's, then the second one's.
+            (B, channels, H / 8, W / 8) each: the main head's, then the second head's.
         """
         relu = functional.relu
         eighth = self.layer2(relu(self.layer1(self.conv1(pictures))))
@@ -90,13 +90,13 @@ class DDRNet23Slim(nn.Module):
     def taps(self) -> dict[str, nn.Module]:
         """The residual stages and bottlenecks by the names of Z-Mask's paper (Rossolini et al., AAAI 2023).
 
-        `rb1` at 1/4 and `rb2` at 1/8, before the branches part; `rbb1` at 1/8 and `rbb2` at 1/64, where they end. None
-        is rectified.
+        `rb1` at 1/4 and `rb2` at 1/8, before the branches separate; `rbb1` at 1/8 and `rbb2` at 1/64, at their ends.
+        All are taken before ReLU.
         """
         return {"rb1": self.layer1, "rb2": self.layer2, "rbb1": self.layer5_, "rbb2": self.layer5}
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """The network's own keys from a checkpoint's: the training wrapper's prefix and its criterion go."""
+    """The network's own keys from a checkpoint: the prefix of the training wrapper and its criterion are dropped."""
     kept = {key: value for key, value in state.items() if not key.startswith("loss.")}
     return {key.removeprefix(WRAPPER): value for key, value in kept.items()}

@@ -1,4 +1,6 @@
-"""What DDRNet is made of: residual blocks, deep aggregation pyramid pooling, heads (Hong et al., arXiv 2101.06085)."""
+"""Building blocks of DDRNet: residual blocks, deep aggregation pyramid pooling, heads (Hong et al., arXiv
+2101.06085).
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,7 @@ from torch.nn import functional
 
 
 def conv3x3(inputs: int, outputs: int, stride: int = 1, *, bias: bool = False) -> nn.Conv2d:
-    """A 3x3 convolution that keeps the size, but for its stride."""
+    """A 3x3 convolution with padding 1."""
     return nn.Conv2d(inputs, outputs, 3, stride, padding=1, bias=bias)
 
 
@@ -18,12 +20,12 @@ def conv1x1(inputs: int, outputs: int, stride: int = 1) -> nn.Conv2d:
 
 
 def upsample(features: Tensor, like: Tensor) -> Tensor:
-    """Bilinear, corners not aligned, to the height and width of another map."""
+    """Bilinear interpolation to the height and width of another map; corners are not aligned."""
     return functional.interpolate(features, size=like.shape[2:], mode="bilinear", align_corners=False)
 
 
 class BasicBlock(nn.Module):
-    """Two 3x3 convolutions with a shortcut; whether the sum is rectified is the caller's choice."""
+    """Two 3x3 convolutions with a shortcut; the caller chooses whether ReLU follows the sum."""
 
     def __init__(self, inputs: int, planes: int, stride: int = 1, *, rectify: bool = True) -> None:
         super().__init__()
@@ -42,7 +44,7 @@ class BasicBlock(nn.Module):
 
 
 class Bottleneck(nn.Module):
-    """1x1, 3x3, 1x1 convolutions to twice the planes, with a shortcut; the sum is not rectified."""
+    """1x1, 3x3 and 1x1 convolutions to twice the planes, with a shortcut; no ReLU follows the sum."""
 
     EXPANSION = 2
 
@@ -68,25 +70,25 @@ class Bottleneck(nn.Module):
 
 
 def shortcut(inputs: int, outputs: int, stride: int) -> nn.Sequential | None:
-    """What brings a block's input to its output's size; None where it has it already."""
+    """A projection of a block's input to the size of its output; None where both are equal."""
     if stride == 1 and inputs == outputs:
         return None
     return nn.Sequential(conv1x1(inputs, outputs, stride), nn.BatchNorm2d(outputs))
 
 
 def stage(inputs: int, planes: int, stride: int = 1) -> nn.Sequential:
-    """Two basic blocks; the last one is not rectified."""
+    """Two basic blocks; no ReLU follows the last one."""
     return nn.Sequential(BasicBlock(inputs, planes, stride), BasicBlock(planes, planes, rectify=False))
 
 
 def pre_activated(convolution: nn.Conv2d, *pooling: nn.Module) -> nn.Sequential:
-    """Pooling if any, then batch normalisation, ReLU and the convolution."""
+    """Pooling, if any, then batch normalisation, ReLU and a convolution."""
     norm = nn.BatchNorm2d(convolution.in_channels)
     return nn.Sequential(*pooling, norm, nn.ReLU(inplace=True), convolution)
 
 
 class Dappm(nn.Module):
-    """Deep aggregation pyramid pooling: five scales, each refined with what the finer one gave."""
+    """Deep aggregation pyramid pooling: five scales, each refined with the result of the next finer one."""
 
     def __init__(self, inputs: int, branch: int, outputs: int) -> None:
         super().__init__()
@@ -117,7 +119,7 @@ class Dappm(nn.Module):
 
 
 class Head(nn.Module):
-    """Two convolutions from features to one map a channel."""
+    """Two convolutions from features to the output channels."""
 
     def __init__(self, inputs: int, planes: int, channels: int) -> None:
         super().__init__()

@@ -1,7 +1,7 @@
-"""The best class of every pixel of a picture, from a network's smaller maps, without logits of the picture's size.
+"""The most likely class of each pixel, from a network's smaller logit maps, without logits at the picture's size.
 
-Those have 160 MB at 2048x1024: writing and reading them was two fifths of a light network's work. Band by band they
-stay in a processor's cache, and come out as `torch.nn.functional.interpolate` has them.
+Full-size logits take 160 MB at 2048 x 1024: writing and reading them was two fifths of a light network's time.
+Processed in bands they stay in the CPU's cache, with the values of `torch.nn.functional.interpolate`.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ _BAND_PX = 16
 
 
 def best_class_at(logits: Tensor, size_px: tuple[int, ...], *, align_corners: bool) -> UInt8Image:
-    """(H, W) uint8: which of (C, h, w) logits is largest once they are interpolated to the size, the first of equals.
+    """(H, W) uint8: the class with the largest of (C, h, w) logits after interpolation; the first of equals.
 
     Args:
         logits: float32, on the CPU.
         size_px: height and width.
-        align_corners: as torch's interpolation has it.
+        align_corners: as of torch's interpolation.
     """
     height, width = size_px
     inner_height = int(logits.shape[1])
@@ -42,15 +42,15 @@ def best_class_at(logits: Tensor, size_px: tuple[int, ...], *, align_corners: bo
 
 
 def best_class(logits: Tensor) -> UInt8Image:
-    """(H, W) uint8: where (C, H, W) logits are largest, the first of equals.
+    """(H, W) uint8: the class with the largest of (C, H, W) logits; the first of equals.
 
-    The same as `argmax(0)`, which reads memory across its order and takes twenty times as long on a CPU.
+    Equal to `argmax(0)`, which reads memory out of order and takes twenty times as long on a CPU.
     """
     return _first_of_largest(logits.float().numpy()) if logits.device.type == "cpu" else _on_device(logits)
 
 
 def _on_device(logits: Tensor) -> UInt8Image:
-    """The same, with what a GPU is quick at; its own `argmax` may give any of equals."""
+    """The same with operations that are fast on a GPU, whose own `argmax` may return any of equals."""
     largest = logits.amax(0)
     best = torch.zeros(largest.shape, dtype=torch.uint8, device=logits.device)
     for index in reversed(range(len(logits))):
@@ -71,8 +71,9 @@ def _first_of_largest(logits: npt.NDArray[np.float32]) -> UInt8Image:
 def _rows(
     inner: int, outer: int, align_corners: bool
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], npt.NDArray[np.float32]]:
-    """Of every row of a picture the two rows of a map that it lies between, and the share of the second, as torch
-    works them out in float32."""
+    """For each row of a picture, the two rows of a map between which it lies and the weight of the second, in torch's
+    float32 arithmetic.
+    """
     row = np.arange(outer, dtype=np.float32)
     half, one = np.float32(0.5), np.float32(1)
     if align_corners:

@@ -20,7 +20,7 @@ TRAIN_ID_OF_LABEL_ID[[label.id for label in LABELS]] = [label.train_id for label
 
 
 class SegmentedSample(Protocol):
-    """What the losses look at."""
+    """What the losses read of a sample."""
 
     @property
     def label_ids(self) -> npt.NDArray[np.uint8]:
@@ -29,7 +29,7 @@ class SegmentedSample(Protocol):
 
 
 def train_ids(samples: Sequence[SegmentedSample], device: torch.device) -> Tensor:
-    """(B, H, W) int64 train ids of samples of one size; 255 for what is not evaluated."""
+    """(B, H, W) int64 Cityscapes train ids of samples of one size; 255 for labels that are not evaluated."""
     labels = (np.ascontiguousarray(sample.label_ids) for sample in samples)
     ids = np.stack([cv2.LUT(one, TRAIN_ID_OF_LABEL_ID) for one in labels])
     return torch.from_numpy(ids).to(device).long()
@@ -40,17 +40,19 @@ STEP_PX = 2
 
 
 def offsets_px(index: int) -> tuple[int, int]:
-    """Row and column of the first pixel that is compared in a batch's picture; over four pictures, every one is."""
+    """Row and column of the first compared pixel in the picture at a position of the batch; four pictures together
+    cover every pixel position.
+    """
     return index // STEP_PX % STEP_PX, index % STEP_PX
 
 
 def sampled_logits(maps: Tensor, size_px: Sequence[int], *, align_corners: bool) -> Tensor:
-    """Bilinear interpolation of maps at the pixels that training compares, the same numbers as at the picture's size.
+    """Bilinear interpolation of maps at the pixels that training compares, with the values of full-size interpolation.
 
     Args:
         maps: (B, C, h, w) float.
         size_px: height and width of the pictures, at least `STEP_PX` each.
-        align_corners: whether the outermost cells lie on the outermost pixels' centres, or share their outer borders.
+        align_corners: whether the centres of the outermost cells and pixels coincide, or their outer borders.
 
     Returns:
         (B, C, H // STEP_PX, W // STEP_PX).
@@ -67,7 +69,7 @@ def sampled_logits(maps: Tensor, size_px: Sequence[int], *, align_corners: bool)
 
 
 def sampled_ids(ids: Tensor) -> Tensor:
-    """(B, H // STEP_PX, W // STEP_PX) of (B, H, W) ids: those of the pixels of `sampled_logits`."""
+    """(B, H // STEP_PX, W // STEP_PX): the entries of (B, H, W) ids at the pixels of `sampled_logits`."""
     height, width = (side // STEP_PX * STEP_PX for side in ids.shape[1:])
     chosen = []
     for index, one in enumerate(ids):
@@ -79,20 +81,20 @@ def sampled_ids(ids: Tensor) -> Tensor:
 def hard_cross_entropy(
     logits: Tensor, ids: Tensor, *, easy: float, least: float, weights: Sequence[float] = ()
 ) -> Tensor:
-    """Cross-entropy over the pixels that the network finds hard: online hard example mining, of pixels.
+    """Cross-entropy over hard pixels: online hard example mining (Shrivastava et al., arXiv 1604.03540), by pixels.
 
-    Shrivastava et al., arXiv 1604.03540, as the recipes of segmentation have it: pixels whose right class has a
-    probability below `easy` count; if they are fewer than `least` of all, those with the largest losses do.
+    Pixels whose correct class has a probability below `easy` count; if they are fewer than `least` of all pixels, those
+    with the largest losses count.
 
     Args:
         logits: (B, C, H, W).
         ids: (B, H, W) int64, 255 is ignored.
         easy: probability, 0..1; 1 keeps every pixel.
-        least: share of the pixels that are not ignored.
-        weights: what each of the C classes counts in the mean; all the same unless given.
+        least: share of the pixels that are not ignored, 0..1.
+        weights: of the C classes in the mean; equal by default.
 
     Returns:
-        The mean over the pixels that count; 0 where none has a class.
+        The mean over the pixels that count; 0 where no pixel has a class.
     """
     each = functional.cross_entropy(logits, ids, ignore_index=IGNORED_TRAIN_ID, reduction="none").flatten()
     known = (ids != IGNORED_TRAIN_ID).flatten()
@@ -120,12 +122,12 @@ leaving out easy pixels already takes most of the common classes away."""
 
 
 class SegmentationLosses:
-    """Hard cross-entropy of the main head and of the others.
+    """Hard cross-entropy of the main head and of the training heads.
 
     Attributes:
         easy, least: see `hard_cross_entropy`.
-        auxiliary_weight: of each other head, in the sum that training minimises.
-        weights: by class; () for none.
+        auxiliary_weight: weight of each training head in the sum that is minimised.
+        weights: by class; () for equal ones.
     """
 
     def __init__(
@@ -134,9 +136,9 @@ class SegmentationLosses:
         self.easy, self.least, self.auxiliary_weight, self.weights = easy, least, auxiliary_weight, tuple(weights)
 
     def __call__(self, outputs: Mapping[str, Tensor], targets: Sequence[SegmentedSample]) -> dict[str, Tensor]:
-        """`cross_entropy` of the output `logits`, and, weighed, one loss for each further output by its name.
+        """`cross_entropy` of the output `logits`, and one weighted loss for each further output, by its name.
 
-        Outputs are (B, 19, H, W) at the size of the targets' labels, or as `sampled_logits` gives them.
+        Outputs are (B, 19, H, W) at the size of the labels, or as `sampled_logits` returns them.
         """
         ids = train_ids(targets, outputs["logits"].device)
         if outputs["logits"].shape[2:] != ids.shape[1:]:

@@ -1,4 +1,4 @@
-"""Networks that give every pixel one of the 19 classes that Cityscapes evaluates."""
+"""Networks that assign to every pixel one of the 19 classes that Cityscapes evaluates."""
 
 from __future__ import annotations
 
@@ -35,16 +35,16 @@ Losses = Callable[[Mapping[str, Tensor], Sequence[Any]], Mapping[str, Tensor]]
 
 
 class SemsegNetwork(Network):
-    """A graph that labels pixels.
+    """A graph for semantic segmentation.
 
-    Its pictures are scaled by `input_scale` and to the nearest multiple of 8 on each side (bilinear, with anti-aliasing
-    where that makes them smaller), nothing is cut off or added, and its logits are interpolated back to the picture's
-    size. A picture whose sides are multiples of 8 is looked at as it is unless `input_scale` says otherwise.
+    Pictures are resized by `input_scale` and to the nearest multiple of 8 on each side (bilinear, with anti-aliasing
+    when reducing); nothing is cropped or padded, and the logits are interpolated back to the picture's size. With
+    `input_scale` 1, pictures whose sides are multiples of 8 are not resized.
 
     Attributes:
-        graph: gives a list of (B, classes, h, w) maps, the main head's first; says in `align_corners` how they are to
-            be interpolated, and in `taps()` what its named feature maps are.
-        input_scale: share of the picture's size.
+        graph: returns a list of (B, classes, h, w) maps, the main head's first; its `align_corners` says how they are
+            interpolated, and its `taps()` returns its named feature maps.
+        input_scale: factor by which pictures are resized before the network.
     """
 
     has_quick_copy = True
@@ -55,10 +55,10 @@ class SemsegNetwork(Network):
         """Wraps a graph.
 
         Args:
-            graph: as above.
-            options: as given by the user.
-            losses: of the network in training.
-            input_scale: used where the options leave it open.
+            graph: torch module, as described for the class.
+            options: as the user gave them.
+            losses: of training.
+            input_scale: used where neither the options nor the weights state one.
         """
         super().__init__(graph, options, views=(VIEW,))
         self.input_scale = input_scale if options.input_scale is None else options.input_scale
@@ -66,24 +66,25 @@ class SemsegNetwork(Network):
         self._losses = losses
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """The graph's own."""
+        """The feature maps of the graph, by name."""
         taps: Mapping[str, nn.Module] = self.graph.taps()  # type: ignore[operator]
         return taps
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """`logits`: (B, 19, H, W), by train id."""
+        """`logits`: (B, 19, H, W), by Cityscapes train id."""
         picture = pictures[VIEW]
         return {LOGITS: self._resized(self._maps(picture, auxiliary=False)[0], picture.shape[2:])}
 
     def run_for_answers(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """On a CPU `maps`: the logits as the graph gives them, which are quicker to answer from."""
+        """On a CPU `maps`: the graph's own smaller logits, from which predictions are faster; `logits` elsewhere."""
         if self.device.type != "cpu":
             return self.run(pictures)
         return {MAPS: self._maps(pictures[VIEW], auxiliary=False)[0]}
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The same, and `auxiliary_0` and so on of the same shape; while the graph is being trained, at the pixels of
-        `gear.networks.segmentation.losses.sampled_logits` alone."""
+        """`logits`, and `auxiliary_0` and so on of the same shape; in training mode at the pixels of
+        `gear.networks.segmentation.losses.sampled_logits` alone.
+        """
         size_px, align = pictures[VIEW].shape[2:], bool(self.graph.align_corners)
         maps = self._maps(pictures[VIEW], auxiliary=True)
         if self.graph.training:
@@ -93,7 +94,7 @@ class SemsegNetwork(Network):
         return {LOGITS: main} | {f"{AUXILIARY}_{index}": other for index, other in enumerate(others)}
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """As the network's recipe has them."""
+        """The losses with which the network was built, by name."""
         return self._losses(outputs, targets)
 
     def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
@@ -104,7 +105,7 @@ class SemsegNetwork(Network):
         return [LABEL_IDS[best_class_at(maps, size_px, align_corners=align)] for maps in outputs[MAPS]]
 
     def _maps(self, pictures: Tensor, *, auxiliary: bool) -> list[Tensor]:
-        """The heads' logits, smaller than the picture; class by class in memory, whichever way the graph has them."""
+        """The logits of all heads, smaller than the picture, in channels-first memory whatever the graph returns."""
         size_px = pictures.shape[2:]
         inner_px = inner_size(size_px, self.input_scale)
         if inner_px != tuple(size_px):
@@ -119,5 +120,5 @@ class SemsegNetwork(Network):
 
 
 def inner_size(size_px: Sequence[int], scale: float) -> tuple[int, ...]:
-    """Height and width that a network runs at: scaled, to the nearest multiple of its stride, at least one of it."""
+    """Height and width of the network's input: resized, rounded to a multiple of its stride, at least one stride."""
     return tuple(max(1, round(side * scale / STRIDE_PX)) * STRIDE_PX for side in size_px)

@@ -13,7 +13,7 @@ EXPANSION = 4
 
 
 class ConvBnRelu(nn.Module):
-    """A convolution without bias, then batch normalisation and ReLU as far as they are asked for."""
+    """A convolution without bias, then optional batch normalisation and optional ReLU."""
 
     def __init__(
         self, inputs: int, outputs: int, kernel: int, stride: int = 1, *, norm: bool = True, rectify: bool = True
@@ -32,7 +32,7 @@ class ConvBnRelu(nn.Module):
 
 
 class Separable(nn.Module):
-    """A 3x3 convolution of each channel for itself, then a 1x1 convolution with batch normalisation."""
+    """A depth-wise 3x3 convolution, then a 1x1 convolution with batch normalisation."""
 
     def __init__(self, inputs: int, outputs: int, stride: int = 1, *, rectify: bool = True) -> None:
         super().__init__()
@@ -46,7 +46,7 @@ class Separable(nn.Module):
 
 
 class Block(nn.Module):
-    """Three separable convolutions with a shortcut; the sum is rectified."""
+    """Three separable convolutions with a shortcut; ReLU follows the sum."""
 
     def __init__(self, inputs: int, planes: int, stride: int) -> None:
         super().__init__()

@@ -1,8 +1,8 @@
-"""Dense photometric alignment: the depth at which the left picture's pixels of a car lie on the right one's best.
+"""Dense photometric alignment (Stereo R-CNN, section 4.2): the depth at which a car's pixels in both pictures match
+best.
 
-Stereo R-CNN, section 4.2. Every pixel in the lower half of the car's box is given the depth that the box has there,
-less that of the box's middle; then the middle is moved along the depth, and the sum of absolute differences of the two
-pictures decides.
+Each pixel in the lower half of the car's box gets the depth of the box's surface there, relative to that of the box's
+centre. The centre is moved along the depth axis, and the sum of absolute differences between the pictures is minimised.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ NEAREST_M = 1.5
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Pair:
-    """Both pictures at the size in which they are compared.
+    """Both pictures at the size at which they are compared.
 
     Attributes:
         left, right: (1, 3, h, w) float.
-        scale: of h and w to the original pictures.
+        scale: factor from the original pictures' size to h and w.
     """
 
     left: Tensor
@@ -44,7 +44,9 @@ class Pair:
 
     @staticmethod
     def of(left: Tensor, right: Tensor, scale: float) -> Pair:
-        """From (1, 3, H, W) pictures that are `scale` times as large as the original ones: twice as large again."""
+        """From (1, 3, H, W) pictures that are `scale` times as large as the original ones; they are enlarged by two
+        again.
+        """
         up = [
             functional.interpolate(picture, scale_factor=UPSAMPLED, mode="bilinear", align_corners=False)
             for picture in (left, right)
@@ -53,12 +55,12 @@ class Pair:
 
 
 def align(pair: Pair, box: Box3d, measured: Measured, calibration: Calibration) -> float | None:
-    """Depth of the middle of the box, in metres; None where no pixel of it can be looked at.
+    """Depth of the box's centre in metres; None where none of its pixels is visible in both pictures.
 
     Args:
         pair: the pictures.
-        box: where the car stands so far.
-        measured: its box and borders in the left picture.
+        box: estimated 3D box of the car.
+        measured: its 2D box and visible columns in the left picture.
         calibration: of the original pictures.
     """
     pixels, behind_m = _surface(pair, box, measured, calibration)
@@ -73,7 +75,9 @@ def align(pair: Pair, box: Box3d, measured: Measured, calibration: Calibration) 
 
 
 def _surface(pair: Pair, box: Box3d, measured: Measured, calibration: Calibration) -> tuple[Array, Array]:
-    """(P, 2) index pixels of the compared pictures, and (P,) metres by which the box lies behind its middle there."""
+    """(P, 2) index pixels of the compared pictures, and (P,) metres from the box's centre to its surface along the
+    depth axis.
+    """
     top, bottom = measured.left_px[1] * pair.scale, measured.left_px[3] * pair.scale
     left, right = (side * pair.scale for side in measured.borders_px)
     height, width = pair.left.shape[-2:]
@@ -91,7 +95,7 @@ def _surface(pair: Pair, box: Box3d, measured: Measured, calibration: Calibratio
 
 
 def _differences(pair: Pair, pixels: Array, behind_m: Array, depths_m: Array, calibration: Calibration) -> Array:
-    """(D,) mean absolute difference of the pictures where the middle of the box stands at each depth."""
+    """(D,) mean absolute difference of the pictures for each depth of the box's centre."""
     reach_px = calibration.intrinsics.focal_px * calibration.baseline_m * pair.scale
     disparities = reach_px / np.maximum(depths_m[:, None] + behind_m[None], NEAREST_M / 2)
     shifted = np.stack([pixels[None, :, 0] - disparities, np.broadcast_to(pixels[:, 1], disparities.shape)], axis=-1)
@@ -101,7 +105,7 @@ def _differences(pair: Pair, pixels: Array, behind_m: Array, depths_m: Array, ca
 
 
 def _sampled(picture: Tensor, pixels: Array) -> Tensor:
-    """(3, D, P) colours at (D, P, 2) index pixels, bilinear; the border outside."""
+    """(3, D, P) colours at (D, P, 2) index pixels, bilinear; the border's colour outside."""
     height, width = picture.shape[-2:]
     grid = 2 * pixels / (width - 1, height - 1) - 1
     places = torch.from_numpy(grid).to(picture)[None]

@@ -1,9 +1,9 @@
-"""Where a car stands, from its boxes in both pictures and one of its corners: Stereo R-CNN, section 4.
+"""3D box of a car from its boxes in both pictures and one corner (Stereo R-CNN, section 4).
 
-Seven measurements (sides, top and bottom of the left box, sides of the right one, the column of the corner that is seen
-between the sides) determine the position and the direction of a box whose size is known. Which corner of the box makes
-which side depends on how it is seen; the authors look that up among eight ways of seeing a car, here the corners are
-projected, solved with, and projected again until none changes.
+Seven measurements (sides, top and bottom of the left box, sides of the right box, column of the ground corner that is
+visible between the sides) determine position and heading of a box of known size. Which corner of the box produces which
+side depends on the view; the authors choose among eight cases from a table. Here the corners are projected, the
+equations solved, and the corners projected again until the assignment is stable.
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ SIGNS = np.array([(-1, -1), (-1, 1), (1, 1), (1, -1)]) / 2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measured:
-    """What a network says of one car; index pixels of the pictures.
+    """A network's measurements of one car, in index pixels of the pictures.
 
     Attributes:
-        left_px: box in the left picture.
+        left_px: box in the left picture: left, top, right, bottom.
         right_sides_px: left and right side of the box in the right picture.
-        corner: which corner on the ground is seen between the sides, 0..3: left behind, left in front, right in front,
-            right behind, as its driver has it.
+        corner: which ground corner is visible between the sides, 0..3: rear left, front left, front right, rear right,
+            seen from the driver.
         corner_px: column of that corner.
-        borders_px: columns between which nothing covers the car.
-        width_m, height_m, length_m: its size.
+        borders_px: first and last column in which the car is not occluded.
+        width_m, height_m, length_m: size.
         alpha_rad: observation angle.
     """
 
@@ -59,22 +59,22 @@ class Measured:
 
     @property
     def alpha_of_corner_rad(self) -> float:
-        """The observation angle that the corner's place between the sides asks for, roughly."""
+        """Rough observation angle from the corner's position between the sides."""
         share = (self.corner_px - self.left_px[0]) / max(self.left_px[2] - self.left_px[0], 1e-6)
         turned = math.asin(min(max(share, -1.0), 1.0))
         return wrap_angle_rad((-math.pi / 2, math.pi, math.pi / 2, 0.0)[self.corner] - turned)
 
 
 def solve_box(measured: Measured, calibration: Calibration, depth_m: float | None = None) -> Box3d | None:
-    """The box that the measurements fit best.
+    """The 3D box that fits the measurements best, in the least-squares sense.
 
     Args:
         measured: of one car.
         calibration: of the pair.
-        depth_m: of the middle of the box, where it is known better; then the right picture is not asked.
+        depth_m: of the box's centre, where it is known from alignment; the right picture is not used then.
 
     Returns:
-        None where the boxes are too small, the car is hardly seen, or nothing sensible fits.
+        None where the 2D boxes are too small, the car is hardly visible, or no plausible box fits.
     """
     left, top, right, bottom = measured.left_px
     seen_px = measured.borders_px[1] - measured.borders_px[0]
@@ -99,7 +99,7 @@ def solve_box(measured: Measured, calibration: Calibration, depth_m: float | Non
 
 
 def _descend(problem: _Problem, state: Array) -> tuple[float, Array]:
-    """The error that is left, and the unknowns."""
+    """Remaining error and unknowns after Gauss-Newton descent."""
     cost, corners = math.inf, tuple[int, ...]()
     for _ in range(ROUNDS):
         chosen = problem.silhouette(state)
@@ -113,7 +113,9 @@ def _descend(problem: _Problem, state: Array) -> tuple[float, Array]:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Problem:
-    """Least squares over x, y, z and rotation_y, without z where it is known; in units of the focal length."""
+    """Least squares over x, y, z and rotation_y, without z where it is known; residuals in units of the focal
+    length.
+    """
 
     measured: Measured
     baseline_m: float
@@ -152,7 +154,7 @@ class _Problem:
         )
 
     def start(self, alpha_rad: float) -> Array | None:
-        """From the disparity of the boxes' middles and an observation angle."""
+        """First guess from the disparity of the 2D boxes' centres and an observation angle."""
         z = self.depth_m
         if z is None:
             disparity = float(self.sides.mean() - self.right_sides.mean())
@@ -165,12 +167,12 @@ class _Problem:
         return np.array([x, y, rotation_y] if self.depth_m is not None else [x, y, z, rotation_y])
 
     def whole(self, state: Array) -> tuple[float, float, float, float]:
-        """x, y, z, rotation_y."""
+        """x, y, z and rotation_y, with the known z filled in."""
         x, y, *others = (float(value) for value in state)
         return (x, y, self.depth_m if self.depth_m is not None else others[0], others[-1])
 
     def scale(self) -> Array:
-        """A step of each unknown that changes the picture about equally."""
+        """Steps of the unknowns that change the picture by about the same amount."""
         return np.array([1.0, 1.0, 0.3] if self.depth_m is not None else [1.0, 1.0, 10.0, 0.3])
 
     def corners(self, state: Array) -> tuple[Array, float]:
@@ -184,7 +186,9 @@ class _Problem:
         return places, y
 
     def silhouette(self, state: Array) -> tuple[int, ...]:
-        """Which corners make the left side, the right side, the top, the bottom, and both sides on the right."""
+        """Indices of the corners that produce the left side, right side, top, bottom, and both sides in the right
+        picture.
+        """
         places, y = self.corners(state)
         left = places[:, 0] / places[:, 1]
         right = (places[:, 0] - self.baseline_m) / places[:, 1]
@@ -193,7 +197,7 @@ class _Problem:
         return tuple(int(corner) for corner in found)
 
     def errors(self, state: Array, corners: tuple[int, ...]) -> Array:
-        """(8,) left, right, top, bottom, left and right in the right picture, corner, angle; weighted."""
+        """(8,) weighted residuals: left, right, top, bottom, left and right in the right picture, corner, angle."""
         places, y = self.corners(state)
         x, _, z, rotation_y = self.whole(state)
         column, right_column = places[:, 0] / places[:, 1], (places[:, 0] - self.baseline_m) / places[:, 1]

@@ -1,13 +1,13 @@
 """Siamese networks with a correlation volume that find objects in a rectified pair by their centres.
 
-Both pictures go through the same first layers of a trunk; their features are correlated over disparities at half the
-resolution (as DispNetC does, Mayer et al., CVPR 2016), and what comes out runs, with the left features, through the
-trunk's other layers and a feature pyramid. Every cell of the finest level then says whether an object's centre lies
-there and what the object is (CenterNet, Zhou et al., 2019; StereoCenterNet, Shi et al., 2021; RTS3D, Li et al., AAAI
-2021). Which way it faces is a distribution over directions (as in Mousavian et al., CVPR 2017): a car that may stand
-one way or the other is not taken to stand between them. The disparity of an object's centre is the expectation of a
-distribution over bins with equal steps of its logarithm, plus a correction, with its own uncertainty. No anchors, no
-boxes to be matched between the pictures; everything is differentiable to the pixels.
+Both pictures pass the same first layers of a trunk. Their features are correlated over disparities at half the
+resolution (as in DispNetC, Mayer et al., CVPR 2016); the result passes, with the left features, the trunk's other
+layers and a feature pyramid. Each cell of the finest level then says whether an object's centre lies there and what the
+object is (CenterNet, Zhou et al., 2019; StereoCenterNet, Shi et al., 2021; RTS3D, Li et al., AAAI 2021). Heading is a
+distribution over directions (as in Mousavian et al., CVPR 2017), so that a car whose front and rear are confused is not
+placed between both headings. The disparity of an object's centre is the expectation of a distribution over bins with
+equal steps of its logarithm, plus a correction, with an uncertainty. There are no anchors and no matching of boxes;
+everything is differentiable with respect to the pixels.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ PRIOR_HEAT = -4.6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StereoCentreShape:
-    """How large the network is.
+    """Size of the network.
 
     Attributes:
-        width: channels of what is matched, of which those of the volume, the pyramid and the heads are multiples.
-        disparities: how many shifts are correlated, each of two pixels of the network's input.
+        width: channels of the matched features; those of the volume, the pyramid and the heads are multiples.
+        disparities: number of correlated shifts, each of two pixels of the network's input.
         bins: of an object's disparity.
         disparity_px: smallest and largest disparity of an object's centre, in pixels of the network's input.
     """
@@ -54,7 +54,7 @@ class StereoCentreShape:
 
 
 def conv(inputs: int, outputs: int, size: int, stride: int = 1) -> nn.Sequential:
-    """Convolution and normalisation."""
+    """A convolution without bias and a batch normalisation."""
     return nn.Sequential(
         nn.Conv2d(inputs, outputs, size, stride, size // 2, bias=False),
         nn.BatchNorm2d(outputs),
@@ -62,20 +62,20 @@ def conv(inputs: int, outputs: int, size: int, stride: int = 1) -> nn.Sequential
 
 
 def conv_relu(inputs: int, outputs: int, size: int, stride: int = 1) -> nn.Sequential:
-    """Convolution, normalisation, ReLU."""
+    """A convolution without bias, a batch normalisation and ReLU."""
     return nn.Sequential(conv(inputs, outputs, size, stride), nn.ReLU(inplace=True))
 
 
 def correlate(left: Tensor, right: Tensor, disparities: int) -> Tensor:
-    """Cosine of the left features at x and the right ones at x - d.
+    """Cosine similarity of the left features at x and the right features at x - d.
 
     Args:
         left, right: (B, C, H, W) features of a rectified pair.
         disparities: d = 0 .. disparities - 1.
 
     Returns:
-        (B, disparities, H, W); 0 where x - d lies outside. In float32, under autocast too: what lies between two
-        disparities is in differences that bfloat16 does not have.
+        (B, disparities, H, W); 0 where x - d lies outside. Computed in float32, under autocast too: sub-disparity
+            differences are below the precision of bfloat16.
     """
     with torch.autocast(left.device.type, enabled=False):
         return _band(left.float(), right.float(), disparities)
@@ -94,7 +94,7 @@ def _band(left: Tensor, right: Tensor, disparities: int) -> Tensor:
 
 
 class Head(nn.Module):
-    """One hidden layer and one number a channel and cell."""
+    """One hidden layer, then the output channels for each cell."""
 
     def __init__(self, inputs: int, hidden: int, outputs: int) -> None:
         super().__init__()
@@ -104,7 +104,7 @@ class Head(nn.Module):
         self.start_at(0.0)
 
     def start_at(self, value: float) -> None:
-        """What it says of everything before it has learnt anything."""
+        """Sets the bias, which is the output everywhere before training."""
         assert self.out.bias is not None
         nn.init.constant_(self.out.bias, value)
 
@@ -115,7 +115,9 @@ class Head(nn.Module):
 
 
 class CentreGraph(nn.Module, ABC):
-    """Matching, pyramid and heads, on a trunk that a subclass has: two normalised pictures in, a map an output name."""
+    """Matching, pyramid and heads, on a trunk that a subclass provides: two normalised pictures to a map by output
+    name.
+    """
 
     log_bins: Tensor
 
@@ -123,11 +125,11 @@ class CentreGraph(nn.Module, ABC):
     """Whether the disparity of an object's middle is said as a change to what the volume says of the surface there."""
 
     def __init__(self, shape: StereoCentreShape, channels: Sequence[int], pyramid: int) -> None:
-        """Everything behind the trunk.
+        """Builds everything after the trunk.
 
         Args:
             shape: of the network.
-            channels: of the trunk's maps at 1/2 (both pictures), and at 1/4, 1/8, 1/16 and 1/32 (the left one).
+            channels: of the trunk's maps at 1/2 (both pictures), and at 1/4, 1/8, 1/16 and 1/32 (left picture).
             pyramid: channels of the pyramid and the heads.
         """
         super().__init__()
@@ -156,14 +158,14 @@ class CentreGraph(nn.Module, ABC):
 
     @abstractmethod
     def shared_layers(self) -> Mapping[str, nn.Module]:
-        """The trunk's layers that both pictures go through, by key name.
+        """The trunk's layers that both pictures pass, by key name.
 
-        They come first, and `left_layers` after the volume's: digests of weights go by the order of their keys.
+        They come first, and `left_layers` after those of the volume: hashes of weights depend on the order of the keys.
         """
 
     @abstractmethod
     def left_layers(self) -> Mapping[str, nn.Module]:
-        """Those that the left picture and the volume go through."""
+        """The trunk's layers that the left picture and the volume pass, by key name."""
 
     @abstractmethod
     def shared(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
@@ -174,22 +176,23 @@ class CentreGraph(nn.Module, ABC):
         """Maps of the left pictures at strides 4, 8, 16 and 32, from their features and the volume's at stride 4."""
 
     def forward(self, left: Tensor, right: Tensor) -> dict[str, Tensor]:
-        """Maps of (B, ..., H / 4, W / 4); lengths are in pixels of the pictures given.
+        """Maps (B, ..., H / 4, W / 4) by name; lengths are in pixels of the pictures given.
 
         Args:
             left, right: (B, 3, H, W), H and W multiples of 32.
 
         Returns:
-            `heat`: logits, a channel a kind of `KINDS`.
-            `sides_px`: 4, above 0, from the cell to the left, top, right and bottom of the object's box.
-            `centre_px`: 2, from the cell to where the middle of the object in space is seen, x and y.
-            `size_m`: 3, above 0, height, width and length.
-            `heading_logits`: a channel a direction of `HEADINGS`, of the observation angle.
-            `hidden`: 1, logit of the share that other things cover.
-            `disparity_logits`: a channel a bin.
-            `disparity_px`: 1, above 0, of the middle of the object in space.
-            `surface_logits`: a channel a bin, of the disparity of what is seen in the cell, from the volume alone.
-            `disparity_spread`: 1, logarithm of the mean absolute error expected of the disparity's logarithm.
+            `heat`: logits, one channel for each of `KINDS`.
+            `sides_px`: 4 channels above 0, distances from the cell to the left, top, right and bottom of the object's
+                box.
+            `centre_px`: 2 channels, from the cell to the projection of the object's 3D centre, x and y.
+            `size_m`: 3 channels above 0, height, width and length.
+            `heading_logits`: one channel for each of `HEADINGS` directions of the observation angle.
+            `hidden`: 1 channel, logit of the occluded share.
+            `disparity_logits`: one channel for each bin.
+            `disparity_px`: 1 channel above 0, of the object's 3D centre.
+            `surface_logits`: one channel for each bin, of the disparity of the visible surface, from the volume alone.
+            `disparity_spread`: 1 channel, logarithm of the expected absolute error of the disparity's logarithm.
         """
         fine, coarse = self.shared(torch.cat([left, right]))
         up = functional.interpolate(self.match_coarse(coarse), scale_factor=2, mode="bilinear", align_corners=False)
@@ -234,15 +237,15 @@ class CentreGraph(nn.Module, ABC):
 
 
 def _exp(raw: Tensor) -> Tensor:
-    """exp within bounds that no real object leaves, so that no weights whatever give infinities."""
+    """exp with bounds beyond all real objects, so that no weights give infinities."""
     return raw.clamp(-5, 5).exp()
 
 
 def fit_to_network(picture: Tensor, scale: float) -> tuple[Tensor, tuple[float, float]]:
-    """Shrinks (B, 3, H, W) pictures and pads them on the right and below to multiples of 32.
+    """Reduces (B, 3, H, W) pictures and pads them on the right and at the bottom to multiples of 32.
 
     Returns:
-        The pictures, and how many pixels of the picture given one pixel of them is, in x and in y.
+        The network's input, and the number of the given picture's pixels for each of its pixels, in x and in y.
     """
     height, width = picture.shape[-2:]
     size = (max(1, round(height * scale)), max(1, round(width * scale)))
@@ -253,7 +256,7 @@ def fit_to_network(picture: Tensor, scale: float) -> tuple[Tensor, tuple[float, 
 
 
 def in_picture_px(raw: Mapping[str, Tensor], ratio: tuple[float, float]) -> dict[str, Tensor]:
-    """The graph's outputs with lengths in pixels of a picture `ratio` times as large, in x and y."""
+    """The graph's outputs with lengths converted to pixels of a picture `ratio` times as large, in x and y."""
     x, y = ratio
     factors = {"sides_px": (x, y, x, y), "centre_px": (x, y), "disparity_px": (x,)}
     return {

@@ -1,4 +1,4 @@
-"""From the outputs of the network of centres to lines of KITTI's result files."""
+"""From the outputs of the centre-based stereo network to lines of KITTI's result files."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ class Peaks:
     """Which centres become detections.
 
     Attributes:
-        most: in a picture.
-        least_score: below which nothing is reported.
-        same_overlap: two detections that overlap by more in the picture are one, if their depths agree too.
-        same_depth: how far the depths of one object's detections may differ, relatively.
+        most: largest number in a picture.
+        least_score: smallest score that is reported.
+        same_overlap: two detections with a larger IoU in the picture are one object, if their depths agree too.
+        same_depth: largest relative difference of the depths of one object's detections.
     """
 
     most: int = 50
@@ -48,14 +48,14 @@ def decode(
     cell_px: tuple[float, float],
     peaks: Peaks,
 ) -> list[tuple[KittiLabel, ...]]:
-    """The detections of each picture of a batch, the surest first.
+    """The detections of each picture of a batch, by falling score.
 
     Args:
-        outputs: as `gear.networks.stereo.centre.CentreGraph` names them, lengths in pixels of the picture.
+        outputs: as `gear.networks.stereo.centre.CentreGraph.forward` names them, lengths in pixels of the picture.
         kinds: KITTI's types in the order of the channels of `heat`.
         calibration: of the pair.
-        cell_px: width and height of a cell.
-        peaks: which of them are kept.
+        cell_px: width and height of a cell in pixels of the picture.
+        peaks: which centres become detections.
     """
     intrinsics = calibration.intrinsics
     heat = outputs["heat"].sigmoid()
@@ -123,16 +123,16 @@ def _label(
 
 
 def heading_rad(logits: Array) -> tuple[Array, Array]:
-    """The angles of distributions over directions, evenly round the circle from 0 on, and how sure their lines are.
+    """Angles of distributions over directions that are spaced evenly from 0, and the confidence of their axes.
 
-    A line is where the chances of both ends are highest together, so that not knowing front from back does not turn
-    it; between directions it is the mean of the best one and its neighbours. Then the likelier end is the front.
+    The axis with the highest sum of the probabilities of both ends is chosen, so that confusion of front and rear does
+    not turn it; it is refined by the mean of the best direction and its neighbours. The likelier end is the front.
 
     Args:
         logits: (..., directions).
 
     Returns:
-        (...) in [-pi, pi), and (...) 0..1.
+        (...) angles in [-pi, pi), and (...) confidences in 0..1.
     """
     chances = np.exp(logits - logits.max(axis=-1, keepdims=True))
     chances /= chances.sum(axis=-1, keepdims=True)
@@ -148,7 +148,7 @@ def heading_rad(logits: Array) -> tuple[Array, Array]:
 
 
 def _apart(labels: Sequence[KittiLabel], peaks: Peaks) -> tuple[KittiLabel, ...]:
-    """The surest of those that are one object."""
+    """The detection with the highest score of each object."""
     ordered = sorted(labels, key=lambda label: -(label.score or 0.0))
     boxes_px = np.array([label.box_px for label in ordered]).reshape(-1, 4)
     logs = np.log([label.location_m[2] for label in ordered])

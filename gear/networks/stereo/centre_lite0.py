@@ -1,8 +1,8 @@
-"""The network of centres on EfficientNet-Lite0, which may begin with what ImageNet taught it.
+"""The centre-based stereo network on EfficientNet-Lite0, which can start from ImageNet weights.
 
-Both pictures go through the layers at a half and a quarter of their size, the left one's map there through the others.
-What the volume says is added to that map by a layer that begins small, so that the trunk at first sees little but what
-it knows. See `gear.networks.stereo.centre`.
+Both pictures pass the layers at 1/2 and 1/4 of their size; the left picture's map at 1/4 passes the others. The volume
+is added to that map by a layer with small initial weights, so that the trunk first receives inputs like those it was
+trained on. See `gear.networks.stereo.centre`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ FUSE_STD = 0.01
 
 
 class StereoCentreLite0(CentreGraph, OnLite0):
-    """Key names of the trunk are timm's."""
+    """The graph. Key names of the trunk are those of timm."""
 
     corrects_surface = True
 
@@ -30,27 +30,27 @@ class StereoCentreLite0(CentreGraph, OnLite0):
         super().__init__(shape, CHANNELS, pyramid=2 * shape.width)
 
     def shared_layers(self) -> Mapping[str, nn.Module]:
-        """`trunk`, all of it: timm's layers lie in one module."""
+        """`trunk`, complete: timm's layers lie in one module."""
         return {"trunk": features_of_lite0(range(len(LEVELS)))}
 
     def left_layers(self) -> Mapping[str, nn.Module]:
-        """`fuse`."""
+        """`fuse`, the layer that adds the volume."""
         fuse = nn.Conv2d(2 * self.shape.width, CHANNELS[1], 1, bias=False)
         nn.init.normal_(fuse.weight, std=FUSE_STD)
         return {"fuse": fuse}
 
     def lite0(self) -> nn.Module:
-        """The trunk."""
+        """The trunk, an EfficientNet-Lite0."""
         return self.trunk
 
     def shared(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
-        """The first two stages'."""
+        """Feature maps of the first two stages."""
         trunk = self.trunk
         fine = trunk.get_submodule("blocks.0")(trunk.get_submodule("bn1")(trunk.get_submodule("conv_stem")(pictures)))
         return fine, trunk.get_submodule("blocks.1")(fine)
 
     def stages(self, coarse: Tensor, volume: Tensor) -> Sequence[Tensor]:
-        """What goes into the third stage, and what each level ends with."""
+        """Input of the third stage, and the last map of each level."""
         maps = [coarse + self.fuse(volume)]
         for level in LEVELS[2:]:
             features = maps[-1]

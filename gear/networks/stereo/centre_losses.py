@@ -35,7 +35,7 @@ ALMOST_ZERO = 1e-6
 
 
 class LabelledObject(Protocol):
-    """What the losses read of an object: `gear.plugins.tasks.stereo3d.Object3d` has it."""
+    """What the losses read of an object; `gear.plugins.tasks.stereo3d.Object3d` provides it."""
 
     @property
     def kitti_type(self) -> str: ...  # noqa: D102
@@ -63,7 +63,7 @@ class Grid:
     """The cells of the outputs in the picture.
 
     Attributes:
-        height, width: in cells.
+        height, width: number of cells.
         cell_px: width and height of a cell in pixels of the picture.
     """
 
@@ -76,22 +76,22 @@ class Grid:
         return (u_px + 0.5) / self.cell_px[0] - 0.5, (v_px + 0.5) / self.cell_px[1] - 0.5
 
     def middles_px(self, rows: Whole, columns: Whole) -> Array:
-        """(N, 2) middles of cells, x and y, in index pixels."""
+        """(N, 2) centres of cells, x and y, in index pixels."""
         return np.stack([(columns + 0.5) * self.cell_px[0] - 0.5, (rows + 0.5) * self.cell_px[1] - 0.5], axis=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class CentreTargets:
-    """What the cells of a batch should say.
+    """Targets of the cells of a batch.
 
     Attributes:
         heat: (B, K, h, w) 0..1, 1 at the cells of the centres.
         is_counted: (B, 1, h, w) bool; False inside ignored objects.
-        where: (N, 3) batch, row and column of the cells that learn what their object is.
-        weight: (N,) of these; an object's sum to 1.
-        values: (N, 11): sides (4), centre (2), size (3) as the outputs are named, observation angle, hidden share.
-        disparity_px: (N,) of the middle of the object in space.
-        surface_px: (B, h, w) disparity of what is seen of vehicles; NaN elsewhere.
+        where: (N, 3) batch index, row and column of the cells that are trained on an object.
+        weight: (N,) of these; the weights of an object sum to 1.
+        values: (N, 11): sides (4), centre (2), size (3) as the outputs are named, observation angle, occluded share.
+        disparity_px: (N,) of the object's 3D centre.
+        surface_px: (B, h, w) disparity of visible vehicle surfaces; NaN elsewhere.
     """
 
     heat: Tensor
@@ -104,11 +104,11 @@ class CentreTargets:
 
 
 def centre_targets(samples: Sequence[LabelledPair], kinds: Sequence[str], grid: Grid) -> CentreTargets:
-    """Where the centres of the labelled objects lie, and what their cells should say.
+    """Positions of the labelled objects' centres, and the targets of their cells.
 
-    An object's cell is that of the middle of its box in the picture, which lies in the picture however much of the
-    object does not. Where the cells of two objects meet, the nearer one has them. Objects of other kinds and ignored
-    ones are not looked for, and nothing is learnt from the empty cells inside their boxes.
+    An object's cell is that of the centre of its visible 2D box, which lies in the picture even where the object leaves
+    it. Where cells of two objects coincide, the nearer object has them. Objects of other kinds and ignored ones are no
+    targets, and nothing is learnt from empty cells inside their boxes.
 
     Args:
         samples: a batch.
@@ -154,7 +154,9 @@ def centre_targets(samples: Sequence[LabelledPair], kinds: Sequence[str], grid: 
 
 
 def _surface_px(sample: LabelledPair, grid: Grid) -> Array:
-    """(h, w) disparity where the lower half of a vehicle is seen well enough, the nearer one before the farther."""
+    """(h, w) disparity where the lower half of a sufficiently visible vehicle is; the nearer vehicle where two
+    overlap.
+    """
     lens, reach = sample.calibration.intrinsics, sample.calibration.intrinsics.focal_px * sample.calibration.baseline_m
     surface = np.full((grid.height, grid.width), np.nan)
     for thing in sorted(sample.objects, key=lambda each: -each.box.bottom_m[2]):
@@ -174,12 +176,12 @@ def _surface_px(sample: LabelledPair, grid: Grid) -> Array:
 
 
 def middle_of(box: Box3d) -> Array:
-    """(3,) middle of the box in the camera's frame."""
+    """(3,) centre of the box in the camera's frame, metres."""
     return np.array(box.bottom_m) - (0, box.height_m / 2, 0)
 
 
 def disparity_px(box: Box3d, calibration: Calibration) -> float:
-    """Of the middle of the box: f B / z, in pixels of the picture."""
+    """Disparity of the box's centre, f B / z, in pixels of the picture."""
     return calibration.intrinsics.focal_px * calibration.baseline_m / float(middle_of(box)[2])
 
 
@@ -188,7 +190,7 @@ def _joined(parts: Sequence[Array], empty: tuple[int, ...]) -> Array:
 
 
 def _bump(box_px: BoxPx, grid: Grid) -> Array:
-    """(h, w) Gaussian, exactly 1 at the cell of the box's middle."""
+    """(h, w) Gaussian with value 1 at the cell of the box's centre."""
     left, top, right, bottom = box_px
     column, row = (round(value) for value in grid.cell_of((left + right) / 2, (top + bottom) / 2))
     column, row = min(max(column, 0), grid.width - 1), min(max(row, 0), grid.height - 1)
@@ -198,7 +200,7 @@ def _bump(box_px: BoxPx, grid: Grid) -> Array:
 
 
 def _inside(box_px: BoxPx, grid: Grid) -> tuple[slice, slice]:
-    """Rows and columns of the cells whose middles lie in the box, and one more on each side."""
+    """Rows and columns of the cells whose centres lie in the box, and one more on each side."""
     (left, top), (right, bottom) = grid.cell_of(*box_px[:2]), grid.cell_of(*box_px[2:])
     return (
         slice(max(0, math.floor(top)), max(0, math.ceil(bottom) + 1)),
@@ -220,19 +222,19 @@ def _values(thing: LabelledObject, calibration: Calibration, middles_px: Array) 
 def centre_losses(
     outputs: Mapping[str, Tensor], targets: CentreTargets, *, bins_px: Tensor, cell_px: tuple[float, float]
 ) -> dict[str, Tensor]:
-    """The losses of a network that finds objects by their centres, weighed so that their plain sum can be trained.
+    """The losses of the centre-based network, weighted so that their sum can be minimised.
 
-    `heat` is CenterNet's focal loss; `disparity` is the negative logarithm of a Laplace density over the disparity's
-    logarithm (Kendall and Gal, NeurIPS 2017), so that one unit is one relative error of depth wherever the object
-    stands, with the cross-entropy of the bins, the target shared between the two next to it. `surface` is the same
-    cross-entropy for the disparities that the volume alone says of every cell on a vehicle: what makes the features
-    match. `heading` is a cross-entropy too.
+    `heat` is the focal loss of CenterNet. `disparity` is the negative log-likelihood of a Laplace density over the
+    disparity's logarithm (Kendall and Gal, NeurIPS 2017), so that one unit is one relative error of depth at any
+    distance, plus the cross-entropy of the bins with the target shared between the two nearest ones. `surface` is the
+    same cross-entropy for the disparities that the volume alone predicts for cells on vehicles, which trains the
+    matching features. `heading` is a cross-entropy as well.
 
     Args:
-        outputs: as `gear.networks.stereo.centre.CentreGraph` names them, lengths in pixels of the picture.
+        outputs: as `gear.networks.stereo.centre.CentreGraph.forward` names them, lengths in pixels of the picture.
         targets: of the batch.
-        bins_px: (D,) disparities of the bins, growing by equal factors.
-        cell_px: width and height of a cell.
+        bins_px: (D,) disparities of the bins, in geometric progression.
+        cell_px: width and height of a cell in pixels of the picture.
     """
     device = outputs["heat"].device
     batch, row, column = targets.where.to(device).unbind(dim=1)
@@ -265,7 +267,7 @@ def centre_losses(
 
 
 def _focal(logits: Tensor, heat: Tensor, is_counted: Tensor) -> Tensor:
-    """Penalty-reduced focal loss over the number of centres."""
+    """Penalty-reduced focal loss, divided by the number of centres."""
     is_centre = heat > 1 - ALMOST_ZERO
     chance = logits.sigmoid()
     hit = functional.logsigmoid(logits) * (1 - chance) ** FOCAL_POWER * is_centre

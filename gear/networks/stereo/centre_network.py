@@ -1,4 +1,4 @@
-"""The networks of centres behind the `Model` protocol."""
+"""The centre-based stereo networks as gear networks."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ from gear.networks.weights import build_graph
 
 
 class StereoCentreNetwork(Network):
-    """Outputs as `gear.networks.stereo.centre.CentreGraph` names them, lengths in pixels of the pictures given."""
+    """Outputs are those of `gear.networks.stereo.centre.CentreGraph.forward`, with lengths in pixels of the pictures
+    given.
+    """
 
     graph: CentreGraph
     options: StereoCentreOptions
@@ -37,9 +39,9 @@ class StereoCentreNetwork(Network):
         Args:
             options: of the network.
             name: of the model plugin.
-            make: its graph.
-            normalise: what the graph is shown of a picture.
-            taps: names of feature maps, and which of the graph's layers they are.
+            make: builds the graph.
+            normalise: applied to pictures in 0..1.
+            taps: layers of the graph by name of the feature map.
         """
         graph = build_graph(lambda: make(StereoCentreShape(width=options.width)), options, name)
         super().__init__(graph, options, views=(LEFT, RIGHT))
@@ -48,7 +50,7 @@ class StereoCentreNetwork(Network):
         self._taps = dict(taps)
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The graph's maps."""
+        """The maps of the graph, by name."""
         # Channels last: a quarter faster on the CPU, in float32 and in bfloat16.
         pair = [self.normalise(pictures[name]).contiguous(memory_format=torch.channels_last) for name in (LEFT, RIGHT)]
         left, ratio = fit_to_network(pair[0], self.input_scale)
@@ -56,7 +58,7 @@ class StereoCentreNetwork(Network):
         return in_picture_px(self.graph(left, right), ratio)
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[LabelledPair]) -> Mapping[str, Tensor]:
-        """`gear.networks.stereo.centre_losses.centre_losses`."""
+        """The losses of `gear.networks.stereo.centre_losses.centre_losses`."""
         intrinsics = targets[0].calibration.intrinsics
         ratio = self._ratio((intrinsics.height_px, intrinsics.width_px))
         height, width = outputs["heat"].shape[-2:]
@@ -65,7 +67,7 @@ class StereoCentreNetwork(Network):
         return centre_losses(outputs, centre_targets(targets, KINDS, grid), bins_px=bins_px, cell_px=grid.cell_px)
 
     def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[KittiLabel, ...]]:
-        """The detections, with scores."""
+        """Detections with scores as KITTI labels, for each picture."""
         ratio = self._ratio(size_px)
         cell_px = (STRIDE * ratio[0], STRIDE * ratio[1])
         peaks = Peaks(least_score=self.options.least_score)
@@ -76,6 +78,6 @@ class StereoCentreNetwork(Network):
         return {name: self.graph.get_submodule(layer) for name, layer in self._taps.items()}
 
     def _ratio(self, size_px: tuple[int, ...]) -> tuple[float, float]:
-        """How many pixels of a picture of (height, width) one of the network's input is, in x and in y."""
+        """Pixels of a picture of (height, width) for each pixel of the network's input, in x and in y."""
         height, width = (max(1, round(side * self.input_scale)) for side in size_px)
         return size_px[1] / width, size_px[0] / height

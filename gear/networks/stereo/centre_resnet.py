@@ -1,4 +1,4 @@
-"""The network of centres on a ResNet-18 of its own: see `gear.networks.stereo.centre`."""
+"""The centre-based stereo network on a ResNet-18: see `gear.networks.stereo.centre`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gear.networks.stereo.centre import CentreGraph, StereoCentreShape, conv, co
 
 
 class Block(nn.Module):
-    """ResNet's basic block; its shortcut averages before it projects (ResNet-D, He et al., CVPR 2019)."""
+    """ResNet's basic block; its shortcut averages before the projection (ResNet-D, He et al., CVPR 2019)."""
 
     def __init__(self, inputs: int, outputs: int, stride: int) -> None:
         super().__init__()
@@ -39,7 +39,9 @@ def _channels(shape: StereoCentreShape) -> list[int]:
 
 
 class StereoCentre(CentreGraph):
-    """The first layers and one stage of the ResNet see both pictures, the other stages the left one and the volume."""
+    """The graph. Both pictures pass the stem and one stage of the ResNet, the left picture and the volume the other
+    stages.
+    """
 
     stem: nn.Module
     layer1: nn.Module
@@ -52,7 +54,7 @@ class StereoCentre(CentreGraph):
         super().__init__(shape, (shape.width, *_channels(shape)), pyramid=3 * shape.width)
 
     def shared_layers(self) -> Mapping[str, nn.Module]:
-        """`stem` and `layer1`."""
+        """`stem` and `layer1`, which both pictures pass."""
         width = self.shape.width
         return {
             "stem": nn.Sequential(conv_relu(3, width, 3, 2), conv_relu(width, width, 3)),
@@ -60,7 +62,7 @@ class StereoCentre(CentreGraph):
         }
 
     def left_layers(self) -> Mapping[str, nn.Module]:
-        """`fuse` and `layer2` to `layer4`."""
+        """`fuse` and `layer2` to `layer4`, which the left picture and the volume pass."""
         one, two, three, four = _channels(self.shape)
         return {
             "fuse": conv_relu(one + 2 * self.shape.width, one, 1),
@@ -70,12 +72,12 @@ class StereoCentre(CentreGraph):
         }
 
     def shared(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
-        """The stem's and the first stage's."""
+        """Feature maps of the stem and the first stage."""
         fine = self.stem(pictures)
         return fine, self.layer1(fine)
 
     def stages(self, coarse: Tensor, volume: Tensor) -> Sequence[Tensor]:
-        """What goes into the second stage, and what the others give."""
+        """Input of the second stage, and the outputs of the other stages."""
         maps = [self.fuse(torch.cat([coarse, volume], dim=1))]
         for layer in (self.layer2, self.layer3, self.layer4):
             maps.append(layer(maps[-1]))

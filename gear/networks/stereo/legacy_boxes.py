@@ -1,4 +1,5 @@
-"""Boxes as the first Faster R-CNN had them: right and bottom are the last pixels inside, so a side is right - left + 1.
+"""Boxes by the convention of the first Faster R-CNN: right and bottom are the last pixels inside, a side is right -
+left + 1.
 
 All boxes are (…, 4): left, top, right, bottom.
 """
@@ -13,19 +14,23 @@ MOST_GROWTH = 4.135
 
 
 def sides(boxes: Tensor) -> Tensor:
-    """(…, 2) width and height."""
+    """(…, 2) width and height in pixels."""
     return boxes[..., 2:] - boxes[..., :2] + 1
 
 
 def encode(boxes: Tensor, anchors: Tensor) -> Tensor:
-    """(…, 4) shift of the middle in sides of the anchor, x and y, and logarithm of the growth, width and height."""
+    """(…, 4) codes: shift of the centre in units of the anchor's sides (x, y), and logarithm of the size ratio (width,
+    height).
+    """
     own, wanted = sides(anchors), sides(boxes)
     middle, target = anchors[..., :2] + own / 2, boxes[..., :2] + wanted / 2
     return torch.cat([(target - middle) / own, (wanted / own).log()], dim=-1)
 
 
 def decode(codes: Tensor, anchors: Tensor) -> Tensor:
-    """The boxes of codes; not quite the inverse of `encode`, as ever: right and bottom come out a pixel larger."""
+    """The boxes of codes. As in the original code this is not the exact inverse of `encode`: right and bottom are one
+    pixel larger.
+    """
     own = sides(anchors)
     middle = anchors[..., :2] + own / 2 + codes[..., :2] * own
     half = codes[..., 2:].clamp(max=MOST_GROWTH).exp() * own / 2
@@ -33,7 +38,7 @@ def decode(codes: Tensor, anchors: Tensor) -> Tensor:
 
 
 def clip(boxes: Tensor, size_px: tuple[int, int]) -> Tensor:
-    """Inside a picture of (height, width)."""
+    """Boxes clipped to a picture of (height, width)."""
     most = boxes.new_tensor([size_px[1] - 1, size_px[0] - 1] * 2)
     return torch.minimum(boxes.clamp(min=0), most)
 
@@ -47,8 +52,8 @@ def overlaps(a: Tensor, b: Tensor) -> Tensor:
 
 
 def left_and_right(six: Tensor) -> tuple[Tensor, Tensor]:
-    """(…, 6) x, y, width, height of the left box, x and width of the right one, to two (…, 4) codes.
+    """Two (…, 4) codes from (…, 6): x, y, width, height of the left box, x and width of the right box.
 
-    A pair is rectified, so both boxes have the same rows.
+    The pair is rectified, so both boxes have the same rows.
     """
     return six[..., :4], six[..., [4, 1, 5, 3]]

@@ -1,4 +1,4 @@
-"""Disparity of what is seen of vehicles: their boxes stand for their surfaces."""
+"""Disparity of visible vehicle surfaces, approximated by their 3D boxes."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ MOST_OCCLUDED = 0.3
 
 
 def depth_of_box(box: Box3d, rays: Array) -> Array:
-    """(…) z at which rays from the camera enter a box; NaN where they miss it.
+    """(…) depth z at which rays from the camera enter a box; NaN where they miss it.
 
     Args:
-        box: in the camera's frame.
-        rays: (…, 3) with z = 1.
+        box: in the camera's frame, metres.
+        rays: (…, 3) directions with z = 1.
     """
     c, s = math.cos(box.rotation_y_rad), math.sin(box.rotation_y_rad)
     box_from_camera = np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])

@@ -1,4 +1,4 @@
-"""Options of the stereo networks, and the calibration that they stand for. No torch here."""
+"""Options of the stereo networks, and the calibration that they imply. torch is not imported."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ INPUT_SCALE = 0.5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StereoOptions(NetworkOptions):
-    """What pictures alone do not say. The defaults are those of the task stereo3d.
+    """Camera parameters that pictures do not contain. The defaults are those of the task stereo3d.
 
     Attributes:
         hfov_deg: horizontal field of view of the pictures.
-        baseline_m: left camera to right camera.
+        baseline_m: distance from the left to the right camera.
     """
 
     hfov_deg: float = 90.0
@@ -35,20 +35,21 @@ class StereoOptions(NetworkOptions):
             raise FieldError("baseline_m", f"must be 0.01 to 10 m, got {self.baseline_m:g}")
 
     def calibration(self, size_px: tuple[int, ...]) -> Calibration:
-        """Of pictures of (height, width)."""
+        """The calibration of pictures of (height, width)."""
         intrinsics = Intrinsics.from_hfov(size_px[1], size_px[0], math.radians(self.hfov_deg))
         return Calibration(intrinsics=intrinsics, baseline_m=self.baseline_m)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StereoCentreOptions(StereoOptions):
-    """Options of the network of centres.
+    """Options of the centre-based stereo network.
 
     Attributes:
-        width: channels of what is matched, and of a stem of its own; what is not a ready trunk's follows from it.
-        input_scale: size at which it looks at the pictures; 0.5 is half the width and half the height. null takes what
-            the weights were trained for, or one half where they do not say.
-        least_score: below which nothing is reported.
+        width: channels of the features that are matched, and of the ResNet's stem; those of the cost volume, pyramid
+            and heads are multiples.
+        input_scale: factor by which pictures are resized before the network. null takes the factor that the weights
+            were trained for, or 0.5 where they state none.
+        least_score: smallest score, 0..1, of a detection that is reported.
     """
 
     width: int = 32
@@ -70,12 +71,12 @@ class StereoRcnnOptions(StereoOptions):
     """Options of Stereo R-CNN.
 
     Attributes:
-        short_side_px: to which the pictures are enlarged.
-        considered: anchors, the best ones, that proposals are made of; twice as many in training.
-        proposals: pairs of boxes that the second stage looks at.
-        least_score: below which nothing is reported.
-        aligns: whether depth is aligned on the pictures; without, it is what the boxes and the keypoint say.
-        aligned_bias_px: added to every aligned disparity. The authors add 0.5; geometry asks for none.
+        short_side_px: the pictures are enlarged until their shorter side has this many pixels.
+        considered: number of anchors with the highest scores from which proposals are made; twice as many in training.
+        proposals: number of box pairs for the second stage.
+        least_score: smallest score, 0..1, of a detection that is reported.
+        aligns: whether depth is refined by dense photometric alignment; otherwise it follows from boxes and keypoint.
+        aligned_bias_px: added to every aligned disparity. The authors add 0.5; the geometry needs none.
     """
 
     short_side_px: int = 600

@@ -1,4 +1,4 @@
-"""From what Stereo R-CNN says of pairs of boxes to lines of KITTI's result files."""
+"""From Stereo R-CNN's outputs for box pairs to lines of KITTI's result files."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ SAME_OVERLAP = 0.3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FoundCar:
-    """One car after suppression.
+    """One detected car after non-maximum suppression.
 
     Attributes:
         score: 0..1.
-        measured: its boxes, corner, size and direction, in index pixels of the original pictures.
+        measured: boxes, corner, size and heading, in index pixels of the original pictures.
     """
 
     score: float
@@ -35,13 +35,13 @@ class FoundCar:
 def decode_cars(
     said: Mapping[str, Tensor], scale: float, size_px: tuple[int, int], least_score: float
 ) -> list[FoundCar]:
-    """The cars of one picture, the surest first.
+    """The cars of one picture, by falling score.
 
     Args:
-        said: outputs of the network for one picture, without the batch's dimension.
-        scale: of the network's input to the original pictures.
+        said: outputs of the network for one picture, without the batch dimension.
+        scale: factor from the original pictures to the network's input.
         size_px: height and width of the network's input.
-        least_score: below which nothing is reported.
+        least_score: smallest score that is reported.
     """
     scores = said["class_logits"].softmax(dim=1)[:, 1]
     is_pair = (said["rois_left"][:, 2:] > said["rois_left"][:, :2]).all(dim=1)
@@ -90,16 +90,16 @@ def decode_cars(
 def place_car(
     car: FoundCar, calibration: Calibration, pair: Pair | None, aligned_bias_px: float = 0.0
 ) -> KittiLabel | None:
-    """Solves for a car's place, aligns its depth on the pictures, and solves again with that depth.
+    """Solves for a car's 3D box, aligns its depth photometrically, and solves again with that depth.
 
     Args:
         car: as decoded.
         calibration: of the original pictures.
-        pair: the pictures; None leaves the depth as solved.
+        pair: the pictures; None keeps the solved depth.
         aligned_bias_px: added to the aligned disparity.
 
     Returns:
-        None where no place fits it.
+        None where no box fits.
     """
     box = solve_box(car.measured, calibration)
     if box is None:

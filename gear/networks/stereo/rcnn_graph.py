@@ -1,8 +1,9 @@
-"""Stereo R-CNN's graph (Li, Chen, Shen, CVPR 2019) under its authors' key names.
+"""The graph of Stereo R-CNN (Li, Chen, Shen, CVPR 2019), with its authors' key names.
 
-A ResNet-101 with a feature pyramid looks at each picture; a region proposal network looks at both pyramids at once and
-proposes pairs of boxes; each pair gives a class, a better pair, a size and a direction, and the left box which corner
-of the car on the ground is seen between its sides, and how much of it nothing covers.
+A ResNet-101 with a feature pyramid processes each picture. A region proposal network takes both pyramids together and
+proposes pairs of boxes. For each pair the second stage gives a class, a refined pair, size and heading; from the left
+box it also gives which ground corner of the car is visible between the box's sides, and the columns in which the car is
+not occluded.
 """
 
 from __future__ import annotations
@@ -34,13 +35,13 @@ VARIANCES = "loss_log_variances"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StereoRcnnShape:
-    """How large the network is; the defaults are the authors'.
+    """Size of the network; the defaults are the authors'.
 
     Attributes:
-        blocks: of the four stages.
-        width: channels of the stem; the stages give 4, 8, 16 and 32 times as many.
-        pyramid, proposals, hidden: channels of the pyramid, of the proposal network, of the second stage.
-        classes: with the background.
+        blocks: in each of the four stages.
+        width: channels of the stem; the stages have 4, 8, 16 and 32 times as many.
+        pyramid, proposals, hidden: channels of the pyramid, the proposal network, the second stage.
+        classes: background included.
     """
 
     blocks: tuple[int, int, int, int] = (3, 4, 23, 3)
@@ -52,7 +53,7 @@ class StereoRcnnShape:
 
 
 class Bottleneck(nn.Module):
-    """Caffe's: the stride is in the first convolution."""
+    """ResNet bottleneck as in Caffe: the stride is in the first convolution."""
 
     def __init__(self, inputs: int, width: int, stride: int) -> None:
         super().__init__()
@@ -82,7 +83,7 @@ def _stage(inputs: int, width: int, blocks: int, stride: int) -> nn.Sequential:
 
 
 class StereoRpn(nn.Module):
-    """The proposal network over both pyramids."""
+    """The region proposal network over both pyramids."""
 
     def __init__(self, inputs: int, hidden: int) -> None:
         super().__init__()
@@ -91,10 +92,10 @@ class StereoRpn(nn.Module):
         self.RPN_bbox_pred_left_right = nn.Conv2d(2 * hidden, 6 * len(RATIOS), 1)
 
     def forward(self, left: Sequence[Tensor], right: Sequence[Tensor]) -> tuple[Tensor, Tensor, Tensor]:
-        """Logits (B, A, 2), the chance that an anchor holds an object (B, A), and codes of its pair (B, A, 6).
+        """Logits (B, A, 2), objectness (B, A) in 0..1, and codes of the box pairs (B, A, 6).
 
-        The chance is what the authors' network proposes by: its softmax pairs channel c with c + 3, though an anchor a
-        was trained with 2 a and 2 a + 1. Weights know it so.
+        Proposals are ranked by the objectness of the authors' network, whose softmax pairs channel c with c + 3
+        although anchor a was trained with channels 2 a and 2 a + 1. The published weights rely on it.
         """
         logits, chances, codes = [], [], []
         for one, two in zip(left, right, strict=True):
@@ -109,7 +110,7 @@ class StereoRpn(nn.Module):
 
 
 class StereoRcnn(nn.Module):
-    """The graph. Its batch normalisation never learns; nor do the first two stages, as in the authors' training."""
+    """The graph. As in the authors' training, batch normalisation and the first two stages are never trained."""
 
     def __init__(self, shape: StereoRcnnShape) -> None:
         super().__init__()
@@ -155,7 +156,7 @@ class StereoRcnn(nn.Module):
         self._freeze()
 
     def _draw_weights(self) -> None:
-        """As the authors draw what no file gives them."""
+        """Initialises the layers as the authors do."""
         small = [self.RCNN_toplayer, self.RCNN_smooth1, self.RCNN_smooth2, self.RCNN_smooth3, self.RCNN_latlayer1]
         small += [self.RCNN_latlayer2, self.RCNN_latlayer3, *self.RCNN_rpn.children()]  # type: ignore[list-item]
         layers: list[tuple[nn.Module, float]] = [(layer, 0.01) for layer in small]
@@ -180,7 +181,7 @@ class StereoRcnn(nn.Module):
         return self
 
     def pyramid(self, pictures: Tensor) -> list[Tensor]:
-        """(B, 3, H, W) BGR 0..255 less the mean to P2 .. P6, strides 4 .. 64."""
+        """Feature maps P2 .. P6 (strides 4 .. 64) of (B, 3, H, W) pictures in BGR, 0..255 minus the mean."""
         stages = [self.RCNN_layer0(pictures)]
         for layer in (self.RCNN_layer1, self.RCNN_layer2, self.RCNN_layer3, self.RCNN_layer4):
             stages.append(layer(stages[-1]))
@@ -199,7 +200,7 @@ class StereoRcnn(nn.Module):
     def regions(
         self, left: Sequence[Tensor], right: Sequence[Tensor], pairs: tuple[Tensor, Tensor], height_px: int
     ) -> dict[str, Tensor]:
-        """What is said of R pairs of boxes in one picture.
+        """Outputs of the second stage for R pairs of boxes in one picture.
 
         Args:
             left, right: levels P2 .. P5 of a batch of one.
@@ -208,7 +209,7 @@ class StereoRcnn(nn.Module):
 
         Returns:
             `class_logits` (R, K); `box_codes` (R, K, 6); `size_and_direction` (R, K, 5): width, height, length, sine
-            and cosine, all coded; `keypoint_logits` (R, 4, 28); `border_logits` (R, 2, 28): left and right.
+                and cosine, all encoded; `keypoint_logits` (R, 4, 28); `border_logits` (R, 2, 28): left and right.
         """
         both = [pooled(left, pairs[0], POOLED, height_px), pooled(right, pairs[1], POOLED, height_px)]
         flat = self.RCNN_top(torch.cat(both, dim=1)).mean(dim=(2, 3))
@@ -224,31 +225,31 @@ class StereoRcnn(nn.Module):
 
 
 def _complete(module: nn.Module, state: dict[str, Any], prefix: str, *_: Any) -> None:
-    """The authors keep the variances of the losses beside the network, so published states lack them."""
+    """Adds variances of the losses to a published state: the authors store them outside of the network."""
     assert isinstance(module, StereoRcnn)
     state.setdefault(f"{prefix}{VARIANCES}", module.loss_log_variances.detach())
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """A published state with variances of the losses, as at the start of a training, if it has none."""
+    """A published state; variances of the losses are added with their initial values where they are missing."""
     return {VARIANCES: torch.full((len(LOSSES),), FIRST_LOG_VARIANCE), **state}
 
 
 def is_norm(module: nn.Module) -> bool:
-    """Whether it is batch normalisation."""
+    """Whether a layer is a batch normalisation."""
     return isinstance(module, nn.BatchNorm2d)
 
 
 def pooled(levels: Sequence[Tensor], boxes: Tensor, cells: int, height_px: int) -> Tensor:
-    """(R, C, cells, cells) features of boxes, each from the level that suits its size.
+    """(R, C, cells, cells) features of boxes, each from the pyramid level that suits its size.
 
-    The level is 4 + ln(side / 224), rounded: the authors' logarithm is the natural one, where the feature pyramid's
-    paper has that to the base of 2.
+    The level is 4 + ln(side / 224), rounded: the authors use the natural logarithm where the paper of feature pyramids
+    has the logarithm to base 2.
 
     Args:
         levels: P2 .. P5 of a batch of one.
         boxes: (R, 4) in pixels of the network's input.
-        cells: of the grid, a side.
+        cells: cells per side of the grid.
         height_px: of the network's input.
     """
     side = sides(boxes).prod(dim=1).sqrt()
@@ -264,7 +265,7 @@ def pooled(levels: Sequence[Tensor], boxes: Tensor, cells: int, height_px: int) 
 
 
 def anchors(levels: Sequence[Tensor]) -> Tensor:
-    """(A, 4) in pixels of the network's input, in the order of the proposal network's outputs.
+    """(A, 4) anchors in pixels of the network's input, in the order of the proposal network's outputs.
 
     Args:
         levels: P2 .. P6.

@@ -1,4 +1,4 @@
-"""What Stereo R-CNN is trained towards, and its six losses (Li, Chen, Shen, CVPR 2019, sections 3 and 5)."""
+"""Training targets and the six losses of Stereo R-CNN (Li, Chen, Shen, CVPR 2019, sections 3 and 5)."""
 
 from __future__ import annotations
 
@@ -39,12 +39,11 @@ class CarTargets:
     """The cars of one picture, in pixels of the network's input.
 
     Attributes:
-        left, right, union: (N, 4) boxes in the left picture, in the right one, and around both.
+        left, right, union: (N, 4) boxes in the left picture, in the right picture, and around both.
         size_and_direction: (N, 5) width, height, length in metres, sine and cosine of the observation angle.
-        corner_px: (N, 4) where the four corners on the ground are seen; NaN for all but the one that is seen between
-            the sides and not covered.
-        borders_px: (N, 2) between which nothing nearer covers the car.
-        ignored: (M, 4) union boxes of what is not to be looked for.
+        corner_px: (N, 4) columns of the four ground corners; NaN for all but the one that is visible between the sides.
+        borders_px: (N, 2) first and last column in which no nearer object occludes the car.
+        ignored: (M, 4) union boxes of objects that are neither targets nor background.
     """
 
     left: Tensor
@@ -56,7 +55,7 @@ class CarTargets:
     ignored: Tensor
 
     def to(self, device: torch.device) -> CarTargets:
-        """The same on a device."""
+        """A copy on a device."""
         return CarTargets(**{field.name: getattr(self, field.name).to(device) for field in fields(self)})
 
 
@@ -65,7 +64,7 @@ def car_targets(sample: LabelledPair, scale: float) -> CarTargets:
 
     Args:
         sample: with its objects.
-        scale: of the network's input to the sample's pictures.
+        scale: factor from the sample's pictures to the network's input.
     """
     calibration = sample.calibration
     rows: list[Array] = []
@@ -109,7 +108,7 @@ def _is_nearer(one: Box3d, two: Box3d) -> bool:
 
 
 def _pair_of(box: Box3d, calibration: Calibration) -> tuple[Array, Array] | None:
-    """The box in both pictures, clipped; None where one of them does not show it."""
+    """The box in both pictures, clipped; None where it lies outside one of them."""
     found = []
     for right_m in (0.0, calibration.baseline_m):
         projected = project_box(box.corners_m - (right_m, 0.0, 0.0), calibration.intrinsics)
@@ -121,7 +120,9 @@ def _pair_of(box: Box3d, calibration: Calibration) -> tuple[Array, Array] | None
 
 
 def _uncovered(left: Array, nearer: Sequence[Array]) -> Array:
-    """(2,) first and last column of the box that no nearer object's box reaches; both its left side if all are."""
+    """(2,) first and last column of the box that no nearer object's box overlaps; twice its left side if all are
+    overlapped.
+    """
     columns = np.arange(math.floor(left[0]), math.floor(left[2]) + 1)
     is_free = np.ones(len(columns), dtype=np.bool_)
     for other in nearer:
@@ -134,7 +135,7 @@ def _uncovered(left: Array, nearer: Sequence[Array]) -> Array:
 
 
 def ground_corners(box: Box3d) -> Array:
-    """(4, 3) corners of the bottom face: left behind, left in front, right in front, right behind, from the car."""
+    """(4, 3) corners of the bottom face: rear left, front left, front right, rear right, seen from the driver."""
     c, s = math.cos(box.rotation_y_rad), math.sin(box.rotation_y_rad)
     front, right = np.array([c, 0.0, -s]), np.array([-s, 0.0, -c])
     signs = np.array([(-1, -1), (-1, 1), (1, 1), (1, -1)]) / 2
@@ -142,7 +143,7 @@ def ground_corners(box: Box3d) -> Array:
 
 
 def _corner_between(box: Box3d, calibration: Calibration, borders: Array) -> Array:
-    """(4,) columns of the corners on the ground; NaN but for the near one that is seen between the sides."""
+    """(4,) columns of the ground corners; NaN except for the near corner that is visible between the sides."""
     corners = ground_corners(box)
     if corners[:, 2].min() <= 0:
         return np.full(4, np.nan)
@@ -155,7 +156,7 @@ def _corner_between(box: Box3d, calibration: Calibration, borders: Array) -> Arr
 def rpn_losses(
     logits: Tensor, codes: Tensor, anchors: Tensor, cars: CarTargets, size_px: tuple[int, int], draws: torch.Generator
 ) -> dict[str, Tensor]:
-    """The proposal network's two losses over one picture.
+    """The two losses of the proposal network for one picture: classification and box pairs.
 
     Args:
         logits: (A, 2).
@@ -163,7 +164,7 @@ def rpn_losses(
         anchors: (A, 4).
         cars: of the picture.
         size_px: height and width of the network's input.
-        draws: which anchors are looked at.
+        draws: generator that samples anchors.
     """
     is_inside = (anchors[:, :2] >= 0).all(dim=1) & (anchors[:, 2] < size_px[1]) & (anchors[:, 3] < size_px[0])
     shared = overlaps(anchors, cars.union)
@@ -193,7 +194,7 @@ def _touches(boxes: Tensor, ignored: Tensor) -> Tensor:
 
 
 def _some(mask: Tensor, most: int, draws: torch.Generator) -> Tensor:
-    """At most so many of the places where the mask holds, drawn without return."""
+    """At most so many indices at which the mask is True, drawn without replacement."""
     places = mask.nonzero()[:, 0]
     if len(places) <= most:
         return places
@@ -201,22 +202,22 @@ def _some(mask: Tensor, most: int, draws: torch.Generator) -> Tensor:
 
 
 def _six(left: Tensor, right: Tensor, left_from: Tensor, right_from: Tensor) -> Tensor:
-    """(N, 6) codes of pairs of boxes."""
+    """(N, 6) codes of box pairs."""
     return torch.cat([encode(left, left_from), encode(right, right_from)[:, [0, 2]]], dim=1)
 
 
 def smooth_l1(said: Tensor, wanted: Tensor, sigma: float = 1.0) -> Tensor:
-    """Square below 1 / sigma^2 and straight above."""
+    """Smooth L1: quadratic below 1 / sigma^2, linear above."""
     return functional.smooth_l1_loss(said, wanted, reduction="none", beta=1 / sigma**2)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SampledPairs:
-    """Pairs of boxes that the second stage learns from; cars first.
+    """Box pairs on which the second stage is trained; those with cars come first.
 
     Attributes:
         left, right: (R, 4).
-        owner: (F,) number of the car that each of the first F pairs holds; the others hold none.
+        owner: (F,) index of the car in each of the first F pairs; the other pairs have none.
     """
 
     left: Tensor
@@ -225,12 +226,12 @@ class SampledPairs:
 
 
 def sample_pairs(left: Tensor, right: Tensor, cars: CarTargets, draws: torch.Generator) -> SampledPairs:
-    """Draws from the proposals and the cars themselves: a quarter that hold a car in both pictures, the rest not quite.
+    """Samples box pairs from proposals and ground truth: a quarter overlap a car in both pictures, the others partly.
 
     Args:
         left, right: (P, 4) proposals.
         cars: of the picture.
-        draws: which are taken.
+        draws: generator that samples pairs.
     """
     left, right = torch.cat([left, cars.left]), torch.cat([right, cars.right])
     if not len(cars.left):
@@ -250,11 +251,11 @@ def sample_pairs(left: Tensor, right: Tensor, cars: CarTargets, draws: torch.Gen
 
 
 def region_losses(said: Mapping[str, Tensor], pairs: SampledPairs, cars: CarTargets) -> dict[str, Tensor]:
-    """The second stage's four losses over one picture.
+    """The four losses of the second stage for one picture.
 
     Args:
-        said: by `gear.networks.stereo.rcnn_graph.StereoRcnn.regions` of the pairs.
-        pairs: that it was asked about.
+        said: outputs of `gear.networks.stereo.rcnn_graph.StereoRcnn.regions` for the pairs.
+        pairs: the sampled pairs.
         cars: of the picture.
     """
     count, held = max(len(pairs.left), 1), len(pairs.owner)
@@ -280,9 +281,9 @@ def region_losses(said: Mapping[str, Tensor], pairs: SampledPairs, cars: CarTarg
 
 
 def _columns(where_px: Tensor, boxes: Tensor, cells: int) -> Tensor:
-    """(N, K) cell of each column in its box; -1 where there is none or it lies outside.
+    """(N, K) grid cell of each column in its box; -1 where there is none or it lies outside.
 
-    The box's last column falls into the last cell; the authors' rounding leaves it out, and with it most right borders.
+    The box's last column belongs to the last cell; the authors' rounding excludes it, and with it most right borders.
     """
     start, width = boxes[:, :1], boxes[:, 2:3] - boxes[:, :1] + 1
     cell = ((where_px - start) * cells / width).round()
@@ -290,7 +291,7 @@ def _columns(where_px: Tensor, boxes: Tensor, cells: int) -> Tensor:
 
 
 def _corner_entropy(logits: Tensor, columns: Tensor) -> Tensor:
-    """Which corner, and where: one cross-entropy over all cells of all corners."""
+    """One cross-entropy over all cells of all four corners: which corner is visible, and where."""
     best, corner = columns.max(dim=1)
     return _column_entropy(logits.flatten(1), torch.where(best >= 0, corner * logits.shape[-1] + best, -1))
 

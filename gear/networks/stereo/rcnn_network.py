@@ -1,4 +1,4 @@
-"""Stereo R-CNN behind the `Model` protocol."""
+"""Stereo R-CNN as a gear network."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ PROPOSED_IN_TRAINING = 2000
 
 
 class StereoRcnnNetwork(Network):
-    """Outputs, for R pairs of boxes in each picture, in pixels of the network's input:
+    """Stereo R-CNN. Outputs for R box pairs in each picture, in pixels of the network's input:
 
-    `rpn_logits` (B, A, 2) and `rpn_codes` (B, A, 6) of the anchors; `rois_left`, `rois_right` (B, R, 4), filled up with
-    zeros, without gradients; and of each pair what `StereoRcnn.regions` says. Where boxes stand in space is solved for
-    in `predict`, and has no gradients.
+    `rpn_logits` (B, A, 2) and `rpn_codes` (B, A, 6) of the anchors; `rois_left` and `rois_right` (B, R, 4), padded with
+    zeros, without gradients; and for each pair what `StereoRcnn.regions` returns. `predict` solves for 3D boxes,
+    without gradients.
     """
 
     graph: StereoRcnn
@@ -45,10 +45,10 @@ class StereoRcnnNetwork(Network):
     def forward(
         self, views: Mapping[str, Tensor], targets: Sequence[LabelledPair] | None = None
     ) -> Mapping[str, Tensor]:
-        """Outputs, or the six losses, each weighed by its learned variance: L exp(-s) + s.
+        """Outputs, or the six losses, each weighted by its learned variance s: L exp(-s) + s.
 
-        Which anchors and pairs of boxes the losses look at is drawn: from `options.seed`, the same ones every time,
-        unless the network is in training mode, where torch's own generator decides, and for every picture anew.
+        Anchors and box pairs for the losses are sampled with `options.seed`, so the same ones each time. In training
+        mode the generator of torch samples them, anew for every picture.
         """
         if targets is None:
             return super().forward(views)
@@ -61,20 +61,20 @@ class StereoRcnnNetwork(Network):
         return {name: means[name] * (-variances[i]).exp() + variances[i] for i, name in enumerate(LOSSES)}
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """All outputs. Pictures go through one by one, as they did in training, so none depends on its neighbours."""
+        """All outputs. Pictures are processed one by one, as in training, so that none depends on the others."""
         each = [self._outputs_of(*self._pyramids(pictures, i)) for i in range(len(pictures[LEFT]))]
         return {name: torch.stack([outputs[name] for outputs in each]) for name in each[0]}
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[LabelledPair]) -> Mapping[str, Tensor]:
-        """Not from outputs: the second stage learns from pairs that are drawn with the targets in hand.
+        """Not available: the second stage is trained on pairs that are sampled with the targets.
 
         Raises:
-            TypeError: always; `forward` computes them.
+            TypeError: always; `forward` computes the losses.
         """
         raise TypeError("Stereo R-CNN has its losses from pictures: call forward(views, targets)")
 
     def predict_many(self, samples: Sequence[Mapping[str, UInt8Image]]) -> list[tuple[KittiLabel, ...]]:
-        """The cars of each sample, their depth aligned on the pictures."""
+        """The cars of each sample, with depth aligned photometrically."""
         found = []
         for sample in samples:
             views = {name: view.to(self.device) for name, view in as_batch([sample], self._views).items()}
@@ -85,7 +85,9 @@ class StereoRcnnNetwork(Network):
         return found
 
     def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[KittiLabel, ...]]:
-        """The cars where boxes and corners alone place them; only `predict` has pictures to align their depth on."""
+        """The cars as boxes and corners alone determine them; `predict` also has the pictures, on which depth is
+        aligned.
+        """
         return self._placed(outputs, size_px, None)
 
     def taps(self) -> Mapping[str, nn.Module]:
@@ -109,7 +111,7 @@ class StereoRcnnNetwork(Network):
         return Pair.of(self._input(views[LEFT]), self._input(views[RIGHT]), self._scale(size_px))
 
     def _scale(self, size_px: tuple[int, ...]) -> float:
-        """Of the network's input to pictures of (height, width)."""
+        """Factor from pictures of (height, width) to the network's input."""
         return self.options.short_side_px / min(size_px)
 
     def _input_size(self, size_px: tuple[int, ...]) -> tuple[int, int]:
@@ -117,7 +119,7 @@ class StereoRcnnNetwork(Network):
         return round(size_px[0] * scale), round(size_px[1] * scale)
 
     def _input(self, picture: Tensor) -> Tensor:
-        """(B, 3, H, W) RGB 0..1, enlarged, as BGR 0..255 less the mean."""
+        """(B, 3, H, W) RGB in 0..1, enlarged, as BGR in 0..255 minus the mean."""
         size = self._input_size(tuple(picture.shape[-2:]))
         large = functional.interpolate(picture, size=size, mode="bilinear", align_corners=False)
         return large.flip(1) * 255 - large.new_tensor(MEAN_BGR)[:, None, None]

@@ -1,4 +1,4 @@
-"""From the proposal network's outputs to pairs of boxes."""
+"""From the outputs of the proposal network to pairs of boxes."""
 
 from __future__ import annotations
 
