@@ -1,1 +1,1 @@
-"""Attacks, one file each."""
+"""Built-in attacks, one file each; what they are made of lies in `optimisation`."""

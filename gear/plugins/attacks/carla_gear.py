@@ -1,8 +1,9 @@
-"""The scene-specific attack exactly as CARLA-GeAR's patches were made, but for the defects of its code.
+"""The scene-specific attack with the settings with which CARLA-GeAR's patches were made, without the defects of
+its code.
 
-Its step sizes live in each network's own input units; here they are said in unit space. Segmentation networks took
-normalised pictures, so a step of 0.5 was 0.5 standard deviations of ImageNet; detectors and depth networks took
-pictures in 0..1; the stereo network took 0..255 with a step of 10.
+The original's step sizes are in the input units of each network; here they are converted to patches in 0..1. Its
+segmentation networks took normalised pictures, so that a step of 0.5 was 0.5 standard deviations of ImageNet; its
+detectors and depth networks took pictures in 0..1; its stereo network took 0..255 with a step of 10.
 """
 
 from __future__ import annotations
@@ -25,15 +26,15 @@ if TYPE_CHECKING:
 IMAGENET_STD = (0.229, 0.224, 0.225)
 PaperTask = Literal["semseg", "depth", "detect2d", "stereo3d"]
 STEREO_LOSSES_LEFT_OUT = ("rpn_class", "class")
-"""Stereo R-CNN's two losses of classification, which the paper computes and does not attack."""
+"""Stereo R-CNN's two classification losses, which the paper computes and does not attack."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CarlaGearConfig:
-    """Options: only the size; everything else is the paper's.
+    """Options: only the size; all other settings are the paper's.
 
     Attributes:
-        height_px, width_px: of every patch.
+        height_px, width_px: size of every patch.
     """
 
     height_px: int = 150
@@ -44,7 +45,7 @@ class CarlaGearConfig:
 
 
 class CarlaGear:
-    """One unit gradient a term, a constant learning rate, gamma 1 for segmentation and 0.8 for depth."""
+    """One gradient of unit length per term, a constant learning rate, gamma 1 for segmentation and 0.8 for depth."""
 
     def __init__(self, config: CarlaGearConfig) -> None:
         self._config = config
@@ -59,10 +60,10 @@ class CarlaGear:
         rng: np.random.Generator,
         watch: Watch | None = None,
     ) -> tuple[Patch, ...]:
-        """One patch a surface.
+        """Optimises one patch per surface.
 
-        The paper's budget is 51 passes over 100 samples: 2550 steps for segmentation, which takes two samples a step,
-        5100 for the others.
+        The paper's budget is 51 epochs of 100 samples: 2550 steps for segmentation, which takes two samples per step,
+        and 5100 for the other tasks.
         """
         from gear.plugins.attacks.optimisation.loop import Problem, climb, unit_gradients
 
@@ -71,7 +72,7 @@ class CarlaGear:
         return climb(problem, unit_gradients(problem, objective, settings), budget=budget, rng=rng, watch=watch)
 
     def settings(self, sample: Any) -> Settings:
-        """The paper's, by the task that the sample is of."""
+        """The paper's settings for the task of a sample."""
         task = task_of(sample)
         return Settings(
             height_px=self._config.height_px,
@@ -84,7 +85,7 @@ class CarlaGear:
         )
 
     def objective(self, sample: Any) -> Objective:
-        """What the paper makes large, by the task that the sample is of."""
+        """The paper's objective for the task of a sample."""
         from gear.plugins.attacks.optimisation.objectives import DepthObjective, LossObjective, SemsegObjective
 
         task = task_of(sample)
@@ -105,7 +106,7 @@ BRIGHTNESS: dict[PaperTask, float] = {"semseg": 0.02 / 0.224, "depth": 0.02, "de
 
 
 def task_of(sample: Any) -> PaperTask:
-    """Which of the paper's tasks a sample is of."""
+    """The paper's task that a sample belongs to."""
     from gear.plugins.attacks.optimisation.objectives import kind_of
 
     kind = kind_of(sample)

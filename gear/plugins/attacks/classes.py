@@ -12,10 +12,11 @@ LABEL_IDS: Mapping[str, int] = {label.name: label.id for label in LABELS if labe
 
 
 def check_classes(attacked: str, target: str) -> None:
-    """Whether both are evaluated classes or empty, and an attacked one has a target.
+    """Checks that the target and the attacked class are evaluated classes or empty, and that an attacked class has
+    a target.
 
     Raises:
-        FieldError: they are not.
+        FieldError: one of these does not hold.
     """
     for name, value in (("attacked", attacked), ("target", target)):
         if value and value not in LABEL_IDS:
@@ -25,10 +26,10 @@ def check_classes(attacked: str, target: str) -> None:
 
 
 def check_seen(attacked: str, dataset: Sequence[Any]) -> None:
-    """Whether any sample shows the class, if one is named.
+    """Checks that some sample shows the attacked class, if one is named.
 
     Raises:
-        GearError: none does, so that there is nothing to push.
+        GearError: no sample shows it, so that there is nothing to attack.
     """
     if attacked and not any(bool((sample.label_ids == LABEL_IDS[attacked]).any()) for sample in dataset):
         raise GearError(

@@ -1,4 +1,4 @@
-"""Controls, against which an attack is measured: noise, one colour, and noise with another patch's statistics."""
+"""Controls to compare attacks with: noise, one colour, and noise with the statistics of another patch."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ class ControlConfig:
     """Options.
 
     Attributes:
-        kind: `noise` draws every value evenly; `solid` is one colour; `matched` is noise with the mean colour, the
-            colours' covariance and the power spectrum of the patches in `like`: as smooth, as colourful, but made
-            against nothing.
-        height_px, width_px: of every patch; those of `like` for `matched`.
-        rgb: of `solid`, sRGB in 0..1.
-        like: for `matched`, a patch folder.
+        kind: `noise` draws every value uniformly; `solid` is one colour; `matched` is noise with the mean colour, the
+            colour covariance and the power spectrum of the patches in `like`: as smooth and as colourful, but not
+            optimised.
+        height_px, width_px: size of every patch; `matched` takes the size of `like`.
+        rgb: colour for `solid`, sRGB in 0..1.
+        like: patch folder for `matched`.
     """
 
     kind: Literal["noise", "solid", "matched"] = "noise"
@@ -51,16 +51,16 @@ class ControlConfig:
 
 
 class Control:
-    """Asks the model nothing."""
+    """An attack that never queries the model."""
 
     def __init__(self, config: ControlConfig) -> None:
         self._config = config
 
     def read_sha256(self) -> str | None:
-        """Of the exact patches of `like`, if there are any to read.
+        """Hash of the exact patches in `like`, if that option is used.
 
         Raises:
-            GearError: there are none.
+            GearError: the folder has none.
         """
         if not self._config.like:
             return None
@@ -76,10 +76,10 @@ class Control:
         rng: np.random.Generator,
         watch: Watch | None = None,
     ) -> tuple[Patch, ...]:
-        """One patch a surface.
+        """Makes one patch per surface.
 
         Raises:
-            GearError: the folder of `like` has too few patches.
+            GearError: the folder `like` has too few patches.
         """
         config, count = self._config, len(dataset[0].record.surfaces)
         size = (config.height_px, config.width_px, 3)
@@ -96,13 +96,14 @@ class Control:
 
 
 def matched(original: Floats, rng: np.random.Generator) -> Floats:
-    """Noise with a picture's statistics: its Fourier magnitudes with random phases, the same for all channels, so that
-    colours vary together as they did (random phase noise; Galerne et al., 2011); mean and spread are set again after
-    values outside 0..1 were cut off.
+    """Noise with the statistics of a picture: its Fourier magnitudes with random phases, which are the same for
+    all channels, so
+    that colours vary together as in the picture (random phase noise; Galerne et al., 2011). Mean and standard deviation
+    are restored after values outside 0..1 are clipped.
 
     Args:
         original: (H, W, 3) in 0..1.
-        rng: of the phases.
+        rng: generator of the phases.
     """
     phases = np.angle(np.fft.fft2(rng.standard_normal(original.shape[:2])))
     mean, spread = original.mean(axis=(0, 1)), original.std(axis=(0, 1))
@@ -115,10 +116,10 @@ def matched(original: Floats, rng: np.random.Generator) -> Floats:
 
 
 def read_exact(folder: Path) -> list[Floats]:
-    """The exact patches of a folder that `gear attack` wrote, in order, (H, W, 3) in 0..1.
+    """The exact patches of a folder that `gear attack` wrote, in the order of the surfaces, (H, W, 3) in 0..1.
 
     Raises:
-        GearError: there are none.
+        GearError: the folder has none.
     """
     from safetensors import SafetensorError
     from safetensors.numpy import load_file
@@ -148,5 +149,5 @@ control: AttackSpec[ControlConfig] = AttackSpec(
 
 @hookimpl
 def gear_attacks() -> list[AttackSpec[ControlConfig]]:
-    """This control."""
+    """The attack plugin of this module."""
     return [control]

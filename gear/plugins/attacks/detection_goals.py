@@ -1,7 +1,7 @@
-"""Targeted harm to detectors: objects that vanish, and one that appears where the patch is.
+"""Targeted attacks on detectors: objects vanish, or an object appears where the patch is.
 
-Both are what the detector would be trained to see in other labels, so its own losses are lowered with the labels
-rewritten (Lee and Kolter's and DPatch's way; Liu et al., 2019).
+Both goals are rewritten labels: the detector's own training losses against them are minimised (as Lee and Kolter, 2019,
+and DPatch; Liu et al., 2019).
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ Goal = Literal["vanish", "appear"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DetectionGoal:
-    """An objective for samples with objects: both goals in `detect2d`, vanishing in `stereo3d`.
+    """An objective for samples with objects: both goals for `detect2d`, vanishing for `stereo3d`.
 
     Attributes:
-        goal: nothing is to be seen any more, or the patch is to be seen as an object.
-        category_id: COCO's, of what appears.
-        left_out: losses that do not count.
+        goal: no object is to be detected, or an object at the patch.
+        category_id: COCO category of the object that is to appear.
+        left_out: names of losses that are ignored.
     """
 
     goal: Goal
@@ -39,13 +39,13 @@ class DetectionGoal:
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> Mapping[str, Term]:
-        """The losses against the rewritten labels, each to be made small."""
+        """The losses against the rewritten labels; all of them are minimised."""
         wanted = [self.rewritten(sample) for sample in samples]
         losses = model.forward(views, wanted)
         return {name: Term(value=-loss) for name, loss in losses.items() if name not in self.left_out}
 
     def rewritten(self, sample: Any) -> Any:
-        """The sample as the detector is to see it: empty, or with one object a visible surface."""
+        """The sample with the labels that the detector is to predict: none, or one object per visible surface."""
         objects = self._on_surfaces(sample) if self.goal == "appear" else ()
         return dataclasses.replace(sample, objects=objects)
 

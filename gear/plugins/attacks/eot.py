@@ -1,8 +1,8 @@
-"""The attack that knows no scene: patches pasted upright at random sizes and places (EOT).
+"""An attack that does not know the scene: patches are pasted upright at random sizes and places (EOT).
 
-Athalye et al. (ICML 2018) over the transforms of Nesti et al. (WACV 2022), who hold their scene-specific attack against
-it: scale, shift, noise, brightness, contrast. Where the board stands, how it is lit and what is in front of it never
-enters.
+Expectation over transformation (Athalye et al., ICML 2018) with the transforms of Nesti et al. (WACV 2022), who compare
+their scene-specific attack with it: scale, shift, noise, brightness, contrast. The place of the board, its light and
+its occluders are not used.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from gear.values.errors import FieldError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EotAppearance(Appearance):
-    """With the noise of Nesti et al. (WACV 2022); a class, so that it stays where another of its options is set."""
+    """The appearance changes of Nesti et al. (WACV 2022); a class, so that setting one field keeps the others."""
 
     noise: float = 0.1
 
@@ -33,9 +33,9 @@ class EotConfig(Settings):
     """Options.
 
     Attributes:
-        share: width of a pasted patch as a share of the picture's, before scaling.
-        least_scale, most_scale: of that width.
-        shift: how far its middle lies from the picture's middle at most, as a share of the patch's own size.
+        share: width of a pasted patch before scaling, as a share of the picture's width.
+        least_scale, most_scale: range of the scale.
+        shift: largest distance of the patch's centre from the picture's centre, as a share of the patch's size.
     """
 
     share: float = 0.15
@@ -53,7 +53,7 @@ class EotConfig(Settings):
 
 
 class Eot:
-    """Never asks the compositor: the patch's place is made up."""
+    """Optimises patches that are pasted at random places; the compositor of the scene is not used."""
 
     def __init__(self, config: EotConfig) -> None:
         self._config = config
@@ -68,7 +68,7 @@ class Eot:
         rng: np.random.Generator,
         watch: Watch | None = None,
     ) -> tuple[Patch, ...]:
-        """One patch a surface, all pasted into every picture."""
+        """Optimises one patch per surface; all of them are pasted into every picture."""
         from gear.plugins.attacks.optimisation.loop import Problem, climb, unit_gradients
         from gear.plugins.attacks.optimisation.objectives import default_objective
         from gear.plugins.attacks.optimisation.upright_pasting import Upright

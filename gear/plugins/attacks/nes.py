@@ -1,6 +1,8 @@
-"""Black-box: gradients estimated from differences of the objective (NES; Ilyas et al., ICML 2018), or SPSA's.
+"""A black-box attack with gradients estimated from differences of the objective (NES; Ilyas et al., ICML 2018; or
+SPSA).
 
-The estimate is made on a coarse grid that is spread over the patch: fewer numbers to learn from the same queries.
+The gradient is estimated on a coarse grid that is upsampled to the patch, so that there are fewer numbers to estimate
+from the same number of queries.
 """
 
 from __future__ import annotations
@@ -25,13 +27,13 @@ class NesConfig:
     """Options.
 
     Attributes:
-        height_px, width_px: of every patch.
-        grid_px: patch pixels to a side of one number that is estimated.
-        draws: normal numbers (`nes`), or signs (`spsa`).
-        pairs: antithetic pairs of queries for one step.
-        spread: size of the changes that are tried, of 0..1.
-        step: how far every number moves, of 0..1.
-        batch: samples that a query looks at.
+        height_px, width_px: size of every patch.
+        grid_px: side of a grid cell in patch pixels.
+        draws: normal perturbations (`nes`), or random signs (`spsa`).
+        pairs: antithetic pairs of queries per step.
+        spread: size of the perturbations, in 0..1.
+        step: step size of every value, in 0..1.
+        batch: samples per query.
     """
 
     height_px: int = 150
@@ -53,7 +55,7 @@ class NesConfig:
 
 
 class Nes:
-    """Signed steps along the estimate."""
+    """Signed steps along the estimated gradient."""
 
     def __init__(self, config: NesConfig) -> None:
         self._config = config
@@ -68,7 +70,7 @@ class Nes:
         rng: np.random.Generator,
         watch: Watch | None = None,
     ) -> tuple[Patch, ...]:
-        """One patch a surface."""
+        """Optimises one patch per surface."""
         from gear.plugins.attacks.optimisation.checkpoint_state import check_saved
         from gear.plugins.attacks.optimisation.loop import batch_of
         from gear.plugins.attacks.optimisation.objectives import default_objective

@@ -1,7 +1,8 @@
-"""Robust physical perturbations (RP2; Eykholt et al., CVPR 2018) on a billboard: everything added up in one loss.
+"""Robust physical perturbations (RP2; Eykholt et al., CVPR 2018) on a billboard: all terms are summed into one
+loss.
 
 A perturbation of a base colour is kept small in the 2-norm and printable, while the mean loss over varied pictures is
-driven: to a target class for segmentation, away from the truth otherwise.
+optimised: towards a target class for segmentation, away from the ground truth otherwise.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rp2Appearance(Appearance):
-    """Stronger light and no blur; a class, so that each stays where another option is set."""
+    """Stronger changes of light and no blur; a class, so that setting one field keeps the others."""
 
     brightness: float = 0.1
     contrast: float = 0.3
@@ -38,15 +39,16 @@ class Rp2Appearance(Appearance):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rp2Config(TextureSettings):
-    """Options; the learning rate, the height and the norm's weight are those of the published code's GTSRB run, the
-    others are gear's.
+    """Options. Learning rate, height and the weight of the norm are those of the published GTSRB experiment; the
+    others are
+    gear's.
 
     Attributes:
-        base: grey value that the perturbation is added to, 0 to 1.
-        norm_weight: of the perturbation's 2-norm.
-        printability_weight: of non-printability, a mean over pixels.
-        smoothness_weight: of the smoothness term, a mean over pixels.
-        attacked, target: semantic segmentation: as in scene_specific.
+        base: grey value to which the perturbation is added, 0 to 1.
+        norm_weight: weight of the perturbation's 2-norm.
+        printability_weight: weight of the non-printability score, a mean over pixels.
+        smoothness_weight: weight of the smoothness term, a mean over pixels.
+        attacked, target: classes for semantic segmentation, as in `scene_specific`.
     """
 
     height_px: int = 32
@@ -69,7 +71,7 @@ class Rp2Config(TextureSettings):
 
 
 class Rp2:
-    """Adam on one sum."""
+    """Adam on the sum of all terms."""
 
     def __init__(self, config: Rp2Config) -> None:
         self._config = config
@@ -84,7 +86,7 @@ class Rp2:
         rng: np.random.Generator,
         watch: Watch | None = None,
     ) -> tuple[Patch, ...]:
-        """One patch a surface."""
+        """Optimises one patch per surface."""
         from gear.plugins.attacks.optimisation.loop import Problem, climb, one_gradient
 
         problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=self._config)
@@ -97,7 +99,7 @@ class Rp2:
         return climb(problem, one_gradient(harm, self._penalties), budget=budget, rng=rng, watch=watch)
 
     def objective(self, sample: Any) -> Objective:
-        """To the target class, or untargeted."""
+        """The loss of the target class, or the untargeted one."""
         from gear.plugins.attacks.optimisation.objectives import SemsegObjective, default_objective, kind_of
 
         config = self._config

@@ -1,7 +1,8 @@
-"""The scene-specific attack with gear's settings: textures of one scene's surfaces, by Adam through the compositor.
+"""The scene-specific attack with gear's settings: textures of one scene's surfaces, optimised by Adam through the
+compositor.
 
-The method is that of CARLA-GeAR (Nesti et al., 2022), which took it from Nesti et al. (WACV 2022), kept in unit space,
-with a falling learning rate and the intentions of their losses.
+The method is that of CARLA-GeAR (Nesti et al., 2022), after Nesti et al. (WACV 2022), on patches in 0..1 and with a
+decreasing learning rate.
 """
 
 from __future__ import annotations
@@ -33,18 +34,19 @@ class SceneSpecificConfig(Settings):
     """Options.
 
     Attributes:
-        learning_rate: null for 0.25 against depth networks, which give way to coarse strokes, and 0.06 against others.
-        gamma: semantic segmentation: share of the pixels that are still right, 0 to 1; below 0 for their share of
-            all pixels, step by step. Depth: share of the pixels whose error is below half a metre, 0.8 where below 0.
+        learning_rate: null for 0.25 against depth networks, on which coarse patterns are effective, and 0.06 against
+            others.
+        gamma: semantic segmentation: weight of the pixels that are still right, 0 to 1; below 0 their current share of
+            all pixels. Depth: weight of the pixels whose error is below half a metre; 0.8 where below 0.
         attacked, target: semantic segmentation: Cityscapes classes; pixels of `attacked` (all where empty) are pushed
             to `target`; untargeted where `target` is empty.
-        direction: depth: push it anywhere, farther or nearer.
-        goal: any harm, or make everything vanish (detectors and stereo networks), or make an object appear on the
-            patch (2D detection).
-        appears: COCO category of what appears.
-        losses: detectors and stereo networks: sign of a loss by name, `+` and `-` to make it large or small, e.g.
-            `bbox_regression=-`, 0 to leave it out; names that are not said are made large. With another `goal` than
-            harm every loss is made small, and can only be left out.
+        direction: depth: change it in any direction, farther or nearer.
+        goal: any harm; make all objects vanish (detectors and stereo networks); or make an object appear on the patch
+            (2D detection).
+        appears: COCO category of the object that is to appear.
+        losses: detectors and stereo networks: sign of a loss by name, `+` to maximise, `-` to minimise, 0 to ignore,
+            such as `bbox_regression=-`; losses without a sign are maximised. With a `goal` other than harm every loss
+            is minimised, and a loss can only be ignored.
     """
 
     learning_rate: float | tuple[float, float, float] | None = None
@@ -77,7 +79,7 @@ SIGNS = {"+": 1.0, "-": -1.0, "0": 0.0}
 
 
 class SceneSpecific:
-    """Adam on all surfaces' textures at once."""
+    """Adam on the textures of all surfaces at once."""
 
     def __init__(self, config: SceneSpecificConfig) -> None:
         self._config = config
@@ -92,7 +94,7 @@ class SceneSpecific:
         rng: np.random.Generator,
         watch: Watch | None = None,
     ) -> tuple[Patch, ...]:
-        """One patch a surface."""
+        """Optimises one patch per surface."""
         from gear.plugins.attacks.optimisation.loop import Problem, climb, unit_gradients
 
         objective, settings = self.objective(dataset[0]), self.settings(dataset[0])
@@ -102,7 +104,7 @@ class SceneSpecific:
         return climb(problem, unit_gradients(problem, objective, settings), budget=budget, rng=rng, watch=watch)
 
     def settings(self, sample: Any) -> SceneSpecificConfig:
-        """With the learning rate that suits the task that the sample is of."""
+        """The settings, with the learning rate for the task of a sample."""
         from gear.plugins.attacks.optimisation.objectives import kind_of
 
         if self._config.learning_rate is not None:
@@ -110,10 +112,10 @@ class SceneSpecific:
         return replace(self._config, learning_rate=LEARNING_RATES.get(kind_of(sample), USUAL_RATE))
 
     def objective(self, sample: Any) -> Objective:
-        """What is made large, by the task that the sample is of.
+        """The objective for the task of a sample.
 
         Raises:
-            GearError: an option is set that is for samples of another task.
+            GearError: an option is set that belongs to another task.
         """
         from gear.plugins.attacks.optimisation.objectives import DepthObjective, LossObjective, SemsegObjective, kind_of
 

@@ -1,7 +1,7 @@
-"""Black-box: random search with squares, kept where they do more harm.
+"""A black-box attack by random search: squares of one colour, kept if they increase the objective.
 
 Square attack (Andriushchenko et al., ECCV 2020) in the form of Sparse-RS for universal patches (Croce et al., AAAI
-2022): every colour is a corner of the colour cube, the squares' side shrinks along a schedule of the queries spent.
+2022): every colour is a corner of the colour cube, and the squares shrink along a schedule of the queries used.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ class SquareConfig:
     """Options.
 
     Attributes:
-        height_px, width_px: of every patch.
-        area: of the first squares, as a share of the patch's.
-        batch: samples that a query looks at.
-        turns: how often other samples are drawn over the whole budget.
+        height_px, width_px: size of every patch.
+        area: area of the first squares, as a share of the patch's.
+        batch: samples per query.
+        turns: how often the samples are redrawn within the budget.
     """
 
     height_px: int = 150
@@ -51,7 +51,7 @@ class SquareConfig:
 
 
 class Square:
-    """One square of one colour at a time."""
+    """Random search over one square of one colour at a time."""
 
     def __init__(self, config: SquareConfig) -> None:
         self._config = config
@@ -66,7 +66,7 @@ class Square:
         rng: np.random.Generator,
         watch: Watch | None = None,
     ) -> tuple[Patch, ...]:
-        """One patch a surface."""
+        """Optimises one patch per surface."""
         from gear.plugins.attacks.optimisation.checkpoint_state import check_saved
         from gear.plugins.attacks.optimisation.loop import batch_of
         from gear.plugins.attacks.optimisation.objectives import default_objective
@@ -109,7 +109,7 @@ class Square:
         return as_patches(textures)
 
     def _first(self, rng: np.random.Generator, count: int) -> np.ndarray:
-        """Vertical stripes of random corners of the colour cube."""
+        """The initial patch: vertical stripes of random corners of the colour cube."""
         config = self._config
         stripes = rng.integers(0, 2, (count, 3, 1, config.width_px)).astype(np.float32)
         return np.ascontiguousarray(np.broadcast_to(stripes, (count, 3, config.height_px, config.width_px)))

@@ -1,4 +1,4 @@
-"""The objectness attack of Thys et al. (CVPR workshops 2019) from a billboard: nothing shall be detected any more.
+"""The objectness attack of Thys et al. (CVPR workshops 2019) on a billboard: nothing is to be detected.
 
 Loss = mean over pictures of the highest objectness + 0.01 NPS + max(2.5 TV, 0.1), as published; Adam with learning rate
 0.03 from mid-grey noise.
@@ -26,12 +26,12 @@ if TYPE_CHECKING:
     from gear.plugins.attacks.optimisation.loop import Seen
 
 SCORES = ("objectness", "cls_logits")
-"""Raw outputs of detectors that a sigmoid makes scores of."""
+"""Raw outputs of detectors that are scores after a sigmoid."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ThysAppearance(Appearance):
-    """The published even spreads as standard deviations; a class, so that each stays where another option is set."""
+    """The published uniform ranges as standard deviations; a class, so that setting one field keeps the others."""
 
     noise: float = 0.06
     brightness: float = 0.06
@@ -40,12 +40,12 @@ class ThysAppearance(Appearance):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ThysConfig(TextureSettings):
-    """Options, with the published constants.
+    """Options, with the published constants as defaults.
 
     Attributes:
-        printability_weight: of non-printability, a sum over pixels by the number of values, three a pixel.
-        variation_weight: of total variation, a sum over values by their number.
-        least_variation: below this, total variation costs nothing more.
+        printability_weight: weight of the non-printability score, a sum over pixels divided by the number of values.
+        variation_weight: weight of the total variation, a sum over values divided by their number.
+        least_variation: total variation below this value is not penalised further.
     """
 
     learning_rate: float | tuple[float, float, float] = 0.03
@@ -56,7 +56,7 @@ class ThysConfig(TextureSettings):
 
 
 class Thys:
-    """Lowers the surest detection of every picture."""
+    """Minimises the most confident detection of every picture."""
 
     def __init__(self, config: ThysConfig) -> None:
         self._config = config
@@ -71,7 +71,7 @@ class Thys:
         rng: np.random.Generator,
         watch: Watch | None = None,
     ) -> tuple[Patch, ...]:
-        """One patch a surface.
+        """Optimises one patch per surface.
 
         Raises:
             GearError: the model has no output of objectness.
@@ -87,7 +87,7 @@ class Thys:
         return climb(problem, one_gradient(harm, self._penalties), budget=budget, rng=rng, watch=watch)
 
     def objective(self, sample: Any) -> Objective:
-        """The surest detection, to be made less sure."""
+        """The objective of the most confident detection."""
         return SurestObjective()
 
     def _harm(self, model: Model, objective: Objective, seen: Seen) -> Mapping[str, Tensor]:
@@ -116,22 +116,22 @@ class Thys:
 
 
 class SurestObjective:
-    """Grows as the surest detection of every picture becomes less sure."""
+    """An objective that grows as the confidence of the most confident detection falls."""
 
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> Mapping[str, Term]:
-        """`objectness`."""
+        """One term, named `objectness`."""
         from gear.contracts.attacks import Term
 
         return {"objectness": Term(value=-surest(model.forward(views)).mean())}
 
 
 def surest(outputs: Mapping[str, Tensor]) -> Tensor:
-    """(B,) the highest score of each picture, 0 to 1.
+    """(B,) highest score of each picture, 0 to 1.
 
     Raises:
-        GearError: no output is of objectness.
+        GearError: the model has no output of objectness.
     """
     for name in SCORES:
         if name in outputs:

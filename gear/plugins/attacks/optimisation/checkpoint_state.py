@@ -1,4 +1,4 @@
-"""What an attack goes on from, looked at first: a checkpoint that was damaged is told in one line."""
+"""Checks the state in the checkpoint of an attack before it is continued."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ TEXTURE_AXES = 4
 
 
 def check_saved(saved: State, fresh: State) -> None:
-    """Whether a saved state holds what one that begins has: the same arrays by name, of the same shapes and types.
+    """Checks that a saved state has the arrays of an initial state: same names, shapes and types.
 
     Raises:
-        GearError: it does not.
+        GearError: it has not.
     """
     if missing := fresh.keys() - saved.keys():
         raise GearError(f"the saved attack is of an older gear, it lacks {', '.join(sorted(missing))}; start it afresh")

@@ -1,4 +1,4 @@
-"""What networks say of pictures without a patch: asked once, because no patch changes it."""
+"""A cache of the outputs of networks on pictures without a patch, which no patch changes."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from gear.contracts.models import Model
 
 
 class CleanAnswers:
-    """Keeps answers, or what an objective makes of them, by network and sample."""
+    """Keeps outputs, or what an objective computes from them, by network and sample."""
 
     def __init__(self) -> None:
         self._kept: dict[tuple[int, int], Tensor] = {}
 
     def of(self, model: Model, samples: Sequence[Any], indexes: Sequence[int], ask: Callable[[Any], Tensor]) -> Tensor:
-        """(B, ...) of a batch, in main memory.
+        """The cached values of a batch, (B, ...) in main memory.
 
         Args:
-            model: whose answers these are.
-            samples: the batch's samples.
-            indexes: their numbers in the data set.
-            ask: what there is to keep of a sample that was not asked about before; runs without gradients.
+            model: model whose outputs are cached.
+            samples: samples of the batch.
+            indexes: indices of the samples in the dataset.
+            ask: computes the value of a sample that is not cached; runs without gradients.
         """
         for sample, index in zip(samples, indexes, strict=True):
             if (id(model), index) not in self._kept:

@@ -1,4 +1,4 @@
-"""A model that is only borrowed: it is attacked, and left as it was."""
+"""Freezes the parameters of an attacked model."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from torch import nn
 
 
 def networks_of(model: Any) -> Iterator[tuple[str, nn.Module]]:
-    """The torch modules of a model: itself, or its attributes that are modules, and those that it taps."""
+    """The torch modules of a model: the model, or its attributes that are modules, and its taps."""
     if isinstance(model, nn.Module):
         yield "model", model
         return
@@ -23,7 +23,7 @@ def networks_of(model: Any) -> Iterator[tuple[str, nn.Module]]:
 
 @contextlib.contextmanager
 def frozen(model: Any) -> Iterator[None]:
-    """Inside, no parameter asks for a gradient: backward passes reach the picture alone, and cost less."""
+    """A context in which no parameter requires a gradient: backward passes reach only the picture and cost less."""
     parameters = {id(p): p for _, network in networks_of(model) for p in network.parameters() if p.requires_grad}
     for parameter in parameters.values():
         parameter.requires_grad_(False)

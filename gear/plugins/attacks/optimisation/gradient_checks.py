@@ -1,4 +1,4 @@
-"""Whether gradients say the truth: a step along them must change the objective by what they promise."""
+"""Checks for masked gradients: a step along the gradient must change the objective by the predicted amount."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ STEP = 0.02
 
 
 def promised_and_kept(value: Callable[[Sequence[Tensor]], Tensor], patches: Sequence[Tensor]) -> tuple[float, float]:
-    """The change of an objective along its gradient: as the gradient promises it, and as it is.
+    """The change of an objective along its gradient: predicted by the gradient, and measured.
 
-    A quotient far below 1 says that the gradient is masked: by a defense that hides it, by saturation, or by arithmetic
-    that is not differentiable.
+    A ratio of measured to predicted change far below 1 indicates a masked gradient: by a defense, by saturation, or by
+    arithmetic that is not differentiable.
 
     Args:
-        value: of patches, (3, h, w) each in 0..1; deterministic.
-        patches: where to look.
+        value: deterministic objective of patches, (3, h, w) each in 0..1.
+        patches: patches at which the gradient is checked.
 
     Returns:
-        The change between both ends of the step that the gradient promises, and the measured one.
+        The predicted and the measured change between both ends of the step.
     """
     asked = [patch.detach().clone().requires_grad_(True) for patch in patches]
     total = value(asked)

@@ -1,4 +1,4 @@
-"""Attacks without gradients see numbers: the objective of patches on some samples, counted by forward passes."""
+"""The objective for attacks without gradients: its value on some samples, with a budget of forward passes."""
 
 from __future__ import annotations
 
@@ -22,13 +22,12 @@ Textures = npt.NDArray[np.float32]
 
 
 class Oracle:
-    """Answers how much harm textures do; a question about a batch costs one query a model.
+    """Computes the harm of textures; one query is one forward pass of one model on a batch.
 
-    Objectives that compare with the answer to the clean picture (`asks_for_clean`) cost one more for every sample not
-    seen before.
+    Objectives that compare with the output on the clean picture (`asks_for_clean`) cost one more query per new sample.
 
     Attributes:
-        left: queries that may still be asked.
+        left: queries that are left.
     """
 
     def __init__(
@@ -41,26 +40,26 @@ class Oracle:
         self._seen: set[int] = set()
 
     def state(self) -> State:
-        """What was spent and on what, to go on from."""
+        """The used queries, for a checkpoint."""
         return {"left": np.array(self.left), "paid": np.array(sorted(self._seen), np.int64)}
 
     def restore(self, state: State) -> None:
-        """Goes on where `state` was taken.
+        """Restores the used queries from `state`.
 
         Raises:
-            GearError: it is none.
+            GearError: it is no such state.
         """
         check_saved(state, {"left": np.array(0), "paid": np.zeros(np.size(state.get("paid", ())), np.int64)})
         self.left, self._seen = int(state["left"]), {int(index) for index in state["paid"]}
 
     def cost(self, indexes: Sequence[int]) -> int:
-        """Queries of one question about these samples."""
+        """Queries that one evaluation on these samples costs."""
         asks = isinstance(self._objective, HarmObjective) and self._objective.asks_for_clean
         clean = len(set(indexes) - self._seen) if asks else 0
         return len(members_of(self._model)) * (1 + clean)
 
     def harm(self, textures: Textures, indexes: Sequence[int]) -> float:
-        """The objective as one number. Only forward passes, without gradients.
+        """The objective as one number, from forward passes without gradients.
 
         Raises:
             RuntimeError: there are no queries left.
@@ -82,6 +81,6 @@ class Oracle:
 
 
 def as_patches(textures: Textures) -> tuple[Patch, ...]:
-    """One patch a texture."""
+    """One patch per texture."""
     rgb = np.ascontiguousarray(textures.transpose(0, 2, 3, 1), np.float32)
     return tuple(Patch(name=f"patch_{n}", rgb=one) for n, one in enumerate(rgb))

@@ -1,4 +1,4 @@
-"""What keeps a patch printable: smoothness, and colours that a press can print."""
+"""Regularisers that keep a patch printable: smoothness, and colours of a printing press."""
 
 from __future__ import annotations
 
@@ -32,16 +32,18 @@ COVERS = (0.0, 0.5, 1.0)
 
 
 def smoothness(patch: Tensor) -> Tensor:
-    """Sum of squared differences of neighbours over a (3, h, w) patch: the paper's term, 0 for one flat colour."""
+    """Sum of squared differences of neighbouring pixels of a (3, h, w) patch: the paper's term, 0 for a single
+    colour.
+    """
     down, right = patch[:, 1:] - patch[:, :-1], patch[:, :, 1:] - patch[:, :, :-1]
     return down.square().sum() + right.square().sum()
 
 
 def non_printability(patch: Tensor) -> Tensor:
-    """Sum over the pixels of a (3, h, w) patch in 0..1 of the distance to the nearest colour that a press prints.
+    """Sum over the pixels of a (3, h, w) patch in 0..1 of the distance to the nearest printable colour.
 
-    After Sharif et al. (CCS 2016), with the smallest distance as in Thys et al. (2019) instead of the product, whose
-    gradient all but vanishes with many colours.
+    After Sharif et al. (CCS 2016), with the smallest distance as in Thys et al. (2019) instead of the product of
+    distances, whose gradient nearly vanishes with many colours.
     """
     palette = palette_srgb().to(patch)
     pixels = patch.flatten(1).T
@@ -50,9 +52,9 @@ def non_printability(patch: Tensor) -> Tensor:
 
 @functools.cache
 def palette_srgb() -> Tensor:
-    """(27, 3) sRGB values in 0..1: every mixture of cyan, magenta and yellow at no, half and full cover.
+    """(27, 3) sRGB values in 0..1: all mixtures of cyan, magenta and yellow at 0, 50 and 100 % coverage.
 
-    Dots of half cover mix paper and solids by area (Neugebauer's equations, Demichel's areas) in linear light.
+    Half coverage mixes paper and solid ink by area (Neugebauer's equations with Demichel's areas) in linear light.
     """
     solids = {inks: _xyz_from_lab(lab) for inks, lab in SOLIDS_LAB.items()}
     colours = []

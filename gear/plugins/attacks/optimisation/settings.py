@@ -1,4 +1,4 @@
-"""How textures are optimised, as data. No torch here: options of attack plugins are made of it."""
+"""Settings of the texture optimisation, as data without torch: options of attack plugins are made of them."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ USUAL_RATE = 0.06
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Appearance:
-    """How a patch may look when it is printed and photographed: random changes, in unit space, 0 for none.
+    """Random changes of a printed and photographed patch, on values in 0..1; 0 for none.
 
     Attributes:
         noise: standard deviation of noise on every value.
-        brightness: standard deviation of one number added to all values.
-        contrast: standard deviation of one factor around 1.
-        blur_px: largest side of a box blur; the side is uniform between 3 and this; below 3 for none.
+        brightness: standard deviation of an offset on all values.
+        contrast: standard deviation of a factor around 1.
+        blur_px: largest side of a box blur; the side is uniform between 3 and this value; below 3 for none.
     """
 
     noise: float = 0.02
@@ -35,15 +35,15 @@ class Appearance:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TextureSettings:
-    """Textures under Adam, whatever is climbed; all in unit space.
+    """Settings of textures optimised by Adam, on values in 0..1.
 
     Attributes:
-        height_px, width_px: of every patch.
-        batch: samples a step.
-        learning_rate: of Adam, at its highest, one number or one a channel; null for 0.06, or what suits the
-            task where the attack knows.
-        decay: whether it falls to 0 with a cosine.
-        appearance: what is varied, anew for every sample of every step.
+        height_px, width_px: size of every patch.
+        batch: samples per step.
+        learning_rate: peak learning rate of Adam, one number or one per channel; null for 0.06, or the attack's default
+            for the task.
+        decay: whether the learning rate falls to 0 along a cosine.
+        appearance: random changes of the patch, drawn anew for every sample of every step.
     """
 
     height_px: int = 150
@@ -65,18 +65,19 @@ class TextureSettings:
 
     @property
     def rate(self) -> float | tuple[float, float, float]:
-        """The learning rate, also where none was said."""
+        """The learning rate, or its default."""
         return USUAL_RATE if self.learning_rate is None else self.learning_rate
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings(TextureSettings):
-    """The same, with the terms' gradients brought to unit length and regularised.
+    """Texture settings with gradients of unit length per term, and regularisers.
 
     Attributes:
-        smoothness: length of the smoothness term's gradient beside the objective's, which is 1.
-        printability: likewise of non-printability, over what an offset press can print.
-        per_term: whether every term's gradient is brought to unit length by itself; one backward pass a term.
+        smoothness: length of the gradient of the smoothness term; the objective's gradient has length 1.
+        printability: length of the gradient of the non-printability term.
+        per_term: whether the gradient of each term is scaled to unit length separately, with one backward pass per
+            term.
     """
 
     smoothness: float = 0.1

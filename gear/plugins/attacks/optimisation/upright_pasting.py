@@ -1,4 +1,4 @@
-"""Pictures with patches pasted upright at made-up places, for attacks that do not know the scene."""
+"""Pictures with patches pasted upright at random places, for attacks that do not know the scene."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ Place = tuple[int, int, int, int]
 
 
 class Upright(Sequence[Any]):
-    """A data set and a compositor in one: its samples say that the patches are where they are pasted.
+    """A dataset and a compositor in one: the surfaces of its samples are the places where patches are pasted.
 
-    Both eyes of a stereo pair see a patch at the same place, as they see something far away.
+    Both views of a stereo pair show a patch at the same place, like something far away.
 
     Args:
-        dataset: whose pictures are used; their own surfaces stay what they show.
-        seed: of the places.
-        aspect: height of a patch over its width.
-        share: width of a patch as a share of the picture's.
-        scales: of that, drawn evenly.
-        shift: of a patch's middle from where it would stand, as a share of its size, either way.
+        dataset: dataset of the pictures; their own surfaces stay as they are.
+        seed: seed of the places.
+        aspect: height of a patch divided by its width.
+        share: width of a patch as a share of the picture's width.
+        scales: range of the factor on that width, drawn uniformly.
+        shift: largest shift of a patch from its regular place, as a share of its size.
     """
 
     def __init__(
@@ -47,7 +47,7 @@ class Upright(Sequence[Any]):
         self._step = 0
 
     def begin(self, step: int) -> None:
-        """Every step has places of its own."""
+        """Begins a step, for which new places are drawn."""
         self._step = step
 
     def __len__(self) -> int:
@@ -73,7 +73,9 @@ class Upright(Sequence[Any]):
         return dataclasses.replace(sample, surfaces=tuple(surfaces))
 
     def compose(self, patches: Sequence[Tensor], samples: Sequence[int], view: str) -> Tensor:
-        """(B, 3, H, W) pictures in 0..1; patches (3, h, w) for all samples, or (B, 3, h, w) with one each."""
+        """Composes patches into pictures: (B, 3, H, W) in 0..1. Patches are (3, h, w) for all samples, or (B, 3,
+        h, w) with one per sample.
+        """
         pictures = []
         for number, index in enumerate(samples):
             stored = self._dataset[index].images[view]
@@ -89,7 +91,7 @@ class Upright(Sequence[Any]):
         return torch.stack(pictures)
 
     def places(self, index: int) -> list[Place]:
-        """Where each patch of a sample is at this step: side by side, scaled and shifted."""
+        """The place of each patch of a sample in this step: side by side, scaled and shifted."""
         sample = self._dataset[index]
         height, width = next(iter(sample.images.values())).shape[:2]
         count = len(sample.record.surfaces)
