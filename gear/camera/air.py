@@ -94,7 +94,7 @@ class Air:
         Args:
             linear_rgb: (H, W, 3) uint16, 0..`LINEAR_FULL_SCALE`.
             depth_m: (H, W) float32 planar z, NaN where nothing is.
-            camera: who looks.
+            camera: the camera that takes the picture.
 
         Returns:
             (H, W, 3) uint16, a new array, rounded.

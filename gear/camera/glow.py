@@ -105,7 +105,7 @@ class Shine:
 
         Args:
             lamps: of one kind.
-            camera: who looks.
+            camera: the camera that takes the picture.
             glare: light of a spot per intensity towards the camera.
             depth_m: (H, W) planar z, NaN where nothing is.
         """

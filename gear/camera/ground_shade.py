@@ -164,7 +164,7 @@ class GroundShade:
             linear_rgb: (H, W, 3) uint16, gear's linear frame.
             depth_m: (H, W) float32 planar z, NaN where nothing is.
             is_ground: (H, W) what is shaded.
-            camera: who looks.
+            camera: the camera that takes the picture.
             record: the scene.
 
         Returns:

@@ -41,7 +41,7 @@ def lens_light(
     Args:
         lenses: (ngeom + 1,) whether a geom is such glass; the last entry is what id -1 finds.
         geom_id, depth_m: (H, W) of a view.
-        camera: who looks.
+        camera: the camera that takes the picture.
         record, geoms: the scene, and what each geom is.
         vehicles: assets that have lamps.
     """

@@ -115,7 +115,7 @@ class Night:
 
         Args:
             truth: depth and ids of a renderer's view.
-            camera: who looks.
+            camera: the camera that takes the picture.
             record: the scene, for who drives with lights.
             geoms: what each geom is.
         """

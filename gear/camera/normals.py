@@ -41,7 +41,7 @@ def strips_of(depth_m: FloatImage, camera: CameraRecord) -> Iterator[Strip]:
 
     Args:
         depth_m: (H, W) float32 planar z, NaN where nothing is.
-        camera: who looks.
+        camera: the camera that takes the picture.
     """
     height, width = depth_m.shape
     pinhole = camera.intrinsics

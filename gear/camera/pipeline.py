@@ -91,7 +91,7 @@ class CameraPipeline:
 
         Args:
             raw: colour and truth of a renderer.
-            camera: who looks.
+            camera: the camera that takes the picture.
             record: the scene, for its seed and the ego car's motion.
             geoms: what each geom is.
             night_light: what the same view, whatever its surfaces show, gets of lamps; found anew unless given.

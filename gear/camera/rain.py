@@ -67,7 +67,7 @@ class Rain:
         Args:
             linear_rgb: (H, W, 3) uint16, 0..`LINEAR_FULL_SCALE`.
             depth_m: (H, W) float32 planar z, NaN where nothing is.
-            camera: who looks.
+            camera: the camera that takes the picture.
             velocity_world_mps: of the camera.
             rng: of this sample and camera.
 

@@ -81,7 +81,7 @@ class Water:
             linear_rgb: (H, W, 3) uint16, 0..`LINEAR_FULL_SCALE`.
             depth_m: (H, W) float32 planar z, NaN where nothing is.
             open_ground: (H, W) where water may be.
-            camera: who looks.
+            camera: the camera that takes the picture.
             reflection: the street, as ground at its height mirrors it; ground at another height, and what is not known
                 of the street, mirrors `mirrored`. Without it puddles do, and there is no film.
 

@@ -73,7 +73,7 @@ class ClassicRenderer:
 
     @property
     def info(self) -> RendererInfo:
-        """Who renders."""
+        """Name, driver and device of this renderer."""
         return self._info
 
     def render(

@@ -96,7 +96,7 @@ class FilamentRenderer:
 
     @property
     def info(self) -> RendererInfo:
-        """Who renders."""
+        """Name, driver and device of this renderer."""
         return self._info
 
     def render(

@@ -16,11 +16,11 @@ from gear.camera import response_for
 from gear.contracts.rendering import Quality, Renderer, Stage
 from gear.render import open_renderer
 from gear.render.pinhole import Frustum
-from gear.render.raster.environment import mirrored_levels
-from gear.render.raster.lights import irradiance_over_pi, lamps_of
-from gear.render.raster.primitives import Triangles, height_field, solid
-from gear.render.raster.shadow_squares import ENDS_M, square_about, squares_before
-from gear.render.raster.split_sum import mirrored_shares
+from gear.render.raster.environment import mip_chain
+from gear.render.raster.lights import irradiance_over_pi, lights_of
+from gear.render.raster.primitives import Triangles, height_field, primitive
+from gear.render.raster.shadow_cascades import CASCADE_ENDS_M, town_cascade, view_cascades
+from gear.render.raster.split_sum import split_sum_table
 from gear.values.geometry import RigidTransform
 from gear.values.scene import CameraRecord, Pose
 from gear.world.compilation.quiet_mjcf import mjcf
@@ -45,7 +45,7 @@ def outwards(shape: Triangles) -> np.ndarray:
 
 @pytest.mark.parametrize(("kind", "size"), VOLUMES)
 def test_a_solid_is_closed_and_looks_outwards(kind: mujoco.mjtGeom, size: tuple[float, ...]) -> None:
-    shape = solid(int(kind), np.array(size))
+    shape = primitive(int(kind), np.array(size))
     across = outwards(shape)
     volume = np.einsum("ij,ij->", shape.positions_m[shape.corners[:, 0]], across) / 6
     assert volume == pytest.approx(VOLUMES[kind, size], rel=0.03)
@@ -75,7 +75,7 @@ def test_a_height_field_lies_where_rays_find_it() -> None:
 
 def test_what_is_no_solid_is_refused() -> None:
     with pytest.raises(ValueError, match="mjGEOM_MESH"):
-        solid(int(GEOM.mjGEOM_MESH), np.ones(3))
+        primitive(int(GEOM.mjGEOM_MESH), np.ones(3))
 
 
 def test_an_even_light_comes_from_everywhere_alike() -> None:
@@ -92,13 +92,13 @@ def test_an_even_light_comes_from_everywhere_alike() -> None:
 
 def test_mirrored_light_gets_coarser_and_keeps_its_mean() -> None:
     radiance = np.random.default_rng(0).random((6, 16, 16, 3))
-    levels = mirrored_levels(radiance)
+    levels = mip_chain(radiance)
     assert [level.shape[1] for level in levels] == [16, 8, 4, 2, 1]
     assert np.allclose(levels[-1][:, 0, 0], radiance.mean(axis=(1, 2)))
 
 
 def test_a_smooth_metal_mirrors_all_and_a_smooth_dielectric_its_reflectance() -> None:
-    shares = mirrored_shares()
+    shares = split_sum_table()
     smooth = shares[0, 3:]
     assert np.allclose(smooth.sum(axis=-1), 1, atol=0.03)
     assert 0.04 * shares[0, -1, 0] + shares[0, -1, 1] == pytest.approx(0.04, abs=1e-3)
@@ -111,17 +111,17 @@ def test_a_smooth_metal_mirrors_all_and_a_smooth_dielectric_its_reflectance() ->
 def test_shadows_are_looked_for_wherever_the_camera_looks() -> None:
     record = camera(320, 192)
     sun = np.array([0.3, -0.5, 0.8]) / np.linalg.norm([0.3, -0.5, 0.8])
-    squares = squares_before(Frustum.of(record), sun)
+    cascades = view_cascades(Frustum.of(record), sun)
     columns, rows = np.meshgrid([-0.5, 319.5], [-0.5, 191.5])
     corners = np.stack([columns, rows], axis=-1).reshape(-1, 2)
     begin_m = 0.1
-    for square, end_m in zip(squares, ENDS_M, strict=True):
+    for cascade, end_m in zip(cascades, CASCADE_ENDS_M, strict=True):
         for depth_m in (begin_m, end_m):
             points = record.world_from_camera_transform.apply(record.intrinsics.unproject(corners, np.full(4, depth_m)))
-            placed = np.concatenate([points, np.ones((4, 1))], axis=1) @ square.matrix(np.zeros(3)).T
+            placed = np.concatenate([points, np.ones((4, 1))], axis=1) @ cascade.matrix(np.zeros(3)).T
             assert (np.abs(placed[:, :2]) <= 1 + 1e-9).all() and ((placed[:, 2] >= 0) & (placed[:, 2] <= 1)).all()
         begin_m = end_m
-    nearer, farther = (squares[0].matrix(np.zeros(3)) @ [*point, 1.0] for point in (2 * sun, 0 * sun))
+    nearer, farther = (cascades[0].matrix(np.zeros(3)) @ [*point, 1.0] for point in (2 * sun, 0 * sun))
     assert nearer[2] < farther[2], "depth grows away from the sun"
     assert np.allclose(nearer[:2], farther[:2])
 
@@ -129,8 +129,8 @@ def test_shadows_are_looked_for_wherever_the_camera_looks() -> None:
 def test_a_town_is_in_one_square_but_for_what_lies_far_outside() -> None:
     points = np.random.default_rng(0).uniform(-100, 100, (1000, 3)) * [1, 1, 0.1]
     points[0] = (1e5, 0, 0)
-    square = square_about(points, np.array([0.0, 0.6, 0.8]))
-    assert 90 < square.half_side_m < 110
+    cascade = town_cascade(points, np.array([0.0, 0.6, 0.8]))
+    assert 90 < cascade.half_side_m < 110
 
 
 LAMBERT = """
@@ -167,10 +167,10 @@ def test_lights_are_taken_as_their_kinds_mean() -> None:
       <light type="directional" dir="1 0 0" diffuse="0.5 0.5 0.5" intensity="38400"/>
       <geom size="1"/></worldbody></mujoco>"""
     model = mujoco.MjModel.from_xml_string(xml)
-    lamps = lamps_of(model, posed(model))
-    assert lamps.casts and np.allclose(lamps.towards[0], (-1, 0, 0, 0)), "what throws shadows comes first"
-    assert np.allclose(lamps.light, [[0.5, 0.5, 0.5], [0.1, 0, 0], [0, math.pi, 0]])
-    assert np.allclose(lamps.towards[1:], [(0, 0, 3, 1), (0, 0, 1, 0)])
+    lights = lights_of(model, posed(model))
+    assert lights.casts_shadows and np.allclose(lights.towards[0], (-1, 0, 0, 0)), "what throws shadows comes first"
+    assert np.allclose(lights.light, [[0.5, 0.5, 0.5], [0.1, 0, 0], [0, math.pi, 0]])
+    assert np.allclose(lights.towards[1:], [(0, 0, 3, 1), (0, 0, 1, 0)])
 
 
 def street(weather: str) -> mujoco.MjModel:

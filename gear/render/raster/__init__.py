@@ -1,4 +1,4 @@
-"""Gear's own physically based renderer, through OpenGL: what Filament shows of a street, for a fraction of the time.
+"""gear's own physically based renderer, through OpenGL: it shows a street as Filament does, in a fraction of the time.
 
 Filament shades every sample with one general shader that comes compiled with MuJoCo. This renderer has a shader for
 each kind of material, draws ids and depth first so that no surface is shaded that nobody sees, draws the shadows of

@@ -1,1 +1,3 @@
+// No colour: only the depth that OpenGL writes, for shadow maps.
+
 void main() {}

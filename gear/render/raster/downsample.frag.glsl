@@ -1,4 +1,4 @@
-// The mean of each block of four samples.
+// The mean of each block of 2 x 2 samples.
 
 layout(binding = 0) uniform sampler2D samples;
 layout(location = 0) out vec4 mean;

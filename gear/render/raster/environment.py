@@ -1,7 +1,7 @@
-"""Cube maps as rough surfaces mirror them.
+"""Mip levels of cube maps: rough surfaces reflect the coarser ones.
 
-Faces lie in OpenGL's order (+x, -x, +y, -y, +z, -z of a cube whose y points up in the world, so that its z points
-south): the order in which MuJoCo keeps them.
+Faces are in OpenGL's and MuJoCo's order: +x, -x, +y, -y, +z, -z of a cube whose y axis points up in the world and whose
+z axis points south.
 """
 
 from __future__ import annotations
@@ -9,8 +9,15 @@ from __future__ import annotations
 from gear.values.geometry import Array
 
 
-def mirrored_levels(radiance: Array) -> tuple[Array, ...]:
-    """(6, n, n, 3) to the chain of its means: (6, n, n, 3), (6, n / 2, n / 2, 3), ..."""
+def mip_chain(radiance: Array) -> tuple[Array, ...]:
+    """The mip levels of a cube map by means of 2 x 2 texels.
+
+    Args:
+        radiance: (6, n, n, 3) float64.
+
+    Returns:
+        (6, n, n, 3), (6, n // 2, n // 2, 3), ..., (6, 1, 1, 3).
+    """
     levels = [radiance]
     while levels[-1].shape[1] > 1:
         half = levels[-1].shape[1] // 2

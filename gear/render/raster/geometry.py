@@ -1,4 +1,4 @@
-"""What a model's geoms are made of, as OpenGL draws it: one buffer of vertices, and where each geom's lie in it."""
+"""Triangles of a model's geoms in the form that OpenGL draws: one vertex buffer, one index buffer, draw commands."""
 
 from __future__ import annotations
 
@@ -9,34 +9,34 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.render.pinhole import FAR_M
-from gear.render.raster.primitives import Triangles, height_field, solid
+from gear.render.raster.primitives import Triangles, height_field, primitive
 from gear.values.geometry import Array
 
 VERTEX = np.dtype([("position_m", "<f4", 3), ("normal", "<i2", 4), ("texcoord", "<f4", 2)])
-"""As it lies in memory; normals count to 32767."""
+"""Memory layout of a vertex; normals are scaled to 32767."""
 
-COMMAND = np.dtype([(name, "<u4") for name in ("count", "instances", "first", "base", "piece")])
-"""What OpenGL wants to know to draw one piece of a geom."""
+DRAW_COMMAND = np.dtype([(name, "<u4") for name in ("count", "instances", "first", "base", "piece")])
+"""Memory layout of an indirect draw command (`DrawElementsIndirectCommand`); `piece` is its base instance."""
 
 _MESHES = (int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_SDF))
 _PLANE, _FIELD = int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD)
 _BITS = 21
 _CELL_M = 48.0
 _WHOLE = 512
-"""Triangles of a mesh that is not cut into pieces: what a draw costs by itself."""
+"""Meshes with fewer triangles are not cut into pieces: a draw command costs about as much as these."""
 
 _Key = tuple[int, int, tuple[float, ...], tuple[float, ...]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Geometry:
-    """Triangles of all geoms, in pieces that are small enough to be left out where nobody looks.
+    """Triangles of all geoms, P pieces small enough for those outside of the view to be skipped.
 
     Attributes:
         vertices: (V,) `VERTEX`.
         indices: (I,) uint32, three for a triangle.
-        commands: (P,) `COMMAND`, piece by piece, in the order of geoms.
-        geoms: (P,) whose piece it is.
+        commands: (P,) `DRAW_COMMAND`, piece by piece, in the order of geoms.
+        geoms: (P,) id of the geom that the piece belongs to.
         centres_m: (P, 3) of spheres about the pieces, in the frames of their geoms.
         radii_m: (P,) of these spheres.
     """
@@ -61,13 +61,17 @@ class _Shape:
 
 
 def geometry_of(model: mujoco.MjModel, drawn: npt.NDArray[np.bool_]) -> Geometry:
-    """Triangles of the geoms that are drawn; those that share a shape share its triangles.
+    """Triangles of the geoms that are drawn; geoms of one shape share its triangles.
+
+    Args:
+        model: the compiled world.
+        drawn: (ngeom,) bool, which geoms are drawn.
 
     Raises:
         ValueError: a mesh has more than two million vertices.
     """
     shapes: dict[_Key, tuple[_Shape, int, int]] = {}
-    commands, centres, radii = [np.zeros(0, COMMAND)], [np.zeros((0, 3))], [np.zeros(0)]
+    commands, centres, radii = [np.zeros(0, DRAW_COMMAND)], [np.zeros((0, 3))], [np.zeros(0)]
     geoms: list[int] = []
     first = base = 0
     for geom in np.flatnonzero(drawn).tolist():
@@ -77,7 +81,7 @@ def geometry_of(model: mujoco.MjModel, drawn: npt.NDArray[np.bool_]) -> Geometry
             shapes[key] = (made, first, base)
             first, base = first + len(made.indices), base + len(made.vertices)
         shape, shape_first, shape_base = shapes[key]
-        pieces = np.zeros(len(shape.radii_m), COMMAND)
+        pieces = np.zeros(len(shape.radii_m), DRAW_COMMAND)
         pieces["count"] = np.diff(shape.starts)
         pieces["first"] = shape_first + shape.starts[:-1]
         pieces["instances"], pieces["base"] = 1, shape_base
@@ -99,24 +103,24 @@ def geometry_of(model: mujoco.MjModel, drawn: npt.NDArray[np.bool_]) -> Geometry
 
 
 def _key(model: mujoco.MjModel, geom: int) -> _Key:
-    """The same for geoms of the same triangles and texture coordinates."""
+    """A key that geoms with equal triangles and texture coordinates share."""
     kind = int(model.geom_type[geom])
     if kind in _MESHES:
         return kind, int(model.geom_dataid[geom]), (), ()
     size = () if kind == _FIELD else tuple(model.geom_size[geom].tolist())
-    return kind, int(model.geom_dataid[geom]), size, tuple(_repeats(model, geom).tolist())
+    return kind, int(model.geom_dataid[geom]), size, tuple(_texture_repeats(model, geom).tolist())
 
 
 def _triangles(model: mujoco.MjModel, geom: int) -> Triangles:
     kind, index = int(model.geom_type[geom]), int(model.geom_dataid[geom])
     if kind in _MESHES:
         return _mesh(model, index)
-    made = height_field(model, index) if kind == _FIELD else solid(kind, model.geom_size[geom])
-    return Triangles(made.positions_m, made.normals, made.texcoords * _repeats(model, geom), made.corners)
+    made = height_field(model, index) if kind == _FIELD else primitive(kind, model.geom_size[geom])
+    return Triangles(made.positions_m, made.normals, made.texcoords * _texture_repeats(model, geom), made.corners)
 
 
-def _repeats(model: mujoco.MjModel, geom: int) -> Array:
-    """(2,) how often a picture repeats over a primitive: `texrepeat`, per metre where the material says so."""
+def _texture_repeats(model: mujoco.MjModel, geom: int) -> Array:
+    """(2,) how often a texture repeats over a primitive: `texrepeat`, per metre with `texuniform`."""
     material = int(model.geom_matid[geom])
     if material < 0:
         return np.ones(2)
@@ -152,7 +156,7 @@ def _mesh(model: mujoco.MjModel, index: int) -> Triangles:
 
 
 def _shape(triangles: Triangles) -> _Shape:
-    """For the device, in pieces of `_CELL_M`."""
+    """Vertices and indices for the device, cut into pieces by a grid of `_CELL_M` metres."""
     vertices = np.zeros(len(triangles.positions_m), VERTEX)
     vertices["position_m"] = triangles.positions_m
     vertices["normal"][:, :3] = np.round(32767 * triangles.normals)
@@ -177,7 +181,7 @@ def _shape(triangles: Triangles) -> _Shape:
 
 
 def _spheres(points_m: Array, starts: npt.NDArray[np.int64]) -> tuple[Array, Array]:
-    """About the points from each start to the next: (P, 3) middles of their boxes, (P,) how far the farthest lies."""
+    """Bounding spheres of runs of points: (P, 3) centres of their boxes, (P,) distances of the farthest points."""
     if len(starts) < 2:
         return np.zeros((0, 3)), np.zeros(0)
     low, high = (ufunc.reduceat(points_m, starts[:-1]) for ufunc in (np.minimum, np.maximum))

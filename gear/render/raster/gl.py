@@ -1,4 +1,4 @@
-"""The little of OpenGL 4.5 that this renderer needs: programs, buffers, targets and textures."""
+"""Wrappers of the parts of OpenGL 4.5 that this renderer uses: programs, buffers, render targets, textures."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ _REMEDY = "update the driver, or use --renderer filament"
 
 
 def require_version() -> None:
-    """Refuses a current context that is too old.
+    """Refuses a current context without OpenGL 4.5 or without storage buffers in vertex shaders.
 
     Raises:
-        BackendError: it has less than OpenGL 4.5.
+        BackendError: says what the driver has.
     """
     words = _text(GL.glGetString(GL.GL_VERSION))
     found = re.match(r"(\d+)\.(\d+)", words)
@@ -33,17 +33,17 @@ def require_version() -> None:
 
 
 class Program:
-    """A compiled pair of shaders with its uniforms by name."""
+    """A vertex and a fragment shader, compiled and linked."""
 
     def __init__(self, vertex: str, fragment: str, flags: tuple[str, ...] = ()) -> None:
-        """Compiles two of this folder's shaders.
+        """Compiles two shaders of this folder, each after `frame.glsl`.
 
         Args:
             vertex, fragment: names of files, without `.glsl`.
-            flags: what is defined in both, with a value after a space where it has one.
+            flags: preprocessor definitions for both, such as `SHADOWS` or `LIGHTS 2`.
 
         Raises:
-            BackendError: the driver does not take them; says what it said.
+            BackendError: they do not compile; has the driver's message.
         """
         self.handle = GL.glCreateProgram()
         head = _VERSION + "".join(f"#define {flag}\n" for flag in flags) + _source("frame")
@@ -61,7 +61,11 @@ class Program:
             raise BackendError("raster", f"{vertex}.glsl with {fragment}.glsl: {said}", _REMEDY)
 
     def use(self, **matrices: npt.NDArray[np.float64]) -> None:
-        """Makes it current, with square matrices and a `corner` of four numbers as its uniforms."""
+        """Makes the program current and sets uniforms.
+
+        Args:
+            **matrices: by name: (4, 4) and (3, 3) matrices, or vectors of four numbers.
+        """
         GL.glUseProgram(self.handle)
         for name, matrix in matrices.items():
             place = GL.glGetUniformLocation(self.handle, name)
@@ -74,8 +78,8 @@ class Program:
                 GL.glUniform4fv(place, 1, values)
 
 
-def buffer_of(content: npt.NDArray[Any]) -> int:
-    """A buffer that keeps its content."""
+def static_buffer(content: npt.NDArray[Any]) -> int:
+    """OpenGL's name of a new buffer with constant content."""
     buffer = np.zeros(1, np.uint32)
     GL.glCreateBuffers(1, buffer)
     if content.nbytes:
@@ -83,8 +87,8 @@ def buffer_of(content: npt.NDArray[Any]) -> int:
     return int(buffer[0])
 
 
-class Stream:
-    """A buffer whose content comes anew with each frame."""
+class StreamBuffer:
+    """A buffer that is filled again for each frame."""
 
     def __init__(self, target: int) -> None:
         self._target = target
@@ -92,19 +96,19 @@ class Stream:
         GL.glCreateBuffers(1, buffer)
         self.handle = int(buffer[0])
 
-    def fill(self, content: npt.NDArray[Any]) -> None:
-        """Binds it with this content."""
+    def upload(self, content: npt.NDArray[Any]) -> None:
+        """Binds the buffer and replaces its content."""
         GL.glBindBuffer(self._target, self.handle)
         GL.glBufferData(self._target, content.nbytes, np.ascontiguousarray(content), GL.GL_STREAM_DRAW)
 
 
 @dataclass(frozen=True, slots=True)
-class Target:
-    """What is drawn into: a frame buffer with a texture of colour, or ids, and one of depth.
+class RenderTarget:
+    """A framebuffer with a colour (or id) texture and a depth texture.
 
     Attributes:
-        handle, colour, depth: of OpenGL; the latter two are 0 where there is none.
-        width, height: in pixels.
+        handle, colour, depth: OpenGL's names of the framebuffer and its textures; 0 for a texture that it lacks.
+        width, height: pixels.
     """
 
     handle: int
@@ -114,14 +118,14 @@ class Target:
     height: int
 
     @staticmethod
-    def of(width: int, height: int, colour_format: int | None, depth: int | None = None) -> Target:
-        """A new one.
+    def create(width: int, height: int, colour_format: int | None, depth: int | None = None) -> RenderTarget:
+        """A new render target.
 
         Args:
-            width: in pixels.
-            height: in pixels.
-            colour_format: of its colour; none for depth alone.
-            depth: a texture to share; 0 for none; without it a new one is made.
+            width: pixels.
+            height: pixels.
+            colour_format: OpenGL's internal format of the colour texture; None for no colour.
+            depth: a depth texture to share; 0 for no depth; None for a new 32-bit one.
         """
         frame = np.zeros(1, np.uint32)
         GL.glCreateFramebuffers(1, frame)
@@ -134,18 +138,30 @@ class Target:
             depth = _plain_texture(width, height, GL.GL_DEPTH_COMPONENT32F)
         if depth:
             GL.glNamedFramebufferTexture(handle, GL.GL_DEPTH_ATTACHMENT, depth, 0)
-        return Target(handle, colour, depth, width, height)
+        return RenderTarget(handle, colour, depth, width, height)
 
-    def begin(self, part: tuple[int, int, int, int] | None = None) -> None:
-        """All that follows is drawn here, or in a part of it: its corner and its size, in pixels."""
+    def bind(self, part: tuple[int, int, int, int] | None = None) -> None:
+        """Makes the target current, with viewport and scissors.
+
+        Args:
+            part: left, top, width and height in pixels to draw into; None for the whole target.
+        """
         GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self.handle)
         rectangle = part or (0, 0, self.width, self.height)
         GL.glViewport(*rectangle)
         GL.glScissor(*rectangle)
 
 
-def picture(content: npt.NDArray[np.uint8], *, is_srgb: bool) -> int:
-    """A texture of (H, W, 1 to 4) bytes with all its mip levels, that repeats and is filtered trilinearly."""
+def upload_texture(content: npt.NDArray[np.uint8], *, is_srgb: bool) -> int:
+    """Uploads a 2D texture with mip levels; it repeats and is filtered trilinearly.
+
+    Args:
+        content: (H, W, C) uint8 with one to four channels; one channel is read as grey.
+        is_srgb: whether the bytes are sRGB-encoded.
+
+    Returns:
+        OpenGL's name of the texture.
+    """
     height, width, channels = content.shape
     texture = _texture(GL.GL_TEXTURE_2D)
     levels = max(height, width).bit_length()
@@ -163,8 +179,8 @@ def picture(content: npt.NDArray[np.uint8], *, is_srgb: bool) -> int:
     return texture
 
 
-def cube(levels: tuple[npt.NDArray[Any], ...]) -> int:
-    """A cube texture of (6, n, n, 3) levels, linear floats."""
+def upload_cubemap(levels: tuple[npt.NDArray[Any], ...]) -> int:
+    """Uploads a cube map from its mip levels, (6, n, n, 3) linear floats each; returns its name."""
     texture = _texture(GL.GL_TEXTURE_CUBE_MAP)
     size = levels[0].shape[1]
     GL.glTextureStorage2D(texture, len(levels), GL.GL_RGBA16F, size, size)
@@ -177,8 +193,8 @@ def cube(levels: tuple[npt.NDArray[Any], ...]) -> int:
     return texture
 
 
-def table(content: npt.NDArray[Any]) -> int:
-    """A texture of (H, W, 2) numbers that is filtered between its cells and clamped at its borders."""
+def upload_table(content: npt.NDArray[Any]) -> int:
+    """Uploads a lookup table of (H, W, 2) floats, filtered bilinearly and clamped at its borders; returns its name."""
     height, width = content.shape[:2]
     texture = _texture(GL.GL_TEXTURE_2D)
     GL.glTextureStorage2D(texture, 1, GL.GL_RG16F, width, height)
@@ -194,7 +210,7 @@ def table(content: npt.NDArray[Any]) -> int:
 
 
 def shadow_map(width: int, height: int) -> int:
-    """A depth texture that is compared with when it is looked up; beyond its borders all is lit."""
+    """A depth texture with comparison: a read returns the lit share, and 1 beyond the borders; returns its name."""
     texture = _texture(GL.GL_TEXTURE_2D)
     GL.glTextureStorage2D(texture, 1, GL.GL_DEPTH_COMPONENT32F, width, height)
     for name, value in (
@@ -211,7 +227,7 @@ def shadow_map(width: int, height: int) -> int:
 
 
 def free_textures(textures: list[int]) -> None:
-    """Lets textures go."""
+    """Frees textures by OpenGL's names."""
     GL.glDeleteTextures(len(textures), np.array(textures, np.uint32))
 
 

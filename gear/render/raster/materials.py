@@ -1,4 +1,4 @@
-"""How geoms look: colours, surfaces and textures of a model, as the shaders want them."""
+"""Materials of geoms in the form that the shaders read: albedo, surface parameters and textures."""
 
 from __future__ import annotations
 
@@ -13,38 +13,38 @@ from gear.contracts.rendering import has_own_colour
 from gear.render.display_colours import has_linear_colours
 from gear.values.geometry import Array
 
-ROLES = {"HAS_BASE": "RGB", "HAS_NORMAL": "NORMAL", "HAS_ORM": "ORM", "HAS_EMISSIVE": "EMISSIVE"}
-"""MuJoCo's texture roles by what a shader calls them, in the order of its samplers."""
+TEXTURE_ROLES = {"HAS_BASE": "RGB", "HAS_NORMAL": "NORMAL", "HAS_ORM": "ORM", "HAS_EMISSIVE": "EMISSIVE"}
+"""MuJoCo's texture roles by the flag that a shader is compiled with, in the order of its samplers."""
 
 DIELECTRIC = 0.04
-"""What surfaces that are no metal mirror of light from straight ahead."""
+"""Reflectance at normal incidence (f0) of everything but metal."""
 
 _DEFAULT_SHININESS = 0.5
 _MOST_SHININESS = 128
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Looks:
-    """By geom.
+class GeomMaterials:
+    """Materials, one row per geom.
 
     Attributes:
-        albedo: (ngeom, 3) float32, linear.
-        surface: (ngeom, 4) float32: perceptual roughness, metallic, emission, reflectance.
-        textures: (ngeom, 4) int, ids in the order of `ROLES`, -1 where there is none.
-        is_clear: (ngeom,) what is so transparent that nothing of it is seen.
+        albedo: (ngeom, 3) float32, linear RGB.
+        surface: (ngeom, 4) float32: perceptual roughness, metallic, emission, reflectance at normal incidence.
+        textures: (ngeom, 4) int32 texture ids in the order of `TEXTURE_ROLES`, -1 for none.
+        is_invisible: (ngeom,) bool, whether the geom is fully transparent.
     """
 
     albedo: npt.NDArray[np.float32]
     surface: npt.NDArray[np.float32]
     textures: npt.NDArray[np.int32]
-    is_clear: npt.NDArray[np.bool_]
+    is_invisible: npt.NDArray[np.bool_]
 
 
-def looks_of(model: mujoco.MjModel) -> Looks:
-    """Looks of a model's geoms before a stage paints them.
+def materials_of(model: mujoco.MjModel) -> GeomMaterials:
+    """Materials of a model's geoms, without the paint and faces of a stage.
 
-    Materials without roughness have Phong's shininess instead, whose highlight is as wide as that of a roughness of
-    (2 / (2 + 128 shininess)) ^ 1/4. What is half transparent is drawn as if it were solid.
+    A material without roughness has Phong's shininess instead; its highlight is as wide as that of a perceptual
+    roughness of (2 / (2 + 128 shininess)) ^ (1/4). Geoms that are partly transparent are drawn as opaque.
     """
     material = model.geom_matid
     bare = material < 0
@@ -54,18 +54,18 @@ def looks_of(model: mujoco.MjModel) -> Looks:
     albedo = rgba[:, :3] if has_linear_colours(model) else decode_srgb(rgba[:, :3])
     surface = np.zeros((model.ngeom, 4), np.float32)
     surface[:] = (_roughness_of(_DEFAULT_SHININESS), 0.0, 0.0, DIELECTRIC)
-    textures = np.full((model.ngeom, len(ROLES)), -1, np.int32)
+    textures = np.full((model.ngeom, len(TEXTURE_ROLES)), -1, np.int32)
     if not bare.all():
         surface[~bare] = _surfaces(model)[material[~bare]]
-        roles = [int(getattr(mujoco.mjtTextureRole, f"mjTEXROLE_{role}")) for role in ROLES.values()]
+        roles = [int(getattr(mujoco.mjtTextureRole, f"mjTEXROLE_{role}")) for role in TEXTURE_ROLES.values()]
         textures[~bare] = model.mat_texid[np.ix_(material[~bare], roles)]
-    return Looks(
-        albedo=albedo.astype(np.float32), surface=surface, textures=textures, is_clear=np.asarray(rgba[:, 3] == 0)
+    return GeomMaterials(
+        albedo=albedo.astype(np.float32), surface=surface, textures=textures, is_invisible=np.asarray(rgba[:, 3] == 0)
     )
 
 
 def _surfaces(model: mujoco.MjModel) -> npt.NDArray[np.float32]:
-    """(nmat, 4) as `Looks.surface`."""
+    """(nmat, 4) float32: `GeomMaterials.surface` of each material."""
     rough, metallic = model.mat_roughness, model.mat_metallic
     return np.stack(
         [

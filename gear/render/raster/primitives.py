@@ -21,12 +21,13 @@ _GEOM = mujoco.mjtGeom
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Triangles:
-    """An indexed surface.
+    """An indexed triangle mesh with V vertices and T triangles.
 
     Attributes:
-        positions_m, normals: (V, 3) each, the latter of unit length.
-        texcoords: (V, 2), v grows downwards.
-        corners: (T, 3) rows of the former, counter-clockwise from outside.
+        positions_m: (V, 3) metres.
+        normals: (V, 3) unit vectors.
+        texcoords: (V, 2) texture coordinates; v grows downwards.
+        corners: (T, 3) int64 vertex indices, counter-clockwise seen from outside.
     """
 
     positions_m: Array
@@ -35,34 +36,39 @@ class Triangles:
     corners: npt.NDArray[np.int64]
 
 
-def solid(kind: int, size_m: Array) -> Triangles:
-    """A primitive of MuJoCo's.
+def primitive(kind: int, size_m: Array) -> Triangles:
+    """Triangles of one of MuJoCo's primitive shapes, in the geom's frame.
 
     Args:
         kind: an `mjtGeom`: plane, sphere, capsule, ellipsoid, cylinder or box.
         size_m: (3,) as `geom_size`.
 
     Raises:
-        ValueError: it is no such shape.
+        ValueError: the kind is not a primitive.
     """
     x, y, z = (float(value) for value in size_m)
     if kind == _GEOM.mjGEOM_PLANE:
-        return _sheet(x or FAR_M, y or FAR_M)
+        return _plane(x or FAR_M, y or FAR_M)
     if kind == _GEOM.mjGEOM_BOX:
         return _box(np.array([x, y, z]))
     if kind == _GEOM.mjGEOM_SPHERE:
-        return _turned(_arc(x, 0.0), np.array([1.0, 1.0, 1.0]))
+        return _surface_of_revolution(_capsule_profile(x, 0.0), np.array([1.0, 1.0, 1.0]))
     if kind == _GEOM.mjGEOM_ELLIPSOID:
-        return _turned(_arc(1.0, 0.0), np.array([x, y, z]))
+        return _surface_of_revolution(_capsule_profile(1.0, 0.0), np.array([x, y, z]))
     if kind == _GEOM.mjGEOM_CAPSULE:
-        return _turned(_arc(x, y), np.array([1.0, 1.0, 1.0]))
+        return _surface_of_revolution(_capsule_profile(x, y), np.array([1.0, 1.0, 1.0]))
     if kind == _GEOM.mjGEOM_CYLINDER:
         return _cylinder(x, y)
     raise ValueError(f"no primitive shape: {_GEOM(kind).name}")
 
 
 def height_field(model: mujoco.MjModel, index: int) -> Triangles:
-    """The upper surface of a height field."""
+    """The upper surface of a height field.
+
+    Args:
+        model: the compiled world.
+        index: id of the height field.
+    """
     rows, columns = int(model.hfield_nrow[index]), int(model.hfield_ncol[index])
     radius_x, radius_y, top, _ = model.hfield_size[index].tolist()
     begin = int(model.hfield_adr[index])
@@ -75,7 +81,7 @@ def height_field(model: mujoco.MjModel, index: int) -> Triangles:
     return _grid(positions, normals / np.linalg.norm(normals, axis=-1, keepdims=True))
 
 
-def _sheet(half_x_m: float, half_y_m: float) -> Triangles:
+def _plane(half_x_m: float, half_y_m: float) -> Triangles:
     u, v = np.meshgrid([-1.0, 1.0], [-1.0, 1.0])
     positions = np.stack([u * half_x_m, v * half_y_m, np.zeros_like(u)], axis=-1)
     return _grid(positions, np.broadcast_to([0.0, 0.0, 1.0], positions.shape))
@@ -94,10 +100,10 @@ def _box(half_m: Array) -> Triangles:
             across, down = _BOX_TEXTURE[axis]
             texcoords = np.stack([1 + positions[..., across], 1 - positions[..., down]], axis=-1) / 2
             parts.append(replace(_grid(positions * half_m, normals), texcoords=texcoords.reshape(-1, 2)))
-    return _joined(parts)
+    return _concatenated(parts)
 
 
-def _arc(radius_m: float, half_length_m: float) -> tuple[Array, Array]:
+def _capsule_profile(radius_m: float, half_length_m: float) -> tuple[Array, Array]:
     """Profile of a capsule: (N, 2) radius and height from the lower pole to the upper one, and its normals."""
     angle = np.linspace(-np.pi / 2, np.pi / 2, _UPWARDS + 1)
     normals = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
@@ -108,8 +114,13 @@ def _arc(radius_m: float, half_length_m: float) -> tuple[Array, Array]:
     return radius_m * normals + shift, normals
 
 
-def _turned(profile: tuple[Array, Array], scale: Array) -> Triangles:
-    """A profile turned about z, then stretched."""
+def _surface_of_revolution(profile: tuple[Array, Array], scale: Array) -> Triangles:
+    """A surface of revolution about z, then scaled along the axes.
+
+    Args:
+        profile: (N, 2) radius and height from bottom to top, and (N, 2) normals.
+        scale: (3,).
+    """
     points, slopes = profile
     around = np.linspace(0, 2 * np.pi, _AROUND + 1)
     cosine, sine = np.cos(around), np.sin(around)
@@ -127,16 +138,16 @@ def _cylinder(radius_m: float, half_length_m: float) -> Triangles:
     level, outwards = np.array([0.0, 1.0]), np.array([1.0, 0.0])
     rims = np.array([[radius_m, -half_length_m], [radius_m, half_length_m]])
     one = np.ones(3)
-    side = _turned((rims, np.stack([outwards, outwards])), one)
+    side = _surface_of_revolution((rims, np.stack([outwards, outwards])), one)
     caps = [
-        _turned((np.array([[0.0, -half_length_m], rims[0]]), np.stack([-level, -level])), one),
-        _turned((np.array([rims[1], [0.0, half_length_m]]), np.stack([level, level])), one),
+        _surface_of_revolution((np.array([[0.0, -half_length_m], rims[0]]), np.stack([-level, -level])), one),
+        _surface_of_revolution((np.array([rims[1], [0.0, half_length_m]]), np.stack([level, level])), one),
     ]
-    return _joined([side, *caps])
+    return _concatenated([side, *caps])
 
 
 def _grid(positions_m: Array, normals: Array) -> Triangles:
-    """(rows, columns, 3) points, columns to the right and rows upwards seen from outside."""
+    """Triangles of a grid of (rows, columns, 3) points; seen from outside, columns go right and rows go up."""
     rows, columns = positions_m.shape[:2]
     u, v = np.meshgrid(np.linspace(0, 1, columns), np.linspace(1, 0, rows))
     first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).reshape(-1)
@@ -150,7 +161,7 @@ def _grid(positions_m: Array, normals: Array) -> Triangles:
     )
 
 
-def _joined(parts: list[Triangles]) -> Triangles:
+def _concatenated(parts: list[Triangles]) -> Triangles:
     starts = np.cumsum([0, *(len(part.positions_m) for part in parts)])
     return Triangles(
         positions_m=np.concatenate([part.positions_m for part in parts]),

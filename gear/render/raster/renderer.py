@@ -1,4 +1,4 @@
-"""The renderer: ids and depth first, then shadows, then colour on what is seen."""
+"""The renderer: a pass for ids and depth, shadow maps, and a colour pass over what is visible."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from gear.render.linear_samples import smooth_edges
 from gear.render.occlusion import openness, shade
 from gear.render.pinhole import FAR_M, NEAR_M, Frustum, depth_from_reversed
 from gear.render.raster import gl
-from gear.render.raster.lights import lamps_of
+from gear.render.raster.lights import lights_of
 from gear.render.raster.scene import Scene, Selection
 from gear.render.raster.sun_shadows import SunShadows
 from gear.values.frames import LINEAR_FULL_SCALE, FloatImage, IdImage, UInt16Image
 from gear.values.geometry import Array
 from gear.values.scene import CameraRecord
 
-_SEEN_UNIT = 6
+_VISIBLE_UNIT = 6
 _FULL = 65535
 
 
@@ -33,11 +33,11 @@ class RasterRenderer:
     """One OpenGL context with one model in it. Not for use from several threads."""
 
     def __init__(self, model: mujoco.MjModel, context: Any, *, quality: Quality = "film") -> None:
-        """Puts a model into a context.
+        """Uploads a model into a context.
 
         Args:
-            model: what is rendered.
-            context: MuJoCo's `GLContext`, current; the renderer frees it when it is closed.
+            model: the compiled world; every stage must be of this model.
+            context: MuJoCo's `GLContext`, current; `close` frees it.
             quality: see `gear.contracts.rendering.Quality`.
 
         Raises:
@@ -54,13 +54,13 @@ class RasterRenderer:
             name="raster", backend="egl", driver=driver, device=name, is_software=is_software(name)
         )
         self._scene = Scene(model)
-        # What a pixel shows by the piece that it counts; nothing is -1, which finds the last entry.
+        # The geom of each piece; index -1, nothing, finds the last entry.
         self._geom_of_piece = np.append(self._scene.geom_of_piece, -1).astype(np.int32)
-        self._truth_program = gl.Program("shapes.vert", "ids.frag")
+        self._ids_program = gl.Program("positions.vert", "ids.frag")
         self._sky_program = gl.Program("fullscreen.vert", "sky.frag")
-        self._halve_program = gl.Program("fullscreen.vert", "downsample.frag")
+        self._downsample_program = gl.Program("fullscreen.vert", "downsample.frag")
         self._shadows: SunShadows | None = None
-        self._targets: dict[tuple[str, int, int], gl.Target] = {}
+        self._targets: dict[tuple[str, int, int], gl.RenderTarget] = {}
         GL.glClipControl(GL.GL_UPPER_LEFT, GL.GL_ZERO_TO_ONE)
         GL.glEnable(GL.GL_DEPTH_TEST)
         GL.glEnable(GL.GL_SCISSOR_TEST)
@@ -72,7 +72,7 @@ class RasterRenderer:
 
     @property
     def info(self) -> RendererInfo:
-        """Who renders."""
+        """Name, driver and device of this renderer."""
         return self._info
 
     def render(
@@ -83,7 +83,7 @@ class RasterRenderer:
         colour: bool = True,
         shapes: Sequence[RawView] | None = None,
     ) -> tuple[RawView, ...]:
-        """One raw view a camera; see `gear.contracts.rendering.Renderer`.
+        """One raw view per camera; see `gear.contracts.rendering.Renderer`.
 
         Raises:
             ValueError: the stage belongs to another model, or a face does not fit its texture.
@@ -95,7 +95,7 @@ class RasterRenderer:
             raise ValueError("the stage was compiled as another model than the renderer was opened for")
         checked_faces(stage.model, stage.faces)
         self._gl.make_current()
-        self._scene.dress(stage)
+        self._scene.set_faces(stage)
         known = [None] * len(cameras) if shapes is None else shapes
         return tuple(
             self._view(stage, camera, shape, colour=colour) for camera, shape in zip(cameras, known, strict=True)
@@ -113,84 +113,86 @@ class RasterRenderer:
         frustum = Frustum.of(camera)
         size = (camera.width_px, camera.height_px)
         centres_m, radii_m = spheres = self._scene.spheres(stage)
-        self._scene.pose(stage, frustum.position_world_m)
+        self._scene.set_poses(stage, frustum.position_world_m)
         distance_m = np.linalg.norm(centres_m - frustum.position_world_m, axis=1) - radii_m
         seen = near_to_far(in_frustum(frustum, centres_m, radii_m), distance_m)
         truth = None
         if shape is None:
-            truth = self._truth(size, seen, frustum)
-            geom_id, depth_m = self._read(truth)
+            truth = self._render_ids(size, seen, frustum)
+            geom_id, depth_m = self._read_ids(truth)
         else:
             geom_id, depth_m = shape.geom_id, shape.depth_m
         linear_rgb = None
         if colour:
-            self._light(stage, frustum, spheres)
-            drawn = self._colour(size, seen, frustum, truth)
-            # While the driver draws.
+            self._update_lights(stage, frustum, spheres)
+            drawn = self._render_colour(size, seen, frustum, truth)
+            # Computed while the driver draws.
             open_share = openness(depth_m, camera.focal_px) * np.float32(LINEAR_FULL_SCALE / _FULL)
             linear_rgb = shade(_pixels(drawn), open_share)
             if self._quality == "fast":
                 linear_rgb = smooth_edges(linear_rgb, geom_id, depth_m)
         return RawView(linear_rgb=linear_rgb, depth_m=depth_m, geom_id=geom_id)
 
-    def _truth(self, size: tuple[int, int], seen: Selection, frustum: Frustum) -> gl.Target:
-        """Pieces and depth of this many pixels, in a target that is current then."""
+    def _render_ids(self, size: tuple[int, int], seen: Selection, frustum: Frustum) -> gl.RenderTarget:
+        """Draws ids of pieces and depth at a size in pixels; the returned target is current."""
         target = self._target("truth", size, GL.GL_R32I)
-        target.begin()
+        target.bind()
         _depth_state(GL.GL_GREATER, writes=True)
         GL.glClearBufferiv(GL.GL_COLOR, 0, np.full(4, -1, np.int32))
         GL.glClearBufferfv(GL.GL_DEPTH, 0, np.zeros(1, np.float32))
-        self._truth_program.use(clip_from_place=_clip_matrix(frustum))
-        self._scene.draw(seen)
+        self._ids_program.use(clip_from_relative=_clip_matrix(frustum))
+        self._scene.draw_depth(seen)
         return target
 
-    def _read(self, truth: gl.Target) -> tuple[IdImage, FloatImage]:
+    def _read_ids(self, truth: gl.RenderTarget) -> tuple[IdImage, FloatImage]:
         width, height = truth.width, truth.height
         reversed_depth = np.empty((height, width), np.float32)
         GL.glReadPixels(0, 0, width, height, GL.GL_DEPTH_COMPONENT, GL.GL_FLOAT, reversed_depth)
         return self._geom_of_piece[_pieces(truth)], depth_from_reversed(reversed_depth)
 
-    def _light(self, stage: Stage, frustum: Frustum, spheres: tuple[Array, Array]) -> None:
-        """Draws the maps of the sun's shadows, and tells the shaders of all lights."""
-        lamps = lamps_of(stage.model, stage.data)
+    def _update_lights(self, stage: Stage, frustum: Frustum, spheres: tuple[Array, Array]) -> None:
+        """Draws shadow maps and uploads all lights."""
+        lights = lights_of(stage.model, stage.data)
         maps = None
-        if lamps.casts:
-            # A hundred megabytes, that nights and models without a sun never need.
+        if lights.casts_shadows:
+            # The maps take a hundred megabytes; nights and models without a sun need none.
             self._shadows = self._shadows or SunShadows(self._model, self._scene)
-            maps = self._shadows.draw(stage, frustum, lamps.towards[0, :3], spheres)
-        self._scene.light(lamps, maps, frustum.position_world_m)
+            maps = self._shadows.draw(stage, frustum, lights.towards[0, :3], spheres)
+        self._scene.set_lights(lights, maps, frustum.position_world_m)
 
-    def _colour(self, size: tuple[int, int], seen: Selection, frustum: Frustum, truth: gl.Target | None) -> gl.Target:
-        """Has the colour of these pixels drawn, in a target that is current then.
+    def _render_colour(
+        self, size: tuple[int, int], seen: Selection, frustum: Frustum, truth: gl.RenderTarget | None
+    ) -> gl.RenderTarget:
+        """Draws colour; the returned target is current and may not be finished yet.
 
         Args:
-            size: of the picture.
-            seen: what to draw.
-            frustum: who looks.
-            truth: ids and depth of this picture, if they have just been drawn.
+            size: width and height of the picture in pixels.
+            seen: pieces to draw, near ones first.
+            frustum: the camera's view volume.
+            truth: ids and depth of this picture where they have just been drawn, else None.
         """
         is_film = self._quality == "film"
         samples = (2 * size[0], 2 * size[1]) if is_film else size
         if is_film or truth is None:
-            truth = self._truth(samples, seen, frustum)
-        truth.begin()
+            truth = self._render_ids(samples, seen, frustum)
+        truth.bind()
         is_seen = np.zeros(len(self._geom_of_piece), np.bool_)
         is_seen[_pieces(truth)] = True
         target = self._target("colour", samples, GL.GL_RGBA16, truth.depth)
-        target.begin()
-        # Only what is seen is shaded; of two surfaces at the very same depth the pieces decide.
+        target.bind()
+        # Only visible samples are shaded. Of two surfaces at equal depth, the shader keeps the piece that the ids name.
         _depth_state(GL.GL_EQUAL, writes=False)
-        GL.glBindTextureUnit(_SEEN_UNIT, truth.colour)
+        GL.glBindTextureUnit(_VISIBLE_UNIT, truth.colour)
         GL.glClearBufferfv(GL.GL_COLOR, 0, np.zeros(4, np.float32))
-        self._scene.draw_surfaces(seen[is_seen[seen]], _clip_matrix(frustum), ("MANY_SAMPLES",) if is_film else ())
+        self._scene.draw_shaded(seen[is_seen[seen]], _clip_matrix(frustum), ("MANY_SAMPLES",) if is_film else ())
         self._draw_sky(frustum)
         if is_film:
-            target = self._halved(target)
+            target = self._downsampled(target)
         GL.glFlush()
         return target
 
     def _draw_sky(self, frustum: Frustum) -> None:
-        """Where nothing was drawn: there the depth is still that of infinity."""
+        """Draws the sky where depth is still that of infinity."""
         if not self._scene.sky:
             return
         _depth_state(GL.GL_EQUAL, writes=False)
@@ -198,36 +200,36 @@ class RasterRenderer:
         right = np.cross(frustum.forward_world, frustum.up_world)
         axes = np.stack([right, frustum.up_world, frustum.forward_world], axis=1)
         half_m = (frustum.half_width_m, frustum.half_height_m)
-        corner = np.array([*half_m, frustum.centre_right_m, frustum.centre_up_m]) / NEAR_M
-        self._sky_program.use(camera_axes=axes, corner=corner)
+        tangents = np.array([*half_m, frustum.centre_right_m, frustum.centre_up_m]) / NEAR_M
+        self._sky_program.use(camera_axes=axes, view_tangents=tangents)
         GL.glDrawArrays(GL.GL_TRIANGLES, 0, 3)
 
-    def _halved(self, samples: gl.Target) -> gl.Target:
-        """The means of blocks of four, in a target that is current then."""
+    def _downsampled(self, samples: gl.RenderTarget) -> gl.RenderTarget:
+        """The means of blocks of 2 x 2 samples; the returned target is current."""
         half = self._target("half", (samples.width // 2, samples.height // 2), GL.GL_RGBA16, 0)
-        half.begin()
+        half.bind()
         _depth_state(GL.GL_ALWAYS, writes=False)
         GL.glBindTextureUnit(0, samples.colour)
-        self._halve_program.use()
+        self._downsample_program.use()
         GL.glDrawArrays(GL.GL_TRIANGLES, 0, 3)
         return half
 
-    def _target(self, purpose: str, size: tuple[int, int], kept_as: int, depth: int | None = None) -> gl.Target:
+    def _target(self, purpose: str, size: tuple[int, int], kept_as: int, depth: int | None = None) -> gl.RenderTarget:
         key = (purpose, *size)
         if key not in self._targets:
-            self._targets[key] = gl.Target.of(*size, kept_as, depth)
+            self._targets[key] = gl.RenderTarget.create(*size, kept_as, depth)
         return self._targets[key]
 
 
-def _pieces(truth: gl.Target) -> npt.NDArray[np.int32]:
-    """(H, W) of a target that is current, -1 for nothing."""
+def _pieces(truth: gl.RenderTarget) -> npt.NDArray[np.int32]:
+    """(H, W) int32 ids of pieces in the current target, -1 for nothing."""
     pieces = np.empty((truth.height, truth.width), np.int32)
     GL.glReadPixels(0, 0, truth.width, truth.height, GL.GL_RED_INTEGER, GL.GL_INT, pieces)
     return pieces
 
 
-def _pixels(colour: gl.Target) -> UInt16Image:
-    """(H, W, 3) of a target that is current, 65535 is full scale."""
+def _pixels(colour: gl.RenderTarget) -> UInt16Image:
+    """(H, W, 3) uint16 colour of the current target; 65535 is full scale."""
     pixels = np.empty((colour.height, colour.width, 3), np.uint16)
     GL.glReadPixels(0, 0, colour.width, colour.height, GL.GL_RGB, GL.GL_UNSIGNED_SHORT, pixels)
     return pixels
@@ -239,7 +241,7 @@ def _depth_state(compare: int, *, writes: bool) -> None:
 
 
 def _clip_matrix(frustum: Frustum) -> Array:
-    """(4, 4) from places relative to the camera, in the world's axes, to OpenGL's clip space with reversed depth."""
+    """(4, 4) from positions relative to the camera, in the world's axes, to clip space with reversed depth."""
     right = np.cross(frustum.forward_world, frustum.up_world)
     span_m = FAR_M - NEAR_M
     matrix = np.zeros((4, 4))

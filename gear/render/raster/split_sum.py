@@ -1,4 +1,4 @@
-"""How much of an even light a rough surface mirrors: the second half of Karis' split sum (2013), as a table."""
+"""The environment BRDF as a table: the second factor of the split-sum approximation (Karis 2013)."""
 
 from __future__ import annotations
 
@@ -13,11 +13,15 @@ _SAMPLES = 32
 
 
 @cache
-def mirrored_shares(size: int = TABLE_PX) -> Array:
-    """(size, size, 2) scale and offset of the reflectance at normal incidence.
+def split_sum_table(size: int = TABLE_PX) -> Array:
+    """Share of uniform light that a rough surface reflects: f0 * scale + offset, f0 being its normal reflectance.
 
-    Rows are perceptual roughness, columns the cosine between the normal and who looks, both 0..1 at the middles of
-    cells. A surface of reflectance f0 mirrors f0 * scale + offset.
+    Args:
+        size: rows and columns of the table.
+
+    Returns:
+        (size, size, 2) float64, read-only: scale and offset. Rows are perceptual roughness, columns the cosine between
+        the normal and the direction to the camera, both 0..1 at the centres of cells.
     """
     middles = (np.arange(size) + 0.5) / size
     cosine = middles[None, :, None]

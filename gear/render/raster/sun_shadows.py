@@ -1,7 +1,7 @@
-"""Maps of the sun's shadows.
+"""Shadow maps of the sun.
 
-What stands still throws the same shadows in every picture, so one map of a whole town is drawn once. Near the camera it
-is too coarse: there a map of everything is drawn for each picture, and farther off one of what can move.
+Static geoms cast the same shadows in every picture, so one map of the whole town is drawn once. Near the camera it is
+too coarse: a map of everything there, and a farther one of what can move, are drawn for each picture.
 """
 
 from __future__ import annotations
@@ -15,72 +15,80 @@ from gear.render.culling import Mask, bounding_radii, in_beam, near_to_far
 from gear.render.pinhole import Frustum
 from gear.render.raster import gl
 from gear.render.raster.scene import Scene
-from gear.render.raster.shadow_squares import ENDS_M, Maps, Square, square_about, squares_before
+from gear.render.raster.shadow_cascades import CASCADE_ENDS_M, Cascade, ShadowMaps, town_cascade, view_cascades
 from gear.values.geometry import Array
 
 _NEAR_PX, _TOWN_PX = 2048, 4096
 _SIZE_PX = 4096, 6144
 _PARTS_PX = ((0, 4096, _NEAR_PX), (2048, 4096, _NEAR_PX), (0, 0, _TOWN_PX))
-"""Corners and sides of the maps in one texture: of everything near, of what moves, of the town."""
+"""Left, top and side in pixels of the three maps in one texture: everything near, what moves, the town."""
 
 _UNIT = 4
 _SLOPE_BIAS, _UNIT_BIAS = 1.5, 2.0
 _SEEN_TEXELS = 2
-"""What is smaller than so many texels of a map throws no shadow there."""
+"""Geoms smaller than this many texels of a map cast no shadow in it."""
 
 
 class SunShadows:
-    """Maps of one model's shadows."""
+    """The shadow maps of one model."""
 
     def __init__(self, model: mujoco.MjModel, scene: Scene) -> None:
-        """Makes room; the town's map is drawn when it is wanted first."""
-        self._model, self._scene = model, scene
-        self._program = gl.Program("shapes.vert", "depth_only.frag")
-        self._texture = gl.shadow_map(*_SIZE_PX)
-        self._target = gl.Target.of(*_SIZE_PX, None, depth=self._texture)
-        self._moves = _moves(model)[scene.geom_of_piece]
-        self._size_m = bounding_radii(model)[scene.geom_of_piece]
-        self._town: tuple[Array, Square] | None = None
-
-    def draw(self, stage: Stage, frustum: Frustum, towards_sun: Array, spheres: tuple[Array, Array]) -> Maps:
-        """Draws what is new, for a scene that is posed for this camera, and binds all maps.
+        """Allocates the texture; the town's map is drawn by the first `draw`.
 
         Args:
-            stage: what throws shadows.
-            frustum: who looks.
+            model: the compiled world.
+            scene: the same model on the device.
+        """
+        self._model, self._scene = model, scene
+        self._program = gl.Program("positions.vert", "depth_only.frag")
+        self._texture = gl.shadow_map(*_SIZE_PX)
+        self._target = gl.RenderTarget.create(*_SIZE_PX, None, depth=self._texture)
+        self._can_move = _can_move(model)[scene.geom_of_piece]
+        self._size_m = bounding_radii(model)[scene.geom_of_piece]
+        self._town: tuple[Array, Cascade] | None = None
+
+    def draw(self, stage: Stage, frustum: Frustum, towards_sun: Array, spheres: tuple[Array, Array]) -> ShadowMaps:
+        """Draws the maps that change with the picture, and binds all of them. The scene must be posed for this camera.
+
+        Args:
+            stage: the posed world that casts shadows.
+            frustum: the camera's view volume.
             towards_sun: (3,) unit vector.
-            spheres: of the stage, as `Scene.spheres` has them.
+            spheres: bounding spheres of the pieces, from `Scene.spheres`.
+
+        Returns:
+            The maps in the form that shaders read.
         """
         centres_m, radii_m = spheres
         if self._town is None or not np.array_equal(self._town[0], towards_sun):
             self._town = towards_sun, self._draw_town(towards_sun)
-            self._scene.pose(stage, frustum.position_world_m)
-        squares = (*squares_before(frustum, towards_sun), self._town[1])
-        for part, square, chosen in zip(
-            _PARTS_PX[:2], squares[:2], (np.ones_like(self._moves), self._moves), strict=True
+            self._scene.set_poses(stage, frustum.position_world_m)
+        cascades = (*view_cascades(frustum, towards_sun), self._town[1])
+        for part, cascade, chosen in zip(
+            _PARTS_PX[:2], cascades[:2], (np.ones_like(self._can_move), self._can_move), strict=True
         ):
-            in_light = in_beam(square.centre_m, towards_sun, square.half_side_m, centres_m, radii_m)
-            self._draw(part, square, frustum.position_world_m, chosen & in_light, centres_m)
+            in_light = in_beam(cascade.centre_m, towards_sun, cascade.half_side_m, centres_m, radii_m)
+            self._draw(part, cascade, frustum.position_world_m, chosen & in_light, centres_m)
         GL.glBindTextureUnit(_UNIT, self._texture)
-        return _maps(squares, frustum.position_world_m)
+        return _maps(cascades, frustum.position_world_m)
 
-    def _draw_town(self, towards_sun: Array) -> Square:
-        """The map of what stands still, where the model has it: it must not depend on what is looked at first."""
+    def _draw_town(self, towards_sun: Array) -> Cascade:
+        """Draws the map of static geoms at their initial poses, so that it does not depend on the first stage."""
         data = mujoco.MjData(self._model)
         mujoco.mj_kinematics(self._model, data)
         stage = Stage(model=self._model, data=data)
         centres_m, _ = self._scene.spheres(stage)
-        square = square_about(self._scene.landmarks(stage, ~self._moves), towards_sun)
-        self._scene.pose(stage, square.centre_m)
-        self._draw(_PARTS_PX[2], square, square.centre_m, ~self._moves, centres_m)
-        return square
+        cascade = town_cascade(self._scene.sample_vertices(stage, ~self._can_move), towards_sun)
+        self._scene.set_poses(stage, cascade.centre_m)
+        self._draw(_PARTS_PX[2], cascade, cascade.centre_m, ~self._can_move, centres_m)
+        return cascade
 
     def _draw(
-        self, part: tuple[int, int, int], square: Square, origin_m: Array, chosen: Mask, centres_m: Array
+        self, part: tuple[int, int, int], cascade: Cascade, origin_m: Array, chosen: Mask, centres_m: Array
     ) -> None:
-        """Draws one map, for a scene that is posed for this origin."""
+        """Draws one map; the scene must be posed relative to `origin_m`."""
         left, top, side = part
-        self._target.begin((left, top, side, side))
+        self._target.bind((left, top, side, side))
         GL.glDepthFunc(GL.GL_LESS)
         GL.glDepthMask(True)
         GL.glDisable(GL.GL_CULL_FACE)
@@ -88,34 +96,34 @@ class SunShadows:
         GL.glEnable(GL.GL_POLYGON_OFFSET_FILL)
         GL.glPolygonOffset(_SLOPE_BIAS, _UNIT_BIAS)
         GL.glClearBufferfv(GL.GL_DEPTH, 0, np.ones(1, np.float32))
-        self._program.use(clip_from_place=square.matrix(origin_m))
-        is_large = self._size_m > _SEEN_TEXELS * 2 * square.half_side_m / side
+        self._program.use(clip_from_relative=cascade.matrix(origin_m))
+        is_large = self._size_m > _SEEN_TEXELS * 2 * cascade.half_side_m / side
         try:
-            self._scene.draw(near_to_far(chosen & is_large, -(centres_m @ square.axes[2])))
+            self._scene.draw_depth(near_to_far(chosen & is_large, -(centres_m @ cascade.axes[2])))
         finally:
             GL.glEnable(GL.GL_CULL_FACE)
             GL.glDisable(GL.GL_DEPTH_CLAMP)
             GL.glDisable(GL.GL_POLYGON_OFFSET_FILL)
 
 
-def _maps(squares: tuple[Square, ...], camera_m: Array) -> Maps:
-    """Where the three maps lie in the texture, for places relative to a camera."""
+def _maps(cascades: tuple[Cascade, ...], camera_m: Array) -> ShadowMaps:
+    """The maps for positions relative to a camera at `camera_m`."""
     corners_px, sides_px = np.array(_PARTS_PX)[:, :2], np.array(_PARTS_PX)[:, 2:]
-    # OpenGL's square reaches from -1 to 1, the first row on top.
+    # OpenGL's cascade reaches from -1 to 1, the first row on top.
     half = np.concatenate([sides_px * (0.5, -0.5) / _SIZE_PX, np.ones((3, 1))], axis=1)
     middle = np.concatenate([(corners_px + sides_px / 2) / _SIZE_PX, np.zeros((3, 1))], axis=1)
-    return Maps(
-        axes=squares[0].axes,
-        scale=half * [square.scale for square in squares],
-        offset=half * [square.offset(camera_m) for square in squares] + middle,
-        texel_m=np.array([2 * square.half_side_m for square in squares]) / sides_px[:, 0],
-        end_m=np.array(ENDS_M),
-        # A texel earlier, since looks take in the next one.
+    return ShadowMaps(
+        axes=cascades[0].axes,
+        scale=half * [cascade.scale for cascade in cascades],
+        offset=half * [cascade.offset(camera_m) for cascade in cascades] + middle,
+        texel_m=np.array([2 * cascade.half_side_m for cascade in cascades]) / sides_px[:, 0],
+        end_m=np.array(CASCADE_ENDS_M),
+        # One texel earlier, since filtered reads include the next one.
         town_ends=(_PARTS_PX[2][1] + _TOWN_PX - 1) / _SIZE_PX[1],
     )
 
 
-def _moves(model: mujoco.MjModel) -> Mask:
-    """(ngeom,) whether a geom's body has a joint above it, or is moved by hand."""
+def _can_move(model: mujoco.MjModel) -> Mask:
+    """(ngeom,) bool, whether a geom's body can move: it or a parent has a joint, or is a mocap body."""
     root = model.body_rootid[model.geom_bodyid]
     return np.asarray((model.body_weldid[model.geom_bodyid] != 0) | (model.body_mocapid[root] >= 0))

@@ -1,4 +1,4 @@
-"""Textures of a model and of the faces that surfaces wear, on the device."""
+"""Textures of a model, and of the patches on surfaces' faces, on the graphics device."""
 
 from __future__ import annotations
 
@@ -20,35 +20,39 @@ _FLAT = int(mujoco.mjtTexture.mjTEXTURE_2D)
 _SKY = int(mujoco.mjtTexture.mjTEXTURE_SKYBOX)
 
 
-class Pictures:
-    """Textures by the model's ids, and faces by what they show."""
+class TextureStore:
+    """Device textures: the model's by texture id, faces by content."""
 
-    def __init__(self, model: mujoco.MjModel, worn: list[int]) -> None:
-        """Uploads what is worn.
+    def __init__(self, model: mujoco.MjModel, used: list[int]) -> None:
+        """Uploads the textures that geoms use.
 
         Args:
-            model: whose textures.
-            worn: ids; -1 and those that are no flat pictures are left out.
+            model: the compiled world.
+            used: texture ids; -1 and cube textures are left out.
         """
-        self._worn = {
-            texture: gl.picture(_texels(model, texture), is_srgb=int(model.tex_colorspace[texture]) == _SRGB)
-            for texture in worn
+        self._handles = {
+            texture: gl.upload_texture(_texels(model, texture), is_srgb=int(model.tex_colorspace[texture]) == _SRGB)
+            for texture in used
             if texture >= 0 and int(model.tex_type[texture]) == _FLAT
         }
         self._faces: OrderedDict[bytes, int] = OrderedDict()
 
     def of(self, texture: int) -> int:
-        """The device's name of a texture; 0 for -1, and for one that is no flat picture."""
-        return self._worn.get(texture, 0)
+        """OpenGL's name of a texture id; 0 for -1 and for cube textures."""
+        return self._handles.get(texture, 0)
 
     def faces(self, srgb_of_geom: Mapping[int, UInt8Image]) -> dict[int, int]:
-        """The device's names of faces' pictures, by geom; good until they are asked for again."""
-        worn = {geom: self._face(srgb) for geom, srgb in srgb_of_geom.items()}
-        idle = [key for key, texture in self._faces.items() if texture not in worn.values()]
+        """Uploads faces and returns OpenGL's names of their textures by geom id; valid until the next call.
+
+        Args:
+            srgb_of_geom: (H, W, 3) uint8 by geom id.
+        """
+        shown = {geom: self._face(srgb) for geom, srgb in srgb_of_geom.items()}
+        idle = [key for key, texture in self._faces.items() if texture not in shown.values()]
         surplus = idle[: max(0, len(self._faces) - _FACES_KEPT)]
         if surplus:
             gl.free_textures([self._faces.pop(key) for key in surplus])
-        return worn
+        return shown
 
     def _face(self, srgb: UInt8Image) -> int:
         content = np.ascontiguousarray(srgb)
@@ -56,12 +60,12 @@ class Pictures:
         if key in self._faces:
             self._faces.move_to_end(key)
             return self._faces[key]
-        self._faces[key] = gl.picture(content, is_srgb=True)
+        self._faces[key] = gl.upload_texture(content, is_srgb=True)
         return self._faces[key]
 
 
 def linear_cubes(model: mujoco.MjModel) -> dict[int, Array]:
-    """(6, n, n, 3) linear faces of the model's cube textures of three channels, by id."""
+    """Linear faces, (6, n, n, 3) float64 in 0..1, of the model's cube textures with three channels, by texture id."""
     cubes = {}
     for texture in range(model.ntex):
         width = int(model.tex_width[texture])
@@ -74,7 +78,7 @@ def linear_cubes(model: mujoco.MjModel) -> dict[int, Array]:
 
 
 def sky_of(model: mujoco.MjModel) -> int | None:
-    """The texture that stands for the sky."""
+    """The id of the model's sky texture; None for a model without one."""
     skies = np.flatnonzero(model.tex_type == _SKY)
     return int(skies[0]) if len(skies) else None
 

@@ -18,7 +18,7 @@ def render_mirror_view(
         world: that the scene was placed in.
         renderer: of that world.
         placed: the sample, placed last.
-        record: who looks.
+        record: the scene, with its cameras.
         pipeline: the camera pipeline of this weather; it says which cameras need a mirror view.
     """
     cameras = [pipeline.mirror_camera(camera, record) for camera in record.cameras]

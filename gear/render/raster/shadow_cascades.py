@@ -1,0 +1,124 @@
+"""Cascaded shadow maps of the sun: which part of the world each map covers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from gear.render.pinhole import NEAR_M, Frustum
+from gear.values.geometry import Array
+
+CASCADE_ENDS_M = (40.0, 160.0)
+"""Metres ahead of the camera at which the map of everything and the map of what moves end."""
+
+TOWARDS_SUN_RANGE_M = 600.0
+"""Metres towards the sun in which a map resolves depth. Casters farther away are clamped and still cast shadows."""
+
+_MARGIN = 1.005
+"""Factor by which maps are larger than what they must cover, so that filtered reads at their edge stay inside."""
+
+_WIDEST_M = 500.0
+_OUTLIERS = 0.02
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cascade:
+    """The square across the sun's rays that one shadow map covers.
+
+    Attributes:
+        centre_m: (3,) its middle in the world.
+        axes: (3, 3) rows: two unit vectors across the sun's rays, and one towards the sun.
+        half_side_m: half the length of its sides.
+    """
+
+    centre_m: Array
+    axes: Array
+    half_side_m: float
+
+    @property
+    def scale(self) -> Array:
+        """(3,) factors from metres along `axes` to -1..1 across the map and 0..1 away from the sun."""
+        return np.array([1 / self.half_side_m, 1 / self.half_side_m, -1 / (TOWARDS_SUN_RANGE_M + 2 * self.half_side_m)])
+
+    def offset(self, origin_m: Array) -> Array:
+        """(3,) offset that is added to scaled positions relative to an origin.
+
+        Args:
+            origin_m: (3,) in the frame of the centre.
+        """
+        towards_sun = -self.scale[2] * (TOWARDS_SUN_RANGE_M + self.half_side_m)
+        return np.asarray((0.0, 0.0, towards_sun) - self.scale * (self.axes @ (self.centre_m - origin_m)))
+
+    def matrix(self, origin_m: Array) -> Array:
+        """(4, 4) from positions relative to an origin to coordinates of the map.
+
+        Args:
+            origin_m: (3,) in the frame of the centre.
+        """
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = self.scale[:, None] * self.axes, self.offset(origin_m)
+        return matrix
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ShadowMaps:
+    """The three shadow maps in the form that shaders read: of everything near, of what moves, of the whole town.
+
+    Attributes:
+        axes: (3, 3) rows: the axes that all cascades share.
+        scale: (3, 3) per map: factors from metres along the axes to texture coordinates 0..1 and depth 0..1.
+        offset: (3, 3) per map: added for positions relative to the camera.
+        texel_m: (3,) side of a texel in metres.
+        end_m: (2,) metres ahead at which the first two maps end.
+        town_ends: texture row, 0..1, at which the town's map ends; the other two lie below it.
+    """
+
+    axes: Array
+    scale: Array
+    offset: Array
+    texel_m: Array
+    end_m: Array
+    town_ends: float
+
+
+def view_cascades(frustum: Frustum, towards_sun: Array) -> tuple[Cascade, ...]:
+    """Cascades that hold all that the frustum shows up to each of `CASCADE_ENDS_M`.
+
+    Args:
+        frustum: the camera's view volume.
+        towards_sun: (3,) unit vector in the world's axes.
+    """
+    axes = _axes(towards_sun)
+    made = []
+    begin_m = NEAR_M
+    width_m = frustum.half_width_m + abs(frustum.centre_right_m)
+    height_m = frustum.half_height_m + abs(frustum.centre_up_m)
+    slope2 = (width_m**2 + height_m**2) / NEAR_M**2
+    for end_m in CASCADE_ENDS_M:
+        # The smallest sphere about the part of the view between its two distances.
+        middle_m = min((begin_m + end_m) / 2 * (1 + slope2), end_m)
+        half_side_m = _MARGIN * math.sqrt((end_m - middle_m) ** 2 + slope2 * end_m**2)
+        made.append(Cascade(frustum.position_world_m + frustum.forward_world * middle_m, axes, half_side_m))
+        begin_m = end_m
+    return tuple(made)
+
+
+def town_cascade(points_m: Array, towards_sun: Array) -> Cascade:
+    """The cascade of a whole town, without outliers far outside of it.
+
+    Args:
+        points_m: (N, 3) some of the town's vertices in the world.
+        towards_sun: (3,) unit vector in the world's axes.
+    """
+    axes = _axes(towards_sun)
+    low, high = np.quantile(points_m @ axes.T, (_OUTLIERS, 1 - _OUTLIERS), axis=0)
+    half_side_m = float(np.clip(((high - low)[:2] / 2).max(), 1.0, _WIDEST_M))
+    return Cascade((low + high) / 2 @ axes, axes, half_side_m)
+
+
+def _axes(towards_sun: Array) -> Array:
+    aside = np.cross((0.0, 0.0, 1.0) if abs(towards_sun[2]) < 0.99 else (0.0, 1.0, 0.0), towards_sun)
+    aside /= np.linalg.norm(aside)
+    return np.stack([aside, np.cross(towards_sun, aside), towards_sun])
