@@ -21,8 +21,8 @@ from functools import partial
 
 import torch
 
+from gear.compositor.base import CACHE_BYTES, Prepared
 from gear.compositor.cache import Cache
-from gear.compositor.pasting import CACHE_BYTES, Prepared
 from gear.config.overrides import with_overrides
 from gear.contracts.models import Model
 from gear.plugins.attacks.optimisation.frozen_model import frozen

@@ -23,7 +23,7 @@ from gear.collecting.lookup import scene_library
 from gear.collecting.pipeline import collect_samples
 from gear.collecting.run import manifest_facts
 from gear.collecting.session import Session
-from gear.compositor.opening import COMPOSITORS, open_compositor
+from gear.compositor.registry import COMPOSITORS, open_compositor
 from gear.config.load import load_collection
 from gear.dataset.reading import Dataset
 from gear.dataset.store import Store

@@ -26,7 +26,7 @@ PUBLIC = (
     "gear.values",
     "gear.readers",
     "gear.testing",
-    "gear.compositor.opening",
+    "gear.compositor.registry",
     "gear.augment.geometry",
     "gear.augment.registry",
     "gear.plugins.defenses.per_picture",

@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from gear.camera.beams import Lamps
-from gear.camera.light_sources import places
+from gear.camera.lamps import Lamps
+from gear.camera.light_sources import world_positions
 from gear.values.frames import FloatImage, IdImage
 from gear.values.geometry import Array
 from gear.values.scene import CameraRecord
@@ -33,7 +33,7 @@ _MOST = 4.0
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Windows:
+class LitWindows:
     """Panes with light behind them.
 
     Attributes:
@@ -76,7 +76,7 @@ class Windows:
             cv2.fillConvexPoly(found, points[index], int(near[index]), cv2.LINE_8, _FRACTION_BITS)
         rows, columns = np.nonzero(found >= 0)
         pane = found[rows, columns]
-        from_pane_m = places(rows, columns, depth_m, camera) - self.corners_m[pane, 0]
+        from_pane_m = world_positions(rows, columns, depth_m, camera) - self.corners_m[pane, 0]
         is_other = self.geom_id[pane] != geom_id[rows, columns]
         is_other |= np.abs(np.einsum("nd,nd->n", from_pane_m, self.normal[pane])) > _OFF_PLANE_M
         found[rows[is_other], columns[is_other]] = -1
@@ -84,7 +84,7 @@ class Windows:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Shine:
+class LampGlare:
     """Lamps of one kind that shine at a camera.
 
     Attributes:
@@ -100,7 +100,7 @@ class Shine:
     strength: Array
 
     @staticmethod
-    def of(lamps: Lamps, camera: CameraRecord, glare: float, depth_m: FloatImage) -> Shine:
+    def of(lamps: Lamps, camera: CameraRecord, glare: float, depth_m: FloatImage) -> LampGlare:
         """Those before the camera that nothing in the picture hides.
 
         Args:
@@ -121,7 +121,7 @@ class Shine:
         before_m[is_shown] = depth_m[rows[is_shown], columns[is_shown]]
         hidden = before_m < inside[chosen, 2] - _HIDDEN_M
         seen = chosen[~hidden]
-        return Shine(
+        return LampGlare(
             position_m=lamps.position_m[seen],
             places_px=places_px[~hidden],
             size_px=camera.focal_px * _LAMP_RADIUS_M / inside[seen, 2],

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from gear.camera.beams import Lamps
-from gear.camera.shadow_map import Floats, LampFrame, Layout, ShadowMap, first_met, lengths, stop_behind
+from gear.camera.lamps import Lamps
+from gear.camera.shadow_map import Floats, LampFrame, Layout, ShadowMap, first_hits, lengths, stop_behind
 from gear.camera.surface_points import longest_edges, points_on
 from gear.values.frames import FloatImage, Shape
 from gear.values.scene import ActorRecord, SceneRecord
@@ -143,7 +143,7 @@ class LampShadows:
     def standing(self, kind: str, index: int, outlook: LampFrame, reach_m: float) -> Floats:
         """(cells, cells) how far the light of a lamp that stands comes among what stands."""
         if (kind, index) not in self._fixed:
-            self._fixed[kind, index] = first_met(self.casters.near(outlook.place_m, reach_m), outlook)
+            self._fixed[kind, index] = first_hits(self.casters.near(outlook.place_m, reach_m), outlook)
         return self._fixed[kind, index]
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 import numpy.typing as npt
 
-from gear.camera.beams import Headlamps, drivers
+from gear.camera.lamps import Headlamps, drivers
 from gear.values.frames import FloatImage, GeomTable, IdImage
 from gear.values.geometry import Array
 from gear.values.scene import CameraRecord, SceneRecord
@@ -27,7 +27,7 @@ ENDS = 0.6
 on the roof, is of blue lights that are off."""
 
 
-def lens_light(
+def vehicle_lamp_light(
     lenses: npt.NDArray[np.bool_],
     geom_id: IdImage,
     depth_m: FloatImage,
@@ -48,7 +48,7 @@ def lens_light(
     rows, columns = np.nonzero(lenses[geom_id])
     if not len(rows):
         return
-    at_m = places(rows, columns, depth_m, camera)
+    at_m = world_positions(rows, columns, depth_m, camera)
     owner = geoms.object_id[geom_id[rows, columns]]
     for actor in drivers(record, vehicles):
         pose = actor.world_from_actor.transform("world", "actor")
@@ -59,7 +59,7 @@ def lens_light(
             yield (rows[mine], columns[mine]), gain, light
 
 
-def inside_light(
+def bus_interior_light(
     panes: npt.NDArray[np.bool_],
     geom_id: IdImage,
     record: SceneRecord,
@@ -89,12 +89,12 @@ def board_light(
         rows, columns = np.nonzero(index == number)
         if surface.actor_id is None and len(rows):
             world_from_surface = record.world_from_surface(surface)
-            away_m = places(rows, columns, depth_m, camera) - world_from_surface.translation_m
+            away_m = world_positions(rows, columns, depth_m, camera) - world_from_surface.translation_m
             down = np.clip(away_m @ world_from_surface.rotation[:, 1] / surface.height_m + 0.5, 0, 1)
             yield (rows, columns), (BOARD_LIGHT * (1 - BOARD_FALL * down)).astype(np.float32)
 
 
-def places(
+def world_positions(
     rows: npt.NDArray[np.intp], columns: npt.NDArray[np.intp], depth_m: FloatImage, camera: CameraRecord
 ) -> Array:
     """(N, 3) where pixels lie in the world."""

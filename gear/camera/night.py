@@ -18,13 +18,13 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
-from gear.camera.beams import Headlamps, Lamps, headlamps
-from gear.camera.glow import Shine, Windows
+from gear.camera.glow import LampGlare, LitWindows
 from gear.camera.lamp_shadows import SHADOWED_WITHIN_M, LampShadow, LampShadows
-from gear.camera.light_sources import INSIDE_LIGHT, board_light, inside_light, lens_light
+from gear.camera.lamps import Headlamps, Lamps, headlamps
+from gear.camera.lamps_in_view import LampsInView
+from gear.camera.light_sources import INSIDE_LIGHT, board_light, bus_interior_light, vehicle_lamp_light
 from gear.camera.normals import STRIP_ROWS, Strip, strips_of
 from gear.camera.response import DISPLAY_POWER
-from gear.camera.spots import Spots
 from gear.contracts.rendering import RawView
 from gear.values.frames import LINEAR_FULL_SCALE, FloatImage, GeomTable, IdImage, UInt16Image
 from gear.values.geometry import Array
@@ -101,7 +101,7 @@ class Night:
     lit: float
     even: Array
     lamps: Mapping[str, Lamps]
-    windows: Windows
+    windows: LitWindows
     vehicles: Mapping[str, Headlamps]
     wetness: float
     is_signal: npt.NDArray[np.bool_]
@@ -124,7 +124,7 @@ class Night:
         streaks = np.zeros_like(glow) if self.wetness > 0 else None
         is_open = np.append(np.isin(geoms.label_code, OPEN_GROUND_CODES), False)[truth.geom_id]
         for kind, lamps in kinds.items():
-            shine = Shine.of(lamps, camera, GLARE[kind], truth.depth_m)
+            shine = LampGlare.of(lamps, camera, GLARE[kind], truth.depth_m)
             _add_colour(glow, shine.spots(is_open.shape), lamps.colour)
             if streaks is not None:
                 image = shine.streaks(camera, record.ego.world_from_actor.position_m[2])
@@ -144,12 +144,12 @@ class Night:
 
     def _spots(
         self, kinds: Mapping[str, Lamps], camera: CameraRecord, record: SceneRecord
-    ) -> list[tuple[Spots, dict[int, LampShadow]]]:
+    ) -> list[tuple[LampsInView, dict[int, LampShadow]]]:
         """The lamps in a view by kind, and what is in the way of those that are near, by number."""
         found = []
         scene = self.shadows.scene(record) if self.shadows is not None else None
         for kind, lamps in kinds.items():
-            spots = Spots.of(lamps, camera)
+            spots = LampsInView.of(lamps, camera)
             shadows = {}
             if scene is not None:
                 for index in spots.near(SHADOWED_WITHIN_M):
@@ -162,7 +162,9 @@ class Night:
     def _shown(self, light: FloatImage) -> FloatImage:
         return light ** np.float32(DISPLAY_POWER) if self.is_display else light
 
-    def _add_lamps(self, strip: Strip, spots: Sequence[tuple[Spots, dict[int, LampShadow]]], share: FloatImage) -> None:
+    def _add_lamps(
+        self, strip: Strip, spots: Sequence[tuple[LampsInView, dict[int, LampShadow]]], share: FloatImage
+    ) -> None:
         """Adds k + E / A to some rows of shares."""
         share += np.where(strip.is_seen, np.float32(self.level), np.float32(self.sky_level))[..., None]
         lit = [(spot.lamps.colour, spot.light(strip, shadows)) for spot, shadows in spots]
@@ -185,9 +187,9 @@ class Night:
         share[where], glow[where] = self.windows.gain[panes[where]], self.windows.light[panes[where]]
         share[np.append(self.is_signal, False)[geom_id]] = SIGNAL_GAIN
         lenses = np.append(self.is_lens, False)
-        for where, gain, light in lens_light(lenses, geom_id, depth_m, camera, record, geoms, self.vehicles):
+        for where, gain, light in vehicle_lamp_light(lenses, geom_id, depth_m, camera, record, geoms, self.vehicles):
             share[where], glow[where] = gain, light
-        inside = inside_light(np.append(self.is_pane, False), geom_id, record, geoms, self.vehicles)
+        inside = bus_interior_light(np.append(self.is_pane, False), geom_id, record, geoms, self.vehicles)
         share[inside] = np.array(INSIDE_LIGHT) / self.even[1]
         for where, lit in board_light(geom_id, depth_m, camera, record, geoms):
             share[where] = lit[:, None] / self.even[1].astype(np.float32)

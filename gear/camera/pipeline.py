@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gear.camera.air import Air
+from gear.camera.contact_shadows import ContactShadows
 from gear.camera.effects import CameraEffects, Exposure
-from gear.camera.ground_shade import GroundShade
 from gear.camera.night import Night, NightLight
 from gear.camera.rain import Rain
 from gear.camera.reflection import MirrorView, Reflection, beyond_mirror, mirror_camera
@@ -29,7 +29,7 @@ class CameraPipeline:
 
     Attributes:
         response: exposure and tone curve.
-        shade: what road users keep from the ground; None for nothing.
+        contact_shadows: what road users keep from the ground; None for nothing.
         night: the town's lamps; None by day.
         air: fog and haze.
         water: on the ground.
@@ -38,7 +38,7 @@ class CameraPipeline:
     """
 
     response: Response
-    shade: GroundShade | None = None
+    contact_shadows: ContactShadows | None = None
     night: Night | None = None
     air: Air
     water: Water
@@ -124,9 +124,9 @@ class CameraPipeline:
         lamps = given or self.night_light(raw, camera, record, geoms)
         if lamps is not None:
             linear_rgb = lamps.apply(linear_rgb)
-        if self.shade is not None:
+        if self.contact_shadows is not None:
             is_ground = np.append(np.isin(geoms.label_code, GROUND_CODES), False)
-            linear_rgb = self.shade.apply(linear_rgb, raw.depth_m, is_ground[raw.geom_id], camera, record)
+            linear_rgb = self.contact_shadows.apply(linear_rgb, raw.depth_m, is_ground[raw.geom_id], camera, record)
         if self.water.share > 0 or reflection is not None:
             # The last entry is what id -1, nothing, finds.
             holds_water = np.append(np.isin(geoms.label_code, OPEN_GROUND_CODES), False)

@@ -164,7 +164,7 @@ def _weights(share: Floats) -> tuple[Floats, Floats, Floats]:
     return half - half * share, half, half * share
 
 
-def first_met(corners_m: Floats, outlook: LampFrame) -> Floats:
+def first_hits(corners_m: Floats, outlook: LampFrame) -> Floats:
     """(cells, cells) float32, how far a lamp's light comes among (N, 3, 3) triangles that are seen from outside.
 
     Triangles of which the lamp sees the back belong to bodies whose front is nearer.

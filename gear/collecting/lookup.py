@@ -11,13 +11,13 @@ from gear.collecting.patch_sources import PatchSet, resolve_patch
 from gear.config.collection import CollectionConfig, SplitConfig, WeatherConfig
 from gear.config.load import load_simulation, split_of
 from gear.config.nodes import Place
-from gear.config.reader import read_node, told_at
+from gear.config.reader import located_errors, read_node
 from gear.plugins.build import find
 from gear.plugins.catalogue import PluginEntry
 from gear.values.errors import ConfigError, FieldError, UnknownNameError
 from gear.values.resources import data_dir
 from gear.values.scene import Weather
-from gear.values.serial import holds_places
+from gear.values.serial import is_places_field
 from gear.world.assets.library import AssetLibrary
 from gear.world.scene_library import SceneFile, read_scene_file
 from gear.world.scene_spec import SceneSpec
@@ -61,34 +61,34 @@ def look_up(config: CollectionConfig) -> Named:
         ConfigError: the same, for a name in a file; or a scene library or the options of the task cannot be read.
         PatchError: the patch cannot be used.
     """
-    with told_at(config.places, "scene"):
+    with located_errors(config.places, "scene"):
         config = with_scene_file(config)
-    with told_at(config.places, "task"):
+    with located_errors(config.places, "task"):
         task = find("task", config.task)
     options = read_node(task.spec.config, config.options, "options")
-    with told_at(config.places, "town"):
+    with located_errors(config.places, "town"):
         library = AssetLibrary.for_town(config.town)
-    with told_at(config.places, "simulation"):
+    with located_errors(config.places, "simulation"):
         simulation = load_simulation(config.simulation)
-    with told_at(config.places, "scenes" if config.scenes else "town"):
+    with located_errors(config.places, "scenes" if config.scenes else "town"):
         scenes = find_scenes(library, config.scenes)
-    with told_at(config.places, "scene"):
+    with located_errors(config.places, "scene"):
         scene = scenes.scene(config.scene)
         check_scene_assets(library, scene, f"scenes.{config.scene}")
     roomy = 1 if scene.boards else ROOMY_FACTOR
     scene = scene.capped(simulation.max_vehicles * roomy, simulation.max_pedestrians)
     scene = _mixed(scene.crowded(config.crowd), config)
-    with told_at(config.places, "split"):
+    with located_errors(config.places, "split"):
         split = split_of(simulation, config.split)
     split = dataclasses.replace(
         split,
         seed=split.seed if config.seed is None else config.seed,
         samples=split.samples if config.samples is None else config.samples,
     )
-    with told_at(config.weather.places, "preset", "weather"):
+    with located_errors(config.weather.places, "preset", "weather"):
         weather = find_weather(config.weather)
     surfaces = len(scene.boards) if scene.truck is None else 1
-    with told_at(config.places, "patch"):
+    with located_errors(config.places, "patch"):
         patch = resolve_patch(config.patch, surfaces=surfaces, seed=config.patch_seed)
     return Named(
         config=config,
@@ -177,7 +177,7 @@ def find_weather(config: WeatherConfig) -> Weather:
     changes: dict[str, Any] = {
         field.name: getattr(config, field.name)
         for field in dataclasses.fields(cast(Any, config))  # mypy sees no dataclass behind its decorator
-        if field.name != "preset" and not holds_places(field) and getattr(config, field.name) is not None
+        if field.name != "preset" and not is_places_field(field) and getattr(config, field.name) is not None
     }
     preset = PRESETS[config.preset]
     if all(getattr(preset, name) == value for name, value in changes.items()):

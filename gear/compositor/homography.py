@@ -20,16 +20,16 @@ import torch
 from torch import Tensor
 
 from gear.camera.effects import Exposure, recorded_effects
-from gear.compositor.pasting import Pasting, Prepared, Sizes, picture_of, products
+from gear.compositor.base import BaseCompositor, Prepared, Sizes, picture_of, products
 from gear.compositor.pyramid import pyramid_of
-from gear.compositor.sampling import Samples, Scan, take_samples, unit_from_image
+from gear.compositor.sampling import Samples, SampleScheme, take_samples, unit_from_image
 from gear.compositor.sparse import SparseMatrix
 from gear.compositor.warp import warp_matrix
 from gear.values.geometry import Array
 
 Ints = npt.NDArray[np.intp]
 
-_SCAN = Scan(supersampled=True, extrapolates=False, smooths=False)
+_FOUR_SAMPLES = SampleScheme(supersampled=True, extrapolates=False, smooths=False)
 _NOWHERE = np.zeros((1, 1), np.bool_)
 
 PIXELS_AT_ONCE = 1 << 17
@@ -51,8 +51,8 @@ class _Outline:
     covers: tuple[Tensor, ...]
 
 
-class HomographyCompositor(Pasting):
-    """Implements `gear.contracts.attacks.Compositor` for any dataset. See `Pasting` for its arguments."""
+class HomographyCompositor(BaseCompositor):
+    """The paper's compositor, for any dataset. `BaseCompositor` documents its arguments."""
 
     def _columns(self, patches: Sequence[Tensor]) -> list[Tensor]:
         return [pyramid_of(int(p.shape[-2]), int(p.shape[-1])).spread(p) for p in patches]
@@ -75,11 +75,11 @@ class HomographyCompositor(Pasting):
         units = [unit_from_image(t, s, camera) for t, s in zip(truths, record.surfaces, strict=True)]
 
         # Four samples per pixel; with a lens, four of each of the pinhole's pixels that it mixes.
-        scan = replace(_SCAN, effects=recorded_effects(camera))
+        scheme = replace(_FOUR_SAMPLES, effects=recorded_effects(camera))
         exposure = Exposure(camera=camera, scene=record)
 
         def samples_at(unit: Array, where: Ints) -> Samples:
-            return take_samples(scan, unit, (where % width, where // width), _NOWHERE, exposure)
+            return take_samples(scheme, unit, (where % width, where // width), _NOWHERE, exposure)
 
         covered = np.zeros(height * width, np.bool_)
         parts = np.array_split(np.arange(covered.size), math.ceil(covered.size / PIXELS_AT_ONCE))

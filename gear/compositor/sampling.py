@@ -43,7 +43,7 @@ class Samples:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Scan:
+class SampleScheme:
     """How a renderer and a camera take samples.
 
     Attributes:
@@ -60,10 +60,10 @@ class Scan:
     effects: tuple[Effect, ...] = ()
 
     @staticmethod
-    def of(renderer_name: str, quality: Quality, effects: tuple[Effect, ...]) -> Scan:
+    def of(renderer_name: str, quality: Quality, effects: tuple[Effect, ...]) -> SampleScheme:
         """For a renderer in a quality."""
         is_film = quality == "film"
-        return Scan(
+        return SampleScheme(
             supersampled=is_film and renderer_name != "classic",
             extrapolates=is_film and renderer_name == "classic",
             smooths=not is_film,
@@ -84,11 +84,13 @@ def unit_from_image(truth: SurfaceTruth, surface: SurfaceRecord, camera: CameraR
     return np.asarray(np.linalg.inv(homography))
 
 
-def take_samples(scan: Scan, unit: Array, pixels: tuple[Array, Array], mask: Mask, exposure: Exposure) -> Samples:
+def take_samples(
+    scheme: SampleScheme, unit: Array, pixels: tuple[Array, Array], mask: Mask, exposure: Exposure
+) -> Samples:
     """The samples of some pixels.
 
     Args:
-        scan: how samples are taken.
+        scheme: how samples are taken.
         unit: of `unit_from_image`.
         pixels: (N,) columns and (N,) rows, index pixels.
         mask: (H, W) where the face is seen, by ids at pixel centres.
@@ -96,7 +98,7 @@ def take_samples(scan: Scan, unit: Array, pixels: tuple[Array, Array], mask: Mas
     """
     x, y = (np.asarray(axis, dtype=np.float64)[:, None] for axis in pixels)
     weight = np.ones_like(x)
-    if scan.smooths and not any(effect.MOVES_PIXELS for effect in scan.effects):
+    if scheme.smooths and not any(effect.MOVES_PIXELS for effect in scheme.effects):
         x, y, weight = _smoothed(x, y, mask)
 
     def inverse_depth(x: Array, y: Array) -> Array:
@@ -104,22 +106,22 @@ def take_samples(scan: Scan, unit: Array, pixels: tuple[Array, Array], mask: Mas
         return np.asarray(unit[2, 0] * x + unit[2, 1] * y + unit[2, 2])
 
     traced = PixelSamples(x=x, y=y, weight=weight, inverse_depth=inverse_depth)
-    for effect in reversed(scan.effects):
+    for effect in reversed(scheme.effects):
         traced = effect.trace(traced, exposure)
     x, y, weight = traced.x, traced.y, traced.weight
     step_px = 1.0
-    if scan.supersampled:
+    if scheme.supersampled:
         step_px = 0.5
         x, y = (np.concatenate([axis + corner[i] for corner in _QUARTERS], axis=1) for i, axis in enumerate((x, y)))
         weight = np.tile(weight / len(_QUARTERS), (1, len(_QUARTERS)))
     u, v, in_front = _on_face(unit, x, y)
     hits = in_front & (u >= 0) & (u <= 1) & (v >= 0) & (v <= 1)
-    counted = weight if scan.extrapolates else weight * hits
+    counted = weight if scheme.extrapolates else weight * hits
     coverage = np.asarray((weight * hits).sum(axis=1))
     total = counted.sum(axis=1, keepdims=True)
     # A pixel that the face only grazes, between all samples, shows the border nearest to it.
     counted = np.where(total > 1e-9, counted / np.maximum(total, 1e-9), weight / weight.sum(axis=1, keepdims=True))
-    if not scan.extrapolates:
+    if not scheme.extrapolates:
         u, v = np.clip(u, 0, 1), np.clip(v, 0, 1)
     level = _level(unit, x, y, step_px)
     return Samples(u=u, v=v, level=level, weight=counted, coverage=coverage)

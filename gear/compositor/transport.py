@@ -20,9 +20,9 @@ from torch import Tensor
 from gear.camera import torch_response
 from gear.camera.effects import CameraEffects, Exposure
 from gear.camera.response import IDENTITY, Response
-from gear.compositor.pasting import Pasting, Prepared, Sizes, picture_of, products
+from gear.compositor.base import BaseCompositor, Prepared, Sizes, picture_of, products
 from gear.compositor.pyramid import Pyramid, halving_of, pyramid_of
-from gear.compositor.sampling import Scan, take_samples, unit_from_image
+from gear.compositor.sampling import SampleScheme, take_samples, unit_from_image
 from gear.compositor.sparse import SparseMatrix
 from gear.compositor.warp import warp_matrix
 from gear.contracts.rendering import Quality
@@ -60,8 +60,8 @@ class _Light:
         return self.black.nbytes + sum(m.nbytes + g.nbytes for m, g in zip(self.matrices, self.gains, strict=True))
 
 
-class TransportCompositor(Pasting):
-    """Implements `gear.contracts.attacks.Compositor` for a dataset with probes. See `Pasting` for its arguments."""
+class TransportCompositor(BaseCompositor):
+    """The exact compositor, for datasets with probes. `BaseCompositor` documents its arguments."""
 
     def _columns(self, patches: Sequence[Tensor]) -> list[Tensor]:
         renderer = self._renderer
@@ -134,7 +134,7 @@ class TransportCompositor(Pasting):
             return SparseMatrix.of(sparse.csr_matrix((len(gain), pyramid.size), dtype=np.float32), self.device)
         truth = self._truth(sample, surface.name, view)
         samples = take_samples(
-            Scan.of(self._renderer, self._quality, self._effects.active()),
+            SampleScheme.of(self._renderer, self._quality, self._effects.active()),
             unit_from_image(truth, surface, camera),
             (pixels[0][lit], pixels[1][lit]),
             rle.decode(truth.mask_rle, camera.height_px, camera.width_px),

@@ -9,7 +9,7 @@ from typing import Any
 import yaml
 
 from gear.config.nodes import Items, Mapping, Node, Scalar
-from gear.values.serial import Json, holds_places
+from gear.values.serial import Json, is_places_field
 
 MAX_NODES = 100_000
 """No options hold more: aliases of aliases, which cost nothing to read, would be written out one by one."""
@@ -56,7 +56,7 @@ def to_plain(value: Any) -> Json:
     if isinstance(value, Path):
         return str(value)
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        said = [field.name for field in dataclasses.fields(value) if not holds_places(field)]
+        said = [field.name for field in dataclasses.fields(value) if not is_places_field(field)]
         return {name: to_plain(getattr(value, name)) for name in said}
     if isinstance(value, (tuple, list)):
         return [to_plain(item) for item in value]

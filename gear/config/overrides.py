@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from gear.config.nodes import Mapping, Node, Place, Scalar, parse_value
-from gear.config.reader import spelled_out
+from gear.config.reader import expand_shorthand
 from gear.values.errors import ConfigError
 
 
@@ -29,7 +29,7 @@ def with_overrides(node: Node, settings: Iterable[str], kind: Any = None, *, fla
         if not separator or not key.strip():
             raise ConfigError(name, 0, 0, "", f"expected KEY=VALUE, {hint}")
         text = f"'{text.strip()}'" if text.strip() == "-" else text  # to YAML a minus alone begins a list
-        below = node if kind is None else spelled_out(kind, node)  # each time: a setting may be a bare word itself
+        below = node if kind is None else expand_shorthand(kind, node)  # each time: a setting may be a bare word itself
         node = with_value(below, tuple(key.strip().split(".")), parse_value(text, name))
     return node
 

@@ -13,7 +13,7 @@ from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin
 
 from gear.config.nodes import Items, Mapping, Node, Place, Scalar
 from gear.values.errors import DuplicateNameError, FieldError, PatchError, UnknownNameError
-from gear.values.serial import holds_places, type_hints
+from gear.values.serial import is_places_field, type_hints
 
 T = TypeVar("T")
 
@@ -38,7 +38,7 @@ def read_node(kind: type[T], node: Node, key: str = "") -> T:
 
 
 @contextlib.contextmanager
-def told_at(places: dict[str, Place], key: str, above: str = "") -> Iterator[None]:
+def located_errors(places: dict[str, Place], key: str, above: str = "") -> Iterator[None]:
     """For looking up what a config names: where a file names what is not there, it is told with line and column.
 
     Args:
@@ -58,7 +58,7 @@ def told_at(places: dict[str, Place], key: str, above: str = "") -> Iterator[Non
         raise place.error(join(above, key), str(error)) from error
 
 
-def spelled_out(kind: Any, node: Node) -> Node:
+def expand_shorthand(kind: Any, node: Node) -> Node:
     """The node of a dataclass with its bare words written in full, so that more can be set beside them."""
     if not isinstance(node, Mapping):
         return node
@@ -114,7 +114,7 @@ def _read_dataclass(kind: Any, node: Node, key: str, default: Any) -> Any:
     """What is not given is as in `default`, or as the class has it where that is None."""
     mapping = _expect_mapping(_in_full(kind, node), key)
     hints = type_hints(kind)
-    fields = {field.name: field for field in dataclasses.fields(kind) if field.init and not holds_places(field)}
+    fields = {field.name: field for field in dataclasses.fields(kind) if field.init and not is_places_field(field)}
     given = {} if default is None else {name: getattr(default, name) for name in fields}
     places: dict[str, Place] = {}
     for name, (place, item) in mapping.entries.items():
@@ -130,7 +130,7 @@ def _read_dataclass(kind: Any, node: Node, key: str, default: Any) -> Any:
         has_default = field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING
         if name not in given and not has_default:
             raise mapping.place.error(join(key, name), "missing")
-    given.update({field.name: places for field in dataclasses.fields(kind) if holds_places(field)})
+    given.update({field.name: places for field in dataclasses.fields(kind) if is_places_field(field)})
     try:
         return kind(**given)
     except FieldError as error:

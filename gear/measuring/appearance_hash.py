@@ -16,7 +16,7 @@ from typing import Any
 
 import mujoco
 
-from gear.camera.ground_shade import MOST_HIDDEN, worth_beside
+from gear.camera.contact_shadows import MOST_HIDDEN, worth_beside
 from gear.camera.response import response_for
 from gear.camera.water import FILM_F90
 from gear.dataset.plan import Plan

@@ -25,7 +25,7 @@ SHOWN = 60
 def to_json(value: Any) -> Json:
     """Dataclasses become dicts, tuples become lists, everything else must be JSON already."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        said = [field.name for field in dataclasses.fields(value) if not holds_places(field)]
+        said = [field.name for field in dataclasses.fields(value) if not is_places_field(field)]
         return {name: to_json(getattr(value, name)) for name in said}
     if isinstance(value, (tuple, list)):
         return [to_json(item) for item in value]
@@ -36,7 +36,7 @@ def to_json(value: Any) -> Json:
     raise TypeError(f"{type(value).__name__} has no JSON form")
 
 
-def holds_places(field: dataclasses.Field[Any]) -> bool:
+def is_places_field(field: dataclasses.Field[Any]) -> bool:
     """Whether a field says where the others were given, and is nothing that one can say."""
     return PLACES.items() <= field.metadata.items()
 
@@ -97,7 +97,7 @@ def _read_dataclass(kind: Any, value: Json, where: str) -> Any:
     if not isinstance(value, dict):
         raise FieldError(where, f"expected a mapping, got {_shown(value)}")
     hints = type_hints(kind)
-    fields = {field.name: field for field in dataclasses.fields(kind) if not holds_places(field)}
+    fields = {field.name: field for field in dataclasses.fields(kind) if not is_places_field(field)}
     for key in value:
         if key not in fields:
             raise FieldError(f"{where}.{key}".lstrip("."), "unknown key")

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from gear.camera.beams import Lamps, globe_beam
 from gear.camera.lamp_shadows import STANDING, Casters, LampShadow, LampShadows
-from gear.camera.shadow_map import BORDER, LampFrame, Layout, ShadowMap, first_met, stop_behind
+from gear.camera.lamps import Lamps, globe_beam
+from gear.camera.shadow_map import BORDER, LampFrame, Layout, ShadowMap, first_hits, stop_behind
 from gear.values.frames import Shape
 from gear.values.geometry import RigidTransform
 from gear.values.scene import ActorRecord, Pose, SceneRecord, Weather
@@ -93,7 +93,7 @@ def test_light_ends_where_rays_first_meet_something(seed: int) -> None:
     corners = np.concatenate([one for one in boxes if np.abs(one - LAMP_M).max(axis=2).min() > 2])
     axis = DOWN + rng.uniform(-0.3, 0.3, 3)
     outlook = LampFrame.of(LAMP_M, axis, STANDING)
-    comes_m = first_met(corners, outlook)
+    comes_m = first_hits(corners, outlook)
     row, column = (rng.integers(4, STANDING.cells - 4, 3000) for _ in range(2))
     rays = outlook.directions(column, row).astype(float)
     before = rays @ (axis / np.linalg.norm(axis)) > 0.05

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gear.camera.beams import Headlamps, Lamps, headlamps, low_beam, street_beam
-from gear.camera.glow import Shine, Windows
+from gear.camera.glow import LampGlare, LitWindows
 from gear.camera.lamp_shadows import Casters, LampShadows
+from gear.camera.lamps import Headlamps, Lamps, headlamps, low_beam, street_beam
+from gear.camera.lamps_in_view import LampsInView
 from gear.camera.light_sources import INSIDE_LIGHT
 from gear.camera.night import Night, NightLight
 from gear.camera.normals import strips_of
-from gear.camera.spots import Spots
 from gear.contracts.rendering import RawView
 from gear.values.frames import LINEAR_FULL_SCALE, GeomTable
 from gear.values.geometry import CAMERA_FROM_ACTOR_AXES, RigidTransform
@@ -71,7 +71,7 @@ def lamps(*places_m: tuple[float, float, float], intensity: float = 20.0) -> Lam
     )
 
 
-NO_WINDOWS = Windows(
+NO_WINDOWS = LitWindows(
     corners_m=np.zeros((0, 4, 3)),
     normal=np.zeros((0, 3)),
     geom_id=np.zeros(0, np.int32),
@@ -172,7 +172,7 @@ def test_nothing_is_lost_at_the_edges_of_what_a_lamp_may_light(seed: int) -> Non
     depth_m, _ = street()
     eye = camera(yaw_rad=rng.uniform(-3, 3), x_m=rng.uniform(-20, 20), y_m=rng.uniform(-20, 20))
     places = tuple(tuple(rng.uniform((-40, -40, 3), (60, 40, 9))) for _ in range(6))
-    spots = Spots.of(lamps(*places), eye)
+    spots = LampsInView.of(lamps(*places), eye)
     everywhere = replace(spots, boxes=np.tile([0, SIZE[1], 0, SIZE[0]], (6, 1)))
     for strip in strips_of(depth_m, eye):
         found, all_of_it = spots.light(strip), everywhere.light(strip)
@@ -239,7 +239,7 @@ def test_lit_panes_are_seen_where_they_are_and_only_from_outside() -> None:
 def test_a_lamp_shines_at_the_camera_unless_something_hides_it() -> None:
     depth_m, _ = street()
     one = lamps((20.0, 2.0, 5.0), (WALL_M + 5, 0.0, 4.0))
-    shine = Shine.of(one, camera(), 0.1, depth_m)
+    shine = LampGlare.of(one, camera(), 0.1, depth_m)
     assert len(shine.strength) == 1
     spot = shine.spots(SIZE)
     row, column = np.unravel_index(np.argmax(spot), SIZE)

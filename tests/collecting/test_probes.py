@@ -119,7 +119,7 @@ def test_a_sidecar_that_says_something_else_of_a_probe_is_one_line(
 def test_a_sidecar_without_a_surfaces_measures_is_one_line(tmp_path: Path, copy_small: Copy, compositor: str) -> None:
     import torch
 
-    from gear.compositor.opening import open_compositor
+    from gear.compositor.registry import open_compositor
 
     copy_small("depth", tmp_path, samples=1, probes=True)
     path = tmp_path / "gear/debug/samples/000000.json"

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from gear.camera.effects import Exposure
 from gear.compositor.homography import HomographyCompositor
-from gear.compositor.sampling import Scan, take_samples, unit_from_image
+from gear.compositor.sampling import SampleScheme, take_samples, unit_from_image
 from gear.measuring.gap.picture_gap import visible_mask
 from gear.plugins.build import build_task
 from gear.testing.synthetic import synthetic_frame
@@ -107,7 +107,7 @@ def test_a_mip_level_is_the_logarithm_of_a_samples_longer_edge_in_texels(distanc
     sample = sample_of(board(distance_m))
     record, (truth,) = sample.record, sample.surfaces
     camera = record.camera("left")
-    scan = Scan(supersampled=False, extrapolates=False, smooths=False)
+    scan = SampleScheme(supersampled=False, extrapolates=False, smooths=False)
     unit = unit_from_image(truth, record.surfaces[0], camera)
     middle = np.array([159.5]), np.array([79.5])
     found = take_samples(scan, unit, middle, np.ones((HEIGHT, WIDTH), np.bool_), Exposure(camera=camera, scene=record))

@@ -11,7 +11,7 @@ import torch
 
 import gear
 from gear.compositor.homography import HomographyCompositor
-from gear.compositor.opening import open_compositor
+from gear.compositor.registry import open_compositor
 from gear.compositor.transport import TransportCompositor
 from gear.dataset.probe_files import probes_of
 from gear.values.errors import DatasetError, UnknownNameError

@@ -15,7 +15,7 @@ import pytest
 import gear
 from gear.cli.main import main
 from gear.collecting.patch_sources import read_patch
-from gear.compositor.opening import open_compositor
+from gear.compositor.registry import open_compositor
 from gear.measuring import plugin_selection
 from gear.measuring.gap.picture_gap import PERFECT_DB, picture_gap
 from gear.measuring.gap.run import sample_gaps, shown_patches

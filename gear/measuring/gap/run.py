@@ -29,7 +29,7 @@ from gear.values.frames import UInt8Image
 from gear.values.progress import Callbacks
 
 if TYPE_CHECKING:
-    from gear.compositor.pasting import Pasting
+    from gear.compositor.base import BaseCompositor
 
 REPORT = "gap.json"
 TABLE = "gap.txt"
@@ -47,7 +47,7 @@ class _Comparison:
     """
 
     pairs: Twins[Any]
-    engines: Mapping[str, Pasting]
+    engines: Mapping[str, BaseCompositor]
     images: Sequence[UInt8Image]
     effect: Effect | None
 
@@ -76,7 +76,7 @@ def measure_gap(request: GapRequest, callbacks: Callbacks) -> GapReport:
 
 def _opened(request: GapRequest, clean: Dataset[Any], callbacks: Callbacks) -> _Comparison:
     """Opens everything, and renders the twin last: what does not suit the dataset must be found before that."""
-    from gear.compositor.opening import open_compositor
+    from gear.compositor.registry import open_compositor
 
     split = clean.plan.info.split
     pairs = None if request.twin is None else pair_twins(clean, open_dataset(request.twin_root, split))
@@ -126,7 +126,7 @@ def _measured(request: GapRequest, compared: _Comparison, callbacks: Callbacks) 
 
 def sample_gaps(
     pairs: Twins[Any],
-    engines: Mapping[str, Pasting],
+    engines: Mapping[str, BaseCompositor],
     images: Sequence[UInt8Image],
     index: int,
     effect: Effect | None,
@@ -160,7 +160,7 @@ def sample_gaps(
     return found
 
 
-def composed_picture(engine: Pasting, images: Sequence[UInt8Image], index: int, view: str) -> UInt8Image:
+def composed_picture(engine: BaseCompositor, images: Sequence[UInt8Image], index: int, view: str) -> UInt8Image:
     """(H, W, 3) uint8 of one sample with patches, through a compositor that rounds."""
     import torch
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import torch
 
+from gear.compositor.base import CACHE_BYTES, Prepared
 from gear.compositor.cache import Cache
-from gear.compositor.pasting import CACHE_BYTES, Prepared
 from gear.config.dump import to_plain
 from gear.contracts.attacks import Budget, Objective, Patch, WithObjective, WithTaskOptions
 from gear.contracts.models import Model

@@ -16,9 +16,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from gear.compositor.base import Prepared
 from gear.compositor.cache import Cache
-from gear.compositor.opening import open_compositor
-from gear.compositor.pasting import Prepared
+from gear.compositor.registry import open_compositor
 from gear.contracts.attacks import Budget
 from gear.contracts.specs import AttackSpec
 from gear.measuring.patch_checks import check_patches

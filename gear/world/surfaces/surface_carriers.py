@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gear.config.reader import told_at
+from gear.config.reader import located_errors
 from gear.world.assets.library import AssetLibrary
 from gear.world.scene_spec import SceneSpec
 
@@ -15,8 +15,8 @@ def check_scene_assets(library: AssetLibrary, scene: SceneSpec, key: str) -> Non
         ConfigError: likewise, where a file names it.
     """
     for number, board in enumerate(scene.boards):
-        with told_at(board.places, "asset", f"{key}.boards[{number}]"):
+        with located_errors(board.places, "asset", f"{key}.boards[{number}]"):
             library.path("surface", board.asset)
     if scene.truck is not None:
-        with told_at(scene.truck.places, "asset", f"{key}.truck"):
+        with located_errors(scene.truck.places, "asset", f"{key}.truck"):
             library.path("vehicle", scene.truck.asset)

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from gear.camera.air import Air, Fog
+from gear.camera.contact_shadows import ContactShadows
 from gear.camera.effects import CameraEffects
-from gear.camera.ground_shade import GroundShade
 from gear.camera.night import Night
 from gear.camera.pipeline import CameraPipeline
 from gear.camera.rain import Rain
@@ -84,7 +84,7 @@ def camera_pipeline(
         mirrored += night.lit * lamplit_houses(_MIRROR_ROWS)
     return CameraPipeline(
         response=response_for(renderer_name, weather),
-        shade=None if shapes is None else shade_of(weather, renderer_name, shapes),
+        contact_shadows=None if shapes is None else contact_shadows_of(weather, renderer_name, shapes),
         night=night,
         air=air_of(weather, renderer_name, left),
         water=Water(
@@ -103,10 +103,10 @@ def camera_pipeline(
     )
 
 
-def shade_of(weather: Weather, renderer_name: str, shapes: Mapping[str, Shape]) -> GroundShade:
+def contact_shadows_of(weather: Weather, renderer_name: str, shapes: Mapping[str, Shape]) -> ContactShadows:
     """What assets keep from the ground of a weather's light."""
     light = lighting_of(weather, sky_face_px=SHADE_SKY_FACE_PX)
-    return GroundShade(shapes=shapes, even_share=even_share(weather, light), is_display=renderer_name == "classic")
+    return ContactShadows(shapes=shapes, even_share=even_share(weather, light), is_display=renderer_name == "classic")
 
 
 def even_share(weather: Weather, light: Lighting) -> float:

@@ -10,8 +10,8 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from gear.camera.beams import Lamps, globe_beam, street_beam
-from gear.camera.glow import Windows
+from gear.camera.glow import LitWindows
+from gear.camera.lamps import Lamps, globe_beam, street_beam
 from gear.values.geometry import Array
 from gear.world.assets.geom_triangles import static_geoms, world_triangles
 
@@ -141,7 +141,7 @@ def _placed(found: Sequence[tuple[Array, Array, float]], intensity: float) -> di
     }
 
 
-def find_windows(model: mujoco.MjModel, data: mujoco.MjData, rng: np.random.Generator) -> Windows:
+def find_windows(model: mujoco.MjModel, data: mujoco.MjData, rng: np.random.Generator) -> LitWindows:
     """The panes behind which there is light.
 
     Args:
@@ -169,7 +169,7 @@ def find_windows(model: mujoco.MjModel, data: mujoco.MjData, rng: np.random.Gene
     gain, light = np.concatenate([np.zeros((0, 2, 3)), *shown]).astype(np.float32).transpose(1, 0, 2)
     normal = np.cross(shape[:, 1] - shape[:, 0], shape[:, 2] - shape[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
-    return Windows(
+    return LitWindows(
         corners_m=shape,
         normal=normal,
         geom_id=np.concatenate([np.zeros(0, np.int32), *geoms]),

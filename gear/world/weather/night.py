@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from gear.camera.beams import Headlamps
 from gear.camera.lamp_shadows import Casters, LampShadows
+from gear.camera.lamps import Headlamps
 from gear.camera.night import Night
 from gear.values.errors import TownError
 from gear.values.labels import VEHICLES

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from gear.compositor.opening import open_compositor
-from gear.compositor.pasting import CACHE_BYTES
+from gear.compositor.base import CACHE_BYTES
+from gear.compositor.registry import open_compositor
 from gear.verbs.attack.run import attack
 from tests.verbs.attack.conftest import SMALL
 from tests.verbs.conftest import Install, Small

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from gear.compositor.opening import open_compositor
+from gear.compositor.registry import open_compositor
 from gear.contracts.hookspecs import hookimpl
 from gear.plugins import build as building
 from gear.plugins.manager import discover

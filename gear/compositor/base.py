@@ -49,7 +49,7 @@ class Prepared:
         return self.picture.nbytes + self.where.nbytes + self.inner_bytes
 
 
-class Pasting:
+class BaseCompositor:
     """A compositor that replaces some pixels of stored pictures. Subclasses say which and by what.
 
     Args:

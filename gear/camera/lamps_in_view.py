@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from gear.camera.beams import Lamps, sides_of
 from gear.camera.lamp_shadows import LampShadow
+from gear.camera.lamps import Lamps, sides_of
 from gear.camera.normals import Strip
 from gear.values.frames import FloatImage
 from gear.values.geometry import Array
@@ -19,7 +19,7 @@ _NEAREST_M = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Spots:
+class LampsInView:
     """The lamps of one kind that light something in a picture.
 
     Attributes:
@@ -35,7 +35,7 @@ class Spots:
     origin_m: Array
 
     @staticmethod
-    def of(lamps: Lamps, camera: CameraRecord) -> Spots:
+    def of(lamps: Lamps, camera: CameraRecord) -> LampsInView:
         """Those within a camera's view."""
         pose = camera.world_from_camera_transform
         sides = np.array([(x, y) for x in (-1, 1) for y in (-1, 1)]) * lamps.reach_m
@@ -53,7 +53,7 @@ class Spots:
         high[z.max(axis=(1, 2)) <= 0] = 0
         low, high = np.clip(low, 0, size), np.clip(high, 0, size)
         boxes = np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=1).astype(np.int64)
-        return Spots(lamps=lamps, sides=sides_of(lamps.axis), boxes=boxes, origin_m=pose.translation_m)
+        return LampsInView(lamps=lamps, sides=sides_of(lamps.axis), boxes=boxes, origin_m=pose.translation_m)
 
     def near(self, within_m: float) -> list[int]:
         """Those that may light something in the picture and are within a distance of the camera."""

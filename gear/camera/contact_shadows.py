@@ -55,7 +55,7 @@ _EDGES = np.array([(i, i | bit) for bit in (1, 2, 4) for i in range(8) if not i 
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class HiddenSky:
+class SkyOcclusion:
     """How much of the sky one asset hides from the ground around it.
 
     Attributes:
@@ -67,7 +67,7 @@ class HiddenSky:
     cells_per_m: float
 
     @staticmethod
-    def of(shape: Shape) -> HiddenSky:
+    def of(shape: Shape) -> SkyOcclusion:
         """Shadows of an asset from directions spread as level ground weighs them. It is solid from its underside up.
 
         Args:
@@ -83,7 +83,7 @@ class HiddenSky:
             from_border = (np.minimum(np.arange(size), np.arange(size)[::-1]) / cells_per_m).astype(np.float32)
             rim = smooth_step(from_border, 0, _RIM * _reach_m(shape))
             hidden *= rim[:, None] if axis == 0 else rim
-        return HiddenSky(hidden, cells_per_m)
+        return SkyOcclusion(hidden, cells_per_m)
 
 
 def _reach_m(shape: Shape) -> float:
@@ -93,7 +93,7 @@ def _reach_m(shape: Shape) -> float:
 
 
 def _grid(shape: Shape) -> tuple[int, int, float]:
-    """Rows and columns of an asset's `HiddenSky`, and how many there are to a metre."""
+    """Rows and columns of an asset's `SkyOcclusion`, and how many there are to a metre."""
     cells_per_m = _CELLS_PER_M["large" if max(shape.box_size_m[:2]) > _LARGE_M else "small"]
     half_m = np.abs(shape.box_centre_m[:2]) + shape.box_size_m[:2] / 2 + _reach_m(shape)
     columns, rows = (2 * math.ceil(side * cells_per_m) + 1 for side in half_m)
@@ -141,7 +141,7 @@ def _points(shape: Shape, per_m: float) -> Array:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class GroundShade:
+class ContactShadows:
     """What the actors of a world hide of one weather's sky.
 
     Attributes:
@@ -153,7 +153,7 @@ class GroundShade:
     shapes: Mapping[str, Shape]
     even_share: float
     is_display: bool
-    _known: dict[str, HiddenSky] = field(default_factory=dict, init=False, repr=False)
+    _known: dict[str, SkyOcclusion] = field(default_factory=dict, init=False, repr=False)
 
     def apply(
         self, linear_rgb: UInt16Image, depth_m: FloatImage, is_ground: Mask, camera: CameraRecord, record: SceneRecord
@@ -207,13 +207,13 @@ class GroundShade:
         left = np.where(is_ground, left, 1 - OUTLINE * (1 - darkest))
         return left ** np.float32(DISPLAY_POWER) if self.is_display else left
 
-    def _sky(self, asset: str, shape: Shape) -> HiddenSky:
+    def _sky(self, asset: str, shape: Shape) -> SkyOcclusion:
         if asset not in self._known:
-            self._known[asset] = HiddenSky.of(shape)
+            self._known[asset] = SkyOcclusion.of(shape)
         return self._known[asset]
 
     def _beside(
-        self, actor: ActorRecord, sky: HiddenSky, depth_m: FloatImage, box: tuple[slice, slice], camera: CameraRecord
+        self, actor: ActorRecord, sky: SkyOcclusion, depth_m: FloatImage, box: tuple[slice, slice], camera: CameraRecord
     ) -> FloatImage:
         """(h, W) shares of light that one actor leaves to ground in a box of the picture."""
         actor_from_camera = (

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gear.camera.ground_shade import DISPLAY_POWER, MOST_HIDDEN, OUTLINE, GroundShade, HiddenSky
+from gear.camera.contact_shadows import DISPLAY_POWER, MOST_HIDDEN, OUTLINE, ContactShadows, SkyOcclusion
 from gear.values.frames import Shape
 from gear.values.geometry import RigidTransform
 from gear.values.scene import ActorRecord, CameraRecord, Pose, SceneRecord, Weather
@@ -45,7 +45,7 @@ def share_by_rays(low: Sequence[float], high: Sequence[float], x_m: float, y_m: 
     return float((near < far).mean())
 
 
-def share_at(sky: HiddenSky, x_m: float, y_m: float) -> float:
+def share_at(sky: SkyOcclusion, x_m: float, y_m: float) -> float:
     """Of the nearest cell."""
     rows, columns = sky.share.shape
     place = round(y_m * sky.cells_per_m) + rows // 2, round(x_m * sky.cells_per_m) + columns // 2
@@ -56,19 +56,19 @@ def share_at(sky: HiddenSky, x_m: float, y_m: float) -> float:
     ("x_m", "y_m"), [(0, 0), (1.2, 0.4), (0, 0.6), (-1.9, -0.8), (0, 1.2), (0, -1.5), (2.4, 0), (-3.0, 0.5)]
 )
 def test_a_box_hides_what_rays_say(x_m: float, y_m: float) -> None:
-    assert share_at(HiddenSky.of(box(LOW, HIGH)), x_m, y_m) == pytest.approx(
+    assert share_at(SkyOcclusion.of(box(LOW, HIGH)), x_m, y_m) == pytest.approx(
         share_by_rays(LOW, HIGH, x_m, y_m), abs=0.06
     )
 
 
 def test_what_hides_little_fades_out_at_the_border() -> None:
-    share = HiddenSky.of(box(LOW, HIGH)).share
+    share = SkyOcclusion.of(box(LOW, HIGH)).share
     assert max(share[0].max(), share[-1].max(), share[:, 0].max(), share[:, -1].max()) == 0
     assert share.max() > 0.9
 
 
 def test_small_assets_have_finer_cells() -> None:
-    person, car = HiddenSky.of(box((-0.2, -0.2, 0.0), (0.2, 0.2, 1.7))), HiddenSky.of(box(LOW, HIGH))
+    person, car = SkyOcclusion.of(box((-0.2, -0.2, 0.0), (0.2, 0.2, 1.7))), SkyOcclusion.of(box(LOW, HIGH))
     assert person.cells_per_m > car.cells_per_m
 
 
@@ -111,8 +111,8 @@ def scene(x_m: float, y_m: float = 0.0, yaw_rad: float = 0.0) -> SceneRecord:
     )
 
 
-def shade(even_share: float = 1.0, is_display: bool = False, low=LOW, high=HIGH) -> GroundShade:  # type: ignore[no-untyped-def]
-    return GroundShade(shapes={"thing": box(low, high)}, even_share=even_share, is_display=is_display)
+def shade(even_share: float = 1.0, is_display: bool = False, low=LOW, high=HIGH) -> ContactShadows:  # type: ignore[no-untyped-def]
+    return ContactShadows(shapes={"thing": box(low, high)}, even_share=even_share, is_display=is_display)
 
 
 def pixel_of(x_m: float, y_m: float) -> tuple[int, int]:
@@ -120,7 +120,7 @@ def pixel_of(x_m: float, y_m: float) -> tuple[int, int]:
     return int(SIZE[1] / 2 + 160 * EYE_M / x_m), int(SIZE[0] / 2 - 160 * y_m / x_m)
 
 
-def left_of(shading: GroundShade, record: SceneRecord, depth_m: np.ndarray | None = None) -> np.ndarray:
+def left_of(shading: ContactShadows, record: SceneRecord, depth_m: np.ndarray | None = None) -> np.ndarray:
     depth_m = plane_depth_m() if depth_m is None else depth_m
     left = shading.left(depth_m, np.isfinite(depth_m), camera(), record)
     assert left is not None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from gear.compositor.pasting import CACHE_BYTES, Pasting, Prepared
+from gear.compositor.base import CACHE_BYTES, BaseCompositor, Prepared
 from gear.dataset.probe_files import demand_probes
 from gear.values.errors import UnknownNameError
 
@@ -26,7 +26,7 @@ def open_compositor(
     rounding: bool = False,
     cache_bytes: int = CACHE_BYTES,
     cache: Cache[Prepared] | None = None,
-) -> Pasting:
+) -> BaseCompositor:
     """A compositor for the samples of a dataset.
 
     Args:
