@@ -1,4 +1,4 @@
-"""Configs back to YAML, with every default filled in: what `gear show-config` prints and every dataset keeps."""
+"""Configs back to YAML with all defaults, as `gear show-config` prints them and every dataset keeps them."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ def to_yaml(config: Any) -> str:
 
 
 def node_to_json(node: Node) -> Json:
-    """Texts stay texts.
+    """A YAML tree as JSON in which all scalars stay texts.
 
     Raises:
-        ConfigError: with its aliases written out it is too large.
+        ConfigError: the tree is too large once its aliases are expanded.
     """
     if _count(node, {}) > MAX_NODES:
         raise node.place.error("", f"holds more than {MAX_NODES} values with its aliases written out")
@@ -32,7 +32,7 @@ def node_to_json(node: Node) -> Json:
 
 
 def _count(node: Node, known: dict[int, int]) -> int:
-    """Nodes in it, each as often as aliases repeat it; `known` has the numbers of those that were met before."""
+    """Number of nodes with aliases expanded; `known` holds the numbers of nodes visited before."""
     if isinstance(node, Scalar):
         return 1
     if id(node) not in known:
@@ -50,7 +50,7 @@ def _written_out(node: Node) -> Json:
 
 
 def to_plain(value: Any) -> Json:
-    """A config as JSON values: paths become texts, unread nodes stay texts."""
+    """A config as JSON values: paths become texts, and options without a type stay texts."""
     if isinstance(value, (Scalar, Items, Mapping)):
         return node_to_json(value)
     if isinstance(value, Path):

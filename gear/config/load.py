@@ -1,4 +1,4 @@
-"""From a file, flags and `--set` to the configs of one run."""
+"""Loads the configs of a run from a file, flags and `--set`."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from gear.values.resources import data_dir
 
 
 def find_config(kind: str, name: str) -> Path:
-    """A config by name (`default` of `simulation`) or by path.
+    """The path of a config given by name (`default` of `simulation`) or by path.
 
     Raises:
-        UnknownNameError: neither a file nor a name that gear knows.
-        ConfigError: nobody can look there.
+        UnknownNameError: it is neither a file nor a known name.
+        ConfigError: the folder cannot be read.
     """
     path, folder = Path(name), data_dir("configs") / kind
     is_path = path.suffix in (".yml", ".yaml", ".py")
@@ -42,12 +42,12 @@ def load_collection(
     """Reads a collection config.
 
     Args:
-        source: name or path of a YAML file (gear's or the original tool's), or None.
-        flags: texts by key, None where a flag was not given; they go before the file.
-        settings: `KEY=VALUE` texts; they go before both.
+        source: name or path of a YAML file (gear's or CARLA-GeAR's), or None.
+        flags: texts by key, None for flags that were not given; they override the file.
+        settings: `KEY=VALUE` texts; they override both.
 
     Raises:
-        ConfigError: anything in it cannot be read; says where.
+        ConfigError: something in it cannot be read; names the place.
     """
     node: Node = MappingNode({}, Place("command line"))
     original: MappingNode | None = None
@@ -73,7 +73,7 @@ def load_collection(
 
 
 def load_simulation(name: str) -> SimulationConfig:
-    """Reads a simulation config by name or path; the original's `.py` without running it.
+    """Reads a simulation config by name or path; CARLA-GeAR's Python file is parsed without running it.
 
     Raises:
         ConfigError: it cannot be read.
@@ -83,10 +83,10 @@ def load_simulation(name: str) -> SimulationConfig:
 
 
 def split_of(simulation: SimulationConfig, split: str) -> SplitConfig:
-    """The split's own entry, or that of the word before its first `_`.
+    """The entry of a split, or of the word before the first `_` of its name.
 
     Raises:
-        UnknownNameError: neither is there.
+        UnknownNameError: there is neither.
     """
     for name in (split, split.split("_")[0]):
         if name in simulation.splits:

@@ -1,4 +1,4 @@
-"""YAML as a tree of texts with places. The dataclass that reads it decides the types, never YAML."""
+"""YAML as a tree of texts with their places. The dataclass that reads the tree decides the types, not YAML."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ MARKS = "'\"[{&*!|>"
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a node stands; line and column count from 1, line 0 is "not in a file"."""
+    """The place of a node: path, line and column from 1; line 0 means that it is in no file."""
 
     path: str
     line: int = 0
     column: int = 0
 
     def error(self, key: str, problem: str) -> ConfigError:
-        """A `ConfigError` here; a flag is its own key."""
+        """A `ConfigError` at this place; for a flag the key is left out, because the flag names it."""
         key = "" if self.path == f"--{key}" else key
         return ConfigError(self.path, self.line, self.column, key, problem)
 
 
 @dataclass(frozen=True, slots=True)
 class Scalar:
-    """A text; `is_null` where YAML says nothing, `null` or `~` without quotes."""
+    """A scalar as text; `is_null` for an empty value, `null` or `~` without quotes."""
 
     text: str
     is_null: bool
@@ -41,7 +41,7 @@ class Scalar:
 
 @dataclass(frozen=True, slots=True)
 class Items:
-    """A list."""
+    """A list of nodes with its place."""
 
     items: tuple[Node, ...]
     place: Place
@@ -49,7 +49,7 @@ class Items:
 
 @dataclass(frozen=True, slots=True)
 class Mapping:
-    """Keys with their places and values, in order; a repeated key is refused on reading."""
+    """A mapping from keys to nodes with their places, in order; repeated keys are refused when reading."""
 
     entries: dict[str, tuple[Place, Node]]
     place: Place
@@ -68,7 +68,7 @@ def parse_file(path: Path) -> Node:
 
 
 def text_of(path: Path) -> str:
-    """What a config file says.
+    """The text of a config file.
 
     Raises:
         ConfigError: the file is missing, too large or not UTF-8.
@@ -110,15 +110,17 @@ def parse_text(text: str, name: str) -> Node:
 
 
 def parse_value(text: str, name: str) -> Node:
-    """Reads one value as given on the command line: `12`, `fog`, `[1, 2]`, `{a: 1}`. Nothing is a comment there, and no
-    place in it is worth a line and a column."""
+    """Parses one value of the command line: `12`, `fog`, `[1, 2]`, `{a: 1}`. There are no comments, and places
+    have no line and
+    column.
+    """
     if "#" in text and text.strip()[0] not in MARKS:
         return Scalar(text.strip(), False, Place(name))
     return in_one_place(parse_text(text, name), Place(name)) if text.strip() else Scalar("", True, Place(name))
 
 
 def in_one_place(node: Node, place: Place) -> Node:
-    """The same tree with one place for all of it: of a text whose lines nobody has before them."""
+    """The same tree with one place for all nodes, for text that the user has not written in a file."""
     done: dict[int, Node] = {}
 
     def moved(node: Node) -> Node:
@@ -135,7 +137,9 @@ def in_one_place(node: Node, place: Place) -> Node:
 
 
 def _convert(node: yaml.Node, name: str, key: str, done: dict[int, Node | None]) -> Node:
-    """`done` keeps what an alias points to, so that aliases of aliases cost nothing; None marks what is being read."""
+    """Converts a PyYAML node. `done` holds the targets of aliases, so that aliases of aliases cost nothing; None
+    marks a node being converted.
+    """
     place = Place(name, node.start_mark.line + 1, node.start_mark.column + 1)
     if id(node) in done:
         known = done[id(node)]

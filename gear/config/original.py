@@ -1,7 +1,8 @@
-"""CARLA-GeAR's own collection configs, accepted as they are; and its simulation config, read without running it.
+"""CARLA-GeAR's own configs: its collection config, accepted unchanged, and its simulation config, parsed without
+running it.
 
-Keys and their meaning: the template files of the original tool (`basepath`, `root`, `town_name`, `weather`, `task`,
-`split`, `billboard`, `patch_folder`, `patch_type`, `net`, `debug`).
+Keys and their meaning follow the template files of the original tool (`basepath`, `root`, `town_name`, `weather`,
+`task`, `split`, `billboard`, `patch_folder`, `patch_type`, `net`, `debug`).
 """
 
 from __future__ import annotations
@@ -45,10 +46,10 @@ def is_original(node: Node) -> bool:
 
 
 def from_original(node: Mapping) -> Mapping:
-    """The same wishes as a collection config of gear's, but for the folder: `original_root`.
+    """The equivalent collection config of gear, without the folder, which `original_root` gives.
 
     Raises:
-        ConfigError: a key is neither the original's nor can be understood, or its task is none of the four.
+        ConfigError: a key is unknown or its value cannot be understood, or the task is none of the four.
     """
     for name, (place, _) in node.entries.items():
         if name not in ORIGINAL_KEYS:
@@ -77,14 +78,14 @@ def from_original(node: Mapping) -> Mapping:
 
 
 def original_root(node: Mapping, above: Mapping) -> Scalar:
-    """Where the files of a CARLA-GeAR config lie: under `basepath/root/billboard`, as they did.
+    """The dataset's folder for a CARLA-GeAR config: `basepath/root/billboard`, as in the original.
 
     Args:
         node: the original's config.
-        above: what became of it, with what was given beside it: another scene's files must not lie with this one's.
+        above: the converted config with flags and settings applied; another scene gets another folder.
 
     Raises:
-        ConfigError: the scene or the task is not one word.
+        ConfigError: the scene or the task is not a single word.
     """
     task, scene = _text(above, "task") or "", _text(above, "scene") or ""
     words = {name: word for word, name in TASKS.items()}
@@ -103,14 +104,14 @@ def _text(node: Mapping, key: str) -> str | None:
 
 
 def simulation_from_python(path: Path) -> Mapping:
-    """The original's `simulation_configs.py` as gear's simulation config. Nothing of it is run.
+    """Converts the original's `simulation_configs.py` to gear's simulation config, without running it.
 
     Only plain assignments of literals are understood (`SEED_VALUES`, `ITERATION_VALUES`, `MAX_VEHICLE_NPC`,
-    `MAX_WALKER_NPC`); everything else in the file is passed over, unless it may change one of those four.
+    `MAX_WALKER_NPC`); everything else in the file is ignored, unless it may change one of those four.
 
     Raises:
-        ConfigError: the file is not Python, or one of those four is computed instead of written or may be changed
-            elsewhere, of which the message says what to write in its place; or a seed has no count.
+        ConfigError: the file is not Python; one of those four is computed, or may be changed elsewhere (the message
+            says what to write instead); or a seed has no number of samples.
     """
     try:
         tree = ast.parse(text_of(path))
@@ -144,7 +145,7 @@ def simulation_from_python(path: Path) -> Mapping:
 
 
 def _may_change(name: ast.Name, parent: ast.AST) -> bool:
-    """Whether what a name stands for may be another after it is mentioned there."""
+    """Whether an expression may change the value of a name."""
     if not isinstance(name.ctx, ast.Load):
         return True
     if name.id not in TABLES:
@@ -162,10 +163,10 @@ def _may_change(name: ast.Name, parent: ast.AST) -> bool:
 
 
 def _node_of(expression: ast.expr, path: Path) -> Node:
-    """A literal as a node.
+    """A literal expression as a node.
 
     Raises:
-        ValueError, TypeError, SyntaxError, MemoryError, RecursionError: it is none.
+        ValueError, TypeError, SyntaxError, MemoryError, RecursionError: it is no literal.
     """
     value = ast.literal_eval(expression)
     if not isinstance(expression, ast.Dict):

@@ -1,4 +1,4 @@
-"""`--set key.path=value` on top of a file, through the same reader."""
+"""`--set key.path=value` on top of a file, read by the same reader."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from gear.values.errors import ConfigError
 
 
 def with_overrides(node: Node, settings: Iterable[str], kind: Any = None, *, flag: str = "--set") -> Node:
-    """The tree with every `a.b.c=value` put in; later ones win.
+    """The tree with every `a.b.c=value` inserted; later settings override earlier ones.
 
     Args:
         node: the tree.
         settings: `KEY=VALUE` texts.
-        kind: dataclass of the tree, whose bare words are kept where a setting goes below them; None for any.
-        flag: that the settings were given with; errors name it.
+        kind: dataclass of the tree, whose shorthands are kept where a setting refers to a key below them; None for any.
+        flag: flag that the settings were given with, for errors.
 
     Raises:
-        ConfigError: a setting has no `=`, or goes through something that has no keys.
+        ConfigError: a setting has no `=`, or its path leads through a value without keys.
     """
     hint = "such as --set weather.cloudiness=30" if kind else "with a key that `gear plugins show NAME` lists"
     for setting in settings:
@@ -38,7 +38,7 @@ def with_value(node: Node, path: tuple[str, ...], value: Node, above: str = "") 
     """The tree with one value replaced or added; `above` is the key of the tree itself.
 
     Raises:
-        ConfigError: the path goes through a list or a word.
+        ConfigError: the path leads through a list or a scalar.
     """
     if not path:
         return value
@@ -54,7 +54,7 @@ def with_value(node: Node, path: tuple[str, ...], value: Node, above: str = "") 
 
 
 def merged(base: Node, above: Node) -> Node:
-    """Two trees: keys of `above` win, mappings are merged, everything else is replaced."""
+    """Merges two trees: keys of `above` override, mappings are merged recursively, everything else is replaced."""
     if not (isinstance(base, Mapping) and isinstance(above, Mapping)):
         return above
     entries = dict(base.entries)

@@ -1,4 +1,4 @@
-"""Nodes into frozen dataclasses, by the declared type of each field."""
+"""Reads nodes into frozen dataclasses, by the declared type of each field."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def read_node(kind: type[T], node: Node, key: str = "") -> T:
     """Reads `node` as a `kind`.
 
     A dataclass may name in `SHORTHAND` the field that a bare word fills: `weather: ClearNoon`. A field of type `Node`
-    is kept as it is, for whoever knows its type later. Where a field is a dataclass and only some of its keys are
-    given, the others are those of the field's own default; with `WHOLE` in its metadata, those of the class.
+    is kept unread, for code that knows its type later. Where a field is a dataclass and only some of its keys are
+    given, the others come from the field's own default; with `WHOLE` in its metadata, from the defaults of the class.
 
     Raises:
         ConfigError: a key is unknown, missing or repeated, a value has another type, or the class refuses it.
@@ -39,15 +39,15 @@ def read_node(kind: type[T], node: Node, key: str = "") -> T:
 
 @contextlib.contextmanager
 def located_errors(places: dict[str, Place], key: str, above: str = "") -> Iterator[None]:
-    """For looking up what a config names: where a file names what is not there, it is told with line and column.
+    """A context for looking up a name of a config: errors get the file, line and column of the name.
 
     Args:
-        places: of the given values, by key.
-        key: whose value is looked up.
-        above: the key that `key` stands below, if any.
+        places: places of the given values, by key.
+        key: key whose value is looked up.
+        above: key above `key`, if any.
 
     Raises:
-        ConfigError: in place of `UnknownNameError`, `DuplicateNameError` and `PatchError`, where a file has the key.
+        ConfigError: instead of `UnknownNameError`, `DuplicateNameError` and `PatchError`, where a file has the key.
     """
     try:
         yield
@@ -59,7 +59,7 @@ def located_errors(places: dict[str, Place], key: str, above: str = "") -> Itera
 
 
 def expand_shorthand(kind: Any, node: Node) -> Node:
-    """The node of a dataclass with its bare words written in full, so that more can be set beside them."""
+    """The node of a dataclass with its shorthands expanded to mappings, so that more keys can be set."""
     if not isinstance(node, Mapping):
         return node
     hints = type_hints(kind)
@@ -98,7 +98,7 @@ def _read(kind: Any, node: Node, key: str, default: Any = None) -> Any:
 
 
 def join(key: str, name: str) -> str:
-    """`key.name`."""
+    """The key path `key.name`, or `name` at the top."""
     return f"{key}.{name}" if key else name
 
 
@@ -111,7 +111,7 @@ def _expect_mapping(node: Node, key: str) -> Mapping:
 
 
 def _read_dataclass(kind: Any, node: Node, key: str, default: Any) -> Any:
-    """What is not given is as in `default`, or as the class has it where that is None."""
+    """Reads a dataclass; missing keys are taken from `default`, or from the class where `default` is None."""
     mapping = _expect_mapping(_in_full(kind, node), key)
     hints = type_hints(kind)
     fields = {field.name: field for field in dataclasses.fields(kind) if field.init and not is_places_field(field)}
@@ -138,7 +138,7 @@ def _read_dataclass(kind: Any, node: Node, key: str, default: Any) -> Any:
 
 
 def _usual(field: dataclasses.Field[Any], default: Any) -> Any:
-    """What a field holds where nothing is given: as in `default`, if there is one; None where keys begin anew."""
+    """The value of a field whose key is missing: that of `default`, if there is one; None where the class decides."""
     if WHOLE.items() <= field.metadata.items():
         return None
     if default is not None:

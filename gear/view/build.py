@@ -1,4 +1,6 @@
-"""From a dataset to the parts of a page: one entry a sample, made in parallel, none of them fatal."""
+"""From a dataset to the parts of its page: one entry per sample, made in parallel; a damaged sample does not stop
+the others.
+"""
 
 from __future__ import annotations
 
@@ -37,12 +39,12 @@ class Entry:
     """One sample, ready for the page.
 
     Attributes:
-        row: its line in the index.
-        detail: the rest of what is known of it, JSON, deflated.
-        pictures: by channel.
+        row: its entry in the index.
+        detail: all other facts, as deflated JSON.
+        pictures: encoded pictures by channel.
         cameras: name of the view that a channel is aligned with, where there is one.
-        originals: link to the file that holds a channel at full size, where the dataset has one and the page has not.
-        problem: why pictures or labels are missing, or an empty text.
+        originals: link to the file with a channel at full size, where the dataset has one and the page has not.
+        problem: why pictures or labels are missing; empty where nothing is missing.
     """
 
     row: dict[str, Json]
@@ -55,12 +57,12 @@ class Entry:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Builder:
-    """Makes entries.
+    """Makes the entries.
 
     Attributes:
         dataset: the split.
-        base_url: where the dataset's root lies, seen from the page; ends in `/`.
-        scale: of the embedded pictures.
+        base_url: URL of the dataset's root relative to the page; ends in `/`.
+        scale: scale of the embedded pictures.
     """
 
     dataset: Dataset[Any]
@@ -68,7 +70,7 @@ class Builder:
     scale: float = 1.0
 
     def entries(self, count: int, on_progress: Progress | None = None) -> Iterator[Entry]:
-        """The first `count` samples, in order; a few at a time, because decoding and encoding can overlap."""
+        """Yields the first `count` samples in order; several are decoded and encoded at the same time."""
         executor = ThreadPoolExecutor(min(8, cores()))
         try:
             for done, entry in enumerate(executor.map(self.entry, range(count)), start=1):
@@ -79,10 +81,10 @@ class Builder:
             executor.shutdown(cancel_futures=True)
 
     def entry(self, index: int) -> Entry:
-        """One sample; what cannot be read is said in its place.
+        """The entry of one sample; files that cannot be read are named in `problem`.
 
         Raises:
-            DatasetError: not even its sidecar can be read.
+            DatasetError: its sidecar cannot be read.
         """
         sidecar = self.dataset.sidecar(index)
         links = {path: self.base_url + quote(path) for path in sidecar.files if is_inside(path)}
@@ -102,7 +104,7 @@ class Builder:
         )
 
     def probe(self, index: int) -> list[UInt8Image]:
-        """A sample's pictures, to see how large they get."""
+        """A sample's pictures, to estimate the size of the page."""
         sample, _ = self._read(index)
         return [] if sample is None else [what.pixels for what in self._shown(sample)[0].values()]
 
@@ -121,7 +123,7 @@ class Builder:
             return images(sample), str(error)
 
     def _original(self, sidecar: Sidecar, pixels: UInt8Image) -> str | None:
-        """The file of the sample that holds exactly these pixels."""
+        """The file of the sample with exactly these pixels, if there is one."""
         for relative in sidecar.files:
             if PurePosixPath(relative).suffix.lower() in PICTURE_FILES and is_inside(relative):
                 try:
@@ -135,7 +137,7 @@ class Builder:
 
 
 def fitting_scale(builder: Builder, count: int, budget_bytes: float) -> float:
-    """The scale at which the pictures of `count` samples fit a budget, from a few of them."""
+    """The scale at which the pictures of `count` samples fit a budget, estimated from a few of them."""
     chosen = sorted({round(i * (count - 1) / (PROBES - 1)) for i in range(PROBES)})
     facts = [len(deflated(finite(detail(builder.dataset.sidecar(i), {})))) for i in chosen]
     room = budget_bytes - sum(facts) / len(facts) * count
@@ -147,12 +149,12 @@ def _pictures(builder: Builder, indices: Sequence[int]) -> list[list[UInt8Image]
 
 
 def deflated(value: Json) -> bytes:
-    """JSON as the page's `DecompressionStream` takes it."""
+    """JSON in the form that the page's `DecompressionStream` reads."""
     text = json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return zlib.compress(text.encode("utf-8", "replace"), 6)
 
 
 def is_inside(relative: str) -> bool:
-    """Whether a sidecar's path stays inside the dataset, so that it may be linked."""
+    """Whether a path of a sidecar stays inside the dataset, so that the page may link it."""
     pure = PurePosixPath(relative)
     return not pure.is_absolute() and ".." not in pure.parts and "\\" not in relative and "\0" not in relative

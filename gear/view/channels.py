@@ -1,4 +1,4 @@
-"""Channels: what a sample can be looked at as; its pictures and the task's previews of them."""
+"""Channels: the kinds of pictures of a sample, from its cameras and from the task's previews."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class Channel:
     """A kind of picture that samples have.
 
     Attributes:
-        kind: `image` for a camera's picture, `preview` for what the task draws.
-        name: the camera's, or the preview's.
+        kind: `image` for a camera's picture, `preview` for a picture that the task draws.
+        name: name of the camera or the preview.
     """
 
     kind: Literal["image", "preview"]
@@ -30,7 +30,7 @@ class Shown:
 
     Attributes:
         pixels: (H, W, 3) uint8 RGB.
-        camera: name of the view whose pixels these are aligned with, or None.
+        camera: name of the view whose pixels it is aligned with, or None.
     """
 
     pixels: UInt8Image
@@ -38,19 +38,19 @@ class Shown:
 
 
 class PreviewError(Exception):
-    """A task's preview failed or gave something that is no picture; says what."""
+    """A task's preview failed or returned something that is no picture."""
 
 
 def images(sample: Sample) -> dict[Channel, Shown]:
-    """The pictures of every camera."""
+    """The pictures of all cameras."""
     return {Channel("image", name): Shown(pixels, name) for name, pixels in sample.images.items()}
 
 
 def previews(task: Task[Any, Any], sample: Sample) -> dict[Channel, Shown]:
-    """The task's previews.
+    """The previews of the task.
 
     Raises:
-        PreviewError: the task failed, which is no reason not to show the rest.
+        PreviewError: the task failed; the pictures can still be shown.
     """
     try:
         pictures = check_previews(task.preview(sample))
@@ -60,9 +60,9 @@ def previews(task: Task[Any, Any], sample: Sample) -> dict[Channel, Shown]:
 
 
 def aligned_with(name: str, pixels: UInt8Image, sample: Sample) -> str | None:
-    """The camera that a preview covers pixel by pixel.
+    """The camera whose picture a preview covers pixel by pixel.
 
-    That is the one of the same size whose name the preview bears, else the first one of the same size.
+    It is the camera of the same size with the preview's name, or the first camera of the same size.
     """
     same: Mapping[str, UInt8Image] = {k: v for k, v in sample.images.items() if v.shape == pixels.shape}
     return next((camera for camera in same if camera == name), None) or next(

@@ -1,7 +1,7 @@
-"""What a task's own facts count, found without knowing the task.
+"""Histograms of a task's facts, found without knowing the task.
 
-Two shapes are understood: a mapping from names to numbers (pixels of each label) is a histogram as it is, and a list of
-mappings (objects) is counted by each of its short text fields (the label, the type).
+Two shapes are understood: a mapping from names to numbers (pixels per label) is a histogram, and a list of mappings
+(objects) is counted by each of its short text fields (label, type).
 """
 
 from __future__ import annotations
@@ -39,17 +39,17 @@ def _by_text(key: str, items: Sequence[Mapping[str, Any]]) -> Counts:
 
 
 def is_number(value: Any) -> bool:
-    """Whether a value can be added up."""
+    """Whether a value can be summed."""
     return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def is_label(value: Any) -> bool:
-    """Whether a value can name a class."""
+    """Whether a value can be the name of a class."""
     return isinstance(value, str) and 0 < len(value) <= LONGEST_LABEL
 
 
 def without_identifiers(samples: Sequence[Counts]) -> list[Counts]:
-    """Leaves out groups whose labels hardly ever come twice over the split: names and codes, not classes."""
+    """Leaves out groups whose labels rarely repeat over the split: they are names or codes, not classes."""
     totals: dict[str, Counter[str]] = {}
     for counts in samples:
         for group, numbers in counts.items():

@@ -1,8 +1,8 @@
-"""The page's text: template, style, script, index, pictures. Everything of the dataset goes in as data, never as HTML.
+"""The text of the page: template, style, script, index, pictures. The dataset's contents are embedded as data,
+never as HTML.
 
-The index is JSON in a script block that no browser runs, with every `<` written as an escape, and the script writes it
-into the page as text. A content security policy lets nothing run but the page's own script, by its hash, and nothing
-be fetched but pictures.
+The index is JSON in a script block that browsers do not run, with every `<` escaped, and the script inserts it as text.
+A content security policy allows only the page's own script, by its hash, and only pictures to be loaded.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ SCRIPTS = ("dom", "store", "histogram", "filters", "picture", "grid", "map", "ta
 
 
 def asset(name: str) -> str:
-    """A file of `gear/view/page`."""
+    """Reads a file of `gear/view/page`."""
     return (files("gear.view") / "page" / name).read_text(encoding="utf-8")
 
 
 def script() -> str:
-    """The page's script."""
+    """The script of the page."""
     body = "\n".join(asset(f"{name}.js") for name in SCRIPTS)
     return f'(() => {{\n"use strict";\n{body}\n}})();\n'
 
 
 def index_of(entries: Sequence[Entry], about: dict[str, Json]) -> dict[str, Json]:
-    """What the script reads first."""
+    """The JSON that the script reads first."""
     channels = channels_of(entries)
     rows = []
     for entry, counts in zip(entries, without_identifiers([e.row["counts"] for e in entries]), strict=True):
@@ -51,7 +51,7 @@ def index_of(entries: Sequence[Entry], about: dict[str, Json]) -> dict[str, Json
 
 
 def channels_of(entries: Sequence[Entry]) -> list[Channel]:
-    """All channels, pictures before previews, in the order in which samples name them."""
+    """All channels, pictures before previews, in the order in which the samples name them."""
     found = dict.fromkeys(channel for entry in entries for channel in entry.pictures)
     return sorted(found, key=lambda channel: channel.kind)
 
@@ -72,7 +72,7 @@ def _pictures(entry: Entry, channels: Sequence[Channel]) -> list[Json]:
 
 
 def document(title: str, entries: Sequence[Entry], about: dict[str, Json]) -> Iterator[str]:
-    """The page, piece by piece; pictures come last, so that a browser can begin before it has read them all."""
+    """Yields the pieces of the page; pictures come last, so that a browser can start before it has read them all."""
     style, code = asset("style.css"), script()
     fillings = {
         "policy": html.escape(policy(style, code)),
@@ -93,7 +93,7 @@ def document(title: str, entries: Sequence[Entry], about: dict[str, Json]) -> It
 
 
 def policy(style: str, code: str) -> str:
-    """The content security policy."""
+    """The page's content security policy."""
 
     def digest(text: str) -> str:
         return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
@@ -105,13 +105,13 @@ def policy(style: str, code: str) -> str:
 
 
 def embedded(value: Json) -> str:
-    """JSON that cannot end the script block that holds it."""
+    """JSON that cannot end the script block around it."""
     text = json.dumps(value, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
 def _filled(template: str, fillings: dict[str, str]) -> str:
-    """One pass, so that nothing inside a filling is taken for a place to fill."""
+    """Fills the template in one pass, so that nothing in a filling is taken for a placeholder."""
     return re.sub(r"\{\{(\w+)\}\}", lambda match: fillings[match[1]], template)
 
 

@@ -1,4 +1,4 @@
-"""Pictures small enough that a page of all of them still opens quickly."""
+"""Encodes pictures so small that a page with all of them opens quickly."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ LEAST_WIDTH_PX = 160
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
-    """A picture as the page carries it.
+    """A picture as embedded in the page.
 
     Attributes:
         data: encoded bytes.
-        width_px, height_px: of the original, before any scaling.
-        is_whole: whether it has the original's size.
+        width_px, height_px: size of the original picture.
+        is_whole: whether it has the size of the original.
     """
 
     data: bytes
@@ -39,7 +39,7 @@ class Picture:
 
 
 def encode(pixels: UInt8Image, scale: float) -> Picture:
-    """Scales (H, W, 3) RGB down by area and compresses it."""
+    """Resizes a (H, W, 3) RGB picture by area averaging and compresses it."""
     height, width = pixels.shape[:2]
     target = max(round(width * scale), min(width, LEAST_WIDTH_PX))
     target = max(1, min(target, MOST_PX, MOST_PX * width // height))
@@ -54,12 +54,12 @@ def encode(pixels: UInt8Image, scale: float) -> Picture:
 
 
 def largest_scale(probes: Sequence[Sequence[UInt8Image]], samples: int, budget_bytes: float) -> float:
-    """The largest of `SCALES` at which all samples fit the budget, as far as a few of them tell.
+    """The largest of `SCALES` at which the pictures of all samples fit the budget, estimated from a few samples.
 
     Args:
-        probes: the pictures of some samples.
-        samples: how many there are altogether.
-        budget_bytes: for all pictures, encoded.
+        probes: pictures of a few samples.
+        samples: number of all samples.
+        budget_bytes: budget for all encoded pictures.
     """
     for scale in SCALES:
         allowed = budget_bytes * len(probes) / samples

@@ -1,7 +1,7 @@
-"""What samples can be filtered by in a task's own facts, found without knowing the task.
+"""The measures by which samples can be filtered, found in a task's facts without knowing the task.
 
-Lists of mappings are objects. Fields whose name ends in `_fraction` or `distance_m` measure them, as gear's own tasks
-say how much of an object is seen and how far it is; the first field that is a short text in all of them is their label.
+Lists of mappings are objects. Fields whose name ends in `_fraction` or `distance_m` are their measures (visible share,
+distance); the first field that is a short text in all of them is their label.
 """
 
 from __future__ import annotations
@@ -16,7 +16,9 @@ MEASURES = ("_fraction", "distance_m")
 
 
 def measures(facts: Json) -> Json:
-    """`labels`, one an object, and `values`, by field, one an object; None where an object has no such field."""
+    """`labels` with one entry per object, and `values` by field with one entry per object; None where an object
+    lacks the field.
+    """
     lists = facts.values() if isinstance(facts, dict) else ()
     objects: list[dict[str, Any]] = []
     labels: list[str] = []

@@ -1,4 +1,4 @@
-"""The page's index: what it must know of every sample before one is opened, as JSON."""
+"""The page's index as JSON: what the overview needs of every sample before one is opened."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gear.view.surface_occlusion import hidden
 
 
 def row(sidecar: Sidecar) -> dict[str, Json]:
-    """One sample's line in the index: places from above, surfaces, what its facts count and measure."""
+    """The index entry of one sample: positions from above, surfaces, counts and measures."""
     record = sidecar.record
     return {
         "index": record.index,
@@ -36,7 +36,7 @@ def row(sidecar: Sidecar) -> dict[str, Json]:
 
 
 def detail(sidecar: Sidecar, links: dict[str, str]) -> dict[str, Json]:
-    """Everything else of a sample, read when its page is opened."""
+    """All other facts of a sample, read when its page is opened."""
     return {
         "record": to_json(sidecar.record),
         "surfaces": to_json(sidecar.surfaces),
@@ -46,7 +46,7 @@ def detail(sidecar: Sidecar, links: dict[str, str]) -> dict[str, Json]:
 
 
 def finite(value: Any) -> Json:
-    """The same JSON with None for what JSON has no number for."""
+    """The same JSON with None for numbers that JSON cannot express."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):
@@ -78,7 +78,7 @@ def _camera(camera: CameraRecord) -> dict[str, Json]:
 
 
 def _board(record: SceneRecord, surface: SurfaceRecord) -> dict[str, Json]:
-    """Both ends of the face seen from above, and where its viewers stand."""
+    """Both ends of a face seen from above, and the side from which it is viewed."""
     world_from_surface = record.world_from_surface(surface)
     right = world_from_surface.rotation[:, 0] * surface.width_m / 2
     outward = -world_from_surface.rotation[:, 2]

@@ -1,4 +1,4 @@
-"""How much of a patch surface the picture's border and other things hide."""
+"""Truncation and occlusion of a patch surface."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Hidden:
-    """Shares of a surface's silhouette; None where a corner lies behind the camera or the surface looks away.
+    """Shares of a surface's silhouette; None where a corner is behind the camera or the surface faces away.
 
     Attributes:
-        truncated_fraction: outside the picture.
-        occluded_fraction: of what lies inside the picture, what something else covers; None too if nothing does.
+        truncated_fraction: share outside the picture.
+        occluded_fraction: share of the part inside the picture that is occluded; None also where no part is inside.
     """
 
     truncated_fraction: float | None
@@ -24,7 +24,7 @@ class Hidden:
 
 
 def hidden(truth: SurfaceTruth, camera: CameraRecord) -> Hidden:
-    """Measures both from the outline in index pixels and the count of visible pixels."""
+    """Computes both shares from the outline in index pixels and the number of visible pixels."""
     if truth.corners_px is None or truth.incidence_deg >= 90:
         return Hidden(None, None)
     outline = [(x, y) for x, y in truth.corners_px]

@@ -1,4 +1,4 @@
-"""`gear view`: a dataset's page, written in one go."""
+"""`gear view`: writes the page of a dataset."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ BASE64 = 4 / 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ViewReport:
-    """What was written.
+    """The result.
 
     Attributes:
-        path: the page.
-        samples: how many it shows.
-        size_bytes: of the page.
-        scale: side of the embedded pictures as a share of the originals'.
-        problems: (index, what) of samples that could not be shown in full.
+        path: path of the page.
+        samples: number of samples on the page.
+        size_bytes: size of the page.
+        scale: scale of the embedded pictures.
+        problems: (index, problem) of samples that could not be shown completely.
     """
 
     path: Path
@@ -43,7 +43,7 @@ class ViewReport:
     problems: tuple[tuple[int, str], ...]
 
     def summary(self) -> str:
-        """One line for a person, and one for the first problem if there are any."""
+        """One line about the result, and one for the first problem if there are any."""
         size = f"{self.size_bytes / MEGABYTE:.1f} MB"
         scaled = "" if self.scale == 1 else f", pictures at {self.scale:.0%} of their width"
         text = f"{self.path}: {counted(self.samples, 'sample')}, {size}{scaled}"
@@ -90,7 +90,7 @@ def write_page(
     max_mb: float = 48.0,
     on_progress: Progress | None = None,
 ) -> ViewReport:
-    """`write_view` of a dataset that is open already."""
+    """As `write_view`, for an opened dataset."""
     target = Path(out)
     refuse_folder(target)
     with explained(target):
@@ -109,7 +109,7 @@ def write_page(
 
 
 def about(dataset: Dataset[Any], scale: float) -> dict[str, Json]:
-    """What the page says of the whole split."""
+    """The facts of the whole split on the page."""
     plan = dataset.plan
     known = {key: value for key, value in dataset.manifest.items() if key not in ("samples", "indexes", "sidecars")}
     named = {"task": plan.task, "options": plan.options, "content": plan.content, "patch": plan.patch}
@@ -129,7 +129,7 @@ def about(dataset: Dataset[Any], scale: float) -> dict[str, Json]:
 
 
 def base_url(root: Path, page: Path) -> str:
-    """Where a dataset's root lies, seen from the page."""
+    """URL of a dataset's root relative to the page."""
     return "./" + quote(Path(os.path.relpath(root.resolve(), page.resolve().parent)).as_posix()) + "/"
 
 

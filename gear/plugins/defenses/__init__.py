@@ -1,1 +1,1 @@
-"""Built-in defenses, one file each."""
+"""Built-in defenses, one file each; defenses that read activations share `activations`."""

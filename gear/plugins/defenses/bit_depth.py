@@ -1,4 +1,4 @@
-"""Feature squeezing: fewer bits a channel (Xu et al., NDSS 2018)."""
+"""Feature squeezing: fewer bits per channel (Xu et al., NDSS 2018)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class BitDepthConfig:
     """Options of bit-depth reduction.
 
     Attributes:
-        bits: of each channel, 1 to 7.
+        bits: bits per channel, 1 to 7.
     """
 
     bits: int = 4
@@ -33,18 +33,18 @@ class BitDepthConfig:
 
 
 class BitDepth(PerPicture):
-    """Each value goes to the nearest of 2^bits evenly spaced levels."""
+    """Rounds each value to the nearest of 2^bits evenly spaced levels."""
 
     def __init__(self, config: BitDepthConfig) -> None:
         steps = 2**config.bits - 1
         self._table = np.rint(np.rint(np.arange(256) / 255 * steps) / steps * 255).astype(np.uint8)
 
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The squeezed picture, no mask."""
+        """The squeezed picture; no mask."""
         return self._table[picture], None
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """The squeezed values, the identity's gradient."""
+        """The squeezed values with the gradient of the identity."""
         return straight_through(pictures, each_as_uint8(pictures, lambda picture: self._table[picture]))
 
 

@@ -1,4 +1,4 @@
-"""FPDA (Rossolini et al., IEEE TNNLS 2023): HyperNeuron on features that were averaged over channels first."""
+"""FPDA (Rossolini et al., IEEE TNNLS 2023): HyperNeuron on features averaged over channels."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ PEAK_CELLS = 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FpdaConfig(DetectorConfig):
-    """Options. The published text says that features are compressed over channels and compared by Z-scores.
+    """Options. The paper says that features are compressed over channels and compared by z-scores.
 
     Attributes:
-        compress: mean over channels, of the features or of their sizes.
-        aggregate: mean of the Z-scores' sizes, or the largest mean of a window of 3 x 3, for patches far away.
+        compress: mean over channels, of the features or of their magnitudes.
+        aggregate: mean of the z-scores' magnitudes, or the largest mean of a 3 x 3 window, for distant patches.
     """
 
     compress: Literal["mean", "mean_abs"] = "mean"
@@ -31,7 +31,7 @@ class FpdaConfig(DetectorConfig):
 
 
 def build(config: FpdaConfig) -> Defense:
-    """The detector."""
+    """Builds the detector."""
     from torch.nn import functional
 
     from gear.plugins.defenses.activations.score_detector import Detector

@@ -45,7 +45,7 @@ class Gaussian(PerPicture):
         self._kernel: npt.NDArray[np.float32] = (kernel / kernel.sum()).astype(np.float32)
 
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The blurred picture, no mask."""
+        """The blurred picture; no mask."""
         blurred = cv2.sepFilter2D(
             picture.astype(np.float32), -1, self._kernel, self._kernel, borderType=cv2.BORDER_REFLECT_101
         )
@@ -67,9 +67,9 @@ class Gaussian(PerPicture):
 
 
 def _mirrored(side_px: int, radius_px: int) -> npt.NDArray[np.int64]:
-    """Which of `side_px` pixels lie in a row with borders, mirrored as often as a border wider than the row asks for.
-
-    Torch's own padding ends at the picture's side.
+    """Indices of the pixels of a row of `side_px` pixels with mirrored borders, mirrored repeatedly where the
+    border is wider than
+    the row. Torch's own padding allows no border wider than the picture.
     """
     there_and_back_px = max(2 * (side_px - 1), 1)
     steps = np.arange(-radius_px, side_px + radius_px) % there_and_back_px

@@ -1,4 +1,4 @@
-"""HyperNeuron (Co et al., 2021): patches drive a network's neurons to values that they hardly ever have."""
+"""HyperNeuron (Co et al., 2021): patches drive a network's neurons to unusual values."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ FAR = 3.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HyperNeuronConfig(DetectorConfig):
-    """Options. The published text says that the score comes from the Z-scores of all features of one layer, not how.
+    """Options. The paper says that the score comes from the z-scores of all features of one layer, but not how.
 
     Attributes:
-        statistics: what is usual is asked of each neuron (channel and place), or of each channel's mean in a picture.
-        aggregate: mean of the Z-scores' sizes, root of the mean of their squares, or share of sizes above 3.
+        statistics: statistics of each neuron (channel and position), or of each channel's mean over a picture.
+        aggregate: mean of the z-scores' magnitudes, their root mean square, or the share of magnitudes above 3.
     """
 
     statistics: Literal["neuron", "channel"] = "neuron"
@@ -31,7 +31,7 @@ class HyperNeuronConfig(DetectorConfig):
 
 
 def build(config: HyperNeuronConfig) -> Defense:
-    """The detector."""
+    """Builds the detector."""
     from gear.plugins.defenses.activations.score_detector import Detector
 
     def compress(features: Tensor) -> Tensor:

@@ -23,7 +23,7 @@ class JpegConfig:
     """Options of JPEG compression.
 
     Attributes:
-        quality: libjpeg's, 1 to 100.
+        quality: libjpeg's quality, 1 to 100.
     """
 
     quality: int = 50
@@ -34,17 +34,17 @@ class JpegConfig:
 
 
 class Jpeg(PerPicture):
-    """Compresses and decompresses."""
+    """Compresses and decompresses every picture."""
 
     def __init__(self, config: JpegConfig) -> None:
         self._parameters = [cv2.IMWRITE_JPEG_QUALITY, config.quality]
 
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The picture as it comes out of the decoder, no mask."""
+        """The decoded picture; no mask."""
         return self._recode(picture), None
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """The decoder's values, the identity's gradient."""
+        """The decoded values with the gradient of the identity."""
         return straight_through(pictures, each_as_uint8(pictures, self._recode))
 
     def _recode(self, picture: UInt8Image) -> UInt8Image:

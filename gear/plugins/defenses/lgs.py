@@ -1,4 +1,4 @@
-"""Local gradients smoothing (Naseer et al., WACV 2019): what changes too quickly is darkened."""
+"""Local gradients smoothing (Naseer et al., WACV 2019): regions with strong gradients are darkened."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ LEAST_SPREAD = 1e-7
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LgsConfig:
-    """Options, with the paper's values.
+    """Options, with the paper's values as defaults.
 
     Attributes:
         window_px: side of the windows.
-        overlap_px: of neighbouring windows.
-        threshold: a window is kept if its mean normalised gradient exceeds this, 0 to 1.
-        strength: how much of the gradient is taken away (lambda).
+        overlap_px: overlap of neighbouring windows.
+        threshold: a window is processed if its mean normalised gradient exceeds this value, 0 to 1.
+        strength: factor lambda on the gradient.
     """
 
     window_px: int = 15
@@ -60,7 +60,7 @@ class Lgs(PerPicture):
         self._stride_px = config.window_px - config.overlap_px
 
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The darkened picture and how much was taken away."""
+        """The darkened picture, and the darkening as a mask."""
         unit = picture.astype(np.float32) / 255
         grey = unit @ np.array(GREY, np.float32)
         dx, dy = np.zeros_like(grey), np.zeros_like(grey)
@@ -91,7 +91,7 @@ class Lgs(PerPicture):
         return np.arange(count) * self._stride_px
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """The same in torch; the gradient passes everywhere but through the choice of windows."""
+        """The same in torch; the choice of windows has no gradient."""
         import torch
 
         grey = (pictures * pictures.new_tensor(GREY).view(1, 3, 1, 1)).sum(1, keepdim=True)

@@ -23,7 +23,7 @@ class MedianConfig:
     """Options of the median filter.
 
     Attributes:
-        radius_px: the window is 2 * radius + 1 pixels a side; 1 to 5.
+        radius_px: radius of the window, 1 to 5; its side is 2 * radius + 1 pixels.
     """
 
     radius_px: int = 1
@@ -34,13 +34,13 @@ class MedianConfig:
 
 
 class Median(PerPicture):
-    """Each channel's median over a square window; borders are repeated."""
+    """The median of each channel over a square window; borders are replicated."""
 
     def __init__(self, config: MedianConfig) -> None:
         self._side_px = 2 * config.radius_px + 1
 
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The filtered picture, no mask."""
+        """The filtered picture; no mask."""
         return np.asarray(cv2.medianBlur(np.ascontiguousarray(picture), self._side_px), np.uint8), None
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:

@@ -1,4 +1,4 @@
-"""Defenses that clean every picture by itself: no model, no calibration, no draw."""
+"""Base of defenses that clean each picture separately: no model, no calibration, no randomness."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ Mask = npt.NDArray[np.float32]
 
 
 class PerPicture(ABC):
-    """A `Defense` made of one picture's cleaning, in NumPy and in torch."""
+    """A `Defense` made of a function that cleans one picture, in NumPy and in torch."""
 
     @abstractmethod
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The cleaned (H, W, 3) sRGB picture, a new array, and where the patch is believed to be, in 0..1."""
+        """The cleaned (H, W, 3) sRGB picture, a new array, and the estimated patch mask in 0..1, or None."""
 
     @abstractmethod
     def clean_tensor(self, pictures: Tensor) -> Tensor:
@@ -37,13 +37,13 @@ class PerPicture(ABC):
         model: Model | None,
         rng: np.random.Generator,
     ) -> None:
-        """Nothing to learn."""
+        """Needs no calibration."""
         return
 
     def apply(
         self, views: Mapping[str, UInt8Image], model: Model | None, state: Any, rng: np.random.Generator
     ) -> DefenseResult:
-        """Cleans each view."""
+        """Cleans the picture of each view."""
         cleaned: dict[str, UInt8Image] = {}
         masks: dict[str, Mask] = {}
         for name, picture in views.items():
@@ -54,11 +54,11 @@ class PerPicture(ABC):
         return DefenseResult(views=cleaned, mask=masks or None, score=score)
 
     def forward(self, views: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """Cleans each view's batch."""
+        """Cleans the batch of each view."""
         return {name: self.clean_tensor(pictures) for name, pictures in views.items()}
 
     def wrap(self, model: Model) -> Model:
-        """The model as it is."""
+        """Returns the model unchanged."""
         return model
 
 
@@ -68,7 +68,7 @@ def straight_through(pictures: Tensor, cleaned: Tensor) -> Tensor:
 
 
 def each_as_uint8(pictures: Tensor, clean: Any) -> Tensor:
-    """Takes every picture of a batch through a uint8 NumPy function, without a gradient."""
+    """Applies a uint8 NumPy function to every picture of a batch, without a gradient."""
     import torch
 
     levels = (pictures.detach().clamp(0, 1) * 255).round().to(torch.uint8).permute(0, 2, 3, 1).cpu().numpy()
