@@ -1,4 +1,4 @@
-"""From a name and options to a product."""
+"""From a plugin's name and options to its product, and whom to blame when a plugin's code fails."""
 
 from __future__ import annotations
 
@@ -22,7 +22,12 @@ NO_OPTIONS = Mapping({}, Place("defaults"))
 
 
 def find(kind: Kind, name: str) -> PluginEntry:
-    """The plugin that answers to a name."""
+    """The plugin of a kind with a name.
+
+    Raises:
+        UnknownNameError: there is none.
+        DuplicateNameError: several packages have one.
+    """
     return catalogue().get(kind, name)
 
 
@@ -37,8 +42,14 @@ def broken_hint() -> str:
 
 
 def name_of_task(written: JsonMapping[str, Any]) -> str:
-    """How the task that wrote a dataset is asked for, from what its plan says of it: with its package, if that is
-    installed, since another's task may have the same name.
+    """The name by which the task that wrote a dataset is found.
+
+    Args:
+        written: what the dataset's plan says of its task.
+
+    Returns:
+        `package/name` where that package is installed, since another package may have a task of the same name; else
+            `name`.
     """
     full = f"{written.get('package')}/{written['name']}"
     return full if any(found.full_name == full for found in catalogue().of_kind("task")) else written["name"]
@@ -58,11 +69,11 @@ def build(found: PluginEntry, options: Node = NO_OPTIONS) -> Any:
 
 @contextlib.contextmanager
 def blamed(found: PluginEntry, stage: str) -> Iterator[None]:
-    """Around a plugin's code: what it prints goes to stderr, and what a third party's raises says whose it is.
+    """Around a plugin's code: output to stdout goes to stderr, and an exception of a third party names its plugin.
 
     Raises:
-        PluginError: it raised something other than a `GearError`. A built-in that does is our bug and keeps its
-            traceback.
+        PluginError: a third party's code raised something other than a `GearError`. Exceptions of built-in plugins are
+            faults of gear and keep their traceback.
     """
     try:
         with contextlib.redirect_stdout(sys.stderr):
@@ -79,11 +90,11 @@ def blamed(found: PluginEntry, stage: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def traced(founds: Iterable[PluginEntry], stage: str) -> Iterator[None]:
-    """Around another's code that calls plugins, such as an attack's that asks a network: what passes through a third
-    party's package on its way says whose it is.
+    """Around code that calls plugins, such as an attack that calls a network: exceptions that passed a third party's
+    package name it.
 
     Raises:
-        PluginError: code of one of the packages raised something other than a `GearError`, or what it called did.
+        PluginError: code of one of the packages, or code that it called, raised something other than a `GearError`.
     """
     try:
         yield
@@ -101,7 +112,7 @@ def traced(founds: Iterable[PluginEntry], stage: str) -> Iterator[None]:
 
 
 def build_task(name: str, options: Node = NO_OPTIONS) -> tuple[TaskSpec[Any], Task[Any, Any]]:
-    """A task and its spec."""
+    """The spec of a task and the task built from options."""
     found = find("task", name)
     assert isinstance(found.spec, TaskSpec)
     return found.spec, build(found, options)

@@ -1,4 +1,4 @@
-"""The plugins that gear brings, by module. They come in by the same hooks as everybody else's."""
+"""Module names of the built-in plugins. They are registered through the same hooks as those of third parties."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What was found: specs with their owners, and plugins that broke. Names are looked up here."""
+"""The catalogue of plugins: specs with their owners, broken plugins, and the look-up of names."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from gear.values.errors import DuplicateNameError, PluginError, UnknownNameError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Owner:
-    """Whose a plugin is.
+    """The distribution that a plugin comes from.
 
     Attributes:
-        plugin: name of its entry point, or of its module for built-ins.
-        package: distribution, `mujoco-gear` for built-ins.
+        plugin: name of its entry point; of built-ins, name of the module.
+        package: name of the distribution; `mujoco-gear` for built-ins.
         version: of the distribution.
     """
 
@@ -35,17 +35,17 @@ class PluginEntry:
 
     @property
     def full_name(self) -> str:
-        """`package/name`: unique whatever else is installed."""
+        """`package/name`, which is unique among all installed plugins."""
         return f"{self.owner.package}/{self.spec.name}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Broken:
-    """A plugin that failed; everything else goes on working.
+    """A plugin that failed to load; all others work.
 
     Attributes:
-        owner: whose it is.
-        stage: `import`, `register`, `hook`, `spec`.
+        owner: where it comes from.
+        stage: `entry_points.txt`, `import`, `register`, `hook <name>` or `spec`.
         problem: one line.
     """
 
@@ -54,33 +54,38 @@ class Broken:
     problem: str
 
     def error(self) -> PluginError:
-        """As an exception, for `--strict-plugins`."""
+        """The failure as an exception, for `--strict-plugins`."""
         return PluginError(f"{self.owner.plugin} ({self.owner.package} {self.owner.version})", self.stage, self.problem)
 
 
 @dataclass(frozen=True, slots=True)
 class Catalogue:
-    """All plugins of this environment."""
+    """All plugins of this environment.
+
+    Attributes:
+        found: plugins that work.
+        broken: plugins that failed.
+    """
 
     found: tuple[PluginEntry, ...]
     broken: tuple[Broken, ...] = field(default=())
 
     def of_kind(self, kind: Kind) -> tuple[PluginEntry, ...]:
-        """Sorted by name, then package."""
+        """The plugins of a kind, sorted by name, then package."""
         return tuple(sorted((f for f in self.found if f.kind == kind), key=lambda f: (f.spec.name, f.owner.package)))
 
     def names(self, kind: Kind) -> tuple[str, ...]:
-        """How each can be asked for: short where that is unique."""
+        """The names by which the plugins of a kind are found: short where that is unique, else `package/name`."""
         found = self.of_kind(kind)
         short = [f.spec.name for f in found]
         return tuple(f.spec.name if short.count(f.spec.name) == 1 else f.full_name for f in found)
 
     def get(self, kind: Kind, name: str) -> PluginEntry:
-        """By short name if unique, else by `package/name`.
+        """The plugin with a short name, if that is unique, or with a name `package/name`.
 
         Raises:
-            UnknownNameError: nothing answers to it; says what was meant and what failed to load.
-            DuplicateNameError: two do.
+            UnknownNameError: there is none; the message suggests similar names and lists plugins that failed to load.
+            DuplicateNameError: several plugins have the name.
         """
         found = self.of_kind(kind)
         hits = [f for f in found if name in (f.spec.name, f.full_name)]
@@ -91,7 +96,7 @@ class Catalogue:
         raise UnknownNameError(kind, name, self.names(kind), self.broken_hint())
 
     def broken_hint(self) -> str:
-        """What failed to load, for those who miss a name; "" if nothing did."""
+        """In brackets, the plugins that failed to load, for messages about unknown names; "" if none did."""
         if not self.broken:
             return ""
         names = dict.fromkeys(b.owner.plugin for b in self.broken)
@@ -109,10 +114,10 @@ class Catalogue:
 
 
 def as_iterable(value: Any) -> Iterable[Any]:
-    """What a hook returned, if it can be walked.
+    """The return value of a hook, if it is a collection.
 
     Raises:
-        TypeError: it cannot.
+        TypeError: it is not.
     """
     if isinstance(value, (str, bytes, dict)) or not isinstance(value, Iterable):
         raise TypeError(f"a hook returns a list of specs, got {type(value).__name__}")

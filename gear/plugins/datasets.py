@@ -51,7 +51,7 @@ def open_dataset(path: str | Path, split: str | None = None) -> Dataset[Any]:
 
 
 def root_and_split(path: str | Path) -> tuple[Path, str | None]:
-    """What `DIR` or `DIR:SPLIT` means."""
+    """Root and split of a path written as `DIR` or `DIR:SPLIT`; the split is None in the former case."""
     if not Path(path).exists() and ":" in str(path):
         text, _, split = str(path).rpartition(":")
         return Path(text), split
@@ -59,7 +59,7 @@ def root_and_split(path: str | Path) -> tuple[Path, str | None]:
 
 
 def roots_of(folder: Path) -> list[Path]:
-    """The folder itself where it is a dataset's root, else the roots in it, by name; none where there is none."""
+    """The folder itself if it is the root of a dataset, else the roots inside it, by name; empty if there are none."""
     if next(folder.glob("gear/*/plan.json"), None) is not None:
         return [folder]
     plans = (plan for depth in range(DEEPEST + 1) for plan in folder.glob("*/" * depth + "gear/*/plan.json"))

@@ -1,4 +1,4 @@
-"""What a plugin says of itself, for lists and pages: capabilities, options with meaning and unit, source."""
+"""Descriptions of plugins for lists and pages: capabilities, options with meaning and unit, source file."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ def summary(found: PluginEntry) -> dict[str, Any]:
 
 
 def training(spec: AnySpec) -> dict[str, Any]:
-    """How a network is trained unless one says otherwise (None where it cannot be), and the names that `gear train
-    --init` knows beside `shipped` and files; nothing for other plugins; JSON.
+    """JSON of a network's training recipe (None where gear cannot train it) and the names that `gear train --init`
+    accepts in addition to `shipped` and files; empty for other plugins.
     """
     if not isinstance(spec, ModelSpec):
         return {}
@@ -54,7 +54,7 @@ def training(spec: AnySpec) -> dict[str, Any]:
 
 
 def options(config: type[Any]) -> list[dict[str, Any]]:
-    """Every option with its type, default, meaning and unit; nested ones with dots; JSON."""
+    """JSON of every option with type, default, meaning and unit; names of nested options have dots."""
     return _options(config(), "")
 
 
@@ -82,7 +82,9 @@ def _options(defaults: Any, prefix: str) -> list[dict[str, Any]]:
 
 
 def meanings_of(config: type[Any]) -> dict[str, str]:
-    """What the docstrings of a config and its bases say under `Attributes:`, by field; one line each."""
+    """The descriptions of a config's fields under `Attributes:` in its docstring and those of its bases, one line
+    each.
+    """
     result: dict[str, str] = {}
     for owner in reversed(config.__mro__):
         _, found, section = inspect.cleandoc(owner.__dict__.get("__doc__") or "").partition("Attributes:\n")
@@ -102,7 +104,7 @@ def meanings_of(config: type[Any]) -> dict[str, str]:
 
 
 def source_of(spec: AnySpec) -> str:
-    """The file that the plugin's `build` is written in, or "" where Python cannot say."""
+    """The file in which the plugin's `build` is written; "" where Python does not know it."""
     try:
         return inspect.getsourcefile(spec.build) or ""
     except TypeError:

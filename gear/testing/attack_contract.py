@@ -38,24 +38,24 @@ class Counted:
         self.passes = 0
 
     def predict(self, views: Mapping[str, Any]) -> Any:
-        """The model's, counted."""
+        """The model's prediction; counted."""
         self.passes += 1
         return self.network.predict(views)
 
     def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
-        """The model's, counted."""
+        """The model's outputs or losses; counted."""
         self.passes += 1
         outputs: Mapping[str, Tensor] = self.network(views, targets)
         return outputs
 
     def taps(self) -> Mapping[str, torch.nn.Module]:
-        """The model's."""
+        """The feature maps of the model."""
         taps: Mapping[str, torch.nn.Module] = self.network.taps()
         return taps
 
 
 class Watching:
-    """A watch that remembers what it is told, and may start from a state."""
+    """A `Watch` that records what it is told, and can start from a state."""
 
     def __init__(self, start: State | None = None) -> None:
         self.start = start
@@ -73,7 +73,7 @@ class Watching:
         patches: Callable[[], tuple[Patch, ...]],
         state: Callable[[], State],
     ) -> bool:
-        """Remembers; never asks to end."""
+        """Records its arguments; never asks the attack to stop."""
         self.told.append(done)
         self.states.append(state())
         assert all(isinstance(value, float) for value in values.values())
@@ -99,7 +99,7 @@ class AttackContract:
     passes_per_step: ClassVar[int] = 4
 
     def make(self) -> Attack:
-        """A fresh one."""
+        """A fresh attack."""
         return self.spec.build(self.spec.config(**self.options))
 
     def model(self) -> Counted:
@@ -107,7 +107,7 @@ class AttackContract:
         return Counted(TINY[self.task].build(TinyConfig()))
 
     def dataset(self, boards: int = 1) -> list[Any]:
-        """Two samples with so many boards."""
+        """Two samples with a number of boards."""
         found = catalogue().get("task", self.task).spec
         assert isinstance(found, TaskSpec)
         task = found.build(found.config(**self.task_options))
@@ -118,7 +118,7 @@ class AttackContract:
         return [freeze(task.ground_truth(*frame)) for frame in frames]
 
     def budget(self, steps: int) -> Budget:
-        """So many steps; for attacks without gradients as many queries as they may take."""
+        """A number of steps; for attacks without gradients, with as many queries as they may use."""
         return Budget(steps=steps, queries=None if self.spec.needs_gradients else steps * self.passes_per_step)
 
     def attack(
@@ -136,7 +136,7 @@ class AttackContract:
         return self.make().optimise(model, dataset, compositor, budget=self.budget(steps), rng=rng, watch=watch)
 
     def harm(self, model: Counted, dataset: Sequence[Any], patches: Sequence[Patch]) -> float:
-        """What the attack wants to be large; override for attacks that want something else than a large loss."""
+        """What the attack maximises; override for attacks with another objective than the loss."""
         tensors = [torch.from_numpy(patch.rgb.copy()).permute(2, 0, 1) for patch in patches]
         (view,) = TINY[self.task].views
         with torch.no_grad():

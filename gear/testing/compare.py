@@ -1,4 +1,4 @@
-"""Equality of samples, which hold arrays and so have no `==` of their own."""
+"""Equality of samples, which hold arrays and therefore have no usable `==`."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import numpy as np
 
 
 def difference(a: Any, b: Any, where: str = "value") -> str:
-    """Where two values differ first, or "" if they are equal: arrays in shape, dtype and every element, NaN equal to
-    NaN."""
+    """The first difference of two values, "" if they are equal: arrays in shape, dtype and all elements, NaN equal to
+    NaN.
+    """
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
         return _array_difference(np.asarray(a), np.asarray(b), where)
     if dataclasses.is_dataclass(a) and not isinstance(a, type):
@@ -31,8 +32,10 @@ def difference(a: Any, b: Any, where: str = "value") -> str:
 
 
 def share_apart(a: Any, b: Any, tolerance: float) -> float:
-    """Share of the numbers of two values that differ by more than `tolerance` times the largest of their array, NaN
-    equal to NaN; of those inside containers the largest share; 1 where shapes, types, names or counts differ.
+    """Share, 0..1, of the numbers that differ by more than `tolerance` times the largest of their array, NaN equal to
+    NaN.
+
+    Of containers, the largest share of their items; 1 where shapes, types, names or counts differ.
     """
     if dataclasses.is_dataclass(a) and type(a) is type(b):
         names = [field.name for field in dataclasses.fields(a)]
@@ -51,7 +54,7 @@ def share_apart(a: Any, b: Any, tolerance: float) -> float:
 
 
 def freeze(value: Any) -> Any:
-    """Makes every array inside read-only, in place, and returns the value."""
+    """Makes all arrays inside a value read-only, in place, and returns the value."""
     if isinstance(value, np.ndarray):
         value.setflags(write=False)
     elif dataclasses.is_dataclass(value) and not isinstance(value, type):

@@ -63,20 +63,20 @@ class DefenseContract:
     size_px: ClassVar[tuple[int, int]] = (128, 72)
 
     def model(self) -> Model | None:
-        """What it guards; override where the defense looks into the model."""
+        """The guarded model; override where the defense needs one."""
         return None
 
     def make(self) -> Defense:
-        """A fresh one."""
+        """A fresh defense."""
         return self.spec.build(self.spec.config(**self.options))
 
     def pictures(self, seed: int = 0, *, is_patched: bool = True) -> dict[str, UInt8Image]:
-        """One sample."""
+        """The pictures of one sample, by camera name."""
         plain = {name: street_picture(*self.size_px, seed * 10 + i) for i, name in enumerate(self.views)}
         return {name: noisy_patch(p, seed)[0] for name, p in plain.items()} if is_patched else plain
 
     def state(self, defense: Defense) -> Any:
-        """What `fit` learns from four samples."""
+        """What `fit` returns for four samples."""
         clean = [self.pictures(i, is_patched=False) for i in range(4)]
         patched = [self.pictures(i) for i in range(4)]
         return defense.fit(clean, patched, self.model(), derive_rng(SEED, "fit"))

@@ -56,7 +56,7 @@ class MetricContract:
         raise NotImplementedError(f"override spoil: say how a prediction of task {task!r} gets worse")
 
     def make(self) -> Evaluator[Any, Any]:
-        """A fresh, empty evaluator."""
+        """A fresh, empty evaluator of the metric."""
         return self.spec.build(self.spec.config(**self.options))
 
     def task(self, name: str) -> Task[Any, Any]:

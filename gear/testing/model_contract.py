@@ -43,7 +43,7 @@ class ModelContract:
     tolerance: ClassVar[float] = 1e-4
 
     def make(self) -> Model:
-        """A fresh one; override where the options cannot be said in advance."""
+        """A fresh model; override where the options depend on the test."""
         return self.spec.build(self.spec.config(**self.options))
 
     def samples(self, task: str) -> list[Any]:
@@ -54,11 +54,11 @@ class ModelContract:
         return [builder.ground_truth(*synthetic_frame(builder.rig(), index=i, seed=5)) for i in range(2)]
 
     def views(self, sample: Any) -> dict[str, UInt8Image]:
-        """What the model sees of a sample."""
+        """The pictures of a sample that the model takes."""
         return {name: sample.images[name] for name in self.spec.views}
 
     def batch(self, samples: Sequence[Any]) -> dict[str, Tensor]:
-        """The same in torch, asking for gradients."""
+        """The pictures of several samples as tensors that require gradients."""
         tensors = as_batch([self.views(sample) for sample in samples])
         return {name: tensor.requires_grad_(self.spec.has_gradients) for name, tensor in tensors.items()}
 

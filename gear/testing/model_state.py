@@ -1,4 +1,4 @@
-"""A model's state, so that whoever borrows a model can be held to leaving it as it was."""
+"""The state of a model, to check that code that uses a model leaves it unchanged."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gear.plugins.attacks.optimisation.frozen_model import networks_of
 
 
 def state_of(model: Any) -> dict[str, str]:
-    """Every parameter and buffer as a hash, with whether it wants a gradient and has one, and every module's mode."""
+    """Hashes of all parameters and buffers, whether each requires and has a gradient, and the mode of every module."""
     state: dict[str, str] = {}
     for root, network in networks_of(model):
         for name, module in network.named_modules():
@@ -25,7 +25,7 @@ def state_of(model: Any) -> dict[str, str]:
 
 
 def changes(before: dict[str, str], after: dict[str, str]) -> list[str]:
-    """Names whose state differs."""
+    """Names of the entries that differ between two states."""
     return sorted(name for name in before.keys() | after.keys() if before.get(name) != after.get(name))
 
 

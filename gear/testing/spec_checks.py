@@ -1,4 +1,4 @@
-"""What every spec promises, whatever its kind."""
+"""Checks of specs that hold for all kinds of plugins."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gear.plugins.spec_validation import spec_problem
 
 
 def check_spec(kind: Kind, spec: AnySpec, options: Mapping[str, Any]) -> None:
-    """Asserts that a spec can be used and that its config, default or not, survives YAML.
+    """Asserts that a spec can be used and that its config, with default and given options, survives YAML.
 
     Raises:
         AssertionError: it does not.

@@ -1,7 +1,7 @@
 """Frames without a renderer: boxes on a plane, drawn by exact ray casting.
 
-Every pixel of colour, depth and ids is known in closed form, so that a task can be held against geometry instead of
-against a renderer. Texture is painted on the things themselves, so that two cameras see the same marks.
+Colour, depth and ids of every pixel are known in closed form, so that tasks are compared with geometry instead of a
+renderer. Textures are fixed to the objects, so that two cameras see the same marks.
 """
 
 from __future__ import annotations
@@ -41,13 +41,13 @@ def synthetic_frame(
     seed: int = 0,
     world_from_ego: RigidTransform | None = None,
 ) -> tuple[Frame, SceneRecord]:
-    """Renders things on a road seen from an ego car, and the record that belongs to them.
+    """Renders objects on a road as an ego car sees them.
 
     Args:
         rig: the cameras.
-        things: what stands there, in the ego car's frame (x forward, y left); `street(seed, index)` by default.
+        things: objects in the ego car's frame (x forward, y left); `street(seed, index)` by default.
         index, seed: of the record.
-        world_from_ego: where the ego car stands; the origin by default. Everything moves along.
+        world_from_ego: pose of the ego car; the origin by default. All objects move with it.
 
     Returns:
         The frame, whose views are exact, and its record.

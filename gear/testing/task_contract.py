@@ -58,7 +58,7 @@ class TaskContract:
         raise NotImplementedError("say how to spoil a prediction of this task")
 
     def task(self) -> Task[Any, Any]:
-        """A fresh one."""
+        """A fresh task."""
         return self.spec.build(self.spec.config(**self.options))
 
     def frame(self, index: int = 0) -> tuple[Frame, SceneRecord]:
@@ -66,7 +66,7 @@ class TaskContract:
         return synthetic_frame(self.task().rig(), index=index, seed=5, world_from_ego=WORLD_FROM_EGO)
 
     def sample(self, index: int = 0) -> Any:
-        """Its ground truth."""
+        """The ground truth of a synthetic frame."""
         return self.task().ground_truth(*self.frame(index))
 
     def sidecar(self, sample: Sample, encoded: Encoded) -> Sidecar:

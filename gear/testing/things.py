@@ -1,4 +1,4 @@
-"""Things to put into a synthetic frame: boxes that move together, and a street full of them."""
+"""Objects of synthetic frames: boxes that move together, and a street with several of them."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from gear.values.scene import Role, Vec3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Part:
-    """One box of a thing, in the thing's frame.
+    """One box of an object, in the object's frame.
 
     Attributes:
         label: name of a gear label.
-        centre_m, size_m: middle, and length (x), width (y), height (z).
-        surface: number of the surface whose face this box is, or -1.
+        centre_m, size_m: centre, and length (x), width (y), height (z).
+        surface: number of the patch surface whose face this box is, or -1.
     """
 
     label: str
@@ -31,10 +31,10 @@ class Thing:
     """Boxes that move together.
 
     Attributes:
-        parts: its boxes; the first says what it mainly is.
-        position_m, yaw_rad: where its frame stands in the world.
-        object_id: as in `GeomTable.object_id`; -1 for what cannot be counted.
-        role: of the actor, or None for a thing of the town.
+        parts: its boxes; the first one has the object's main label.
+        position_m, yaw_rad: pose of its frame in the world.
+        object_id: as in `GeomTable.object_id`; -1 for what is not an instance.
+        role: of the actor; None for a fixed part of the town.
     """
 
     parts: tuple[Part, ...]
@@ -45,7 +45,7 @@ class Thing:
 
     @property
     def world_from_thing(self) -> RigidTransform:
-        """Its pose."""
+        """Pose of the object in the world."""
         return RigidTransform.from_yaw("world", "object", self.position_m, self.yaw_rad)
 
 

@@ -1,7 +1,7 @@
-"""A tiny compositor for tests: it pastes patches by homography where the ground truth sees their surfaces.
+"""A small compositor for tests: pastes patches by homography where the ground truth sees their surfaces.
 
-It knows nothing of light. Renderers' probes make gear's real compositors exact; this one is for testing attacks without
-a renderer.
+It ignores light. gear's own compositors are exact, but need probes of a renderer; this one serves tests of attacks
+without a renderer.
 """
 
 from __future__ import annotations
@@ -28,11 +28,19 @@ class TinyCompositor:
 
     @property
     def surfaces(self) -> int:
-        """How many patches it takes."""
+        """Number of patches that it takes."""
         return len(self._dataset[0].record.surfaces)
 
     def compose(self, patches: Sequence[Tensor], samples: Sequence[int], view: str) -> Tensor:
-        """(B, 3, H, W) pictures in 0..1 with the patches on their surfaces: (3, h, w), or (B, 3, h, w) one a sample.
+        """Pictures with the patches on their surfaces.
+
+        Args:
+            patches: one for each surface, values in 0..1: (3, h, w), or (B, 3, h, w) with one for each sample.
+            samples: B numbers of samples.
+            view: name of the camera.
+
+        Returns:
+            (B, 3, H, W) pictures in 0..1.
 
         Raises:
             ValueError: the number of patches is not that of the surfaces.

@@ -1,7 +1,7 @@
-"""Tiny real networks: a few convolutions behind the `Model` protocol, quick enough to be attacked in a test.
+"""Small but real networks: a few convolutions with the `Model` protocol, fast enough to be attacked in a test.
 
-They have what makes real networks awkward: batch normalisation with buffers, a stride, feature taps, losses. Their
-weights follow from a seed. They have learnt nothing.
+They have what complicates real networks: batch normalisation with buffers, a stride, feature taps, losses. Their
+weights follow from a seed and are not trained.
 """
 
 from __future__ import annotations
@@ -74,25 +74,25 @@ class TinyNetwork(nn.Module, ABC):
         return self.outputs(raw) if targets is None else {"loss": self.loss(raw, targets)}
 
     def module(self) -> nn.Module:
-        """Itself: what `gear train` trains and saves."""
+        """The network itself, which `gear train` trains and saves."""
         return self
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """`stem` and `trunk`."""
+        """The feature maps `stem` and `trunk`."""
         return {"stem": self.stem, "trunk": self.trunk}
 
     def predict(self, views: Mapping[str, UInt8Image]) -> Any:
-        """One sample's prediction."""
+        """The task's prediction for one sample."""
         with torch.no_grad():
             return self.answer(self(as_batch([{VIEW: views[VIEW]}])))
 
     @abstractmethod
     def outputs(self, raw: Tensor) -> Mapping[str, Tensor]:
-        """Named outputs from the (B, C, H, W) head."""
+        """Outputs by name from the head's (B, C, H, W) map."""
 
     @abstractmethod
     def loss(self, raw: Tensor, targets: Sequence[Any]) -> Tensor:
-        """A number without dimensions, to be minimised in training."""
+        """Scalar loss for training."""
 
     @abstractmethod
     def answer(self, outputs: Mapping[str, Tensor]) -> Any:
@@ -106,7 +106,7 @@ class TinySegmenter(TinyNetwork):
         super().__init__(config, LABEL_COUNT)
 
     def outputs(self, raw: Tensor) -> Mapping[str, Tensor]:
-        """The logits."""
+        """`logits` (B, 34, H, W)."""
         return {"logits": raw}
 
     def loss(self, raw: Tensor, targets: Sequence[Any]) -> Tensor:
@@ -129,7 +129,7 @@ class TinyDepth(TinyNetwork):
         super().__init__(config, 1)
 
     def outputs(self, raw: Tensor) -> Mapping[str, Tensor]:
-        """The depth in metres."""
+        """`depth_m` (B, H, W) in metres."""
         return {"depth_m": 10 * functional.softplus(raw[:, 0]) + self.LEAST_M}
 
     def loss(self, raw: Tensor, targets: Sequence[Any]) -> Tensor:
@@ -141,7 +141,7 @@ class TinyDepth(TinyNetwork):
         return (error * is_known).sum() / is_known.sum().clamp_min(1)
 
     def answer(self, outputs: Mapping[str, Tensor]) -> FloatImage:
-        """(H, W) float32 metres."""
+        """(H, W) float32 depth in metres."""
         depth_m: FloatImage = outputs["depth_m"][0].numpy()
         return depth_m
 

@@ -33,7 +33,7 @@ SMALL_RIG = Rig(cameras=(CameraMount(name="rgb", width_px=320, height_px=160),))
 
 
 def tiny_scenes() -> SceneLibrary:
-    """The tiny town's scenes."""
+    """The scene library of the tiny town."""
     return read_node(SceneLibrary, parse_file(TINY_SCENES))
 
 
@@ -44,5 +44,5 @@ def build_tiny_world(scene: str = "board", weather: Weather = CLEAR) -> World:
 
 @cache
 def tiny_world(scene: str = "board") -> World:
-    """A world of the tiny town that tests share: compiled once a process, moved by every `place`."""
+    """A world of the tiny town that tests share: compiled once per process, changed by every `place`."""
     return build_tiny_world(scene)

@@ -189,7 +189,7 @@ def test_show_knows_the_built_in_tasks_options(capsys: pytest.CaptureFixture[str
     assert main(["plugins", "show", "semseg", "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
     by_name = {option["name"]: option for option in facts["options"]}
-    assert by_name["hfov_deg"]["meaning"] == "horizontal field of view."
+    assert by_name["hfov_deg"]["meaning"].startswith("horizontal field of view")
     assert by_name["labels.coarse_window_px"]["default"] == 9
     assert all(option["meaning"] for option in facts["options"])
     assert facts["source"].endswith("semseg.py")

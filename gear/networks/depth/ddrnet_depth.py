@@ -53,8 +53,8 @@ class DdrnetDepth(DepthNetwork):
         return {DEPTH: MIDDLE_M * resized(channel.float(), height, width)[:, 0].clamp(least, most).exp()}
 
     def depth_losses(self, outputs: Mapping[str, Tensor], depth_m: Tensor) -> Mapping[str, Tensor]:
-        """Scale-invariant error (dominated by outliers), mean relative error (robust), and root mean square in
-        metres.
+        """Scale-invariant error (dominated by outliers), mean relative error (robust), and root mean square error in
+        units of `RMS_UNIT_M`.
         """
         cap_m = self.options.max_depth_m
         return {

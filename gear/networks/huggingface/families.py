@@ -1,4 +1,4 @@
-"""Image processors of transformers that gear repeats in torch: what a file leaves out is as their classes have it."""
+"""Image processors of transformers that gear repeats in torch, with the defaults of their classes."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ class Family:
     """One class of image processors.
 
     Attributes:
-        defaults: of the keys of its file, where they are not `EVERYWHERE`'s.
-        networks: `model_type` of the networks whose folders need not name it.
-        is_square: whether a `size` of one number is the height and the width, rather than the shorter edge.
+        defaults: values of the keys of its file, where they differ from `EVERYWHERE`.
+        networks: `model_type` of the networks whose folders need not name the class.
+        is_square: whether a `size` of one number is height and width, instead of the shorter edge.
     """
 
     defaults: Mapping[str, Any] = field(default_factory=dict)
@@ -49,11 +49,11 @@ class Family:
     is_square: bool = True
 
     def facts(self, said: Mapping[str, Any]) -> dict[str, Any]:
-        """The keys of a file and what it leaves out; null is left out."""
+        """The values of a file, completed with the class's defaults; null values are left out."""
         return {**EVERYWHERE, **self.defaults, **{key: value for key, value in said.items() if value is not None}}
 
     def steps(self) -> frozenset[str]:
-        """Keys `do_…` that this class, or nothing that gear does, looks at."""
+        """Keys `do_…` that gear accepts: steps that it implements, and keys that do not change the picture."""
         return frozenset((*STEPS, *FOR_LABELS_OR_OTHER_FILES, *(key for key in self.defaults if key.startswith("do_"))))
 
 
@@ -115,15 +115,15 @@ FAMILIES: Mapping[str, Family] = MappingProxyType(
 
 
 def family_of(said: Mapping[str, Any], model_type: str, path: Path) -> str:
-    """The name in `FAMILIES` of the image processor of a folder.
+    """The name in `FAMILIES` of a folder's image processor.
 
     Args:
-        said: its file.
-        model_type: of the network beside it, for files that name no class.
+        said: content of its file.
+        model_type: of the folder's network, for files that name no class.
         path: of the file.
 
     Raises:
-        GearError: gear does not know the class, or nothing says which it is.
+        GearError: gear does not know the class, or neither file nor network names one.
     """
     named = said.get("image_processor_type") or said.get("feature_extractor_type")
     if named is not None:

@@ -1,4 +1,4 @@
-"""Networks of transformers out of a folder: without the net, without pickles, without the folder's own code."""
+"""Opens networks of transformers from a folder: without network access, pickles, or the folder's own code."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def open_folder(options: FolderOptions, auto: str) -> nn.Module:
         auto: name of the class of transformers that opens this kind of network.
 
     Raises:
-        GearError: there is no network of this kind in the folder, or it is damaged.
+        GearError: the folder holds no network of this kind, or is damaged.
     """
     folder = Path(options.folder)
     if not options.folder or not (folder / "config.json").is_file():
@@ -60,21 +60,21 @@ def open_folder(options: FolderOptions, auto: str) -> nn.Module:
 
 
 def start_from(folder_network: Any, auto: str) -> None:
-    """Puts the folder's own weights into a network of that folder, whatever it was built with: `--init folder`.
+    """Loads the folder's own weights into a network of that folder: `gear train --init folder`.
 
     Args:
         folder_network: a `gear.networks.huggingface.network.FolderNetwork`.
         auto: as for `open_folder`.
 
     Raises:
-        GearError: the folder has none that fit.
+        GearError: the folder has no weights that fit.
     """
     graph = open_folder(dataclasses.replace(folder_network.options, weights=FOLDER), auto)
     folder_network.module().load_state_dict(graph.state_dict())
 
 
 def _opened(options: FolderOptions, auto: str) -> tuple[nn.Module, Mapping[str, Any]]:
-    """The graph, and what transformers found in the folder's weights."""
+    """The graph, and what transformers reports about the folder's weights."""
     import transformers
 
     kind: Any = getattr(transformers, auto)
@@ -104,9 +104,9 @@ def _opened(options: FolderOptions, auto: str) -> tuple[nn.Module, Mapping[str, 
 
 
 def _with_backbone(said: Mapping[str, Any]) -> Mapping[str, Any]:
-    """A config.json whose backbone of timm's is described in it rather than named beside its options.
+    """A config.json in which a backbone of timm is described, instead of being named next to its options.
 
-    transformers before 5 wrote DETRs so; today it asks the net whether the name is a repository's.
+    transformers before version 5 wrote DETRs in the latter form; current versions look the name up on the network.
     """
     name, options = said.get("backbone"), said.get("backbone_kwargs", {})
     if said.get("use_timm_backbone") is not True or said.get("backbone_config") is not None or not name:
@@ -122,10 +122,10 @@ def _with_backbone(said: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _need_safetensors(folder: Path) -> None:
-    """Refuses pickles: opening one runs what its author wants.
+    """Refuses pickles, since opening one runs code.
 
     Raises:
-        GearError: there are no safetensors, or the list of files names others.
+        GearError: the folder has no safetensors, or its list of files names other files.
     """
     wanted = "open the network where you trust it and save it again with save_pretrained"
     if not any(folder.glob("*.safetensors")):
@@ -155,16 +155,17 @@ def _refused(folder: Path, auto: str, error: Exception) -> GearError:
 
 
 def in_one_line(error: Exception) -> str:
-    """Its kind and the beginning of what it says."""
+    """An exception's type and the beginning of its text."""
     said = " ".join(str(error).split())
     return f"{type(error).__name__}: {said if len(said) <= SHOWN else said[:SHOWN] + '...'}"
 
 
 def _check(graph: nn.Module, found: Mapping[str, Any], folder: Path) -> None:
-    """Refuses weights that transformers made up, because the folder lacks them, and weights that are no numbers.
+    """Refuses weights that transformers initialised at random because the folder lacks them, and numbers that are not
+    finite.
 
     Raises:
-        GearError: there are such: a classifier, say, has no head for depth.
+        GearError: there are such weights; a classifier, for example, has no head for depth.
     """
     name = type(graph).__name__
     lost = sorted(key for key in found.get("missing_keys", ()) if not key.endswith(OPTIONAL))
@@ -183,7 +184,7 @@ def _check(graph: nn.Module, found: Mapping[str, Any], folder: Path) -> None:
 
 @contextlib.contextmanager
 def _offline() -> Iterator[None]:
-    """Inside, nothing of Hugging Face's asks the net: `local_files_only` does not hold for backbones."""
+    """Inside, no library of Hugging Face accesses the network: `local_files_only` does not hold for backbones."""
     from huggingface_hub import constants
 
     was = constants.HF_HUB_OFFLINE
@@ -196,7 +197,7 @@ def _offline() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _quietly() -> Iterator[None]:
-    """Inside, transformers draws no progress bars and prints no tables: errors say what matters of them."""
+    """Inside, transformers prints neither progress bars nor tables; errors contain what matters of them."""
     from transformers.utils import logging as settings
 
     had_bars, verbosity = settings.is_progress_bar_enabled(), settings.get_verbosity()

@@ -1,4 +1,4 @@
-"""Names of classes as others write them, brought to the names that Cityscapes and COCO have."""
+"""Maps class names of other data sets to those of Cityscapes and COCO."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ SYNONYMS = {
 
 
 def match(names: Mapping[int, str], known: Mapping[str, int]) -> tuple[dict[int, int], tuple[str, ...]]:
-    """Which of a network's classes are which of ours.
+    """Which classes of a network are which of ours.
 
-    A name may list several, divided by commas or semicolons, as ADE20K's do; the first that is known counts.
+    A name may list several, separated by commas or semicolons, as in ADE20K; the first known one counts.
 
     Args:
         names: of the network's classes, by number.
         known: our numbers by name, in lower case.
 
     Returns:
-        Our numbers by the network's, and the names that have none, in the network's order.
+        Our numbers by the network's, and the names without a match, in the network's order.
     """
     found = {}
     for index, name in names.items():

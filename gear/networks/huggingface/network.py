@@ -1,4 +1,4 @@
-"""Networks of Hugging Face's `transformers` from a local folder, behind the `Model` protocol."""
+"""Networks of Hugging Face's `transformers` from a local folder, as gear networks."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ logger = logging.getLogger(__name__)
 
 
 class FolderNetwork(Network):
-    """A network of a folder.
+    """A network from a folder, with the image processor of its folder.
 
     Attributes:
         unmatched: names of its classes that the task does not have.
@@ -59,14 +59,14 @@ class FolderNetwork(Network):
         self.processor = read_processor(Path(options.folder), resizes=resizes, config=graph.config)
 
     def seen(self, pictures: Mapping[str, Tensor]) -> Tensor:
-        """(B, 3, h, w) as the network wants it."""
+        """(B, 3, h, w) input of the graph: (B, 3, H, W) pictures in 0..1 after the image processor."""
         return self.processor.apply(pictures[VIEW])
 
     def said(self, seen: Tensor, **labels: Any) -> Any:
-        """What the graph makes of pictures as it wants them.
+        """The graph's output for its inputs.
 
         Raises:
-            GearError: it does not run on them, as with a config.json whose sizes can be built but do not fit.
+            GearError: the graph fails on them, as with a config.json whose sizes can be built but do not fit.
         """
         try:
             return self.graph(pixel_values=seen, **labels)
@@ -79,12 +79,13 @@ class FolderNetwork(Network):
             ) from error
 
     def restored(self, maps: Tensor, pictures: Mapping[str, Tensor], mode: str) -> Tensor:
-        """(B, C, H, W) at the size of the pictures, without the margins that the network saw."""
+        """(B, C, H, W) maps at the size of the pictures, with the margins of the input cut off."""
         size = (int(pictures[VIEW].shape[2]), int(pictures[VIEW].shape[3]))
         return self.processor.restore(maps, size, mode)
 
     def matched(self, known: Mapping[str, int], whose: str) -> dict[int, int]:
-        """Our numbers of the network's classes, by name; what matches nothing goes to `unmatched` and the log.
+        """Our class numbers by those of the network, matched by name; names without a match go to `unmatched` and the
+        log.
 
         Raises:
             GearError: nothing matches, or the network's classes have no names.
@@ -105,10 +106,10 @@ class FolderNetwork(Network):
 
 
 class FolderSegmenter(FolderNetwork):
-    """`logits` (B, 19, H, W) over Cityscapes train ids.
+    """Semantic segmentation: `logits` (B, 19, H, W) over Cityscapes train ids.
 
-    Several classes of the network that are one of Cityscapes' add up (as probabilities); what it does not know has a
-    logit of -50 and takes no part in the loss.
+    Probabilities of several classes of the network that are one of Cityscapes add up. Classes that the network lacks
+    have a logit of -50 and do not count in the loss.
     """
 
     def __init__(self, graph: nn.Module, options: FolderOptions) -> None:
@@ -118,19 +119,19 @@ class FolderSegmenter(FolderNetwork):
         self._indexes = [[i for i, number in found.items() if number == train_id] for train_id in range(CLASSES)]
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """At the picture's size."""
+        """`logits` (B, 19, H, W) at the picture's size."""
         theirs = self.their_logits(self.seen(pictures)).float()
         nothing = torch.full_like(theirs[:, 0], UNKNOWN_LOGIT)
         ours = [theirs[:, indexes].logsumexp(1) if indexes else nothing for indexes in self._indexes]
         return {LOGITS: self.restored(torch.stack(ours, dim=1), pictures, "bilinear")}
 
     def their_logits(self, seen: Tensor) -> Tensor:
-        """(B, classes, h, w) over the network's own classes, for pictures as it wants them."""
+        """(B, classes, h, w) logits over the network's own classes, for inputs of the graph."""
         logits: Tensor = self.said(seen).logits
         return logits
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """Cross-entropy over the pixels whose class the network knows."""
+        """Cross-entropy over the pixels whose class the network has."""
         ids = train_ids(targets, self.device)
         known = torch.tensor([train_id for train_id, indexes in enumerate(self._indexes) if indexes])
         is_known = torch.isin(ids, known.to(self.device))
@@ -138,13 +139,13 @@ class FolderSegmenter(FolderNetwork):
         return {"cross_entropy": (each * is_known).sum() / is_known.sum().clamp_min(1)}
 
     def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
-        """(H, W) uint8 label ids."""
+        """(H, W) uint8 Cityscapes label ids for each picture."""
         labels = np.array(LABEL_ID_OF_TRAIN_ID, dtype=np.uint8)
         return [labels[best_class(logits)] for logits in outputs[LOGITS]]
 
 
 class FolderDepth(FolderNetwork):
-    """`depth_m` (B, H, W), metres."""
+    """Monocular depth: `depth_m` (B, H, W), metres."""
 
     options: DepthFolderOptions
 
@@ -164,7 +165,7 @@ class FolderDepth(FolderNetwork):
             )
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """At the picture's size."""
+        """`depth_m` (B, H, W) in metres at the picture's size."""
         said = self.said(self.seen(pictures)).predicted_depth.float()
         said = self.restored(said[:, None], pictures, "bicubic")[:, 0]  # as transformers does
         if self.options.inverse_scale:
@@ -173,20 +174,23 @@ class FolderDepth(FolderNetwork):
         return {DEPTH: said.clamp(min=NEAREST_M)}
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """Mean absolute difference of logarithms where depth is known."""
+        """Mean absolute difference of logarithms over pixels with ground truth."""
         truth = torch.from_numpy(np.stack([sample.depth_m for sample in targets])).to(self.device)
         is_known = torch.isfinite(truth)
         error = (outputs[DEPTH].log() - truth.where(is_known, 1.0).log()).abs()
         return {"log_l1": (error * is_known).sum() / is_known.sum().clamp_min(1)}
 
     def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[FloatImage]:
-        """(H, W) float32 metres."""
+        """(H, W) float32 depth in metres for each picture."""
         return [depth_m.cpu().numpy() for depth_m in outputs[DEPTH]]
 
 
 class FolderDetector(FolderNetwork):
-    """A DETR, RT-DETR, YOLOS or the like: `logits` (B, N, classes) and `pred_boxes` (B, N, 4), middle and size as
-    shares of the picture's."""
+    """DETR, RT-DETR, YOLOS and similar detectors.
+
+    Outputs: `logits` (B, N, classes) and `pred_boxes` (B, N, 4), centre and size as shares of the picture's width and
+    height.
+    """
 
     options: DetectorFolderOptions
 
@@ -197,24 +201,26 @@ class FolderDetector(FolderNetwork):
         self._categories = self.matched({name: number for number, name in CATEGORY_NAMES.items()}, "COCO")
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """One row a query."""
+        """`logits` and `pred_boxes`, one row for each of N object queries."""
         said = self.said(self.seen(pictures))
         return {LOGITS: said.logits, BOXES: said.pred_boxes}
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """What the network's own loss starts from: the picture as it sees it, and the picture's size."""
+        """The graph's input and the picture's size, from which the network's own loss is computed."""
         size = torch.tensor(pictures[VIEW].shape[2:], device=self.device)
         return {"seen": self.seen(pictures), PICTURE: size.expand(len(pictures[VIEW]), -1)}
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """The network's own set loss, in float32, against the objects of classes that it has; others are ignored."""
+        """The network's own set loss, in float32, against the objects of classes that it has; other objects are
+        ignored.
+        """
         height, width = outputs[PICTURE][0].tolist()
         labels = [self._labels(sample, torch.tensor([width, height] * 2)) for sample in targets]
         with autocast(self.device, self.options.precision):
             return {"set_loss": self.said(outputs["seen"], labels=labels).loss}
 
     def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[Detection, ...]]:
-        """Sure enough boxes of classes that COCO has, surest first."""
+        """Detections of COCO classes with at least the least score, by falling score."""
         scale = torch.tensor([size_px[1], size_px[0]] * 2, device=self.device)
         answers = []
         for logits, boxes in zip(outputs[LOGITS], outputs[BOXES], strict=True):
@@ -236,8 +242,9 @@ class FolderDetector(FolderNetwork):
         return answers
 
     def _scores(self, logits: Tensor) -> Tensor:
-        """(N, classes): each class's own probability, or, where the last of the logits means nothing there, the
-        likeliest class's alone."""
+        """(N, classes) probabilities of the classes. For networks with a softmax, all but the likeliest class of a
+        query are 0.
+        """
         config: Any = self.graph.config
         if logits.shape[-1] == config.num_labels:
             return logits.sigmoid()

@@ -1,4 +1,4 @@
-"""Options of networks of Hugging Face's. No torch here: specs are cheap."""
+"""Options of networks of Hugging Face. torch is not imported, so that specs are quick to make."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ class FolderOptions(NetworkOptions):
     """Options of a network from a local folder.
 
     Attributes:
-        folder: where `save_pretrained` wrote it: config.json, model.safetensors and, where there is one,
-            preprocessor_config.json. Nothing is downloaded, and neither a pickle nor code of the folder's own is run.
-        weights: `folder` are the folder's own, `none` are random ones from `seed`, anything else is the path of a
-            safetensors file that gear has trained.
-        input_size: `processor` resizes pictures as the folder's image processor says, `picture` leaves them as they
-            are, but for what the network needs.
+        folder: written by `save_pretrained`: config.json, model.safetensors and, optionally, preprocessor_config.json.
+            Nothing is downloaded, and neither pickles nor the folder's own code are run.
+        weights: `folder` for the folder's own, `none` for random ones from `seed`, or the path of a safetensors file
+            that gear has trained.
+        input_size: `processor` resizes pictures as the folder's image processor does; `picture` keeps their size,
+            except for what the network needs.
     """
 
     folder: str = ""
@@ -34,9 +34,9 @@ class DepthFolderOptions(FolderOptions):
     """Options of a depth network from a local folder.
 
     Attributes:
-        inverse_scale: networks of relative depth say how near things are in units of their own; depth in metres is
-            1 / (inverse_scale * what they say + inverse_shift). 0 for networks of metric depth, which say metres.
-        inverse_shift: see there, in 1/m.
+        inverse_scale: for networks of relative depth, whose output is an inverse depth without unit: depth in metres is
+            1 / (inverse_scale * output + inverse_shift). 0 for networks of metric depth, whose output is in metres.
+        inverse_shift: see `inverse_scale`, in 1/m.
     """
 
     inverse_scale: float = 0.0
@@ -52,7 +52,7 @@ class DetectorFolderOptions(FolderOptions):
     """Options of a detector from a local folder.
 
     Attributes:
-        least_score: detections that are less sure are dropped.
+        least_score: smallest score, 0..1, of a detection that is reported.
     """
 
     least_score: float = 0.05

@@ -1,4 +1,4 @@
-"""What an image processor of Hugging Face's does to a picture, in torch, so that gradients pass it."""
+"""What an image processor of Hugging Face does to a picture, in torch, so that gradients pass it."""
 
 from __future__ import annotations
 
@@ -22,15 +22,16 @@ class Processor:
 
     Attributes:
         mean, std: of each channel of a picture in 0..1.
-        size: as the file has it: `height` and `width`, or `shortest_edge` and perhaps `longest_edge`; empty for none.
-        mode: of interpolation.
+        size: as in the file: `height` and `width`, or `shortest_edge` and optionally `longest_edge`; empty for no
+            resizing.
+        mode: interpolation mode of torch.
         multiple_px: sides are multiples of this, which may be a fraction.
-        keeps_ratio: whether `height` and `width` are a frame that the picture is fitted to by the lesser change.
-        rounds_down: whether sides are cut down to the multiple rather than rounded.
-        pads_to_px: what is left to a multiple of this is filled with zeros on all sides, after all else; 0 for nothing.
-        has_margin: whether the picture is mirrored beyond its edges, before all else.
-        aligns_corners: of interpolation, which has no anti-aliasing then.
-        is_bgr: whether the network takes blue first.
+        keeps_ratio: whether `height` and `width` are a frame to which the picture is fitted by the smaller change.
+        rounds_down: whether sides are rounded down to the multiple instead of to the nearest.
+        pads_to_px: at the end, the picture is padded with zeros on all sides to a multiple of this; 0 for no padding.
+        has_margin: whether the picture is first extended by reflection.
+        aligns_corners: of the interpolation, which has no anti-aliasing then.
+        is_bgr: whether the network takes BGR.
     """
 
     mean: Channels = IMAGENET_MEAN
@@ -46,7 +47,7 @@ class Processor:
     is_bgr: bool = False
 
     def target(self, picture_px: Size) -> Size:
-        """Height and width that a picture, with its mirrored margin, is resized to."""
+        """Height and width to which a picture, with its reflected margin, is resized."""
         height, width = picture_px
         size = self.size or {}
         if "shortest_edge" in size:
@@ -58,7 +59,7 @@ class Processor:
         return self._multiple(scales[0] * height), self._multiple(scales[1] * width)
 
     def apply(self, pictures: Tensor) -> Tensor:
-        """(B, 3, h, w) as the network wants them, from (B, 3, H, W) in 0..1."""
+        """(B, 3, h, w) input of the network from (B, 3, H, W) pictures in 0..1."""
         rows, columns = self._margin(_size(pictures))
         if rows or columns:
             pictures = functional.pad(pictures, (columns, columns, rows, rows), mode="reflect")
@@ -69,7 +70,7 @@ class Processor:
         return functional.pad(seen, (left, right, top, bottom))
 
     def restore(self, maps: Tensor, picture_px: Size, mode: str) -> Tensor:
-        """(B, C, H, W) over the picture, from (B, C, h, w) over what the network saw: the margins are cut off."""
+        """(B, C, H, W) over the picture from (B, C, h, w) over the network's input; the margins are cut off."""
         rows, columns = self._margin(picture_px)
         wide = (picture_px[0] + 2 * rows, picture_px[1] + 2 * columns)
         height, width = self.target(wide)
@@ -96,12 +97,12 @@ class Processor:
         return max(1, int(max(1, int(steps) if self.rounds_down else round(steps)) * self.multiple_px))
 
     def _margin(self, picture_px: Size) -> Size:
-        """Rows above and below, columns left and right."""
+        """Reflected rows at the top and bottom, and columns on the left and right."""
         rows, columns = (int(math.sqrt(side / 2) * 3) if self.has_margin else 0 for side in picture_px)
         return rows, columns
 
     def _filled(self, seen_px: Size) -> tuple[int, int, int, int]:
-        """Rows above and below, columns left and right."""
+        """Padded rows at the top and bottom, and columns on the left and right."""
         rows, columns = (-side % self.pads_to_px if self.pads_to_px else 0 for side in seen_px)
         return rows // 2, rows - rows // 2, columns // 2, columns - columns // 2
 
@@ -117,7 +118,7 @@ def _interpolated(maps: Tensor, size_px: Size, mode: str) -> Tensor:
 
 
 def _with_edges(picture_px: Size, edge_px: int, most_px: int | None) -> Size:
-    """The picture's shorter edge brought to `edge_px`, or as near as the longer one stays within `most_px`."""
+    """The size at which the shorter edge is `edge_px`, or as near to it as the longer edge stays within `most_px`."""
     short, long = min(picture_px), max(picture_px)
     exact: float = edge_px
     if most_px and long / short * edge_px > most_px:

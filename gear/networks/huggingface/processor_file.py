@@ -1,4 +1,4 @@
-"""The file of an image processor of Hugging Face's, checked: preprocessor_config.json."""
+"""Reads and checks preprocessor_config.json, the file of an image processor of Hugging Face."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ DETR_LONGEST_PX = 1333
 
 
 def read_processor(folder: Path, *, resizes: bool = True, config: object = None) -> Processor:
-    """The image processor of a folder; without one, ImageNet's normalisation and no resizing.
+    """The image processor of a folder; without a file, ImageNet's normalisation and no resizing.
 
     Args:
         folder: of the network.
-        resizes: whether to resize pictures as the file says; what the network needs is done in any case.
-        config: the network's, as transformers has it, for the patches that it looks at.
+        resizes: whether pictures are resized as the file says; what the network needs is done in any case.
+        config: of the network, as transformers has it, for its patch size.
 
     Raises:
-        GearError: it is not JSON, or asks for what gear does not do.
+        GearError: the file is not JSON, or asks for a step that gear does not have.
     """
     path, beside = folder / FILE, folder / "config.json"
     model_type = str(read_mapping(beside).get("model_type")) if beside.is_file() else ""
@@ -51,10 +51,10 @@ def read_processor(folder: Path, *, resizes: bool = True, config: object = None)
 
 
 def read_mapping(path: Path) -> dict[str, Any]:
-    """A JSON file that holds a mapping.
+    """The mapping in a JSON file.
 
     Raises:
-        GearError: it does not.
+        GearError: the file holds no mapping.
     """
     try:
         facts = json.loads(read_regular(path).decode("utf-8"))
@@ -68,7 +68,7 @@ def read_mapping(path: Path) -> dict[str, Any]:
 
 
 class _Facts:
-    """A file's values and its family's defaults. Every method raises a `GearError` for a value of another kind."""
+    """A file's values with its family's defaults. Every method raises a `GearError` for a value of another kind."""
 
     def __init__(self, family: Family, said: Mapping[str, Any], path: Path) -> None:
         self.family = family
@@ -77,11 +77,11 @@ class _Facts:
         self._path = path
 
     def refuse(self, key: str, wanted: str) -> GearError:
-        """The error to raise."""
+        """The error for a value that cannot be used."""
         return GearError(f"{self._path}: {key} must be {wanted}, got {self._all.get(key)!r:.80}")
 
     def check_steps(self) -> None:
-        """Refuses a step that gear does not do."""
+        """Refuses steps that gear does not have."""
         for key in (key for key in self._all if key.startswith("do_")):
             if self.flag(key) and key not in self.family.steps():
                 raise GearError(
@@ -91,28 +91,28 @@ class _Facts:
             raise GearError(f"{self._path}: pad_size is not supported; take it out, and pictures keep their own size")
 
     def flag(self, key: str) -> bool:
-        """Whether a step is done; one that nobody speaks of is not."""
+        """Whether a step is switched on; steps that are not mentioned are off."""
         value = self._all.get(key, False)
         if not isinstance(value, bool):
             raise self.refuse(key, "true or false")
         return value
 
     def number(self, key: str) -> float:
-        """A number above 0."""
+        """The number above 0 under a key."""
         value = self._all[key]
         if not (_is_number(value) and 0 < value <= MOST_PX):
             raise self.refuse(key, "a number above 0")
         return float(value)
 
     def pixels(self, key: str) -> int:
-        """A number of pixels that is not 0."""
+        """The number of pixels above 0 under a key."""
         value = self._all.get(key)
         if not _is_pixels(value):
             raise self.refuse(key, f"a whole number of pixels, 1 to {MOST_PX}")
         return int(value)
 
     def channels(self, key: str, *, is_positive: bool) -> Channels:
-        """Three numbers."""
+        """The three numbers, one for each channel, under a key."""
         value = self._all[key]
         if (
             not isinstance(value, list | tuple)
@@ -123,14 +123,14 @@ class _Facts:
         return float(value[0]), float(value[1]), float(value[2])
 
     def mode(self) -> str:
-        """Of interpolation."""
+        """The interpolation mode of torch for the file's `resample`."""
         value = self._all["resample"]
         if type(value) is not int or value not in RESAMPLING:
             raise self.refuse("resample", "nearest (0), bilinear (2) or bicubic (3)")
         return RESAMPLING[value]
 
     def size(self) -> dict[str, int]:
-        """`height` and `width`, or `shortest_edge` and perhaps `longest_edge`."""
+        """`height` and `width`, or `shortest_edge` and optionally `longest_edge`."""
         value = self._all["size"]
         if _is_pixels(value):
             if self.family.is_square:
@@ -188,7 +188,7 @@ def _multiple_px(name: str, facts: _Facts, size: dict[str, int] | None) -> float
 
 
 def _patch_px(config: object) -> int:
-    """What the sides of whole patches are multiples of; 1 where the config says nothing of use."""
+    """Side of the network's patches, of which sides are multiples; 1 where the config states none."""
     said = [getattr(each, "patch_size", None) for each in (config, getattr(config, "backbone_config", None))]
     return math.lcm(*(int(each) for each in said if _is_pixels(each)))
 

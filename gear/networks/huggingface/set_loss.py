@@ -1,4 +1,4 @@
-"""Set losses of transformers' detectors: in float32, and without background that lies in ignored objects."""
+"""Set losses of transformers' detectors: in float32, and without background inside ignored objects."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ SURE, FAR = 50.0, 10.0
 
 
 def set_loss(loss: Callable[..., Any], device_type: str, *said: Any, **more: Any) -> Any:
-    """A loss of transformers' on what its network says, whatever precision that was worked out in.
+    """A loss of transformers for a network's output, computed in float32 whatever the output's precision.
 
-    Queries that lie mostly in ignored objects, and near none that is to be found, are shown to it as sure background
-    far away: nothing is matched with them, and nothing is learnt of them. Where too few others would be left for the
-    objects of a picture, all of its queries take part. Queries that are matched in groups are counted so.
+    Queries that lie mostly in ignored objects, and near no target, are replaced by certain background far away: nothing
+    is matched with them, and nothing is learnt from them. Where too few other queries would be left for a picture's
+    objects, all of its queries take part. For losses that match queries in groups, each group is treated separately.
     """
     call = signature(loss).bind(*said, **more)
     given = call.arguments
@@ -59,11 +59,11 @@ def set_loss(loss: Callable[..., Any], device_type: str, *said: Any, **more: Any
 
 
 def is_hidden(boxes: Tensor, labels: Mapping[str, Tensor]) -> Tensor:
-    """(…, N): which queries of a picture take no part in its loss.
+    """(…, N) bool: which queries of a picture take no part in its loss.
 
     Args:
-        boxes: (…, N, 4) of queries, middle and size as shares of the picture's.
-        labels: `boxes` and `ignored`, likewise.
+        boxes: (…, N, 4) of the queries, centre and size as shares of the picture's.
+        labels: `boxes` of targets and `ignored`, in the same format.
     """
     from transformers.loss.loss_for_object_detection import box_iou
 
@@ -76,7 +76,7 @@ def is_hidden(boxes: Tensor, labels: Mapping[str, Tensor]) -> Tensor:
 
 
 def _hidden(boxes: Tensor, labels: Sequence[Mapping[str, Tensor]], batch: int, noised: int, group: int) -> Tensor:
-    """(…, N) for (…, N, 4), of which the dimension `batch` are the pictures."""
+    """(…, N) bool for (…, N, 4) boxes, of which the dimension `batch` counts the pictures."""
     count = boxes.shape[-2] - noised
     group = group if count % group == 0 else count
     grouped = boxes[..., noised:, :].reshape(*boxes.shape[:-2], count // group, group, 4)
@@ -85,7 +85,7 @@ def _hidden(boxes: Tensor, labels: Sequence[Mapping[str, Tensor]], batch: int, n
 
 
 def _without(hidden: Tensor, logits: Tensor, boxes: Tensor, classes: int) -> tuple[Tensor, Tensor]:
-    """Queries of which the hidden ones are sure background far away."""
+    """The queries, with the hidden ones replaced by certain background far away."""
     background, away = torch.full_like(logits, -SURE), torch.zeros_like(boxes)
     if logits.shape[-1] > classes:
         background[..., -1] = SURE

@@ -20,7 +20,7 @@ def build(options: AdaBinsOptions) -> Model:
     """The network with its weights.
 
     Raises:
-        GearError: timm, torchvision or the weights are not there.
+        GearError: timm, torchvision or the weights are missing.
     """
     from gear.networks.depth.adabins import AdaBins
     from gear.networks.depth.adabins_graph import AdaBinsGraph
@@ -32,7 +32,7 @@ def build(options: AdaBinsOptions) -> Model:
 
 
 def convert(state: Mapping[str, Tensor]) -> Mapping[str, Any]:
-    """The authors' checkpoints under the graph's keys."""
+    """A checkpoint of the authors with the key names of the graph."""
     from gear.networks.depth.adabins import from_official
 
     return from_official(state)

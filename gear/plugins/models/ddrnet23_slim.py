@@ -37,7 +37,7 @@ def build(options: SegmentationOptions) -> SemsegNetwork:
 
 
 def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
-    """See `gear.networks.segmentation.ddrnet.from_official`."""
+    """A published state with the network's own keys: `gear.networks.segmentation.ddrnet.from_official`."""
     from gear.networks.segmentation.ddrnet import from_official
 
     return from_official(state)

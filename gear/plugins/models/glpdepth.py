@@ -31,7 +31,7 @@ def build(options: GlpnOptions) -> Model:
 
 
 def convert(state: Mapping[str, Tensor]) -> Mapping[str, Any]:
-    """The authors' checkpoints and transformers' folders under the graph's keys."""
+    """A checkpoint of the authors, or of transformers, with the key names of the graph."""
     from gear.networks.depth.glpn_official import from_official
 
     return from_official(state)

@@ -23,7 +23,7 @@ RECIPE = Recipe(learning_rate=6e-5, weight_decay=1e-2, batch=8, epochs=20, gradi
 
 
 def build_semseg(options: FolderOptions) -> FolderSegmenter:
-    """SegFormer and its like."""
+    """A semantic segmentation network from a folder, such as SegFormer."""
     from gear.networks.huggingface.folder import open_folder
     from gear.networks.huggingface.network import FolderSegmenter
 
@@ -31,7 +31,7 @@ def build_semseg(options: FolderOptions) -> FolderSegmenter:
 
 
 def build_depth(options: DepthFolderOptions) -> FolderDepth:
-    """GLPN, Depth Anything and their like."""
+    """A depth network from a folder, such as GLPN or Depth Anything."""
     from gear.networks.huggingface.folder import open_folder
     from gear.networks.huggingface.network import FolderDepth
 
@@ -39,7 +39,7 @@ def build_depth(options: DepthFolderOptions) -> FolderDepth:
 
 
 def build_detect2d(options: DetectorFolderOptions) -> FolderDetector:
-    """DETR, RT-DETR and their like."""
+    """A detector from a folder, such as DETR or RT-DETR."""
     from gear.networks.huggingface.folder import open_folder
     from gear.networks.huggingface.network import FolderDetector
 
@@ -97,5 +97,5 @@ detect2d: ModelSpec[DetectorFolderOptions] = ModelSpec(
 
 @hookimpl
 def gear_models() -> list[ModelSpec[Any]]:
-    """One for each task."""
+    """The three model plugins of this module, one for each task."""
     return [semseg, depth, detect2d]

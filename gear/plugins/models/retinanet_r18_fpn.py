@@ -63,14 +63,14 @@ def build_lite0(options: ReferenceDetectorOptions) -> RetinaNetDetector:
 
 
 def scale_of(options: ReferenceDetectorOptions, name: str) -> float:
-    """The input's scale: what the options say, or else the weights, or else one half."""
+    """The factor by which pictures are resized: from the options, else from the weights, else 0.5."""
     from gear.networks.input_scale import input_scale_of
 
     return input_scale_of(options, name, INPUT_SCALE)
 
 
 def start_from_imagenet(model: Any) -> None:
-    """See `gear.networks.efficientnet_lite0.start_from_imagenet`."""
+    """Loads ImageNet weights into the trunk: `gear.networks.efficientnet_lite0.start_from_imagenet`."""
     from gear.networks.efficientnet_lite0 import start_from_imagenet
 
     start_from_imagenet(model.graph.get_submodule("backbone"))
@@ -110,5 +110,5 @@ retinanet_lite0: ModelSpec[ReferenceDetectorOptions] = ModelSpec(
 
 @hookimpl
 def gear_models() -> list[ModelSpec[ReferenceDetectorOptions]]:
-    """These networks."""
+    """The two model plugins of this module."""
     return [retinanet_r18, retinanet_lite0]

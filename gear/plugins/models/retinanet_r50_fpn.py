@@ -32,7 +32,7 @@ def build(options: OfficialDetectorOptions) -> RetinaNetDetector:
 
 
 def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
-    """See `gear.networks.detection.official.from_official`."""
+    """A published state with the network's own keys: `gear.networks.detection.official.from_official`."""
     from gear.networks.detection.official import from_official
 
     return from_official(state)

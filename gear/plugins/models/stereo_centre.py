@@ -42,7 +42,7 @@ def build_lite0(options: StereoCentreOptions) -> StereoCentreNetwork:
 
 
 def start_from_imagenet(model: Any) -> None:
-    """See `gear.networks.efficientnet_lite0.start_from_imagenet`."""
+    """Loads ImageNet weights into the trunk: `gear.networks.efficientnet_lite0.start_from_imagenet`."""
     from gear.networks.efficientnet_lite0 import start_from_imagenet
 
     start_from_imagenet(model.graph)
@@ -81,5 +81,5 @@ stereo_centre_lite0: ModelSpec[StereoCentreOptions] = ModelSpec(
 
 @hookimpl
 def gear_models() -> list[ModelSpec[StereoCentreOptions]]:
-    """These networks."""
+    """The two model plugins of this module."""
     return [stereo_centre, stereo_centre_lite0]

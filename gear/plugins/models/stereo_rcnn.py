@@ -1,4 +1,4 @@
-"""Stereo R-CNN, as the paper attacks it."""
+"""Stereo R-CNN (Li, Chen, Shen, CVPR 2019), the stereo network that CARLA-GeAR attacks."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def build(options: StereoRcnnOptions) -> Model:
 
 
 def from_official(state: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The authors' keys are the graph's own; the variances of the losses are added where they are missing."""
+    """A published state with the network's own keys; variances of the losses are added where they are missing."""
     from gear.networks.stereo.rcnn_graph import from_official
 
     return from_official(state)

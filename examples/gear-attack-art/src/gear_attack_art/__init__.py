@@ -17,10 +17,10 @@ class ArtConfig:
 
     Attributes:
         method: `pgd` is the toolbox's ProjectedGradientDescent, `mim` its MomentumIterativeMethod.
-        height_px, width_px: the patch's size.
-        eps_unit: how far a value may move from where it began, of 0..1; 1 is no limit.
-        step_unit: how far a step moves each value, of 0..1.
-        batch: samples that a step looks at.
+        height_px, width_px: size of the patch.
+        eps_unit: largest change of a value from its start, of 0..1; 1 is no limit.
+        step_unit: change of each value in a step, of 0..1.
+        batch: number of samples per step.
     """
 
     method: Literal["pgd", "mim"] = "pgd"
@@ -37,7 +37,7 @@ class ArtConfig:
 
 
 def build(config: ArtConfig) -> Attack:
-    """Imports the toolbox only when somebody asks for the attack."""
+    """Imports the toolbox when the attack is asked for."""
     from gear_attack_art.art import ArtAttack
 
     return ArtAttack(config)

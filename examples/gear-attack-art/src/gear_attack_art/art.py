@@ -1,4 +1,4 @@
-"""The toolbox attacks an "estimator" whose input is the patches: gear's compositor and the model are behind it."""
+"""The toolbox attacks an "estimator" whose input are the patches: gear's compositor and the model lie behind it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ METHODS = {"pgd": ProjectedGradientDescent, "mim": MomentumIterativeMethod}
 
 
 class PatchEstimator(LossGradientsMixin, BaseEstimator):  # type: ignore[misc]
-    """What the toolbox needs of a model: a loss gradient. Its input is (surfaces, 3, h, w) patches in 0..1."""
+    """What the toolbox needs of a model: the gradient of a loss. Its input are (surfaces, 3, h, w) patches in 0..1."""
 
     estimator_params = BaseEstimator.estimator_params
 
@@ -31,7 +31,7 @@ class PatchEstimator(LossGradientsMixin, BaseEstimator):  # type: ignore[misc]
         self._batch, self._rng = min(batch, len(dataset)), rng
 
     def loss_gradient(self, x: np.ndarray, y: Any, **kwargs: Any) -> np.ndarray:
-        """Of the model's losses on a few samples, with respect to the patches."""
+        """Gradient of the model's losses on a few samples with respect to the patches, of the patches' shape."""
         model, dataset, compositor = self._parts
         chosen = sorted(self._rng.choice(len(dataset), self._batch, replace=False).tolist())
         patches = torch.from_numpy(np.asarray(x, np.float32)).requires_grad_(True)
@@ -45,7 +45,7 @@ class PatchEstimator(LossGradientsMixin, BaseEstimator):  # type: ignore[misc]
         return np.zeros((len(x), 1), np.float32)
 
     def fit(self, x: np.ndarray, y: Any, **kwargs: Any) -> None:
-        """Never trained.
+        """Not available: the estimator is never trained.
 
         Raises:
             NotImplementedError: always.
@@ -54,7 +54,7 @@ class PatchEstimator(LossGradientsMixin, BaseEstimator):  # type: ignore[misc]
 
     @property
     def input_shape(self) -> tuple[int, ...]:
-        """Of one patch, any size."""
+        """Shape of one patch: (3, h, w)."""
         return (3, -1, -1)
 
 
@@ -74,7 +74,9 @@ class ArtAttack:
         rng: np.random.Generator,
         watch: Watch | None = None,
     ) -> tuple[Patch, ...]:
-        """One patch a surface, from random values; the toolbox itself draws nothing and tells nothing on its way."""
+        """One patch for each surface, starting from random values; the toolbox draws nothing and reports nothing in
+        between.
+        """
         config, count = self.config, len(dataset[0].record.surfaces)
         start = rng.uniform(0, 1, (count, 3, config.height_px, config.width_px)).astype(np.float32)
         attack = METHODS[config.method](

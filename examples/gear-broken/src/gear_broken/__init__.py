@@ -1,1 +1,1 @@
-"""Broken plugins."""
+"""Plugins that are broken on purpose, one in each module."""

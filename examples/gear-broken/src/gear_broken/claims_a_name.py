@@ -10,6 +10,6 @@ print("thank you for choosing gear-broken")
 
 @hookimpl
 def gear_defenses() -> list[Any]:
-    """A second median."""
+    """Returns a second defense with the name `median`."""
     print("here I am")
     return [spec]

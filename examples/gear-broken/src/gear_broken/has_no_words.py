@@ -1,4 +1,4 @@
-"""Raises an exception whose text cannot be had."""
+"""Raises an exception whose own text raises."""
 
 
 class MuteError(BaseException):

@@ -7,5 +7,5 @@ from gear.contracts.hookspecs import hookimpl
 
 @hookimpl
 def gear_defences() -> list[Any]:
-    """Nobody asks."""
+    """Is never called, since gear has no hook of this name."""
     return []

@@ -8,6 +8,6 @@ from gear.contracts.hookspecs import hookimpl
 
 @hookimpl
 def gear_defenses() -> Iterator[Any]:
-    """Yields for ever."""
+    """Yields one object after another and never ends."""
     while True:
         yield None

@@ -7,5 +7,5 @@ from gear.contracts.hookspecs import hookimpl
 
 @hookimpl
 def gear_defenses() -> list[Any]:
-    """Never answers."""
+    """Raises an exception in place of returning specs."""
     raise KeyError("weights")

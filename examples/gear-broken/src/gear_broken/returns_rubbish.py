@@ -7,5 +7,5 @@ from gear.contracts.hookspecs import hookimpl
 
 @hookimpl
 def gear_models() -> list[Any]:
-    """Rubbish."""
+    """Returns objects that are no specs."""
     return [42, "resnet"]

@@ -10,5 +10,5 @@ from gear.plugins.defenses.median import spec
 
 @hookimpl
 def gear_defenses() -> list[Any]:
-    """From the future."""
+    """Returns a spec of a later version of the protocol."""
     return [dataclasses.replace(spec, name="future", protocol=PROTOCOL_VERSION + 1)]

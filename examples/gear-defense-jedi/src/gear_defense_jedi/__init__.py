@@ -20,7 +20,7 @@ class JediConfig:
         patch_mean, patch_std: entropy of patches in bits, for the small, middle and large windows.
         clean_mean, clean_std: the same of clean pictures.
         least_share: blobs below this share of the picture are dropped, if there are larger ones.
-        grow_px: the mask is closed and grown by so much before the picture is filled in.
+        grow_px: radius by which the mask is closed and dilated.
     """
 
     patch_mean: Triple = (5.32, 6.06, 6.47)
@@ -41,7 +41,7 @@ class JediConfig:
 
 
 def build(config: JediConfig) -> Defense:
-    """Imports OpenCV only when somebody asks for the defense."""
+    """Imports OpenCV when the defense is asked for."""
     from gear_defense_jedi.jedi import Jedi
 
     return Jedi(config)

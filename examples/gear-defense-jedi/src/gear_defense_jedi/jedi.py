@@ -25,13 +25,13 @@ Bool = npt.NDArray[np.bool_]
 
 
 class Jedi(PerPicture):
-    """Fills in what is too busy to be street."""
+    """Detects areas of high local entropy and fills them in."""
 
     def __init__(self, config: JediConfig) -> None:
         self.config = config
 
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The picture with suspicious areas filled in from around, and where they are."""
+        """The picture with the detected areas inpainted, and (H, W) float32 mask of them."""
         mask = self.suspicious(picture)
         if not mask.any():
             return picture.copy(), mask.astype(np.float32)
@@ -39,11 +39,11 @@ class Jedi(PerPicture):
         return np.asarray(filled, np.uint8), mask.astype(np.float32)
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """There is no gradient through a search."""
+        """Raises an error: no gradient passes the search for windows."""
         raise ValueError("jedi has no gradient; attack it by queries")
 
     def suspicious(self, picture: UInt8Image) -> Bool:
-        """(H, W) True where a patch is believed to be."""
+        """(H, W) bool, True where a patch is detected."""
         config = self.config
         grey = np.asarray(cv2.cvtColor(np.ascontiguousarray(picture), cv2.COLOR_RGB2GRAY), np.uint8)
         mask = np.zeros(grey.shape, np.bool_)
@@ -59,7 +59,7 @@ class Jedi(PerPicture):
         return self._completed(mask)
 
     def _completed(self, mask: Bool) -> Bool:
-        """Without small blobs, closed and grown."""
+        """The mask without small blobs, closed and dilated."""
         count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8))
         areas = stats[:, cv2.CC_STAT_AREA]
         large = [i for i in range(1, count) if areas[i] >= self.config.least_share * mask.size]

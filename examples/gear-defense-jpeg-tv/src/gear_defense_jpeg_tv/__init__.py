@@ -15,8 +15,8 @@ class JpegTvConfig:
     """Options of jpeg_tv.
 
     Attributes:
-        quality: libjpeg's, 1 to 100.
-        weight_levels: how strongly variation is taken away; about the size of the noise that goes, of 0..255.
+        quality: of JPEG, 1 to 100.
+        weight_levels: strength of the denoising, about the amplitude of the noise that is removed, of 0..255.
         iterations: of the denoiser.
     """
 
@@ -34,7 +34,7 @@ class JpegTvConfig:
 
 
 def build(config: JpegTvConfig) -> Defense:
-    """Imports OpenCV and torch only when somebody asks for the defense."""
+    """Imports OpenCV and torch when the defense is asked for."""
     from gear_defense_jpeg_tv.jpeg_tv import JpegTv
 
     return JpegTv(config)

@@ -21,17 +21,17 @@ STEP = 0.125
 
 
 class JpegTv(PerPicture):
-    """Compresses, decompresses, and smooths what is left but for strong edges."""
+    """Compresses and decompresses a picture, then smooths it except for strong edges."""
 
     def __init__(self, config: JpegTvConfig) -> None:
         self.config = config
 
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The cleaned picture, no mask."""
+        """The cleaned (H, W, 3) uint8 picture, and None for no mask."""
         return self._clean(picture), None
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """The same values with the gradient of doing nothing."""
+        """The same values, with the identity as substitute gradient."""
         return straight_through(pictures, each_as_uint8(pictures, self._clean))
 
     def _clean(self, picture: UInt8Image) -> UInt8Image:
@@ -45,7 +45,7 @@ class JpegTv(PerPicture):
 
 
 def denoised(picture: Levels, weight: float, iterations: int) -> Levels:
-    """The (H, W, C) picture u that makes |u - picture|^2 / (2 weight) + TV(u) small."""
+    """The (H, W, C) picture u that minimises |u - picture|^2 / (2 weight) + TV(u)."""
     dual = np.zeros((2, *picture.shape), np.float32)
     for _ in range(iterations):
         slope = gradient(divergence(dual) - picture / weight)
