@@ -122,7 +122,7 @@ def call(*command: str | Path, cwd: Path, env: dict[str, str] | None = None) -> 
     return done.stdout
 
 
-BLOCK = re.compile(r"```(?:sh run)?\n(.*?)```", re.DOTALL)
+BLOCK = re.compile(r"```(?:sh)?(?: run)?\n(.*?)```", re.DOTALL)
 
 
 def instructions(text: str) -> str:
