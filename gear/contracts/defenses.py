@@ -100,3 +100,36 @@ class Taught(Protocol):
             state: what `fit` returned for this model.
         """
         ...
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class DefendedBatch:
+    """What a defense makes of a batch, with gradients to the pictures.
+
+    Attributes:
+        views: (B, 3, H, W) cleaned pictures in 0..1 by camera name.
+        masks: (B, H, W) where the patch is believed to be, in 0..1 by camera name, before any rounding; None for none.
+        scores: (B,) how sure the defense is of an attack, in 0..1; None for none.
+    """
+
+    views: Mapping[str, Tensor]
+    masks: Mapping[str, Tensor] | None = None
+    scores: Tensor | None = None
+
+
+@runtime_checkable
+class Detecting(Protocol):
+    """A defense whose score or mask an adaptive attack can lower.
+
+    A defense that only scores must have this: nothing else of it has a gradient for an attack.
+    """
+
+    def defend_batch(self, views: Mapping[str, Tensor], model: Model, state: Any) -> DefendedBatch:
+        """Pictures, masks and scores of a batch; attacks call neither `forward` nor `forward_taught` beside it.
+
+        Args:
+            views: (B, 3, H, W) float pictures in 0..1 by camera name.
+            model: that is guarded; its parameters may need no gradient.
+            state: what `fit` returned for this model.
+        """
+        ...

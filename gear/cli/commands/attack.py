@@ -62,6 +62,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_calibration(parser)
     parser.add_argument(
+        "--score-weight",
+        type=float,
+        default=1.0,
+        metavar="W",
+        help="weight of lowering the defense's score; 0 for none (1)",
+    )
+    parser.add_argument(
+        "--mask-weight",
+        type=float,
+        default=1.0,
+        metavar="W",
+        help="weight of uncovering the patch in the defense's mask; 0 for none (1)",
+    )
+    parser.add_argument(
         "--val",
         action="append",
         default=[],

@@ -19,6 +19,7 @@ from gear.dataset.sidecar import dump_json
 from gear.dataset.store import plan_of, splits_of
 from gear.measuring.guard import OpenedGuard, open_guard
 from gear.measuring.plugin_selection import Chosen
+from gear.plugins.attacks.optimisation.model_group import DefenseWeights
 from gear.plugins.build import NO_OPTIONS, find
 from gear.plugins.catalogue import PluginEntry
 from gear.plugins.datasets import root_and_split, roots_of
@@ -53,6 +54,7 @@ class Job:
         steps, queries: the budget.
         every, patience: steps between validations, and validations without improvement before the attack stops.
         seed: seed of all random draws.
+        weights: of the terms that lower what the defense says.
     """
 
     datasets: Sequence[Dataset[Any]]
@@ -71,6 +73,7 @@ class Job:
     every: int
     patience: int
     seed: int
+    weights: DefenseWeights
 
     def plan(self, weights_sha256: str | None, product: Any) -> Json:
         """Everything that decides the patches: a run with an equal plan finds them made. Weights are those of the
@@ -91,6 +94,7 @@ class Job:
             "defense": None if self.guard.defense is None else self.guard.defense.facts(),
             **({} if learnt.clean is None else {"calibration": learnt.facts()}),
             **learnt.counted(),
+            **({} if self.guard.defense is None else {"defense_weights": to_plain(self.weights)}),
             "task": self.task,
             "data": [_facts(dataset) for dataset in self.datasets],
             "validation": [_facts(dataset) for dataset in self.validation],
@@ -144,6 +148,7 @@ def resolve(request: AttackRequest, on_fit_progress: Progress) -> Job:
         every=request.every,
         patience=request.patience,
         seed=request.seed,
+        weights=DefenseWeights(score=request.score_weight, mask=request.mask_weight),
     )
 
 

@@ -6,15 +6,20 @@ from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import Any
 
-from gear.contracts.defenses import Defense, Taught
+from gear.contracts.defenses import Defense, Detecting, Taught
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec, DefenseSpec, ModelSpec
 from gear.dataset.reading import Dataset
-from gear.measuring.calibration import Calibration
 from gear.measuring.checked_defense import CheckedDefense
 from gear.measuring.guard import OpenedGuard
 from gear.measuring.plugin_selection import Chosen, check_model, chosen_model
-from gear.plugins.attacks.optimisation.model_group import Cleaned, Defended, Group
+from gear.plugins.attacks.optimisation.model_group import (
+    USUAL_WEIGHTS,
+    Cleaned,
+    Defended,
+    DefenseWeights,
+    Group,
+)
 from gear.plugins.build import blamed, build
 from gear.plugins.catalogue import PluginEntry
 from gear.values.errors import GearError
@@ -87,8 +92,20 @@ def check_attack(
     return spec
 
 
-def build_model(models: Sequence[Chosen], guard: OpenedGuard, seed: int) -> Model:
-    """The model for `Attack.optimise`. A defense that needs calibration is calibrated for each model separately."""
+def build_model(
+    models: Sequence[Chosen], guard: OpenedGuard, seed: int, weights: DefenseWeights = USUAL_WEIGHTS
+) -> Model:
+    """The model for `Attack.optimise`. A defense that needs calibration is calibrated for each model separately.
+
+    Args:
+        models: the attacked ones.
+        guard: the defense that the attack is adaptive to.
+        seed: of the calibration.
+        weights: of the terms that lower the defense's score and mask.
+
+    Raises:
+        GearError: nothing of the defense can reach an attack.
+    """
     built: dict[str, Model] = {}
     short = [chosen.found.spec.name for chosen in models]
     for chosen in models:
@@ -96,14 +113,16 @@ def build_model(models: Sequence[Chosen], guard: OpenedGuard, seed: int) -> Mode
         spec = chosen.found.spec
         assert isinstance(spec, ModelSpec)
         if guard.defense is not None:
-            model = _behind(guard.defense, model, spec.views, guard.calibration, seed)
+            model = _behind(guard, model, spec.views, seed, weights)
         # Two packages may each have a network of the same name; both are attacked.
         built[spec.name if short.count(spec.name) == 1 else chosen.found.full_name] = model
     return next(iter(built.values())) if len(built) == 1 else Group(built)
 
 
-def _behind(defense: Chosen, model: Model, cameras: Sequence[str], calibration: Calibration, seed: int) -> Model:
+def _behind(opened: OpenedGuard, model: Model, cameras: Sequence[str], seed: int, weights: DefenseWeights) -> Defended:
     """A model guarded by a defense, which is calibrated when it is used for the first time."""
+    defense, calibration = opened.defense, opened.calibration
+    assert defense is not None
     product: Defense = build(defense.found, defense.options)
     spec = defense.found.spec
     assert isinstance(spec, DefenseSpec)
@@ -111,12 +130,37 @@ def _behind(defense: Chosen, model: Model, cameras: Sequence[str], calibration: 
         wrapped = product.wrap(model)
     learn = partial(calibration.fit, defense, product, model, cameras, seed)
     guard = CheckedDefense(defense.found, product, model if spec.needs_model or spec.taps else None, learn)
+    if wrapped is model and "images" not in spec.outputs and not isinstance(product, Detecting):
+        raise GearError(
+            f"defense {spec.name!r} leaves pictures as they are and has no `defend_batch`, so an attack through it "
+            "would be an attack without it (gear.contracts.defenses.Detecting)"
+        )
     if spec.gradient == "none":
         # What it draws, it draws alike each time it is asked.
         return Cleaned(
-            wrapped, product, model, lambda views: guard.apply(views, derive_rng(0, "attack", spec.name), 0).views
+            wrapped,
+            product,
+            model,
+            lambda views: guard.apply(views, derive_rng(0, "attack", spec.name), 0).views,
+            calibrate=lambda: guard.state,
+        )
+    if isinstance(product, Detecting):
+        detecting = product
+        return Defended(
+            wrapped,
+            product,
+            model,
+            detect=lambda views: detecting.defend_batch(views, model, guard.state),
+            weights=weights,
+            calibrate=lambda: guard.state,
         )
     if isinstance(product, Taught):
         taught = product
-        return Defended(wrapped, product, model, lambda views: taught.forward_taught(views, model, guard.state))
+        return Defended(
+            wrapped,
+            product,
+            model,
+            lambda views: taught.forward_taught(views, model, guard.state),
+            calibrate=lambda: guard.state,
+        )
     return Defended(wrapped, product, model)

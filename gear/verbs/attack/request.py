@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,6 +33,8 @@ class AttackRequest:
     patience: int = 0
     compositor: str = "transport"
     seed: int = 0
+    score_weight: float = 1.0
+    mask_weight: float = 1.0
     allow_test_data: bool = False
     force: bool = False
 
@@ -40,6 +43,8 @@ class AttackRequest:
         counts = (self.steps, self.queries, self.every)
         if any(count is not None and count < 1 for count in counts) or self.patience < 0:
             raise GearError("steps, queries and every must be at least 1, patience at least 0")
+        if not (0 <= self.score_weight < math.inf and 0 <= self.mask_weight < math.inf):
+            raise GearError("score_weight and mask_weight must be at least 0, and finite")
         if self.patience and not self.val:
             raise GearError("patience counts looks at validation samples, and there are none: name some with --val")
 

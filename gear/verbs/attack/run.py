@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +24,7 @@ from gear.measuring.guard import Guard
 from gear.measuring.guarded_model import weights_digest
 from gear.measuring.patch_checks import check_patches
 from gear.measuring.shown_size import size_note
-from gear.plugins.attacks.optimisation.model_group import device_name
+from gear.plugins.attacks.optimisation.model_group import Defended, device_name, members_of
 from gear.plugins.attacks.optimisation.objectives import default_objective
 from gear.plugins.build import blamed, build, traced
 from gear.plugins.catalogue import PluginEntry
@@ -84,6 +85,8 @@ def attack(
     patience: int = 0,
     compositor: str = "transport",
     seed: int = 0,
+    score_weight: float = 1.0,
+    mask_weight: float = 1.0,
     allow_test_data: bool = False,
     force: bool = False,
     progress: bool = False,
@@ -114,6 +117,8 @@ def attack(
         patience: looks without a better one until the attack ends; 0 for never.
         compositor: `transport`, or `homography`, which needs no probes.
         seed: of everything that is drawn.
+        score_weight: weight of the term that lowers the defense's score; 0 leaves it out.
+        mask_weight: weight of the term that uncovers the patch in the defense's mask; 0 leaves it out.
         allow_test_data: whether `test` splits may be optimised on.
         force: start afresh where something else is.
         progress: shows a progress bar.
@@ -140,6 +145,8 @@ def attack(
         patience=patience,
         compositor=compositor,
         seed=seed,
+        score_weight=score_weight,
+        mask_weight=mask_weight,
         allow_test_data=allow_test_data,
         force=force,
     )
@@ -162,15 +169,16 @@ def run_attack(request: AttackRequest, callbacks: Callbacks) -> AttackReport:
     job = resolve(request, callbacks.on_fit_progress)
     _warn(job, callbacks.on_warning)
     product, root = build(job.found, job.options), Path(request.out)
-    network = build_model(job.models, job.guard, job.seed)
+    network = build_model(job.models, job.guard, job.seed, job.weights)
     plan = job.plan(weights_digest(network), product)
     with alone_at_work(root):
         there = begin(root, plan, force=request.force)
         if there is not None:
             return AttackReport(out=root, patches=read_patches(root), facts=there, made=False)
         with traced(_asked(job), "forward"):
+            calibration_s = _calibrated(network)
             made = _optimised(job, product, network, root, plan, callbacks.on_progress)
-            facts = _facts(job, network, plan, made)
+            facts = _facts(job, network, plan, made) | {"calibration_seconds": round(calibration_s, 3)}
         names = ", ".join(one.found.spec.name for one in job.models)
         write_curves(root, f"{request.attack} on {names}", made.recorder.curves, made.recorder.judged)
         write_samples(root, made.seen.pairs(made.patches))
@@ -208,6 +216,8 @@ def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, o
     """
     cache, device = Cache[Prepared](CACHE_BYTES), device_name(network)
     seen, held = (Scenes(group, job.compositor, device, cache) for group in (job.datasets, job.validation))
+    if job.spec.needs_gradients:
+        seen.check_adaptive(network, job.surfaces, derive_rng(job.seed, "adaptive"))
     # One each: an objective remembers the clean answers of its samples by their numbers.
     make = product.objective if isinstance(product, WithObjective) else default_objective
     settings = product.settings(seen.samples[0]) if isinstance(product, WithTaskOptions) else job.config
@@ -249,6 +259,15 @@ def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, o
         recorder=recorder,
         steps_done=done,
     )
+
+
+def _calibrated(network: Model) -> float:
+    """Makes the defenses learn before any step, so that the time of steps is that of steps; returns the seconds."""
+    begun = time.monotonic()
+    for member in members_of(network).values():
+        if isinstance(member, Defended):
+            member.calibrate()
+    return time.monotonic() - begun
 
 
 def _facts(job: Job, network: Model, plan: Json, made: _Made) -> Json:

@@ -17,10 +17,15 @@ from gear.contracts.models import Model
 from gear.dataset.reading import Dataset
 from gear.plugins.attacks.optimisation.frozen_model import frozen
 from gear.plugins.attacks.optimisation.gradient_checks import promised_and_kept
-from gear.plugins.attacks.optimisation.objectives import counted
+from gear.plugins.attacks.optimisation.model_group import Defended, members_of
+from gear.plugins.attacks.optimisation.objectives import counted, defense_terms
 from gear.readers import Kept, all_of
+from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
 from gear.verbs.attack.data import JoinedCompositor
+
+RANDOM_PX = (32, 64)
+"""Height and width of the random patches with which gradients are checked."""
 
 KEPT_BYTES = 2 << 30
 SHOWN = 3
@@ -65,6 +70,44 @@ class Scenes:
         tensors = [torch.from_numpy(patch.rgb.copy()).permute(2, 0, 1) for patch in patches]
         with frozen(model):
             return promised_and_kept(lambda changed: self.value(model, objective, changed, indexes), tensors)
+
+    def check_adaptive(self, model: Model, surfaces: int, rng: np.random.Generator) -> None:
+        """Checks that a gradient of what the defenses say reaches random patches.
+
+        Raises:
+            GearError: a term of a defense has a gradient of 0, so an attack would not be adaptive to it.
+        """
+        patches = [
+            torch.from_numpy(rng.uniform(0.05, 0.95, (3, *RANDOM_PX)).astype(np.float32)) for _ in range(surfaces)
+        ]
+        is_seen = [any(one.visible_px for one in sample.surfaces) for sample in self.samples]
+        for name, member in members_of(model).items():
+            if not isinstance(member, Defended):
+                continue
+            sizes: dict[str, float] = {}
+            with frozen(model):
+                for index in np.flatnonzero(is_seen)[:SHOWN].tolist():
+                    for term, size in self._gradients(member, patches, index).items():
+                        sizes[term] = max(sizes.get(term, 0.0), size)
+            for term in (term for term, size in sizes.items() if not size > 0):
+                kind, of_model = term.removeprefix("defense_"), f" of {name[:-1]}" if name else ""
+                raise GearError(
+                    f"the {kind} of the defense{of_model} has no gradient at random patches, so that the attack would "
+                    f"not lower it; leave it out with --{kind}-weight 0"
+                )
+
+    def _gradients(self, member: Defended, patches: Sequence[Tensor], index: int) -> dict[str, float]:
+        """The largest entry of the gradient of each term of a defense to the patches in one sample."""
+        asked = [patch.clone().requires_grad_(True) for patch in patches]
+        sample = self.samples[index]
+        views = {view: self.compositor.compose(asked, [index], view) for view in sample.images}
+        sizes = {}
+        for name, term in defense_terms(member, views, [sample]).items():
+            found: Sequence[Tensor | None] = ()
+            if term.value.requires_grad:
+                found = torch.autograd.grad(term.value, asked, retain_graph=True, allow_unused=True)
+            sizes[name] = max((float(one.abs().max()) for one in found if one is not None), default=0.0)
+        return sizes
 
     def pairs(self, patches: Sequence[Patch]) -> list[tuple[UInt8Image, UInt8Image]]:
         """A few pictures without and with the patches."""

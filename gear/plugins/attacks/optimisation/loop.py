@@ -17,7 +17,7 @@ from gear.plugins.attacks.optimisation.appearance import vary
 from gear.plugins.attacks.optimisation.checkpoint_state import check_saved
 from gear.plugins.attacks.optimisation.frozen_model import frozen
 from gear.plugins.attacks.optimisation.model_group import members_of
-from gear.plugins.attacks.optimisation.objectives import not_finite
+from gear.plugins.attacks.optimisation.objectives import all_terms, not_finite
 from gear.plugins.attacks.optimisation.regularisers import non_printability, smoothness
 from gear.plugins.attacks.optimisation.settings import Settings, TextureSettings
 from gear.values.errors import GearError
@@ -206,7 +206,7 @@ def unit_gradients(problem: Problem, objective: Objective, settings: Settings) -
         terms = {
             prefix + name: term
             for prefix, member in members_of(problem.model).items()
-            for name, term in objective.terms(member, seen.views, seen.samples, seen.indexes).items()
+            for name, term in all_terms(objective, member, seen.views, seen.samples, seen.indexes).items()
         }
         values = {name: float(term.value.detach()) for name, term in terms.items()}
         total = torch.zeros_like(textures)

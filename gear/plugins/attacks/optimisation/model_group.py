@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
-from gear.contracts.defenses import Defense
+from gear.contracts.defenses import DefendedBatch, Defense
 from gear.contracts.models import Model
 from gear.plugins.attacks.optimisation.frozen_model import networks_of
 from gear.values.frames import UInt8Image
 
+DefendsBatches = Callable[[Mapping[str, Tensor]], DefendedBatch]
 CleansBatches = Callable[[Mapping[str, Tensor]], Mapping[str, Tensor]]
 """(B, 3, H, W) pictures in 0..1 by camera name to the same."""
 
@@ -49,6 +51,22 @@ class Group(nn.Module):
         return {f"{name}/{key}": tap for name, member in self.members.items() for key, tap in member.taps().items()}
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DefenseWeights:
+    """How much an adaptive attack lowers what a defense says beside harming the task; 0 leaves a term out.
+
+    Attributes:
+        score: weight of the defense's score.
+        mask: weight of the defense's mask on the patch.
+    """
+
+    score: float = 1.0
+    mask: float = 1.0
+
+
+USUAL_WEIGHTS = DefenseWeights()
+
+
 class Defended(nn.Module):
     """A model that sees what a defense lets through, for attacks that know of the defense.
 
@@ -57,17 +75,30 @@ class Defended(nn.Module):
         defense: what cleans its pictures.
         bare: the model that was wrapped, if the wrapping is another: its networks are attacked too.
         clean: what cleans batches; by default the defense's `forward`.
+        detect: what cleans batches and says their scores and masks, instead of `clean`.
+        calibrate: makes the defense learn; called by `calibrate`.
 
     Attributes:
         device: where the model runs, whatever is around it.
+        weights: of the terms that lower the defense's score and mask.
     """
 
     def __init__(
-        self, model: Model, defense: Defense, bare: Model | None = None, clean: CleansBatches | None = None
+        self,
+        model: Model,
+        defense: Defense,
+        bare: Model | None = None,
+        clean: CleansBatches | None = None,
+        *,
+        detect: DefendsBatches | None = None,
+        weights: DefenseWeights = USUAL_WEIGHTS,
+        calibrate: Callable[[], object] = lambda: None,
     ) -> None:
         super().__init__()
-        self.model, self.defense = model, defense
-        self._clean_batch = defense.forward if clean is None else clean
+        self.model, self.defense, self.weights, self.calibrate = model, defense, weights, calibrate
+        clean = defense.forward if clean is None else clean
+        self._defend = detect or (lambda views: DefendedBatch(views=clean(views)))
+        self._last: tuple[Mapping[str, Tensor], bool, DefendedBatch] | None = None
         self.device = device_name(model if bare is None else bare)
         inside = [model] if bare is None or bare is model else [bare, model]
         self.networks = _networks(*(one for one in inside if one is not model or not isinstance(one, nn.Module)))
@@ -78,7 +109,14 @@ class Defended(nn.Module):
 
     def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
         """The model's, of the cleaned pictures; gradients pass the defense as it declares."""
-        return self.model.forward(self._clean_batch(views), targets)
+        return self.model.forward(self.defended(views).views, targets)
+
+    def defended(self, views: Mapping[str, Tensor]) -> DefendedBatch:
+        """What the defense makes of a batch; computed once for the last one, whose graph is kept."""
+        has_gradients = torch.is_grad_enabled()
+        if self._last is None or self._last[0] is not views or self._last[1] != has_gradients:
+            self._last = (views, has_gradients, self._defend(views))
+        return self._last[2]
 
     def taps(self) -> Mapping[str, nn.Module]:
         """The model's."""
@@ -101,8 +139,9 @@ class Cleaned(Defended):
         defense: Defense,
         bare: Model,
         clean: Callable[[Mapping[str, UInt8Image]], Mapping[str, UInt8Image]],
+        calibrate: Callable[[], object] = lambda: None,
     ) -> None:
-        super().__init__(model, defense, bare)
+        super().__init__(model, defense, bare, calibrate=calibrate)
         self._clean = clean
 
     def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:

@@ -25,7 +25,7 @@ from gear.formats.cityscapes import IGNORED_TRAIN_ID, LABELS
 from gear.networks.network import as_batch
 from gear.plugins.attacks.optimisation.clean_outputs import CleanAnswers
 from gear.plugins.attacks.optimisation.frozen_model import frozen
-from gear.plugins.attacks.optimisation.model_group import members_of
+from gear.plugins.attacks.optimisation.model_group import Defended, members_of
 from gear.values.errors import GearError
 
 TRAIN_IDS = torch.tensor([label.train_id for label in LABELS if label.id >= 0])
@@ -105,7 +105,7 @@ class SemsegObjective:
         metric would fall as the attack succeeds, to 0 where nothing is right any more.
         """
         if not self.asks_for_clean:
-            terms = weighted(self, model, views, samples, indexes)
+            terms = [one.weight * one.value for one in self.terms(model, views, samples, indexes).values()]
             return torch.stack(terms).sum() if terms else torch.zeros(())
         assert self.gamma != "dynamic"
         logits, labels, counts = self._answers(model, views, samples)
@@ -224,7 +224,11 @@ def counted(
     They are the objective's own `harm` where it has one, its weighted terms otherwise.
     """
     if isinstance(objective, HarmObjective):
-        return [objective.harm(member, views, samples, indexes) for member in members_of(model).values()]
+        harms = [objective.harm(member, views, samples, indexes) for member in members_of(model).values()]
+        terms = [
+            term for member in members_of(model).values() for term in defense_terms(member, views, samples).values()
+        ]
+        return harms + [term.weight * term.value for term in terms]
     return weighted(objective, model, views, samples, indexes)
 
 
@@ -239,8 +243,37 @@ def weighted(
     return [
         term.weight * term.value
         for member in members_of(model).values()
-        for term in objective.terms(member, views, samples, indexes).values()
+        for term in all_terms(objective, member, views, samples, indexes).values()
     ]
+
+
+def all_terms(
+    objective: Objective,
+    member: Model,
+    views: Mapping[str, Tensor],
+    samples: Sequence[Any],
+    indexes: Sequence[int],
+) -> dict[str, Term]:
+    """The objective's terms of one model, and those that lower what its defense says, if there is one."""
+    return {**objective.terms(member, views, samples, indexes), **defense_terms(member, views, samples)}
+
+
+def defense_terms(member: Model, views: Mapping[str, Tensor], samples: Sequence[Any]) -> dict[str, Term]:
+    """`defense_score` and `defense_mask`, which grow as a defense is less sure and covers less of the patch.
+
+    They are the negative means of the scores and of the mask before rounding on the patch's visible pixels, as in the
+    defense-aware attacks of Z-Mask's supplement (Rossolini et al., AAAI 2023). Empty for a model without a defense, for
+    one whose defense says neither, and for weights of 0.
+    """
+    if not isinstance(member, Defended):
+        return {}
+    batch, terms = member.defended(views), {}
+    if batch.scores is not None and member.weights.score:
+        terms["defense_score"] = Term(value=-batch.scores.mean(), weight=member.weights.score)
+    if batch.masks and member.weights.mask:
+        means = [_mean(mask, ~outside(samples, view, mask.device)) for view, mask in batch.masks.items()]
+        terms["defense_mask"] = Term(value=-torch.stack(means).mean(), weight=member.weights.mask)
+    return terms
 
 
 def not_finite(what: str, indexes: Sequence[int]) -> GearError:

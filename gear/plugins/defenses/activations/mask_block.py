@@ -51,8 +51,12 @@ class MaskBlock:
 
     def score(self, shallow: Tensor, deep: Tensor) -> float:
         """How much both maps agree on under the mask: sum(H_D H_S M) / (1 + sum M), 0 or more."""
+        return float(self.score_tensor(shallow, deep))
+
+    def score_tensor(self, shallow: Tensor, deep: Tensor) -> Tensor:
+        """As `score`, with the gradient to both maps."""
         mask = self.mask(shallow, deep)
-        return float((deep * shallow * mask).sum() / (1 + mask.sum()))
+        return (deep * shallow * mask).sum() / (1 + mask.sum())
 
 
 def learn(examples: Sequence[Example], steps: int, rng: np.random.Generator) -> MaskBlock:

@@ -6,12 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import torch
 from torch import Tensor
 
-from gear.contracts.defenses import DefenseResult
+from gear.contracts.defenses import DefendedBatch, DefenseResult
 from gear.contracts.models import Model
-from gear.plugins.defenses.activations.feature_maps import deepest, feature_maps
-from gear.plugins.defenses.activations.z_scores import Usual, alarm_level, sureness, usual
+from gear.plugins.defenses.activations.feature_maps import deepest, feature_maps, tapped
+from gear.plugins.defenses.activations.z_scores import Usual, alarm_level, sureness, sureness_tensor, usual
 from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
 
@@ -85,6 +86,12 @@ class Detector:
     def forward(self, views: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """The pictures as they came."""
         return dict(views)
+
+    def defend_batch(self, views: Mapping[str, Tensor], model: Model, state: Learnt) -> DefendedBatch:
+        """The pictures unchanged, and their scores with the gradient to the pictures."""
+        features = tapped(model, views, [state.layer])[state.layer]
+        raw = torch.stack([self._aggregate(state.usual.z_scores(self._compress(one))) for one in features])
+        return DefendedBatch(views=dict(views), scores=sureness_tensor(raw, state.level))
 
     def wrap(self, model: Model) -> Model:
         """The model as it is."""

@@ -12,6 +12,9 @@ from torch import Tensor
 
 from gear.values.errors import GearError
 
+LEAST_LEVEL = 1e-9
+"""An alarm level of 0 would make every score 1."""
+
 FLOOR = 0.01
 """Of the mean deviation, added to each. A number that never changed in calibration has none: the least change of it
 would outweigh all others."""
@@ -74,4 +77,9 @@ def sureness(raw: float, level: float) -> float:
     """A score in 0..1 that grows with `raw` (0 or more) and is 0.5 at `level`."""
     if not math.isfinite(raw):
         return 1.0
-    return raw / (raw + max(level, 1e-9))
+    return raw / (raw + max(level, LEAST_LEVEL))
+
+
+def sureness_tensor(raw: Tensor, level: float) -> Tensor:
+    """As `sureness`, of (B,) scores with their gradient."""
+    return raw / (raw + max(level, LEAST_LEVEL))

@@ -15,7 +15,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from gear.contracts.defenses import DefenseResult
+from gear.contracts.defenses import DefendedBatch, DefenseResult
 from gear.contracts.models import Model
 from gear.plugins.defenses.activations.feature_maps import feature_maps, spread, tapped
 from gear.plugins.defenses.activations.mask_block import Example, MaskBlock, learn
@@ -28,7 +28,7 @@ from gear.plugins.defenses.activations.over_activation import (
     refined,
 )
 from gear.plugins.defenses.activations.twin_masks import patch_area
-from gear.plugins.defenses.activations.z_scores import alarm_level, sureness
+from gear.plugins.defenses.activations.z_scores import alarm_level, sureness, sureness_tensor
 from gear.plugins.defenses.activations.zmask_layers import Layers, Look, Views, layers_of, looks
 from gear.plugins.defenses.activations.zmask_options import ZMaskConfig
 from gear.values.errors import GearError
@@ -66,6 +66,7 @@ class ZMask:
 
     def __init__(self, settings: ZMaskConfig) -> None:
         self._settings = settings
+        self._fill = torch.from_numpy(FILL / np.float32(255))[:, None, None]
 
     def fit(
         self, clean: Sequence[Views], patched: Sequence[Views], model: Model | None, rng: np.random.Generator
@@ -123,30 +124,36 @@ class ZMask:
         raise ValueError("Z-Mask looks into the model: it has `forward_taught`")
 
     def forward_taught(self, views: Mapping[str, Tensor], model: Model, state: Learnt) -> Mapping[str, Tensor]:
+        """The pictures of `defend_batch`."""
+        return self.defend_batch(views, model, state).views
+
+    def defend_batch(self, views: Mapping[str, Tensor], model: Model, state: Learnt) -> DefendedBatch:
         """Covers as `apply` does; how far a patch is covered has the gradient of the mask before it is rounded."""
-        masks = {name: torch.zeros_like(pictures[:, :1]) for name, pictures in views.items()}
-        scores = [0.0] * len(next(iter(views.values())))
+        covers = {name: torch.zeros_like(pictures[:, :1]) for name, pictures in views.items()}
+        masks = {name: pictures.new_zeros(pictures[:, 0].shape) for name, pictures in views.items()}
+        scores: list[Tensor] = []
         for look in looks(views):
             maps = tapped(model, look.views, state.layers.all())
             size = look.views[look.camera].shape[2:]
             grid = self._grid(*size)
-            said = []
-            for number in range(len(scores)):
+            soft, raw = [], []
+            for number in range(len(look.views[look.camera])):
                 own = {name: features[number] for name, features in maps.items()}
                 heats = self._heats(own, grid, state.layers, state.statistics)
                 heats = _flipped(heats) if look.is_mirrored else heats
-                raw = state.block.score(*(heat.detach() for heat in heats))
-                scores[number] = max(scores[number], sureness(raw, state.level))
-                said.append(state.block.mask(*heats))
-            soft = functional.interpolate(torch.stack(said)[:, None], size=size, mode="nearest-exact")
-            masks[look.camera] = ((soft > COVERED_FROM).float() + soft - soft.detach()).to(masks[look.camera])
-        sure = [score > COVERED_FROM or not self._settings.only_if_sure for score in scores]
-        fill = torch.from_numpy(FILL / np.float32(255))[:, None, None]
+                raw.append(state.block.score_tensor(*heats))
+                soft.append(state.block.mask(*heats))
+            scores.append(sureness_tensor(torch.stack(raw), state.level))
+            mask = functional.interpolate(torch.stack(soft)[:, None], size=size, mode="nearest-exact")
+            masks[look.camera] = mask[:, 0].to(masks[look.camera])
+            covers[look.camera] = ((mask > COVERED_FROM).float() + mask - mask.detach()).to(covers[look.camera])
+        score = torch.stack(scores).amax(dim=0)
+        is_sure = (score.detach() > COVERED_FROM) | (not self._settings.only_if_sure)
         cleaned = {}
         for name, pictures in views.items():
-            mask = masks[name] * pictures.new_tensor(sure)[:, None, None, None]
-            cleaned[name] = pictures * (1 - mask) + fill.to(pictures) * mask
-        return cleaned
+            cover = covers[name] * is_sure.to(pictures)[:, None, None, None]
+            cleaned[name] = pictures * (1 - cover) + self._fill.to(pictures) * cover
+        return DefendedBatch(views=cleaned, masks=masks, scores=score)
 
     def wrap(self, model: Model) -> Model:
         """The model as it is."""
