@@ -1,7 +1,7 @@
-"""What is felt: where the ground is, what overlaps, what hides the board, how things come to rest.
+"""Questions to the placement model: where the ground is, what overlaps, what hides a face, how actors come to rest.
 
-MuJoCo answers all of it, on the placement model: rays for the ground and for lines of sight, its collision detection
-for overlaps, and a short simulation from a reset state for what does not stand evenly.
+MuJoCo answers them: with rays for the ground and for lines of sight, with its collision detection for overlaps, and
+with a short simulation from a reset state for actors on uneven ground.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from gear.world.compilation.actor_pool import PARKED_DEPTH_M
 from gear.world.compilation.model_compilation import ACTOR_GROUP, GROUND_GROUP, OBSTACLE_GROUP
 
 EVEN_M = 0.005
-"""Four feet within this of one plane stand evenly; no simulation is needed."""
+"""Most distance of four feet from their common plane on even ground, where no simulation is needed."""
 
 STEP_UP_M = 1.2
-"""The ground is looked for from this far above where the lane says it is, so bridges do not count for what is below."""
+"""Rays to the ground start this far above the height of the lane, so that a bridge above a road is not its ground."""
 
 SETTLE_DROP_M = 0.01
 SETTLE_STEP_S = 0.005
@@ -34,11 +34,11 @@ OVERLAP_M = 1e-4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GroundPose:
-    """How an actor stands.
+    """An actor's pose on the ground.
 
     Attributes:
-        world_from_actor: pose.
-        is_even: whether all four feet are on the ground there.
+        world_from_actor: the pose.
+        is_even: whether all four feet touch the ground at this pose.
     """
 
     world_from_actor: RigidTransform
@@ -57,13 +57,17 @@ _ACTORS = _groups(ACTOR_GROUP)
 
 
 class PlacementSpace:
-    """The placement model with nothing in it until asked; every answer starts from the reset state."""
+    """The placement model of a world. Every answer starts from the reset state, so none depends on an earlier one."""
 
     def __init__(
         self, model: mujoco.MjModel, bodies: Mapping[str, ActorType], parked_m: float = -PARKED_DEPTH_M
     ) -> None:
-        """Takes the placement model, its actors by body name, and the height at which those wait that are not asked
-        for.
+        """Takes a placement model.
+
+        Args:
+            model: the placement model.
+            bodies: the assets of its actors, by body name.
+            parked_m: height at which the actors are that a question does not name.
         """
         self._model = model
         self._parked_m = parked_m
@@ -77,7 +81,7 @@ class PlacementSpace:
         self._pose({})
 
     def ground_m(self, x_m: float, y_m: float, near_z_m: float) -> float | None:
-        """Height of the ground at a place, near a height; None where there is none within reach below."""
+        """Height of the ground at a place, looked for near a height; None where there is no ground near it."""
         start_m = np.array([x_m, y_m, near_z_m + STEP_UP_M])
         geom = np.zeros(1, np.int32)
         down = np.array([0.0, 0.0, -1.0])
@@ -89,9 +93,19 @@ class PlacementSpace:
     def ground_pose(
         self, actor_type: ActorType, x_m: float, y_m: float, near_z_m: float, yaw_rad: float
     ) -> GroundPose | None:
-        """An actor on the ground; None where there is none.
+        """Puts an actor on the ground at a place and a heading.
 
-        People stand upright at their middle. A vehicle's four feet are fitted to what is below them.
+        A person stands upright at its middle. A vehicle stands on the plane through the ground below its four feet, by
+        least squares.
+
+        Args:
+            actor_type: its asset.
+            x_m, y_m: place in the world.
+            near_z_m: height near which the ground is looked for.
+            yaw_rad: heading, counter-clockwise from east.
+
+        Returns:
+            The pose; None where there is no ground below one of the feet.
         """
         if actor_type.is_person:
             z_m = self.ground_m(x_m, y_m, near_z_m)
@@ -123,7 +137,7 @@ class PlacementSpace:
         return GroundPose(pose, bool(uneven_m <= EVEN_M))
 
     def overlaps(self, poses: Mapping[str, RigidTransform]) -> list[tuple[str, str]]:
-        """Pairs of bodies that overlap; the second is "" where an actor overlaps the town or a board."""
+        """Pairs of bodies that overlap at given poses; the second is "" where an actor overlaps the town or a board."""
         self._pose(poses)
         mujoco.mj_collision(self._model, self._data)
         pairs: set[tuple[str, str]] = set()
@@ -142,7 +156,7 @@ class PlacementSpace:
         return ACTOR_GROUP in groups and all(group in (ACTOR_GROUP, OBSTACLE_GROUP) for group in groups)
 
     def settle(self, poses: Mapping[str, RigidTransform]) -> dict[str, RigidTransform]:
-        """Lets actors come to rest from just above where they are."""
+        """Drops actors from just above their poses and returns the poses at which they come to rest."""
         lifted = {
             name: RigidTransform.from_parts(
                 "world", "actor", pose.rotation, pose.translation_m + pose.rotation[:, 2] * SETTLE_DROP_M
@@ -162,11 +176,11 @@ class PlacementSpace:
         return settled
 
     def visible(self, eye_m: Array, targets_m: Array) -> npt.NDArray[np.bool_]:
-        """Which of (N, 3) points can be seen from a point past the town, its boards and its ground."""
+        """Which of (N, 3) points are visible from a point, past the town, its boards and its ground, as (N,) bool."""
         return self._rays(eye_m, targets_m, _STATIC)[0] < 0
 
     def occluders(self, eye_m: Array, targets_m: Array, poses: Mapping[str, RigidTransform]) -> list[str | None]:
-        """For each of (N, 3) points the actor that hides it from a point, if any."""
+        """For each of (N, 3) points, the body of the actor that hides it from a point, or None."""
         self._pose(poses)
         geoms = self._rays(eye_m, targets_m, _ACTORS)[0]
         roots = [int(self._model.body_rootid[self._model.geom_bodyid[g]]) if g >= 0 else -1 for g in geoms]
@@ -175,7 +189,7 @@ class PlacementSpace:
     def _rays(
         self, eye_m: Array, targets_m: Array, groups: npt.NDArray[np.uint8]
     ) -> tuple[npt.NDArray[np.int32], Array]:
-        """Geom hit before each target, else -1, and distances."""
+        """Casts rays to (N, 3) targets: (N,) id of the geom hit before each target, else -1, and (N,) distances."""
         rays = np.ascontiguousarray(targets_m - eye_m, dtype=np.float64)
         reach_m = np.linalg.norm(rays, axis=1)
         count = len(rays)
@@ -190,7 +204,7 @@ class PlacementSpace:
         return geoms, distances_m
 
     def _pose(self, poses: Mapping[str, RigidTransform]) -> None:
-        """Resets, then puts the named actors into place and all others far below, apart from one another."""
+        """Resets the state, moves the named actors to their poses, and all others far below, apart from each other."""
         mujoco.mj_resetData(self._model, self._data)
         for number, (name, address) in enumerate(self._qpos.items()):
             if name in poses:

@@ -1,4 +1,4 @@
-"""Plans samples: `plan(index)` is a pure function of the world, the split's seed and the index."""
+"""Plans the samples of a split. A sample is a pure function of the world, the split's seed and its index."""
 
 from __future__ import annotations
 
@@ -21,19 +21,21 @@ from gear.world.traffic.spawn import Spawn, Spawner
 from gear.world.world import World
 
 SEQUENCES_CACHED = 4
+"""Planned sequences that are kept, since frames are mostly asked for in their order."""
 
 
 class ScenePlanner:
-    """Makes the records of one split."""
+    """Plans the records of one split."""
 
     def __init__(self, world: World, rig: Rig, split: SplitConfig, *, split_name: str) -> None:
         """Prepares what all samples share.
 
         Args:
             world: compiled; the planner uses its placement model.
-            rig: cameras on the ego car; the first one must have the boards in view.
-            split: seed, and length of its sequences.
-            split_name: what records call it. Draws do not depend on it, so `test_night` shows the scenes of `test`.
+            rig: cameras on the ego car. The first one must have the boards in view.
+            split: seed, and length of the sequences.
+            split_name: name of the split in records. Draws do not depend on it, so `test_night` shows the scenes of
+                `test`.
 
         Raises:
             PlacementError: a camera is inside the ego car.
@@ -63,17 +65,20 @@ class ScenePlanner:
         )
 
     def plan(self, index: int) -> SceneRecord:
-        """The record of one sample; `index` counts all frames of the split.
+        """Plans one sample.
+
+        Args:
+            index: number of the sample; it counts all frames of the split.
 
         Raises:
-            PlacementError: the scene's limits are too tight; says which.
+            PlacementError: the limits of the scene are too tight; the error names the limit.
         """
         sequence, frame = divmod(index, self._split.frames)
         state = self._frames_of(sequence)[frame]
         return self._record(state, index, sequence, frame)
 
     def _frames_of(self, sequence: int) -> Sequence[FrameState]:
-        """All frames of a sequence. The last few are kept: frames are mostly asked for in their order."""
+        """All frames of a sequence, out of the last ones that were planned where it is among them."""
         if sequence not in self._cached:
             self._cached[sequence] = self._sample(sequence)
             if len(self._cached) > SEQUENCES_CACHED:

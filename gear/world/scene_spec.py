@@ -1,4 +1,4 @@
-"""Scenes as their YAML says them: where boards stand, and what may stand around them."""
+"""The form of a scene library: where boards stand, and which traffic may surround them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ FACE_SIDE_M = (0.1, 100.0)
 """Least and most width and height of a face: smaller shows no patch, larger was meant in other units."""
 
 FARTHEST_M = 10_000.0
-"""From the origin or the first board: the 32-bit numbers of models and renderers are a millimetre coarse there."""
+"""Most distance from the origin or the first board. At that distance the 32-bit floats of models and renderers have
+steps of a millimetre."""
 
 
 def _check_range(name: str, value: Range | None, *, least: float = -FARTHEST_M) -> None:
@@ -41,11 +42,11 @@ class BoardSpec:
 
     Attributes:
         position_m: ground point under the middle of its face, in the world.
-        facing_deg: where its face looks, counter-clockwise from east.
+        facing_deg: direction that its face looks in, counter-clockwise from east.
         asset: name of its MJCF in `mjcf/surfaces`.
         size_m: width and height of its face; None for the size in the asset's file. The whole board is scaled about its
             foot, so a higher face also hangs higher.
-        places: where a file gives what, by key.
+        places: place in the file of each key that the file gives.
     """
 
     position_m: Vec3
@@ -56,8 +57,8 @@ class BoardSpec:
 
     def __post_init__(self) -> None:
         if max(map(abs, self.position_m)) > FARTHEST_M:
-            told = ", ".join(f"{value:g}" for value in self.position_m)
-            raise FieldError("position_m", f"must lie within {FARTHEST_M:g} m of the town's origin, got {told}")
+            given = ", ".join(f"{value:g}" for value in self.position_m)
+            raise FieldError("position_m", f"must lie within {FARTHEST_M:g} m of the town's origin, got {given}")
         if not -360 <= self.facing_deg <= 360:
             raise FieldError("facing_deg", f"must be -360 to 360 degrees, got {self.facing_deg:g}")
         if not self.asset:
@@ -70,12 +71,14 @@ class BoardSpec:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EgoLimits:
-    """Where the ego car may stand, in the frame of the first board (ahead of its face, to the left of that direction).
+    """Where the ego car may be, in the frame of the first board.
 
     Attributes:
-        ahead_m, lateral_m: from, to.
-        max_incidence_deg: how obliquely the reference camera may see the face, 0 is head-on.
-        min_free: share of the face that nothing of the town may hide.
+        ahead_m: least and largest distance ahead of the face.
+        lateral_m: least and largest distance to the left of the direction that the face looks in.
+        max_incidence_deg: largest angle between the face's normal and the direction to the reference camera; 0 is
+            head-on.
+        min_free: share of each face that must be visible to the reference camera.
     """
 
     ahead_m: Range
@@ -93,7 +96,7 @@ class EgoLimits:
 
 
 ONE_PLACE_M, ONE_WAY_DEG = 0.05, 5.0
-"""Boards that stand and look closer together than this are one, written twice."""
+"""Two boards that differ by less than this in position and direction are one board, written twice."""
 
 
 def _is_one_way(board: BoardSpec, other: BoardSpec) -> bool:
@@ -105,12 +108,13 @@ MOST_NPCS = 1000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NpcLimits:
-    """Where other road users may be, and how many.
+    """How many other road users there are, and where they may be.
 
     Attributes:
-        count: fewest, most; drawn evenly between.
-        ahead_m, lateral_m: from, to, in the frame of the first board.
-        radius_m: from, to, around the ego car; holds as well where both are given.
+        count: least and largest number; each number between is equally likely.
+        ahead_m, lateral_m: least and largest distances in the frame of the first board, as in `EgoLimits`; None for no
+            limit.
+        radius_m: least and largest distance from the ego car; None for no limit. All limits that are given hold.
     """
 
     count: CountRange
@@ -128,17 +132,17 @@ class NpcLimits:
 
     @property
     def needs_board(self) -> bool:
-        """Whether the limits speak of a board."""
+        """Whether the limits refer to a board."""
         return self.ahead_m is not None or self.lateral_m is not None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleLimits(NpcLimits):
-    """As `NpcLimits`, for vehicles.
+    """The limits of vehicles.
 
     Attributes:
-        parked_share: share of them that stands in parking bays, as far as there are free ones.
-        mix: how often kinds of vehicles (`car`, `bus`, …) come, times their usual share; 0 for never.
+        parked_share: share of the vehicles that is parked, as far as there are free parking bays.
+        mix: factors by which kinds of vehicles (`car`, `bus`, …) are more frequent than usual; 0 for never.
     """
 
     parked_share: float = 0.3
@@ -153,12 +157,12 @@ class VehicleLimits(NpcLimits):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TruckSpec:
-    """A vehicle that bears the patch on its rear, ahead of the ego car in its lane.
+    """A vehicle that carries the patch on its rear, ahead of the ego car in the same lane.
 
     Attributes:
         asset: name of its MJCF in `mjcf/vehicles`.
-        gap_m: from, to, between the ego's front and the face.
-        places: where a file gives what, by key.
+        gap_m: least and largest distance between the front of the ego car and the rear of the vehicle.
+        places: place in the file of each key that the file gives.
     """
 
     asset: str = "truck_box"
@@ -171,13 +175,13 @@ class TruckSpec:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SceneSpec:
-    """One scene: boards or a truck or neither, and limits for what is around them.
+    """One scene: boards, a truck or neither, and limits for the traffic around them.
 
     Attributes:
-        boards: take `patch_0`, `patch_1`, … in this order.
-        truck: instead of boards.
-        ego: limits of the ego car; needed with boards, anywhere on the road network without.
-        npc_vehicles, pedestrians: limits of the others.
+        boards: the boards, which take `patch_0`, `patch_1`, … in this order.
+        truck: the vehicle that carries the patch; a scene has boards or a truck, not both.
+        ego: limits of the ego car; required with boards. Without boards the ego car may be on any lane.
+        npc_vehicles, pedestrians: limits of the other vehicles and of the people.
     """
 
     boards: tuple[BoardSpec, ...] = ()
@@ -206,7 +210,7 @@ class SceneSpec:
                 raise FieldError(name, "ahead_m and lateral_m are in the frame of the first board; use radius_m")
 
     def capped(self, max_vehicles: int, max_pedestrians: int) -> SceneSpec:
-        """The same scene with at most so many others."""
+        """The same scene with at most `max_vehicles` other vehicles and `max_pedestrians` people."""
         return replace(
             self,
             npc_vehicles=_capped(self.npc_vehicles, max_vehicles),
@@ -214,7 +218,7 @@ class SceneSpec:
         )
 
     def crowded(self, factor: float) -> SceneSpec:
-        """The same scene with so many times as many others."""
+        """The same scene with `factor` times as many other vehicles and people."""
         if factor == 1:
             return self
         return replace(
@@ -222,7 +226,7 @@ class SceneSpec:
         )
 
     def mixed(self, mix: Mapping[str, float]) -> SceneSpec:
-        """The same scene with kinds of vehicles so many times as often as it has them."""
+        """The same scene with the factors of its vehicle mix multiplied by those of another mix."""
         if not mix:
             return self
         return replace(self, npc_vehicles=replace(self.npc_vehicles, mix=product_of(self.npc_vehicles.mix, mix)))
@@ -248,7 +252,7 @@ class SceneLibrary:
     Attributes:
         town: name of the town that the poses belong to.
         scenes: by name.
-        places: where a file gives what, by key.
+        places: place in the file of each key that the file gives.
     """
 
     town: str

@@ -1,4 +1,4 @@
-"""What there is: actors with their triangles, boxes and colours; countable things of the town."""
+"""Measures the compiled assets: shapes and sizes of actors, and the countable objects of a town."""
 
 from __future__ import annotations
 
@@ -21,22 +21,23 @@ from gear.world.compilation.actor_pool import Slot
 from gear.world.compilation.model_compilation import PlacementBody
 
 PERSON_MASS_KG = 75.0
+"""Mass of a person in the placement model."""
 
 ACTOR_SIDE_M = (0.1, 100.0)
-"""Least and most of an actor's longest side: what is beyond was drawn in other units."""
+"""Least and most length of an actor's longest side. An asset beyond was drawn in other units."""
 
 COUNTABLE = frozenset(label.code for label in LABELS if label.coco_id is not None and not label.is_instance)
-"""Labels of the town's things that are counted one by one, each in a body of its own."""
+"""Codes of the labels whose objects in the town are counted one by one; each object needs a body of its own."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ActorType:
-    """One asset that may take part.
+    """One asset of the pool of actors, measured.
 
     Attributes:
-        facts: what its file says.
-        shape: visible triangles in the actor frame.
-        half_length_m, half_width_m: half of its footprint, symmetric about the origin, so that it holds the asset.
+        facts: what its file says of it.
+        shape: its visible triangles in the actor's frame (x ahead, y to the left, z up, origin on the ground).
+        half_length_m, half_width_m: half of its footprint: the smallest rectangle around the origin that contains it.
     """
 
     facts: ActorFacts
@@ -61,17 +62,17 @@ class ActorType:
 
     @property
     def front_m(self) -> float:
-        """How far it reaches ahead of its origin."""
+        """Distance of its front from its origin."""
         return float(self.shape.box_centre_m[0] + self.shape.box_size_m[0] / 2)
 
     @property
     def rear_m(self) -> float:
-        """How far it reaches behind its origin."""
+        """Distance of its rear from its origin."""
         return float(self.shape.box_size_m[0] / 2 - self.shape.box_centre_m[0])
 
     @property
     def placement_body(self) -> PlacementBody:
-        """How it stands: its feet are a fifth inside its footprint, where wheels are."""
+        """Its body in the placement model. Its feet are a fifth inside of its footprint, where wheels are."""
         return PlacementBody(
             half_length_m=0.8 * self.half_length_m,
             half_width_m=0.8 * self.half_width_m,
@@ -81,13 +82,13 @@ class ActorType:
 
 
 def body_tree(model: mujoco.MjModel, body_id: int) -> list[int]:
-    """Ids of a body and of all below it, which follow it: MuJoCo numbers bodies depth first."""
+    """Ids of a body and of all bodies below it. They are consecutive, since MuJoCo numbers bodies depth first."""
     outside = np.flatnonzero(model.body_parentid[body_id + 1 :] < body_id)
     return list(range(body_id, body_id + 1 + int(outside[0]) if len(outside) else model.nbody))
 
 
 def visible_geoms(model: mujoco.MjModel, body_id: int, label_code: npt.NDArray[np.uint8]) -> list[int]:
-    """Ids of the visible geoms of a body and of all below it."""
+    """Ids of the visible geoms of a body and of all bodies below it; `label_code` is (ngeom,) uint8."""
     owners = np.isin(model.geom_bodyid, body_tree(model, body_id))
     return [int(geom) for geom in np.flatnonzero(owners & (label_code != HIDDEN_CODE))]
 
@@ -95,11 +96,20 @@ def visible_geoms(model: mujoco.MjModel, body_id: int, label_code: npt.NDArray[n
 def actor_types(
     model: mujoco.MjModel, data: mujoco.MjData, classes: GeomClasses, slots: Sequence[Slot]
 ) -> dict[str, ActorType]:
-    """Every asset of the pool by name, measured on its first instance.
+    """Measures every asset of the pool on its first instance.
+
+    Args:
+        model: the render model.
+        data: with kinematics up to date.
+        classes: labels of the geoms.
+        slots: the pool.
+
+    Returns:
+        The assets by name.
 
     Raises:
-        TownError: an asset has nothing visible, something without bounds, a size that no road user has, or does not
-            stand at its origin.
+        TownError: an asset has no visible geom or an infinite one, has a size that no road user has, or does not stand
+            on the ground at its origin.
     """
     types: dict[str, ActorType] = {}
     for slot in slots:
@@ -135,11 +145,11 @@ def _shape(
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class StaticObjects:
-    """Countable things of the town.
+    """The countable objects of a town, such as traffic lights.
 
     Attributes:
-        objects: by object id.
-        object_id: (ngeom,) int32, the thing that each geom belongs to, else -1.
+        objects: the objects by their ids.
+        object_id: (ngeom,) int32 id of the object that each geom belongs to, else -1.
     """
 
     objects: Mapping[int, SceneObject]
@@ -149,10 +159,17 @@ class StaticObjects:
 def static_objects(
     model: mujoco.MjModel, data: mujoco.MjData, classes: GeomClasses, slots: Sequence[Slot], path: Path
 ) -> StaticObjects:
-    """Traffic lights, benches and the like: one object a body that holds geoms of such a label.
+    """Finds the countable objects of a town: one for each label in `COUNTABLE` and each body with geoms of it.
+
+    Args:
+        model: the render model.
+        data: with kinematics up to date.
+        classes: labels of the geoms.
+        slots: the pool, whose bodies belong to no object of the town.
+        path: the town's file, for errors.
 
     Raises:
-        TownError: such a geom is not in a body of its own, or has no bounds.
+        TownError: such a geom is in no body of its own, or is infinite.
     """
     actor_bodies = {body for slot in slots for body in body_tree(model, model.body(slot.body).id)}
     object_id = np.full(model.ngeom, -1, np.int32)

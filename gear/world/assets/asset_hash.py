@@ -1,4 +1,4 @@
-"""Which files a town's pictures can show, and one hash over all of them."""
+"""The files that the pictures of a town can show, and one hash over all of them."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from gear.values.resources import data_dir
 from gear.world.assets.library import AssetLibrary, read_xml
 
 ASSET_SUFFIXES = (".xml", ".obj", ".msh", ".stl", ".png")
+"""Suffixes of the files in the folders of a town that are assets."""
 
 
 def asset_files(library: AssetLibrary) -> dict[str, Path]:
-    """Every MJCF file, mesh and texture that goes with a town, by a name that does not say where it lies."""
+    """Every MJCF file, mesh and texture of a town, by a name that does not depend on where the folders are."""
     own = data_dir("mjcf")
     roots = [library.town, library.town.with_suffix("")]
     roots += [library.folder("vehicle"), library.folder("pedestrian"), library.folder("surface")]
@@ -28,7 +29,7 @@ def asset_files(library: AssetLibrary) -> dict[str, Path]:
         for path in root.rglob("*") if root.is_dir() else [root]:
             if (path.suffix.lower() in ASSET_SUFFIXES or path == library.town) and path.is_file():
                 files[f"{root.name}/{path.relative_to(root).as_posix()}"] = path
-    # gear's own refer to nothing else, and there are many: asking where each really lies takes longer than the rest.
+    # gear's own files refer to no others. There are many, and resolving their paths would take most of the time.
     others = [
         path
         for path in files.values()
@@ -43,14 +44,14 @@ def asset_files(library: AssetLibrary) -> dict[str, Path]:
 
 
 def _referred(path: Path) -> Iterator[tuple[str, Path]]:
-    """What an MJCF file and what is included in it name, as far as it is there: by how it is written, and where."""
+    """The existing files that an MJCF file and its includes refer to: each name as it is written, and its path."""
     elements: list[tuple[Path, ET.Element]] = []
     files, folders = [path], dict[str, str]()
-    for file in files:  # grows: what is included is looked at in turn
+    for file in files:  # grows by the files that are included
         try:
             root = read_xml(file)
         except TownError:
-            continue  # whoever reads it says so
+            continue  # reported where the file is read
         for compiler in root.iter("compiler"):
             folders.update({key: value for key, value in compiler.items() if key.endswith("dir")})
         elements += [(file, element) for element in root.iter()]
@@ -81,12 +82,12 @@ def _check_asset(path: Path, target: Path) -> None:
 
 
 def _bases(path: Path, file: Path) -> list[Path]:
-    """Where what `file` names may lie, a part of the MJCF at `path`: MuJoCo looks beside both."""
+    """The folders to which paths in `file` may be relative: its own, and that of the MJCF file that includes it."""
     return list(dict.fromkeys((path.parent, file.parent)))
 
 
 def assets_digest(library: AssetLibrary) -> str:
-    """sha256 over every MJCF file, mesh and texture that a town's pictures can show."""
+    """sha256 in hex over the names and contents of all files that `asset_files` finds."""
     files = asset_files(library)
     digest = hashlib.sha256()
     for name in sorted(files):

@@ -1,4 +1,4 @@
-"""What each geom is, by the convention of its default class."""
+"""The label of each geom, which the name of its default class gives."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from gear.values.errors import TownError
 from gear.values.labels import LABEL_BY_NAME
 
 HIDDEN_CODE = 255
-"""Label code of geoms that no renderer draws."""
+"""Label code of hidden geoms, which no renderer draws."""
 
 FIRST_HIDDEN_GROUP = 3
-"""Geoms of this group and above are felt, not seen."""
+"""Geoms of this group and above are hidden; collision geoms are in it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -35,19 +35,19 @@ class GeomClasses:
 
 
 def unprefixed_class(classname: str) -> str:
-    """The class as its own file names it: dm_control puts `<file>/` before it when files are composed."""
+    """The name of a class in its own file: dm_control prefixes it with `<file>/` when it composes files."""
     return classname.rsplit("/", 1)[-1]
 
 
 def classify(spec: mujoco.MjSpec, path: Path) -> GeomClasses:
-    """Labels of a compiled spec's geoms.
+    """Finds the labels of a model's geoms.
 
     Args:
-        spec: compiled, so that its geoms have ids.
-        path: the town's file, for the error.
+        spec: of the model, compiled, so that its geoms have ids.
+        path: the town's file, for errors.
 
     Raises:
-        TownError: a visible geom has no known label.
+        TownError: the class of a visible geom starts with no known label.
     """
     geoms = spec.geoms
     label_code = np.full(len(geoms), HIDDEN_CODE, np.uint8)

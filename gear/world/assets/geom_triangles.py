@@ -1,4 +1,4 @@
-"""Triangles of compiled geoms, for measuring what they cover."""
+"""Triangles of compiled geoms."""
 
 from __future__ import annotations
 
@@ -15,14 +15,18 @@ Faces = npt.NDArray[np.int32]
 Triangles = tuple[Array, Faces]
 
 ROUND_SEGMENTS = 24
-"""Sides of a round primitive: its silhouette is within 1 % of the true one."""
+"""Sides of a round primitive. Its silhouette is within 1 % of the true one."""
 
 
 def geom_triangles(model: mujoco.MjModel, geom_id: int) -> Triangles:
-    """One geom's surface in the geom's own frame: (N, 3) vertices in metres, (M, 3) faces, outward by the right hand.
+    """The surface of one geom in the geom's frame.
+
+    Returns:
+        (N, 3) float64 vertices in metres, and (M, 3) int32 vertex indices of the triangles, counter-clockwise as seen
+        from outside.
 
     Raises:
-        ValueError: the geom is of a kind without a finite surface.
+        ValueError: the geom is a plane or a height field, which have no finite surface.
     """
     size = np.asarray(model.geom_size[geom_id], dtype=np.float64)
     kind = mujoco.mjtGeom(int(model.geom_type[geom_id]))
@@ -58,7 +62,7 @@ def _box(half: Array) -> Triangles:
 
 
 def _revolved(radii: Array, heights: Array, y_scale: float = 1.0) -> Triangles:
-    """A profile from the bottom to the top, turned about z."""
+    """The surface of revolution about z of a profile (radius, height) from the bottom to the top."""
     turn = np.arange(ROUND_SEGMENTS) * (2 * np.pi / ROUND_SEGMENTS)
     x, y = np.outer(radii, np.cos(turn)), np.outer(radii, np.sin(turn)) * y_scale
     vertices = np.stack([x, y, np.repeat(heights[:, None], ROUND_SEGMENTS, axis=1)], axis=-1).reshape(-1, 3)
@@ -72,7 +76,7 @@ def _revolved(radii: Array, heights: Array, y_scale: float = 1.0) -> Triangles:
 
 
 def world_triangles(model: mujoco.MjModel, data: mujoco.MjData, geom_id: int) -> Array:
-    """(N, 3, 3) corners of one geom's triangles in the world; kinematics up to date.
+    """(N, 3, 3) corners in metres of one geom's triangles in the world; `data` has kinematics up to date.
 
     Raises:
         ValueError: as `geom_triangles`.
@@ -82,7 +86,7 @@ def world_triangles(model: mujoco.MjModel, data: mujoco.MjData, geom_id: int) ->
 
 
 def static_geoms(model: mujoco.MjModel) -> npt.NDArray[np.bool_]:
-    """(ngeom,) what is part of the town and of its boards, and of no actor."""
+    """(ngeom,) bool, whether each geom belongs to the town or its boards, and not to an actor."""
     return np.asarray(model.body_mocapid[model.body_rootid[model.geom_bodyid]] < 0)
 
 
@@ -93,14 +97,17 @@ def body_shape(
     geom_ids: Sequence[int],
     label_code: npt.NDArray[np.uint8],
 ) -> Shape:
-    """Some geoms of one body tree as one shape in the body's frame.
+    """Joins geoms into one shape in the frame of a body.
 
     Args:
         model: compiled.
-        data: kinematics up to date.
-        body_id: whose frame the shape is in.
-        geom_ids: what belongs to it; not empty.
-        label_code: (ngeom,) labels of all geoms.
+        data: with kinematics up to date.
+        body_id: the body.
+        geom_ids: the geoms; at least one.
+        label_code: (ngeom,) uint8 labels of all geoms.
+
+    Raises:
+        ValueError: as `geom_triangles`.
     """
     body_position_m = data.xpos[body_id]
     body_rotation = data.xmat[body_id].reshape(3, 3)

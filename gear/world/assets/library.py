@@ -1,4 +1,4 @@
-"""Finding MJCF by name or by path, and reading what a file says of itself without compiling it."""
+"""Finds MJCF files by name or path, and reads the facts that an actor's file states, without compiling it."""
 
 from __future__ import annotations
 
@@ -24,31 +24,31 @@ PERSON = "person"
 
 
 MOST_WEIGHT = 1e6
-"""Of an asset among others, or of a colour: sums and shares of such are finite."""
+"""Largest weight of an asset or a colour, so that sums and shares of weights are finite."""
 
 _NAN = re.compile(r"^([-+.\deE\s]*\s)?[-+]?nan(\s|$)", re.IGNORECASE)
-"""Numbers of which one is none."""
+"""Matches a list of numbers in which one is NaN."""
 
 FOLDERS = {"town": "towns", "vehicle": "vehicles", "pedestrian": "pedestrians", "surface": "surfaces"}
 
 
 def read_xml(path: Path) -> ET.Element:
-    """The root of a MJCF file.
+    """Parses an MJCF file and returns its root element.
 
     Raises:
         TownError: it is no XML, or cannot be read.
     """
     try:
         return ET.parse(check_regular(path)).getroot()
-    except (ET.ParseError, OSError, LookupError, ValueError) as error:  # the latter two: an encoding that nobody knows
+    except (ET.ParseError, OSError, LookupError, ValueError) as error:  # the last two: an unknown encoding
         raise TownError(path, f"cannot be read as MJCF: {error}") from error
 
 
 def read_numbers(path: Path) -> ET.Element:
-    """As `read_xml`, for a file whose numbers are used: over a nan MuJoCo only mutters, and what has it is not drawn.
+    """Parses an MJCF file as `read_xml` does, and refuses NaN: MuJoCo only warns of it and does not draw the geom.
 
     Raises:
-        TownError: it is no XML, cannot be read, or one of its numbers is none.
+        TownError: it is no XML, cannot be read, or holds a NaN.
     """
     root = read_xml(path)
     for element in root.iter():
@@ -60,15 +60,15 @@ def read_numbers(path: Path) -> ET.Element:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ActorFacts:
-    """What an actor's file says of itself.
+    """The facts that an actor's MJCF file states.
 
     Attributes:
-        name: of the asset: its file's stem.
-        path: its MJCF.
+        name: name of the asset: the stem of its file.
+        path: path of the file.
         kind: `person`, or a name in `VEHICLES`.
-        gait: `walk` or `stand` for people, empty for vehicles.
-        weight: how common it is among all assets of its folder.
-        palette: linear albedo choices of its paint, with how common each is.
+        gait: `walk` or `stand` for people, "" for vehicles.
+        weight: probability of the asset relative to the others of its folder.
+        palette: colours of its paint as linear albedo 0..1, each with its weight.
     """
 
     name: str
@@ -90,10 +90,10 @@ class ActorFacts:
 
 
 def read_actor_facts(path: Path) -> ActorFacts:
-    """Reads the `<custom>` sections of an actor's MJCF, those of files that it includes too.
+    """Reads the facts of an actor from the `<custom>` sections of its MJCF file and of the files that it includes.
 
     Raises:
-        TownError: it is no MJCF or breaks the conventions.
+        TownError: a file is no XML, or a fact breaks the conventions.
     """
     sections = (custom for root in _with_included(path) for custom in root.iter("custom"))
     entries = {item.get("name", ""): item.get("data", "") for custom in sections for item in custom}
@@ -129,13 +129,13 @@ def read_actor_facts(path: Path) -> ActorFacts:
 
 
 def _with_included(path: Path) -> Iterator[ET.Element]:
-    """The roots of a MJCF file and of what it includes.
+    """Yields the root elements of an MJCF file and of the files that it includes.
 
     Raises:
         TownError: one of them is no XML, or cannot be read.
     """
     files = [path]
-    for file in files:  # grows: what is included is looked at in turn
+    for file in files:  # grows by the files that are included
         root = read_xml(file)
         yield root
         included = [file.parent / name for include in root.iter("include") if (name := include.get("file"))]
@@ -151,20 +151,20 @@ def _numbers(path: Path, name: str, text: str) -> tuple[float, ...]:
 
 @dataclass(frozen=True)
 class AssetLibrary:
-    """The MJCF that goes with one town.
+    """The MJCF files of one town and of its actors and boards.
 
-    A town inside a folder `towns` may bring its own `vehicles`, `pedestrians` and `surfaces` beside that folder; each
-    kind that it brings replaces gear's.
+    A town inside of a folder `towns` may have folders `vehicles`, `pedestrians` and `surfaces` next to that folder.
+    Each of them replaces gear's own.
 
     Attributes:
-        town: path of the town's MJCF.
+        town: path of the town's MJCF file.
     """
 
     town: Path
 
     @staticmethod
     def for_town(town: str | Path) -> AssetLibrary:
-        """By a town's name, or by the path of its MJCF, with or without the `.xml` at its end.
+        """The library of a town, given by its name or by the path of its MJCF with or without the suffix `.xml`.
 
         Raises:
             UnknownNameError: there is no such town.
@@ -184,21 +184,21 @@ class AssetLibrary:
 
     @property
     def town_name(self) -> str:
-        """Name of the town: its file's stem."""
+        """Name of the town: the stem of its file."""
         return self.town.stem
 
     def folder(self, kind: Literal["vehicle", "pedestrian", "surface"]) -> Path:
-        """Where assets of a kind are."""
+        """Folder of the assets of a kind."""
         own = self.town.parent.parent / FOLDERS[kind]
         if self.town.parent.name == "towns" and own.is_dir():
             return own
         return data_dir("mjcf") / FOLDERS[kind]
 
     def path(self, kind: Literal["vehicle", "pedestrian", "surface"], name: str) -> Path:
-        """An asset's MJCF.
+        """Path of an asset's MJCF file.
 
         Raises:
-            UnknownNameError: there is none of that name.
+            UnknownNameError: there is no asset of that name.
         """
         folder = self.folder(kind)
         path = folder / f"{name}.xml"
@@ -211,12 +211,12 @@ class AssetLibrary:
 
     @cached_property
     def vehicles(self) -> dict[str, ActorFacts]:
-        """All vehicles by name, in alphabetical order."""
+        """Facts of all vehicles by name, in alphabetical order."""
         return self._actors("vehicle")
 
     @cached_property
     def pedestrians(self) -> dict[str, ActorFacts]:
-        """All people on foot by name, in alphabetical order."""
+        """Facts of all people by name, in alphabetical order."""
         return self._actors("pedestrian")
 
     def _actors(self, kind: Literal["vehicle", "pedestrian"]) -> dict[str, ActorFacts]:

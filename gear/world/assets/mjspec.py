@@ -1,4 +1,4 @@
-"""A MJCF file as MuJoCo itself reads it."""
+"""Reads MJCF files with MuJoCo's own parser."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gear.world.assets.library import read_xml
 
 
 def read_spec(path: Path) -> mujoco.MjSpec:
-    """Reads a file that may have any name: MuJoCo alone takes none for MJCF whose name does not end in `.xml`.
+    """Reads an MJCF file whose name may have any suffix; MuJoCo itself accepts only `.xml`.
 
     Raises:
         ValueError: MuJoCo refuses it.
@@ -30,5 +30,5 @@ def read_spec(path: Path) -> mujoco.MjSpec:
 
 
 def accept_flat_bodies(spec: mujoco.MjSpec) -> None:
-    """Lets a flat sign be a body of its own: it is at the edge of what inertia can be, and rounding decides."""
+    """Lets a flat plate be a body of its own: its inertia is at the limit that MuJoCo accepts, and rounding decides."""
     spec.compiler.balanceinertia = True

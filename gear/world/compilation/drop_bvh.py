@@ -1,4 +1,7 @@
-"""Models without what rays find the triangles of meshes by: half of a town's, and no renderer looks at it."""
+"""Saves models without the bounding volume hierarchies (BVH) of their meshes.
+
+They are half of a town's render model, and only rays use them.
+"""
 
 from __future__ import annotations
 
@@ -12,18 +15,18 @@ import numpy.typing as npt
 
 _TREES = ("bvh_aabb", "bvh_child", "bvh_depth", "bvh_nodeid")
 _NBVH, _NBVHSTATIC, _NBUFFER = 7, 8, 97
-"""Places of sizes in MuJoCo's `mjModel`, which begins with them; whether they are there is looked at each time."""
+"""Indices of sizes in MuJoCo's `mjModel`, which begins with its sizes. They are checked each time."""
 
 _ALIGNMENT_BYTES = 64
-"""Arrays of a model begin at multiples of this."""
+"""Alignment of the arrays of a model."""
 
 
 @contextlib.contextmanager
 def without_mesh_bvh(model: mujoco.MjModel) -> Iterator[None]:
-    """For a while a model has its bodies' trees alone; one that is saved then comes back so.
+    """Within the context a model has the BVH of its bodies alone; a model that is saved then loads without the others.
 
-    All its meshes share one box without a size in place of their trees, so that rays miss them. A model with
-    flexes stays as it is, and one that is laid out otherwise than in the version of MuJoCo that this was written for.
+    All its meshes share one empty box in place of their BVH, so that rays miss them. A model with flexes is left as it
+    is, and so is one whose memory layout is not that of the MuJoCo release that this module knows.
     """
     sizes, count = _sizes(model), int(np.max(model.body_bvhadr + model.body_bvhnum, initial=0))
     if sizes is None or count >= model.nbvh or model.nflex or not model.nmesh:
@@ -45,7 +48,7 @@ def without_mesh_bvh(model: mujoco.MjModel) -> Iterator[None]:
 
 
 def _sizes(model: mujoco.MjModel) -> npt.NDArray[np.int64] | None:
-    """(98,) sizes of a model as they lie in memory, to be written to; None where they are not what they should be."""
+    """(98,) int64 writable view of a model's sizes in memory; None where the layout is not the expected one."""
     address = getattr(model, "_address", None)
     if address is None:
         return None

@@ -1,4 +1,4 @@
-"""Materials of a compiled model: what colour geoms have, and what a renderer would die of."""
+"""Materials of a compiled model: the colours of geoms, and textures that would crash a renderer."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ TEXTURE_KINDS = {
     mujoco.mjtTexture.mjTEXTURE_CUBE: "cube",
     mujoco.mjtTexture.mjTEXTURE_SKYBOX: "skybox",
 }
-"""As messages name them."""
+"""Names of the types in messages."""
 
 LARGEST_SIDE_PX = 16384
-"""Of a texture, for Vulkan and OpenGL as Mesa has them."""
+"""Largest side of a texture that Mesa's Vulkan and OpenGL drivers accept."""
 
 
 def effective_rgba(model: mujoco.MjModel) -> Array:
-    """(ngeom, 4) what geoms are coloured with."""
+    """(ngeom, 4) float64 colour of each geom, 0..1: its own, or that of its material."""
     rgba: Array = model.geom_rgba.astype(np.float64)
     plain = ~has_own_colour(model)
     rgba[plain] = model.mat_rgba[model.geom_matid[plain]]
@@ -32,7 +32,7 @@ def effective_rgba(model: mujoco.MjModel) -> Array:
 
 
 def visible_materials(model: mujoco.MjModel) -> dict[int, int]:
-    """A visible geom, the first, for each material that one wears."""
+    """The first visible geom that uses each material, by material id."""
     first_geoms: dict[int, int] = {}
     for geom in np.flatnonzero((model.geom_group < FIRST_HIDDEN_GROUP) & (model.geom_matid >= 0)).tolist():
         first_geoms.setdefault(int(model.geom_matid[geom]), geom)
@@ -40,19 +40,19 @@ def visible_materials(model: mujoco.MjModel) -> dict[int, int]:
 
 
 def textures_of(model: mujoco.MjModel, material: int) -> list[tuple[int, int]]:
-    """(role, texture id) of the textures of a material."""
+    """(role, texture id) of each texture of a material; roles are those of `mujoco.mjtTextureRole`."""
     return [(role, int(texture)) for role, texture in enumerate(model.mat_texid[material]) if texture >= 0]
 
 
 def reject_fatal_textures(model: mujoco.MjModel, path: Path) -> None:
-    """Filament ends the process, without a word, over some textures.
+    """Refuses textures with which Filament would end the process without a message.
 
     Args:
         model: compiled.
-        path: the town's file, for the error.
+        path: the town's file, for errors.
 
     Raises:
-        TownError: a visible geom wears such a texture.
+        TownError: a visible geom uses such a texture.
     """
     for material, geom in visible_materials(model).items():
         for _, texture in textures_of(model, material):
@@ -63,7 +63,7 @@ def reject_fatal_textures(model: mujoco.MjModel, path: Path) -> None:
 
 
 def _fatal_texture(model: mujoco.MjModel, material: int, texture: int) -> str:
-    """What a material has of a texture that Filament cannot draw, and what to do; empty if it can."""
+    """Says why Filament cannot draw a material's texture, and what to do; empty if it can."""
     name = _own(model.tex(texture).name)
     width, height = int(model.tex_width[texture]), int(model.tex_height[texture])
     if width > LARGEST_SIDE_PX or height > LARGEST_SIDE_PX:
@@ -83,5 +83,5 @@ def _fatal_texture(model: mujoco.MjModel, material: int, texture: int) -> str:
 
 
 def _own(name: str) -> str:
-    """As its own file names it."""
+    """The name of an element in its own file, without the prefix that dm_control adds."""
     return name.rpartition("/")[2]

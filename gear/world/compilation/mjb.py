@@ -1,5 +1,7 @@
-"""Compiled models in files, written and read in place: half of the time of a large model's way to the disk and back
-went into the copy of it that is made in between."""
+"""Writes and reads compiled models through memory-mapped files.
+
+MuJoCo's own functions copy the whole model once more, which takes half of the time for a large model.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,7 @@ Bytes: TypeAlias = np.ndarray[tuple[int], np.dtype[np.uint8]]
 
 
 def write_model(model: mujoco.MjModel, path: Path) -> int:
-    """Writes a model into a new file; the CRC-32 of the content.
+    """Writes a model into a new file and returns the CRC-32 of its content.
 
     Raises:
         OSError: there is no room for it.
@@ -34,15 +36,15 @@ def write_model(model: mujoco.MjModel, path: Path) -> int:
 
 
 def read_model(path: Path, crc32: int) -> mujoco.MjModel:
-    """Reads what `write_model` wrote.
+    """Reads a model that `write_model` wrote.
 
     Args:
         path: of the file.
-        crc32: of its content; a power cut may leave one of the right size.
+        crc32: of its content; after a power cut a file may have the right size and the wrong content.
 
     Raises:
-        OSError: there is none.
-        ValueError: it is not what was written.
+        OSError: the file is missing or cannot be read.
+        ValueError: its content has another CRC-32.
     """
     with path.open("rb") as file:
         content = _view(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ))
@@ -52,13 +54,15 @@ def read_model(path: Path, crc32: int) -> mujoco.MjModel:
 
 
 def _view(mapped: mmap.mmap) -> Bytes:
-    """A map as an array, which alone holds it: a map that is closed by hand while an array looks at it, as after Ctrl-C
-    in the middle of a reading, raises an error of its own in place of what happened."""
+    """An array over a memory map, which keeps the map open for as long as the array exists.
+
+    A map that is closed explicitly while an array uses it, as after Ctrl-C, raises an error that hides the first one.
+    """
     return np.frombuffer(mapped, np.uint8)
 
 
 def _model_in(content: Bytes) -> mujoco.MjModel | None:
-    """A model out of memory, which MuJoCo's bindings offer for files alone; None where its library hides the way."""
+    """Loads a model from memory, which MuJoCo's Python bindings do not offer; None where that is impossible."""
     load = getattr(ctypes.CDLL(mujoco._structs.__file__), "mj_loadModelBuffer", None)
     adopt = getattr(mujoco.MjModel, "_from_model_ptr", None)
     if load is None or adopt is None:

@@ -1,11 +1,11 @@
-"""The two compiled models of a composition: what is seen, and what is felt."""
+"""Compiles the two models of a composition: the render model and the placement model."""
 
 from __future__ import annotations
 
 import contextlib
 import copy
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,30 +22,31 @@ COLLISION_CLASS = "collision"
 GROUND_PREFIX = "ground"
 
 GROUND_GROUP, OBSTACLE_GROUP, ACTOR_GROUP, FOOT_GROUP = 0, 1, 2, 3
-"""Geom groups of the placement model, so that rays can choose what to hit."""
+"""Geom groups of the placement model, by which rays choose what they hit."""
 
 _BODIES, _FEET = "1", "2"
-"""Contact bits: bodies touch bodies and obstacles, feet touch ground."""
+"""Contact bits: the bodies of actors touch each other and obstacles, their feet touch the ground."""
 
 FOOT_RADIUS_M = 0.05
 _CORNERS = ((1, 1), (1, -1), (-1, 1), (-1, -1))
 
 _OPAQUE = "1 1 1 1"
-"""Rays pass through what has no colour."""
+"""Colour of collision geoms: rays pass through geoms with alpha 0."""
 
 _ASSET_REFERENCES = ("material", "mesh", "hfield")
 _PLACEMENT_SECTIONS = ("compiler", "size", "default", "worldbody", "custom")
-"""A town's own options are left out: where it turns contacts or gravity off, nothing would be felt."""
+"""Sections of the MJCF that the placement model takes over. The town's `<option>` is left out: it could turn contacts
+or gravity off."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlacementBody:
-    """How an actor stands: what the placement model must know of it.
+    """The body of an actor in the placement model.
 
     Attributes:
-        half_length_m, half_width_m: where its feet are.
-        height_m: of the whole.
-        mass_kg: of the whole.
+        half_length_m, half_width_m: distances of its four feet from its middle.
+        height_m: its height.
+        mass_kg: its mass.
     """
 
     half_length_m: float
@@ -55,13 +56,16 @@ class PlacementBody:
 
 
 def render_model(composition: Composition) -> tuple[mujoco.MjModel, GeomClasses]:
-    """Compiles what is seen: no collision geoms, actors are mocap bodies.
+    """Compiles the render model: no collision geoms, and actors are mocap bodies.
+
+    Returns:
+        The model, and the labels of its geoms.
 
     Raises:
-        TownError: MuJoCo refuses it, a visible geom has no label, or a material would end Filament.
+        TownError: MuJoCo cannot compile it, a visible geom has no label, or a texture would crash Filament.
     """
     tree = copy.deepcopy(composition.tree)
-    for parent, geom in _geoms(tree, _collides):
+    for parent, geom in _geoms(tree, collision=True):
         parent.remove(geom)
     with _naming_the_file(composition):
         spec = _read(composition, tree, composition.assets)
@@ -71,11 +75,13 @@ def render_model(composition: Composition) -> tuple[mujoco.MjModel, GeomClasses]
 
 
 def placement_spec(composition: Composition) -> mujoco.MjSpec:
-    """What is felt: collision geoms, every actor of the pool free to move and on four feet. How they stand is missing,
-    which only shows in what is seen; until that is compiled, this is read beside.
+    """Reads the spec of the placement model: collision geoms alone, and every actor a free body on four feet.
+
+    Sizes and masses of the actors are missing, since they are measured on the render model. `placement_model` sets
+    them, so this function can run while the render model is compiled.
 
     Raises:
-        TownError: MuJoCo refuses it, a collision geom is no primitive, or an actor has none.
+        TownError: MuJoCo cannot read it, a collision geom is no primitive, or an actor has no collision geom.
     """
     tree = copy.deepcopy(composition.tree)
     for section in list(tree):
@@ -85,7 +91,7 @@ def placement_spec(composition: Composition) -> mujoco.MjSpec:
         for geom in default.findall("geom"):
             for reference in _ASSET_REFERENCES:
                 geom.attrib.pop(reference, None)
-    for parent, geom in _geoms(tree, lambda placement: not placement):
+    for parent, geom in _geoms(tree, collision=False):
         parent.remove(geom)
     worldbody = tree.find("worldbody")
     assert worldbody is not None  # dm_control always writes one
@@ -115,15 +121,15 @@ def placement_spec(composition: Composition) -> mujoco.MjSpec:
 def placement_model(
     composition: Composition, spec: mujoco.MjSpec, placement_bodies: Mapping[str, PlacementBody]
 ) -> mujoco.MjModel:
-    """Compiles what is felt.
+    """Compiles the placement model.
 
     Args:
         composition: the world.
-        spec: of it, as `placement_spec` gives it.
-        placement_bodies: by name of the slot's body.
+        spec: what `placement_spec` returned for it; changed in place.
+        placement_bodies: sizes and masses of the actors, by body name.
 
     Raises:
-        TownError: MuJoCo refuses it.
+        TownError: MuJoCo cannot compile it.
     """
     for name, placement_body in placement_bodies.items():
         _set_placement_body(spec, name, placement_body)
@@ -132,18 +138,14 @@ def placement_model(
 
 
 def _files_of_bodies(composition: Composition) -> dict[str, Path]:
-    """Which file a body comes from, by its name, of those that gear puts into the town."""
+    """The MJCF file of each body that gear puts into the town, by the body's name."""
     files = {file.stem: file for file in composition.files[1:]}
     boards = {face.owner: files[face.asset] for face in composition.faces}
     return boards | {slot.body: slot.actor.path for slot in composition.slots}
 
 
-def _collides(placement: bool) -> bool:
-    return placement
-
-
-def _geoms(tree: ET.Element, wanted: Callable[[bool], bool]) -> list[tuple[ET.Element, ET.Element]]:
-    """(parent, geom) for the geoms of the world that are wanted, by whether they are collision geoms."""
+def _geoms(tree: ET.Element, *, collision: bool) -> list[tuple[ET.Element, ET.Element]]:
+    """(parent, geom) of the collision geoms of the worldbody, or of all others."""
     found: list[tuple[ET.Element, ET.Element]] = []
 
     def walk(parent: ET.Element, inherited: str) -> None:
@@ -151,7 +153,7 @@ def _geoms(tree: ET.Element, wanted: Callable[[bool], bool]) -> list[tuple[ET.El
         for child in parent:
             if child.tag == "geom":
                 name = unprefixed_class(child.get("class", inherited))
-                if wanted(name.partition(".")[0] == COLLISION_CLASS):
+                if (name.partition(".")[0] == COLLISION_CLASS) == collision:
                     found.append((parent, child))
             elif child.tag in ("body", "frame"):
                 walk(child, inherited)
@@ -162,7 +164,7 @@ def _geoms(tree: ET.Element, wanted: Callable[[bool], bool]) -> list[tuple[ET.El
 
 
 def _fix(geom: ET.Element) -> None:
-    """A collision geom of the town."""
+    """Sets the group and the contact bits of a collision geom of the town."""
     is_ground = geom.get("name", "").rpartition("/")[2].startswith(GROUND_PREFIX)
     geom.set("group", str(GROUND_GROUP if is_ground else OBSTACLE_GROUP))
     geom.set("contype", "0" if is_ground else _BODIES)
@@ -171,7 +173,7 @@ def _fix(geom: ET.Element) -> None:
 
 
 def _free(body: ET.Element) -> None:
-    """Makes an actor of the pool free to move, with all that `_set_placement_body` gives a size and a place."""
+    """Makes an actor a free body, with the feet and the inertia that `_set_placement_body` sizes."""
     body.attrib.pop("mocap")
     name = body.get("name", "")
     for geom in body.iter("geom"):
@@ -194,16 +196,15 @@ def _free(body: ET.Element) -> None:
 
 
 def _set_placement_body(spec: mujoco.MjSpec, name: str, placement_body: PlacementBody) -> None:
-    """Stands an actor of the pool on its feet.
+    """Sets mass, inertia and feet of an actor.
 
-    Numbers are rounded so that they do not hang on the last digits of what is seen, and everything stands as before
-    where those change.
+    Numbers are rounded, so that actors settle at the same poses if the last digits of the measured sizes change.
     """
     body = spec.body(name)
     x, y, z = 2 * placement_body.half_length_m, 2 * placement_body.half_width_m, placement_body.height_m
     body.mass, body.ipos = _rounded(placement_body.mass_kg, 6), [0, 0, _rounded(0.4 * z, 6)]
     body.inertia = [_rounded(placement_body.mass_kg / 12 * (a * a + b * b), 9) for a, b in ((y, z), (x, z), (x, y))]
-    # Its last geoms: to find them by name, MuJoCo would look at every geom before them.
+    # The feet are its last geoms. Finding them by name would search all geoms in front of them.
     for foot, (sx, sy) in zip(body.geoms[-len(_CORNERS) :], _CORNERS, strict=True):
         place = sx * placement_body.half_length_m, sy * placement_body.half_width_m, FOOT_RADIUS_M
         foot.pos = [_rounded(along, 9) for along in place]
@@ -217,7 +218,7 @@ def _read(composition: Composition, tree: ET.Element, assets: Mapping[str, bytes
     spec = mujoco.MjSpec.from_string(ET.tostring(tree, encoding="unicode"), assets=dict(assets))
     if composition.folder is not None:
         spec.meshdir = spec.texturedir = str(composition.folder)
-    # Either would make away with bodies and geoms that are looked for by name.
+    # Either setting would remove bodies and geoms that are looked up by name.
     spec.compiler.discardvisual = spec.compiler.fusestatic = False
     accept_flat_bodies(spec)
     return spec
@@ -225,7 +226,7 @@ def _read(composition: Composition, tree: ET.Element, assets: Mapping[str, bytes
 
 @contextlib.contextmanager
 def _naming_the_file(composition: Composition) -> Iterator[None]:
-    """What MuJoCo has against a world, with the file that it is in."""
+    """Turns an error of MuJoCo into one that names the file."""
     try:
         yield
     except ValueError as error:

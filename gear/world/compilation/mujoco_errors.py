@@ -1,6 +1,6 @@
-"""What MuJoCo has against a file, in its own words and with the file's own lines.
+"""Finds the file and the line behind an error of MuJoCo.
 
-A world is composed of many files, and of what MuJoCo says of the whole neither the file nor the line is anybody's.
+A world is composed of many files. MuJoCo's error for the whole names neither the file nor a line of it.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ _LINE = re.compile(r",? line \d+\b")
 
 
 def without_breaks(error: BaseException) -> str:
-    """What an error says, without line breaks."""
+    """The message of an error on one line."""
     return " ".join(str(error).split())
 
 
 def compile_problem(path: Path) -> str:
-    """What stock MuJoCo has against a file alone; empty where it compiles it."""
+    """MuJoCo's error for one file alone; empty if the file compiles."""
     try:
         read_spec(path).compile()
     except ValueError as error:
@@ -33,11 +33,11 @@ def compile_error(error: ValueError, files: Sequence[Path]) -> TownError:
     """The error for a world that MuJoCo cannot compile.
 
     Args:
-        error: what it says of the whole.
-        files: what the world was composed of; the first one is named where each is fine alone.
+        error: MuJoCo's error for the world.
+        files: the files of the world; the error names the first one if each of them compiles alone.
     """
     for path in files:
-        if said := compile_problem(path):
-            return TownError(path, f"MuJoCo cannot compile it: {said}")
-    # The lines are those of a text that nobody has.
+        if problem := compile_problem(path):
+            return TownError(path, f"MuJoCo cannot compile it: {problem}")
+    # Line numbers would be those of the composed text, which the user does not have.
     return TownError(files[0], f"MuJoCo cannot compile it: {_LINE.sub('', without_breaks(error))}")

@@ -1,14 +1,14 @@
-"""Normal maps that are lit from the right side, in a renderer that does not look at texture coordinates.
+"""Prepares normal maps for Filament, which computes tangents without texture coordinates.
 
 Filament, as MuJoCo 4.0 fills it, makes a mesh's tangents of its normals alone, in the frame that MuJoCo turns the mesh
 into for its inertia. For a unit normal (x, y, z) in that frame red tilts it along `T` and green along `B` (measured),
 
     T = (-x z / (1 + y), -z, 1 - z^2 / (1 + y))        B = -(1 - x^2 / (1 + y), -x, -x z / (1 + y))
 
-which is Frisvad's basis about y, left-handed ("Building an Orthonormal Basis from a Unit Vector", 2012). So on every
-upright wall red goes up and green to the right of who looks at it, wherever it faces; on level ground and on slopes
-it depends on how the mesh is turned about the vertical. A usual map, with red to the right and green up, is therefore
-right with its two channels exchanged, in a mesh that stands upright and is turned by a well-chosen yaw.
+which is Frisvad's basis about y, left-handed ("Building an Orthonormal Basis from a Unit Vector", 2012). On every
+upright wall red therefore points up and green to the right of a viewer. On level ground and on slopes the directions
+depend on the yaw of the mesh's frame. A usual map, with red to the right and green up, is right when its two channels
+are exchanged and the frame of the mesh is upright and has a suitable yaw.
 """
 
 from __future__ import annotations
@@ -20,28 +20,28 @@ import numpy.typing as npt
 from gear.values.geometry import Array
 
 _YAWS = 16
-"""How many directions a mesh is tried in, evenly around the vertical."""
+"""Number of yaws that are tried for a mesh, evenly spaced."""
 
-_LOOKED_AT = 192
-"""Triangles of a mesh that decide, evenly out of all."""
+_SAMPLED_TRIANGLES = 192
+"""Number of triangles of a mesh that choose its yaw, evenly spaced among all."""
 
 _NORMAL, _RGB_CHANNELS = int(mujoco.mjtTextureRole.mjTEXROLE_NORMAL), 3
 _MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 _SINGULAR = 1e-6
-"""Of 1 + y, below which the basis has no direction of its own."""
+"""Value of 1 + y below which the basis is undefined."""
 
 _SLACK_M = 1e-4
-"""Boxes of flat meshes have no thickness, and turned vertices are rounded."""
+"""Margin of bounding boxes: those of flat meshes have no thickness, and turned vertices are rounded."""
 
 
 def align_normal_maps(model: mujoco.MjModel) -> None:
-    """Turns normal maps, and the frames of meshes that wear them, so that Filament reads them as they were meant.
+    """Changes normal maps, and the frames of the meshes that use them, so that Filament lights them correctly.
 
-    Geoms stay where they are, and so do their triangles; what is turned is the frame between them. Primitives, meshes
-    without texture coordinates and textures that some material wears as something else stay as they are.
+    No triangle moves: only the frame between a geom and its mesh is turned. Primitives, meshes without texture
+    coordinates, and textures that a material also uses in another role are left as they are.
 
     Args:
-        model: compiled, changed in place: normal textures, and meshes with their geoms. A mesh's file has z up.
+        model: compiled, changed in place. The files of its meshes have z up.
     """
     wearers = np.flatnonzero((model.geom_type == _MESH) & (model.geom_matid >= 0))
     wearers = wearers[model.mesh_texcoordnum[model.geom_dataid[wearers]] > 0]
@@ -58,13 +58,13 @@ def align_normal_maps(model: mujoco.MjModel) -> None:
 
 
 def tangents(normals: Array) -> tuple[Array, Array]:
-    """What red and green of a normal map tilt a normal along.
+    """The directions in which red and green of a normal map tilt a normal in Filament.
 
     Args:
         normals: (..., 3) unit vectors in a mesh's frame.
 
     Returns:
-        (..., 3) unit vectors: red's, and green's.
+        (..., 3) unit vectors for red, and the same for green.
     """
     x, y, z = np.moveaxis(normals, -1, 0)
     is_singular = 1 + y < _SINGULAR
@@ -76,14 +76,14 @@ def tangents(normals: Array) -> tuple[Array, Array]:
 
 
 def best_yaws(sheets: list[tuple[Array, Array, Array]]) -> Array:
-    """How meshes have to be turned for their normal maps, in radians.
+    """Finds the yaws of meshes at which their normal maps are right.
 
     Args:
-        sheets: of each mesh, in an upright frame: (M, 3) unit normals of triangles, the directions to the right in the
-            texture, and those up in it, both as long as twice the triangle's area.
+        sheets: for each mesh, in an upright frame: (M, 3) unit normals of its triangles, (M, 3) directions to the right
+            in the texture, and (M, 3) directions up in it, the directions with twice the triangle's area as length.
 
     Returns:
-        (meshes,) yaw of the frame in which red goes up and green to the right over most of the mesh.
+        (meshes,) yaw in radians at which red points up and green to the right over most of the mesh.
     """
     normals, right, up = (np.concatenate(columns) for columns in zip(*sheets, strict=True))
     starts = np.cumsum([0, *(len(sheet[0]) for sheet in sheets[:-1])])
@@ -94,16 +94,18 @@ def best_yaws(sheets: list[tuple[Array, Array, Array]]) -> Array:
         red, green = tangents(normals @ turn)
         agreement = np.einsum("ij,ij->i", red, up @ turn) + np.einsum("ij,ij->i", green, right @ turn)
         fits.append(np.add.reduceat(agreement, starts))
-    # Upright walls are as well off with any yaw but those that make them singular: rounding must not choose.
+    # For upright walls nearly all yaws fit equally well, and rounding must not choose among them.
     fit = np.array(fits)
     is_best = fit >= fit.max(axis=0) - 1e-4 * np.abs(fit).max(axis=0)
     return np.asarray(yaws[is_best.argmax(axis=0)])
 
 
 def _sheet(model: mujoco.MjModel, mesh: int, upright_from_mesh: Array) -> tuple[Array, Array, Array]:
-    """What `best_yaws` wants to know of a mesh."""
+    """Normals and texture directions of a mesh, as `best_yaws` takes them."""
     count = int(model.mesh_facenum[mesh])
-    chosen = model.mesh_faceadr[mesh] + np.unique(np.linspace(0, count - 1, min(count, _LOOKED_AT)).astype(np.int64))
+    chosen = model.mesh_faceadr[mesh] + np.unique(
+        np.linspace(0, count - 1, min(count, _SAMPLED_TRIANGLES)).astype(np.int64)
+    )
     corners = model.mesh_vert[model.mesh_vertadr[mesh] + model.mesh_face[chosen]].astype(np.float64)
     uvs = model.mesh_texcoord[model.mesh_texcoordadr[mesh] + model.mesh_facetexcoord[chosen]].astype(np.float64)
     edges = (corners[:, 1:] - corners[:, :1]) @ upright_from_mesh.T
@@ -122,7 +124,7 @@ def _sheet(model: mujoco.MjModel, mesh: int, upright_from_mesh: Array) -> tuple[
 
 
 def _turn(model: mujoco.MjModel, mesh: int, upright_from_mesh: Array, yaw: float) -> None:
-    """Gives a mesh another frame about the same origin, and its geoms too, so that nothing moves."""
+    """Turns the frame of a mesh about its origin, and its geoms the other way, so that nothing moves."""
     new_from_mesh = _about_z(yaw).T @ upright_from_mesh
     upright_from_new = np.array([np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)])
     mesh_from_new = np.empty(4)
@@ -139,7 +141,7 @@ def _turn(model: mujoco.MjModel, mesh: int, upright_from_mesh: Array, yaw: float
     vertices[:], normals[:] = vertices @ matrix, normals @ matrix
     polygons = slice(model.mesh_polyadr[mesh], model.mesh_polyadr[mesh] + model.mesh_polynum[mesh])
     model.mesh_polynormal[polygons] = model.mesh_polynormal[polygons] @ new_from_mesh.T
-    # What rays find triangles by: boxes about the turned boxes are larger than need be, and right.
+    # Boxes around the turned bounding boxes are larger than necessary, and correct.
     boxes = model.bvh_aabb[int(model.mesh_bvhadr[mesh]) : int(model.mesh_bvhadr[mesh] + model.mesh_bvhnum[mesh])]
     boxes[:, :3] = boxes[:, :3] @ new_from_mesh.T
     boxes[:, 3:] = boxes[:, 3:] @ np.abs(new_from_mesh).T + _SLACK_M
@@ -149,7 +151,7 @@ def _turn(model: mujoco.MjModel, mesh: int, upright_from_mesh: Array, yaw: float
         turned = np.empty(4)
         mujoco.mju_mulQuat(turned, model.geom_quat[geom], mesh_from_new)
         model.geom_quat[geom] = turned
-        # Kinematics would else take the frame of its body's inertia for it.
+        # Otherwise kinematics would take the frame of the body's inertia for the geom's.
         model.geom_sameframe[geom] = int(mujoco.mjtSameFrame.mjSAMEFRAME_NONE)
         model.geom_aabb[geom] = *(low + high) / 2, *(high - low) / 2
         model.geom_size[geom] = np.maximum(-low, high)

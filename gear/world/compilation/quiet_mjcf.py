@@ -1,4 +1,4 @@
-"""`dm_control.mjcf`, without the complaint of a window toolkit that finds no display; gear never opens a window."""
+"""Imports `dm_control.mjcf` without the warnings of a window toolkit that finds no display."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ with warnings.catch_warnings():
     except ModuleNotFoundError as error:
         if error.name != "dm_control":
             raise
-        # From Python 3.13 on pip cannot build labmaze, on which dm-control depends and of which gear uses nothing.
+        # dm-control depends on labmaze, which gear does not use and which pip cannot build from Python 3.13 on.
         raise GearError(
             "towns are composed with dm-control, which is not installed: pip install --no-deps dm-control"
         ) from error

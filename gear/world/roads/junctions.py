@@ -1,4 +1,4 @@
-"""Which lanes of a junction cross each other."""
+"""Conflicts between the lanes of a junction: which of them cannot be driven at the same time."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from gear.world.roads.lanes import LaneGraph
 from gear.world.roads.routes import Route
 
 CLEARANCE_M = 2.4
-"""Lanes nearer than this to each other cannot be driven at once."""
+"""Centre lines that come nearer than this to each other are in conflict."""
 
 
 class Junctions:
-    """Conflicts between the junction lanes of a town, found when first asked for."""
+    """Conflicts between the junction lanes of a town. Each pair of lanes is measured once, at the first question."""
 
     def __init__(self, graph: LaneGraph) -> None:
-        """Takes the town's lanes."""
+        """Takes the lane graph of the town."""
         self._graph = graph
         self._conflicts: dict[tuple[str, str], bool] = {}
         self._points: dict[str, Array] = {}
 
     def crossings(self, route: Route) -> list[tuple[str, float, float]]:
-        """The junction lanes of a route: name, and arc length of start and end on it."""
+        """The junction lanes of a route: name of each, and the arc lengths on the route where it starts and ends."""
         ends_m = (*route.starts_m[1:], route.line.length_m)
         return [
             (lane, start_m, end_m)
@@ -31,7 +31,10 @@ class Junctions:
         ]
 
     def conflict(self, first: str, second: str) -> bool:
-        """Whether two lanes come too near to each other; lanes that part from one lane are a queue, not a conflict."""
+        """Whether two lanes come nearer than `CLEARANCE_M` to each other.
+
+        Lanes that branch off the same lane are not in conflict: their vehicles follow each other.
+        """
         key = (min(first, second), max(first, second))
         if key not in self._conflicts:
             self._conflicts[key] = self._measure(*key)

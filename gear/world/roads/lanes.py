@@ -16,10 +16,10 @@ from gear.world.roads.polyline import Polyline
 from gear.world.scene_spec import FARTHEST_M
 
 LEAST_SIDE_M = 1.0
-"""Of the area that a town covers: maps are drawn to its scale."""
+"""Least width and height of the area that a town covers; maps are drawn to its scale."""
 
 _KINDS = ("lane", "sidewalk", "crosswalk", "parking", "town")
-"""How the names of custom fields begin that are read."""
+"""First part of the names of the custom fields that are read."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -27,11 +27,12 @@ class Lane:
     """One lane.
 
     Attributes:
-        name: with its `lane.`.
-        width_m, speed_mps: of the lane, and usual on it.
+        name: name of its custom field, `lane.…`.
+        width_m: width of the lane.
+        speed_mps: usual speed on the lane.
         line: centre line in the direction of travel.
         next: names of the lanes that continue it; empty where the road ends.
-        left, right: neighbour in the same direction, or "".
+        left, right: name of the neighbouring lane in the same direction, or "".
         is_junction: whether it lies inside a junction.
     """
 
@@ -50,8 +51,8 @@ class Walk:
     """A sidewalk or a crosswalk; people walk both ways.
 
     Attributes:
-        name: with its `sidewalk.` or `crosswalk.`.
-        width_m: across.
+        name: name of its custom field, `sidewalk.…` or `crosswalk.…`.
+        width_m: width of the walk.
         line: centre line.
         is_crossing: whether it crosses a road.
     """
@@ -67,10 +68,10 @@ class ParkingBay:
     """One place to park.
 
     Attributes:
-        name: of its row and its number.
-        length_m, width_m: of the bay.
-        position_m: its middle on the ground.
-        yaw_rad: heading of a car that stands in it.
+        name: name of its row, and its number in the row.
+        length_m, width_m: size of the bay.
+        position_m: its middle on the ground, in the world.
+        yaw_rad: heading of a car that is parked in it, counter-clockwise from east.
     """
 
     name: str
@@ -85,9 +86,9 @@ class LanePoint:
     """A place on a lane.
 
     Attributes:
-        lane: its name.
-        s_m: arc length from the lane's start.
-        lateral_m: to the left of the centre line.
+        lane: name of the lane.
+        s_m: arc length from the start of the lane.
+        lateral_m: distance to the left of the centre line.
     """
 
     lane: str
@@ -97,14 +98,14 @@ class LanePoint:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LaneGraph:
-    """Where road users may be.
+    """The lanes, walks and parking bays of a town.
 
     Attributes:
-        lanes: by name.
-        previous: names of the lanes that lead into a lane, by its name.
+        lanes: the lanes by name.
+        previous: names of the lanes that lead into a lane, by the name of that lane.
         walks: sidewalks and crosswalks by name.
         bays: parking bays.
-        bounds_m: xmin, ymin, xmax, ymax of the area that the town covers.
+        bounds_m: xmin, ymin, xmax, ymax of the area that the town covers, in the world.
     """
 
     lanes: Mapping[str, Lane]
@@ -115,14 +116,14 @@ class LaneGraph:
 
     @staticmethod
     def from_model(model: mujoco.MjModel, path: Path) -> LaneGraph:
-        """Reads a compiled town.
+        """Reads the lane graph of a compiled town.
 
         Args:
-            model: compiled from the town, alone or composed.
+            model: compiled from the town's MJCF, alone or in a world.
             path: the town's file, for errors.
 
         Raises:
-            TownError: a lane, walk or row of bays is malformed; names it.
+            TownError: a lane, a walk or a row of bays is malformed, or there are no lanes or no bounds.
         """
         lanes: dict[str, Lane] = {}
         walks: dict[str, Walk] = {}
@@ -162,13 +163,16 @@ class LaneGraph:
 
     @property
     def lowest_m(self) -> float:
-        """Height of the lowest place where road users may be."""
+        """Height in metres of the lowest point of any lane, walk or parking bay."""
         lines = [lane.line for lane in self.lanes.values()] + [walk.line for walk in self.walks.values()]
         heights_m = [float(line.points_m[:, 2].min()) for line in lines]
         return min(heights_m + [bay.position_m[2] for bay in self.bays])
 
     def project(self, position_m: Array) -> LanePoint:
-        """The nearest place on any lane, measured in the plane; lanes on other levels lose by their height."""
+        """The point on a lane that is nearest to a position, (3,) in the world.
+
+        Nearest means in space: a lane on a bridge is far from a car below it.
+        """
         best: tuple[float, LanePoint] | None = None
         for lane in self.lanes.values():
             s_m, lateral_m, distance_m = lane.line.project(position_m)

@@ -1,4 +1,4 @@
-"""Lines through points, by arc length."""
+"""Polylines in the world that are addressed by arc length."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from gear.values.geometry import Array, frozen
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Polyline:
-    """A line through points, measured along the ground plan: arc length is that of its projection to the plane.
+    """A polyline whose arc length is measured in the ground plan, that is, without its climbs.
 
     Attributes:
-        points_m: (N, 3), no two neighbours in one place.
+        points_m: (N, 3) its points in the world; no two neighbours are at the same place.
         s_m: (N,) arc length at each point, from 0.
     """
 
@@ -24,23 +24,28 @@ class Polyline:
 
     @staticmethod
     def through(points_m: Array) -> Polyline:
-        """Through (N, 3) points."""
+        """The polyline through (N, 3) points in metres."""
         steps_m = np.linalg.norm(np.diff(points_m[:, :2], axis=0), axis=1)
         return Polyline(frozen(points_m), frozen(np.concatenate([[0.0], np.cumsum(steps_m)])))
 
     @property
     def length_m(self) -> float:
-        """Of the whole line."""
+        """Arc length of the whole line."""
         return float(self.s_m[-1])
 
     def segment(self, s_m: float) -> int:
-        """Index of the segment that holds `s_m`; the ends hold all beyond them."""
+        """Index of the segment at an arc length; the first and the last one also hold all that lies beyond them."""
         return int(np.clip(np.searchsorted(self.s_m, s_m, side="right") - 1, 0, len(self.s_m) - 2))
 
     def at(self, s_m: float, lateral_m: float = 0.0) -> tuple[Array, float]:
-        """The point at an arc length, moved to the left, and the heading there in radians counter-clockwise from east.
+        """The point beside the line at an arc length, and the heading there.
 
-        Beyond its ends the line goes straight on.
+        Args:
+            s_m: arc length; beyond its ends the line continues straight.
+            lateral_m: distance of the point to the left of the line.
+
+        Returns:
+            (3,) point in metres, and heading in radians counter-clockwise from east.
         """
         index = self.segment(s_m)
         step = self.points_m[index + 1] - self.points_m[index]
@@ -50,7 +55,10 @@ class Polyline:
         return point, math.atan2(step[1], step[0])
 
     def heading(self, s_m: float, reach_m: float) -> float:
-        """The mean heading from `reach_m` before an arc length to as far after it: it turns evenly round corners."""
+        """Mean heading in radians over `reach_m` metres before and after an arc length.
+
+        Unlike the heading of a segment it turns steadily round a corner.
+        """
         steps = np.diff(self.points_m[:, :2], axis=0)
         headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
         ends_m = np.concatenate([[-np.inf], self.s_m[1:-1], [np.inf]])
@@ -58,7 +66,7 @@ class Polyline:
         return float(headings @ np.clip(within_m, 0.0, None) / (2 * reach_m))
 
     def sample(self, s_m: Array, lateral_m: float = 0.0) -> tuple[Array, Array]:
-        """As `at`, for (N,) arc lengths: (N, 3) points and (N,) headings."""
+        """As `at`, for (N,) arc lengths: (N, 3) points in metres and (N,) headings in radians."""
         index = np.clip(np.searchsorted(self.s_m, s_m, side="right") - 1, 0, len(self.s_m) - 2)
         steps = self.points_m[index + 1] - self.points_m[index]
         lengths_m = np.hypot(steps[:, 0], steps[:, 1])
@@ -67,7 +75,11 @@ class Polyline:
         return points, np.arctan2(steps[:, 1], steps[:, 0])
 
     def project(self, position_m: Array) -> tuple[float, float, float]:
-        """Where the line is nearest to a point: arc length, how far to its left the point is, distance in space."""
+        """The place on the line that is nearest to a point, (3,) in the world.
+
+        Returns:
+            Arc length, distance of the point to the left of the line, and distance in space, all in metres.
+        """
         starts, steps = self.points_m[:-1], np.diff(self.points_m, axis=0)
         squared = np.einsum("ij,ij->i", steps[:, :2], steps[:, :2])
         shares = np.clip(np.einsum("ij,ij->i", position_m[:2] - starts[:, :2], steps[:, :2]) / squared, 0.0, 1.0)

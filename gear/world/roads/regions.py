@@ -1,4 +1,4 @@
-"""Where the limits of a scene lie on the ground plan, and the places on lanes and walks inside them."""
+"""The limits of a scene as regions of the ground plan, and the pieces of lanes and walks inside them."""
 
 from __future__ import annotations
 
@@ -18,13 +18,14 @@ TABLE_STEP_M = 1.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Region:
-    """Limits around a board, around the ego car, or both.
+    """A region around a board, around the ego car, or around both: then the intersection.
 
     Attributes:
-        board: whose frame `ahead_m` and `lateral_m` are in; None where there is none.
-        ahead_m, lateral_m: from, to; None for no limit.
-        radius_m: from, to, around `centre_m`; None for no limit.
-        centre_m: the ego car's place.
+        board: the board whose frame `ahead_m` and `lateral_m` are in; None for no limits of that kind.
+        ahead_m: least and largest distance ahead of the board's face; None for no limit.
+        lateral_m: least and largest distance to the left of the board's facing direction; None for no limit.
+        radius_m: least and largest distance from `centre_m`; None for no limit.
+        centre_m: x and y of the ego car, in the world.
     """
 
     board: BoardSpec | None = None
@@ -34,7 +35,7 @@ class Region:
     centre_m: tuple[float, float] = (0.0, 0.0)
 
     def holds(self, xy_m: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-        """(N, 2) places to (N,) whether each is inside."""
+        """Which of (N, 2) points in the world are inside, as (N,) bool."""
         places = np.atleast_2d(np.asarray(xy_m, dtype=np.float64))
         inside = np.ones(len(places), bool)
         if self.board is not None:
@@ -52,14 +53,14 @@ class Region:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LineTable:
-    """Many lines, cut into pieces of about a metre; drawing a piece evenly draws a place evenly.
+    """Lines cut into pieces of about a metre, from which places are drawn.
 
     Attributes:
-        names: (N,) which line each piece is of.
-        s_m: (N,) arc length of its middle.
-        length_m: (N,) of the piece.
-        points_m: (N, 3) its middle.
-        weight: (N,) how much more often than others a metre of it is drawn.
+        names: (N,) name of the line that each piece belongs to.
+        s_m: (N,) arc length of the middle of each piece.
+        length_m: (N,) length of each piece.
+        points_m: (N, 3) middle of each piece, in the world.
+        weight: (N,) relative probability of a metre of each piece.
     """
 
     names: tuple[str, ...]
@@ -70,7 +71,7 @@ class LineTable:
 
     @staticmethod
     def of(lines: Iterable[tuple[str, Polyline, float]]) -> LineTable:
-        """From (name, line, weight)."""
+        """Cuts lines, given as (name, line, weight)."""
         names: list[str] = []
         rows: list[tuple[float, float, float, float, float, float]] = []
         for name, line, weight in lines:
@@ -85,11 +86,19 @@ class LineTable:
         return LineTable(tuple(names), table[:, 0], table[:, 1], table[:, 2:5], table[:, 5])
 
     def inside(self, region: Region) -> npt.NDArray[np.intp]:
-        """Indices of the pieces whose middle lies inside a region."""
+        """(M,) indices of the pieces whose middle lies inside a region."""
         return np.flatnonzero(region.holds(self.points_m[:, :2])) if self.names else np.zeros(0, np.intp)
 
     def draw(self, pieces: npt.NDArray[np.intp], rng: np.random.Generator) -> tuple[str, float]:
-        """A line and an arc length, evenly over the pieces given; they must not be empty."""
+        """Draws a place on the given pieces, by their weights and lengths.
+
+        Args:
+            pieces: (M,) indices of pieces; at least one.
+            rng: source of the draw.
+
+        Returns:
+            Name of the line, and arc length on it.
+        """
         shares = np.cumsum(self.weight[pieces] * self.length_m[pieces])
         piece = int(pieces[min(int(np.searchsorted(shares, rng.random() * shares[-1])), len(pieces) - 1)])
         return self.names[piece], float(self.s_m[piece] + (rng.random() - 0.5) * self.length_m[piece])

@@ -1,4 +1,4 @@
-"""Ways through the lane graph, as one line each."""
+"""Routes through the lane graph, and the poses of vehicles on them."""
 
 from __future__ import annotations
 
@@ -12,25 +12,26 @@ from gear.world.roads.lanes import LaneGraph
 from gear.world.roads.polyline import Polyline
 
 HALF_WHEELBASE_SHARE = 0.6
-"""Axles stand this share of half a vehicle's length from its middle; its heading is from axle to axle."""
+"""Distance of an axle from the middle of a vehicle, as a share of half its length. A vehicle heads from its rear axle
+to its front axle."""
 
 PACE_M = 0.25
-"""Way before and after a place over which the speed there is taken."""
+"""Distance before and after a place over which the speed at that place is measured."""
 
 BRAKING_WAY_M = 15.0
-"""Drivers heed the speed of lanes this far ahead."""
+"""Drivers obey the speed limits of lanes this far ahead."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Route:
-    """Lanes in a row.
+    """A sequence of connected lanes.
 
     Attributes:
-        lanes: their names.
-        starts_m: arc length at which each begins.
-        speeds_mps: usual on each.
-        line: all of them.
-        is_dead_end: whether nothing continues the last one.
+        lanes: names of the lanes.
+        starts_m: arc length on the route at which each lane begins.
+        speeds_mps: usual speed on each lane.
+        line: centre line of all lanes together.
+        is_dead_end: whether no lane continues the last one.
     """
 
     lanes: tuple[str, ...]
@@ -41,7 +42,7 @@ class Route:
 
     @staticmethod
     def along(graph: LaneGraph, lanes: tuple[str, ...]) -> Route:
-        """Through the lanes given, each a follower of the one before."""
+        """The route along given lanes, of which each continues the one before it."""
         points: list[Array] = []
         firsts: list[int] = []
         for name in lanes:
@@ -59,16 +60,19 @@ class Route:
         )
 
     def lane_at(self, s_m: float) -> int:
-        """Number of the lane at an arc length."""
+        """Index of the lane at an arc length."""
         return max(0, int(np.searchsorted(self.starts_m, s_m, side="right")) - 1)
 
     def speed_at(self, s_m: float) -> float:
-        """The lowest usual speed here and where a car that brakes comes to rest."""
+        """The lowest usual speed in m/s between an arc length and `BRAKING_WAY_M` ahead of it."""
         return min(self.speeds_mps[self.lane_at(s_m) : self.lane_at(s_m + BRAKING_WAY_M) + 1])
 
 
 def extend_route(graph: LaneGraph, lane: str, length_m: float, rng: np.random.Generator) -> tuple[str, ...]:
-    """Lanes from the start of `lane` that together have a length, or end where the road does."""
+    """Names of lanes that begin with `lane` and together are at least `length_m` long, or end where the road ends.
+
+    At each branch the generator draws the lane that follows.
+    """
     names = [lane]
     total_m = graph.lanes[lane].line.length_m
     while total_m < length_m and graph.lanes[names[-1]].next:
@@ -81,7 +85,19 @@ def extend_route(graph: LaneGraph, lane: str, length_m: float, rng: np.random.Ge
 def trace_back(
     graph: LaneGraph, lane: str, s_m: float, distance_m: float, rng: np.random.Generator
 ) -> tuple[tuple[str, ...], float] | None:
-    """The place so far before another one: the lanes from it to there, and its arc length on the first of them."""
+    """Goes back along the lanes from a place, and draws the lane at each junction.
+
+    Args:
+        graph: of the town.
+        lane: name of the lane of the place.
+        s_m: arc length of the place on that lane.
+        distance_m: how far to go back.
+        rng: source of the draws.
+
+    Returns:
+        Names of the lanes from the new place to the old one, and the arc length of the new place on the first of them;
+        None where the road begins less than `distance_m` before.
+    """
     names = [lane]
     s_m -= distance_m
     while s_m < 0:
@@ -94,7 +110,17 @@ def trace_back(
 
 
 def vehicle_pose(line: Polyline, s_m: float, half_length_m: float, lateral_m: float = 0.0) -> tuple[Array, float]:
-    """Where a vehicle stands on a line: the point under its middle, and its heading from axle to axle."""
+    """Pose of a vehicle on a line.
+
+    Args:
+        line: centre line of its lane or route.
+        s_m: arc length of its middle.
+        half_length_m: half of its length.
+        lateral_m: distance of its middle to the left of the line.
+
+    Returns:
+        (3,) point under its middle in metres, and heading in radians counter-clockwise from east.
+    """
     reach_m = HALF_WHEELBASE_SHARE * half_length_m
     point, _ = line.at(s_m, lateral_m)
     rear, front = line.at(s_m - reach_m)[0], line.at(s_m + reach_m)[0]
@@ -102,15 +128,24 @@ def vehicle_pose(line: Polyline, s_m: float, half_length_m: float, lateral_m: fl
 
 
 def offset_left(point_m: Array, yaw_rad: float, lateral_m: float) -> Array:
-    """A point to the left of another, by a heading that turns as its owner does.
+    """Moves a (3,) point to the left of a heading.
 
-    By the left of the line's pieces, who moves would jump where two of them meet, and back on the inside of a turn.
+    The heading is that of the road user, which turns steadily. With the heading of a segment of the line the point
+    would jump where two segments meet, and move backwards on the inside of a turn.
     """
     return point_m + lateral_m * np.array([-math.sin(yaw_rad), math.cos(yaw_rad), 0.0])
 
 
 def moving_pose(line: Polyline, s_m: float, half_length_m: float, lateral_m: float = 0.0) -> tuple[Array, float, float]:
-    """As `vehicle_pose`, of one that moves; and its way for each metre of the line, which is less inside a turn."""
+    """Pose of a vehicle that moves along a line.
+
+    Args:
+        line, s_m, half_length_m, lateral_m: as for `vehicle_pose`.
+
+    Returns:
+        Point and heading as `vehicle_pose` returns them, and the distance that its middle moves for each metre of the
+        line: less than 1 on the inside of a turn.
+    """
 
     def at(place_m: float) -> tuple[Array, float]:
         point, yaw_rad = vehicle_pose(line, place_m, half_length_m)

@@ -1,9 +1,9 @@
-"""The face of a board: how a patch of any size becomes the one texture size that all faces have.
+"""The texture of a face: how a patch of any size is resampled to the one size that all face textures have.
 
-Resampling averages areas in linear light. It is linear and separable, so it is two small matrices:
-`face = rows @ patch @ columns.T` for each channel, with `rows = box_matrix(h, 600)`, `columns = box_matrix(w, 1200)`. A
-differentiable twin uses the same two matrices. Where the face's size is a multiple of the patch's, every patch pixel
-becomes a block of equal texels, exactly.
+Resampling averages areas in linear light. It is linear and separable, so two small matrices do it:
+`face = rows @ patch @ columns.T` for each channel, with `rows = box_matrix(h, 600)`, `columns = box_matrix(w, 1200)`.
+The compositors use the same two matrices in torch. Where the size of the texture is a multiple of the patch's size,
+every pixel of the patch becomes a block of equal texels, exactly.
 """
 
 from __future__ import annotations
@@ -19,20 +19,23 @@ from gear.values.frames import UInt8Image
 from gear.values.geometry import Array, frozen
 
 FACE_SIZE_PX = (1200, 600)
-"""Width and height of every face's texture."""
+"""Width and height of the texture of every face."""
 
 SurfaceAlbedo = Literal["none", "white", "black"] | UInt8Image
-"""What a surface shows: its neutral face, albedo one, albedo zero, or a patch: (h, w, 3) uint8 in sRGB."""
+"""What a surface shows: "none" for its neutral texture, albedo 1, albedo 0, or a patch, (h, w, 3) uint8 sRGB."""
 
 SurfaceAlbedos = Mapping[str, SurfaceAlbedo]
-"""By surface name; surfaces that are not named show their neutral face."""
+"""What surfaces show, by surface name. A surface that is not named shows its neutral texture."""
 
 
 @lru_cache(maxsize=64)
 def box_matrix(source_px: int, target_px: int) -> Array:
-    """Box (area) resampling along one axis.
+    """The matrix of box (area) resampling along one axis.
 
-    Target pixel i covers [i, i + 1) * source / target of the source axis and takes the mean of what it covers.
+    Target pixel i covers [i, i + 1) * source / target of the source axis, and is the mean of what it covers.
+
+    Args:
+        source_px, target_px: number of pixels before and after.
 
     Returns:
         (target_px, source_px) float64, rows sum to 1, read-only.
@@ -46,30 +49,37 @@ def box_matrix(source_px: int, target_px: int) -> Array:
 
 
 def linear_from_srgb(srgb: npt.ArrayLike) -> Array:
-    """sRGB in 0..1 to linear light in 0..1, elementwise."""
+    """Converts sRGB values in 0..1 to linear light in 0..1, elementwise (IEC 61966-2-1)."""
     values = np.asarray(srgb, dtype=np.float64)
     return np.asarray(np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4))
 
 
 def srgb_from_linear(linear: npt.ArrayLike) -> Array:
-    """Linear light in 0..1 to sRGB in 0..1, elementwise."""
+    """Converts linear light, clipped to 0..1, to sRGB values in 0..1, elementwise (IEC 61966-2-1)."""
     values = np.clip(np.asarray(linear, dtype=np.float64), 0.0, 1.0)
     return np.asarray(np.where(values <= 0.0031308, values * 12.92, 1.055 * values ** (1 / 2.4) - 0.055))
 
 
 LINEAR_FROM_BYTE = linear_from_srgb(np.arange(256) / 255)
-"""(256,) linear light of each sRGB byte."""
+"""(256,) float64 linear light, 0..1, of each sRGB byte."""
 
 
 def resample_linear(linear: npt.ArrayLike, size_px: tuple[int, int] = FACE_SIZE_PX) -> Array:
-    """(h, w, 3) linear light to (size[1], size[0], 3) linear light; linear in its input."""
+    """Resamples an (h, w, 3) image in linear light to (size_px[1], size_px[0], 3) float64; linear in its input."""
     image = np.asarray(linear, dtype=np.float64)
     rows, columns = box_matrix(image.shape[0], size_px[1]), box_matrix(image.shape[1], size_px[0])
     return np.asarray(np.einsum("ih,hwc,jw->ijc", rows, image, columns, optimize=True))
 
 
 def face_from_patch(patch: UInt8Image, size_px: tuple[int, int] = FACE_SIZE_PX) -> UInt8Image:
-    """(h, w, 3) sRGB bytes of any size to the face's sRGB bytes, (size[1], size[0], 3), read-only.
+    """Resamples a patch to the size of a face's texture.
+
+    Args:
+        patch: (h, w, 3) uint8 sRGB, of any size.
+        size_px: width and height of the texture.
+
+    Returns:
+        (size_px[1], size_px[0], 3) uint8 sRGB, read-only.
 
     Raises:
         ValueError: the patch has another shape or dtype.
@@ -87,7 +97,7 @@ def face_from_patch(patch: UInt8Image, size_px: tuple[int, int] = FACE_SIZE_PX) 
 
 
 def uniform_face(value: int, size_px: tuple[int, int] = FACE_SIZE_PX) -> UInt8Image:
-    """A face of one grey sRGB byte."""
+    """A texture whose pixels all have one grey sRGB byte: (size_px[1], size_px[0], 3) uint8, read-only."""
     face = np.full((size_px[1], size_px[0], 3), value, np.uint8)
     face.setflags(write=False)
     return face

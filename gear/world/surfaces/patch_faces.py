@@ -1,4 +1,4 @@
-"""Faces that take patches: where they are in the compiled model, how large, and what they show."""
+"""The faces that take patches: their frames and sizes in the compiled model, and their textures."""
 
 from __future__ import annotations
 
@@ -20,20 +20,22 @@ from gear.world.surfaces.face_texture import SurfaceAlbedo, face_from_patch, srg
 from gear.world.surfaces.upright import texture_problem
 
 FLATNESS_M = 0.01
+"""Most thickness of a face, and most distance of its middle from the origin of its frame."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Face:
-    """One face in the render model.
+    """One face that takes a patch.
 
     Attributes:
-        name: `surface_0`, ….
-        asset: MJCF that it comes from.
-        is_carried: whether an actor bears it.
-        geom_id: in the render model.
-        parent_from_surface: its frame in the world, or in its actor.
+        name: `surface_0`, `surface_1`, …, in patch order.
+        asset: name of the MJCF file that it comes from.
+        is_carried: whether an actor carries it.
+        geom_id: its geom in the render model.
+        parent_from_surface: pose of its frame (origin in its middle, x right, y down, z into the board as a viewer sees
+            it) in the world, or in the frame of the actor that carries it.
         width_m, height_m: its size.
-        neutral: (H, W, 3) what it shows without a patch.
+        neutral: (H, W, 3) uint8 sRGB texture without a patch.
     """
 
     name: str
@@ -46,7 +48,7 @@ class Face:
     neutral: UInt8Image
 
     def record(self, carrier_id: int | None) -> SurfaceRecord:
-        """As data, on the actor of that id if it is carried."""
+        """The face as data; `carrier_id` is the id of the actor that carries it, if one does."""
         return SurfaceRecord(
             name=self.name,
             asset=self.asset,
@@ -66,11 +68,17 @@ class Face:
 
 
 def find_faces(model: mujoco.MjModel, data: mujoco.MjData, names: Sequence[FaceNames], path: Path) -> tuple[Face, ...]:
-    """Measures the faces of a compiled model; actors stand at their own origins in `data`.
+    """Measures the faces of a compiled model.
+
+    Args:
+        model: the render model.
+        data: with kinematics up to date.
+        names: names of the faces' elements, in patch order.
+        path: the town's file, for errors.
 
     Raises:
-        TownError: a face is not flat in its `surface` frame, has no size of a board's, or would not show a patch
-            upright and whole there.
+        TownError: a face is not flat in its `surface` frame, is smaller or larger than any board, or would not show a
+            patch upright and whole.
     """
     return tuple(_face(model, data, number, name, path) for number, name in enumerate(names))
 
@@ -122,7 +130,7 @@ def _face(model: mujoco.MjModel, data: mujoco.MjData, number: int, name: FaceNam
 
 
 def _neutral(model: mujoco.MjModel, material: str) -> UInt8Image:
-    """What the asset's own material looks like, as a face."""
+    """Texture of a face with the look of a material: (H, W, 3) uint8 sRGB, its image or its plain colour."""
     material_id = model.material(material).id
     roles = (mujoco.mjtTextureRole.mjTEXROLE_RGB, mujoco.mjtTextureRole.mjTEXROLE_RGBA)
     textures = [int(model.mat_texid[material_id, role]) for role in roles]

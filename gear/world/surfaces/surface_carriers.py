@@ -1,4 +1,4 @@
-"""What bears the surfaces of a scene, by the names that its library gives it."""
+"""Checks that a town has the boards and the truck that a scene names."""
 
 from __future__ import annotations
 
@@ -8,11 +8,16 @@ from gear.world.scene_spec import SceneSpec
 
 
 def check_scene_assets(library: AssetLibrary, scene: SceneSpec, key: str) -> None:
-    """Whether a town has the boards and the truck of a scene; `key` is where that stands in its library.
+    """Checks that a town has the assets that carry the surfaces of a scene.
+
+    Args:
+        library: of the town.
+        scene: names the assets.
+        key: key of the scene in its file, such as `scenes.corner`.
 
     Raises:
-        UnknownNameError: one is not there.
-        ConfigError: likewise, where a file names it.
+        UnknownNameError: the town has no such board or truck.
+        ConfigError: the same, with the place in the file that names the asset.
     """
     for number, board in enumerate(scene.boards):
         with located_errors(board.places, "asset", f"{key}.boards[{number}]"):

@@ -1,4 +1,4 @@
-"""Whether a face shows a patch as its `surface` frame says: upright, whole, and to who stands before it."""
+"""Checks that a face shows its texture as its `surface` frame says: upright, whole, and on the side of the viewer."""
 
 from __future__ import annotations
 
@@ -9,20 +9,21 @@ from gear.values.geometry import Array, RigidTransform
 from gear.world.assets.geom_triangles import geom_triangles
 
 UV_TOLERANCE = 0.01
-"""Share of the face's sides by which a corner of its texture may be off."""
+"""Most distance of a corner's texture coordinates from where they should be, as a share of the face's sides."""
 
 _BOX_TEXTURE = ((1, -2), (0, -2), (0, -1))
-"""Where u and v run on the sides of a box that look along x, y, z: an axis, downwards if negative; as both renderers
-show it, on opposite sides the same, so that one of the two is a mirror."""
+"""Axes of the box along which u and v grow on the sides that face along x, y and z; a negative sign means against the
+axis. All renderers draw opposite sides with the same axes, so one side of each pair shows a mirrored texture."""
 
 
 def texture_problem(model: mujoco.MjModel, geom_id: int, surface_from_geom: RigidTransform) -> str:
-    """What keeps a face from showing a patch; empty if nothing does.
+    """Says what keeps a face from showing a patch; empty if nothing does.
 
     Args:
         model: compiled.
-        geom_id: the face, flat in the plane z = 0 of its surface's frame, whose origin is its middle.
-        surface_from_geom: x to the right and y down as who looks at it sees it, z into it.
+        geom_id: the face, flat in the plane z = 0 of its surface frame, whose origin is its middle.
+        surface_from_geom: transform into the surface frame, in which a viewer sees x to the right, y down and z into
+            the face.
     """
     kind = mujoco.mjtGeom(int(model.geom_type[geom_id]))
     if kind == mujoco.mjtGeom.mjGEOM_BOX:

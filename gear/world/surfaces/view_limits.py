@@ -1,4 +1,4 @@
-"""Whether the reference camera has the faces in view."""
+"""The limits within which the reference camera must see the faces."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ from gear.world.placement import PlacementSpace
 from gear.world.surfaces.patch_faces import Face
 
 PICTURE_MARGIN = 0.06
-"""The middle of a face keeps this share of the picture's size from its border."""
+"""Least distance of a face's middle from the border of the picture, as a share of the picture's width and height."""
 
 GRID = (5, 3)
+"""Columns and rows of the points of a face to which lines of sight are tested."""
 STAND_OFF_M = 0.2
-"""Lines of sight end this far before a face, so that its own board does not hide it."""
+"""Lines of sight end this far in front of a face, so that they do not hit its own board."""
 
 TRUCK_MAX_INCIDENCE_DEG = 75.0
 
@@ -29,12 +30,12 @@ Verdict = Literal["seen", "out of the picture", "too oblique", "hidden"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FaceInWorld:
-    """A face where it stands.
+    """A face in the world.
 
     Attributes:
-        centre_m: its middle.
-        outward: unit normal, away from the board.
-        grid_m: (15, 3) points spread over it, just before it.
+        centre_m: (3,) its middle.
+        outward: (3,) unit normal, away from the board.
+        grid_m: (15, 3) points spread over it, `STAND_OFF_M` in front of it.
     """
 
     centre_m: Array
@@ -43,7 +44,7 @@ class FaceInWorld:
 
     @staticmethod
     def of(face: Face, world_from_surface: RigidTransform) -> FaceInWorld:
-        """From its size and its frame."""
+        """The face at a pose of its frame."""
         u, v = np.meshgrid((np.arange(GRID[0]) + 0.5) / GRID[0] - 0.5, (np.arange(GRID[1]) + 0.5) / GRID[1] - 0.5)
         local_m = np.stack([u * face.width_m, v * face.height_m, np.full(u.shape, -STAND_OFF_M)], axis=-1)
         return FaceInWorld(
@@ -58,8 +59,8 @@ class ViewLimits:
     """What the reference camera must see of each face.
 
     Attributes:
-        max_incidence_deg: how obliquely it may see it.
-        min_free: share that nothing of the town may hide.
+        max_incidence_deg: largest angle between the face's normal and the direction to the camera.
+        min_free: share of the face that the town and its boards must leave visible.
     """
 
     max_incidence_deg: float = TRUCK_MAX_INCIDENCE_DEG
@@ -68,7 +69,14 @@ class ViewLimits:
     def judge(
         self, space: PlacementSpace, faces: Sequence[FaceInWorld], mount: CameraMount, camera: CameraRecord
     ) -> Verdict:
-        """The first thing that is wrong with any of the faces, or `seen`."""
+        """Tests the limits, the cheap ones first, and returns the first one that a face breaks, or `seen`.
+
+        Args:
+            space: the placement model, for lines of sight.
+            faces: in the world.
+            mount: the camera's intrinsics and picture size.
+            camera: the camera's pose in the world.
+        """
         world_from_camera = camera.world_from_camera_transform
         eye_m = world_from_camera.translation_m
         camera_from_world = world_from_camera.inverse()
@@ -91,5 +99,5 @@ class ViewLimits:
 
 
 def reference_camera(rig: Rig, world_from_ego: RigidTransform) -> tuple[CameraMount, CameraRecord]:
-    """The rig's first camera, on the car."""
+    """The first camera of a rig, and its pose for a pose of the ego car."""
     return rig.cameras[0], rig.place(world_from_ego)[0]

@@ -1,4 +1,4 @@
-"""Everybody of one sample: drawn, stood up, and free of overlaps."""
+"""The road users of one sample: drawn, placed on the ground, and checked for overlaps."""
 
 from __future__ import annotations
 
@@ -18,33 +18,35 @@ from gear.world.traffic.footprints import Footprint
 from gear.world.traffic.spawn import FreeSlots, Spawn, Spawner
 
 TRIES = 40
+"""Places that are drawn for one road user before it is left out of a round."""
+
 ROUNDS = 5
-"""A crowd is drawn, felt for overlaps, and what overlaps is drawn again, so many times."""
+"""Rounds of drawing: after each one, road users that overlap are removed, and the next round replaces them."""
 
 VEHICLE_GAP_M = (1.5, 0.3)
 PERSON_GAP_M = (0.35, 0.35)
-"""Least gap ahead and behind, and to the sides, to everybody else."""
+"""Least gaps to all other road users: ahead and behind, and to the sides."""
 
 UPRIGHT = 0.9
-"""What stands with its z axis lower than this has fallen over, or has its wheels on different levels of the ground."""
+"""Least z component of an actor's z axis. With less it has fallen over, or its wheels are on different levels."""
 
 SLIP_M = 0.5
-"""What moves further than this while it settles has slid off its place."""
+"""An actor that moves further than this while it settles has slid off its place."""
 
 
 @dataclass(eq=False, kw_only=True)
 class RoadUsers:
-    """Who takes part, and where everybody stands.
+    """The road users of one sample while it is drawn. Bodies are named as in the placement model.
 
     Attributes:
-        spawns: by body of the placement model; the ego car first, then the carrier if there is one, then the others in
-            the order in which they were drawn.
-        poses: by the same bodies.
-        keep_out: where nobody else may be.
-        free: what is left of the pool.
-        protected: bodies of the ego car and the carrier.
-        required_lanes: lanes that the ego car must take, from where it starts, by its body.
-        drive_m: length of its way to the end of its limits, 0 where it only stands or has none.
+        spawns: the road users by body: the ego car first, then the carrier if there is one, then the others in the
+            order in which they were drawn.
+        poses: their poses in the world, by body.
+        keep_out: areas in which no other road user may be.
+        free: the slots of the pool that are still free.
+        protected: bodies of the ego car and the carrier, which are never removed.
+        required_lanes: lanes that the ego car must follow from its start, by its body.
+        drive_m: distance from the ego car's start to the end of its limits; 0 where it stands or has no limits.
     """
 
     spawns: dict[str, Spawn]
@@ -56,13 +58,13 @@ class RoadUsers:
     drive_m: float = 0.0
 
     def drop(self, body: str) -> None:
-        """Somebody leaves."""
+        """Removes a road user and frees its slot."""
         spawn = self.spawns.pop(body)
         self.poses.pop(body, None)
         self.free.release(spawn.actor_type.facts.name, body)
 
     def count(self, *, people: bool) -> int:
-        """How many others there are of one sort."""
+        """Number of people, or of vehicles, without the ego car and the carrier."""
         return sum(
             (spawn.walk is not None) == people for body, spawn in self.spawns.items() if body not in self.protected
         )
@@ -70,7 +72,7 @@ class RoadUsers:
 
 @dataclass(frozen=True, slots=True)
 class _Draw:
-    """What the random numbers of one round of drawing derive from."""
+    """The keys that the random numbers of one round of drawing derive from."""
 
     seed: int
     sequence: int
@@ -79,13 +81,13 @@ class _Draw:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Crowd:
-    """Fills casts with other road users.
+    """Draws the road users around the ego car.
 
     Attributes:
-        scene_name, scene: whose limits hold.
-        types: what there is.
-        spawner: where they may be.
-        space: what feels overlaps.
+        scene_name, scene: give the limits.
+        types: the assets of the pool by name.
+        spawner: draws places.
+        space: the placement model, for overlaps.
     """
 
     scene_name: str
@@ -97,15 +99,15 @@ class Crowd:
     def fill(
         self, road_users: RoadUsers, seed: int, sequence: int, occlusion_test: OcclusionTest | None = None
     ) -> None:
-        """Adds vehicles and people around the leads of a cast.
+        """Adds vehicles and people around the ego car.
 
         Args:
-            road_users: has its leads; is changed.
-            seed, sequence: what the draws derive from.
-            occlusion_test: who stands in the way of the board.
+            road_users: holds the ego car and the carrier, if there is one; changed in place.
+            seed, sequence: keys of the draws.
+            occlusion_test: finds road users that hide a face; None where the scene has no face.
 
         Raises:
-            PlacementError: fewer than the least count could be placed; says which limit is too tight.
+            PlacementError: fewer than the least count could be placed; the error names the limit that is too tight.
         """
         ego = next(iter(road_users.spawns.values()))
         wanted: dict[str, int] = {}
@@ -188,7 +190,7 @@ class Crowd:
         return True
 
     def _place_on_ground(self, road_users: RoadUsers, bodies: Sequence[str]) -> bool:
-        """Puts drafts on the ground and drops who cannot stand there; whether there was anybody."""
+        """Places actors on the ground, removes those that cannot stand there, and returns whether one was removed."""
         before = len(road_users.spawns)
         uneven: dict[str, RigidTransform] = {}
         for body in bodies:
@@ -209,7 +211,7 @@ class Crowd:
         return len(road_users.spawns) < before
 
     def _drop_overlapping(self, road_users: RoadUsers, occlusion_test: OcclusionTest | None) -> bool:
-        """Drops who overlaps somebody drawn before, or the town, or hides the board; whether there was anybody."""
+        """Removes actors that overlap another one or the town, or hide a face; returns whether one was removed."""
         order = {body: number for number, body in enumerate(road_users.spawns)}
         overlapping = {
             max(pair, key=lambda body: order.get(body, -1)) for pair in self.space.overlaps(road_users.poses)
@@ -223,7 +225,7 @@ class Crowd:
 
 
 def is_upright(pose: RigidTransform) -> bool:
-    """Whether an actor stands as it would drive or walk."""
+    """Whether an actor stands upright enough to drive or walk."""
     return bool(pose.rotation[2, 2] >= UPRIGHT)
 
 
@@ -232,7 +234,7 @@ def _distance_m(first: RigidTransform, second: RigidTransform) -> float:
 
 
 def region_of(limits: NpcLimits, boards: Sequence[BoardSpec], centre_m: tuple[float, float]) -> Region:
-    """Where limits let somebody be."""
+    """The region that limits describe, around the first board and around a centre (x, y) in the world."""
     return Region(
         board=boards[0] if boards and limits.needs_board else None,
         ahead_m=limits.ahead_m,
@@ -244,12 +246,12 @@ def region_of(limits: NpcLimits, boards: Sequence[BoardSpec], centre_m: tuple[fl
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OcclusionTest:
-    """Who stands between the reference camera and the faces.
+    """Finds the road users that hide a face from the reference camera.
 
     Attributes:
-        eye_m: the camera.
-        grids_m: points spread over each face.
-        min_free: share of each face that no road user may hide.
+        eye_m: (3,) position of the camera.
+        grids_m: for each face, (N, 3) points spread over it.
+        min_free: share of each face that road users must leave visible.
     """
 
     eye_m: Array
@@ -257,7 +259,7 @@ class OcclusionTest:
     min_free: float
 
     def occluders(self, space: PlacementSpace, poses: Mapping[str, RigidTransform]) -> set[str]:
-        """Bodies that together hide too much of a face."""
+        """Bodies of the actors that together hide more of a face than they may."""
         found: set[str] = set()
         for grid_m in self.grids_m:
             occluders = space.occluders(self.eye_m, grid_m, poses)

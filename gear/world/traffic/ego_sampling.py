@@ -1,4 +1,4 @@
-"""The ego car, and the truck ahead of it where the scene has one: where they stand is what a sample is drawn around."""
+"""Draws the ego car of a sample, and the truck ahead of it where the scene has one. All else is placed around them."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from gear.world.traffic.spawn import FreeSlots, Spawn, Spawner
 EGO_TRIES = 60
 LONGEST_WAY_M = 40.0
 USUAL_MPS = 5.0
-"""A driving ego car starts at most so far before its limits, and no further than it comes at this speed."""
+"""A driving ego car starts at most `LONGEST_WAY_M` before its limits, and no further than it drives at `USUAL_MPS`."""
 
 CAMERA_ADVICE = (
     "a level camera with a field of view of 90 degrees would have it in view: change options.pitch_deg,"
@@ -40,7 +40,7 @@ CAMERA_ADVICE = (
 """What to do where the camera's options, and not the scene's limits, keep the faces out of the picture."""
 
 CORRIDOR_M = 1.3
-"""Half the width of the strip between the ego car and its truck that others keep out of."""
+"""Half the width of the strip between the ego car and its truck in which no other road user may be."""
 
 
 @dataclass(eq=False, kw_only=True)
@@ -48,12 +48,13 @@ class EgoSampler:
     """Draws ego cars and carriers for one scene.
 
     Attributes:
-        scene_name, scene: whose limits hold.
+        scene_name, scene: give the limits.
         rig: the cameras on the ego car.
-        types, slots: the pool.
-        faces: what takes patches.
-        spawner: where vehicles may be.
-        space: what feels overlaps and hidden faces.
+        types: the assets of the pool by name.
+        slots: the pool.
+        faces: the faces that take patches.
+        spawner: draws places.
+        space: the placement model, for overlaps and lines of sight.
     """
 
     scene_name: str
@@ -66,21 +67,21 @@ class EgoSampler:
     space: PlacementSpace
 
     def draw(self, seed: int, sequence: int, duration_s: float = 0.0) -> RoadUsers:
-        """A cast with its leads alone.
+        """Draws the ego car, and the carrier if the scene has one.
 
         Args:
-            seed, sequence: what the draws derive from.
-            duration_s: how long they will drive. The ego car then starts where its limits begin or before, has the
-                boards in view from there already, and drives to where they end.
+            seed, sequence: keys of the draws.
+            duration_s: length of the sequence, 0 for a single picture. In a sequence the ego car starts at or before
+                the beginning of its limits, sees the boards from there, and drives to the end of its limits.
 
         Raises:
-            PlacementError: no place keeps the limits; says which is too tight.
+            PlacementError: no place keeps the limits; the error names the limit that is too tight.
         """
         problems: Counter[str] = Counter()
         camera_is_cause = 0
         for attempt in range(EGO_TRIES):
             road_users = self.empty()
-            # Failures bring the start nearer to the limits, so that the last tries begin where the board is in view.
+            # Each failure moves the start nearer to the limits, so that the last tries start with the board in view.
             before_s = duration_s * 0.5 ** (attempt // 6)
             problem = self._place(road_users, derive_rng(seed, self.scene_name, "ego", sequence, attempt), before_s)
             if problem is None:
@@ -93,11 +94,11 @@ class EgoSampler:
         raise PlacementError(self.scene_name, f"no place for the ego car in {EGO_TRIES} tries ({told}); {advice}")
 
     def empty(self) -> RoadUsers:
-        """Nobody yet."""
+        """No road users, and the whole pool free."""
         return RoadUsers(spawns={}, poses={}, keep_out=[], free=FreeSlots.of(self.slots))
 
     def enter(self, road_users: RoadUsers, spawns: Sequence[Spawn]) -> str | None:
-        """Stands leads up in a cast; what is wrong with their places, if anything is."""
+        """Places the ego car and the carrier on the ground, and returns what is wrong with their places, or None."""
         for spawn in spawns:
             grounded = self.space.ground_pose(spawn.actor_type, spawn.x_m, spawn.y_m, spawn.near_z_m, spawn.yaw_rad)
             if grounded is None:
@@ -123,7 +124,7 @@ class EgoSampler:
         return self.limits.judge(self.space, self.faces_in_world(road_users), mount, camera)
 
     def faces_in_world(self, road_users: RoadUsers) -> list[FaceInWorld]:
-        """Every face, on its board or on the carrier of a cast."""
+        """Every face at its pose in the world: on its board, or on the carrier."""
         placed = []
         for face in self.faces:
             frame = face.parent_from_surface
@@ -135,12 +136,12 @@ class EgoSampler:
 
     @property
     def ego_type(self) -> ActorType:
-        """What the ego car is."""
+        """The asset of the ego car, measured."""
         return self.types[EGO_ASSET]
 
     @cached_property
     def limits(self) -> ViewLimits:
-        """What the reference camera must see."""
+        """The limits within which the reference camera must see the faces."""
         if self.scene.ego is None:
             return ViewLimits()
         return ViewLimits(max_incidence_deg=self.scene.ego.max_incidence_deg, min_free=self.scene.ego.min_free)
@@ -181,7 +182,7 @@ class EgoSampler:
         return [ego]
 
     def _run(self, lane: str, s_m: float) -> tuple[float, float]:
-        """From where to where along a lane, around a place on it, the ego car may be without a gap."""
+        """Arc lengths of the first and last piece of the unbroken run of allowed pieces around a place on a lane."""
         table = self.spawner.lane_table
         pieces = np.array([piece for piece in self.places if table.names[piece] == lane])
         here = int(pieces[np.argmin(np.abs(table.s_m[pieces] - s_m))])
@@ -194,7 +195,7 @@ class EgoSampler:
         return float(table.s_m[first]), float(table.s_m[last])
 
     def ego_on_lane(self, road_users: RoadUsers, lane: str, s_m: float, rng: np.random.Generator) -> Spawn:
-        """The ego car on a lane."""
+        """The ego car on a lane, in a slot of the pool."""
         return self.spawner.on_lane(self.ego_type, road_users.free.take(EGO_ASSET), "ego", lane, s_m, rng)
 
     def _draw_behind_truck(self, road_users: RoadUsers, rng: np.random.Generator) -> list[Spawn] | str:
@@ -215,10 +216,10 @@ class EgoSampler:
 
     @cached_property
     def places(self) -> npt.NDArray[np.intp]:
-        """Pieces of lanes where the ego car (or the truck) may be, found once.
+        """(N,) indices of the pieces of lanes on which the ego car, or the truck, may be.
 
         Raises:
-            PlacementError: there are none; says what is wrong with those that the limits hold.
+            PlacementError: there are none; the error says why the pieces within the limits are excluded.
         """
         table = self.spawner.lane_table
         ego = self.scene.ego
@@ -255,7 +256,7 @@ class EgoSampler:
 
 
 def _between(ego: Spawn, truck: Spawn) -> Footprint:
-    """The strip from the ego car to its truck."""
+    """The strip of road between the ego car and its truck."""
     dx, dy = truck.x_m - ego.x_m, truck.y_m - ego.y_m
     return Footprint(
         (ego.x_m + truck.x_m) / 2,

@@ -1,4 +1,4 @@
-"""Rectangles on the ground plan, for gaps between road users."""
+"""Footprints of road users on the ground plan, for the gaps between them."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ import math
 from dataclasses import dataclass
 
 LEVEL_M = 3.0
-"""Things this far apart in height are on different levels of the town."""
+"""Objects with a larger difference in height are on different levels of the town, as on a bridge and below it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Footprint:
-    """An oriented rectangle.
+    """An oriented rectangle on the ground.
 
     Attributes:
-        x_m, y_m, z_m: its middle, on the ground.
-        yaw_rad: heading of its length.
+        x_m, y_m, z_m: its middle, in the world.
+        yaw_rad: direction of its length, counter-clockwise from east.
         half_length_m, half_width_m: half of its sides.
     """
 
@@ -27,18 +27,18 @@ class Footprint:
     half_width_m: float
 
     def grown(self, length_m: float, width_m: float) -> Footprint:
-        """With so much more at each end and at each side."""
+        """The rectangle with `length_m` more at each end and `width_m` more at each side."""
         return Footprint(
             self.x_m, self.y_m, self.z_m, self.yaw_rad, self.half_length_m + length_m, self.half_width_m + width_m
         )
 
     @property
     def radius_m(self) -> float:
-        """Of the circle that holds it."""
+        """Radius of the circle around its middle that contains it."""
         return math.hypot(self.half_length_m, self.half_width_m)
 
     def overlaps(self, other: Footprint) -> bool:
-        """Whether two rectangles share a point (by separating axes)."""
+        """Whether two rectangles on one level share a point, by the separating axis theorem."""
         dx, dy = other.x_m - self.x_m, other.y_m - self.y_m
         if math.hypot(dx, dy) > self.radius_m + other.radius_m or abs(other.z_m - self.z_m) > LEVEL_M:
             return False

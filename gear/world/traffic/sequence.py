@@ -1,4 +1,4 @@
-"""Driving sequences: a cast set in motion, frame by frame, without overlaps."""
+"""Driving sequences: the road users of a sample in motion, frame by frame, without overlaps."""
 
 from __future__ import annotations
 
@@ -19,18 +19,22 @@ from gear.world.traffic.simulation import MovingPedestrian, MovingVehicle, Traff
 from gear.world.traffic.spawn import Spawn
 
 ROOM_M = 80.0
+"""Length of a route beyond what its vehicle can drive in the sequence."""
+
 SLOWEST_MPS = 1.5
+"""Least cruising speed of the ego car through its limits."""
+
 OFF_THE_ROAD_M = 1.2
-"""People leave a crossing for so far onto the sidewalk, and stop so far before the end of one."""
+"""People who leave a crossing walk this far onto the sidewalk. On a sidewalk they stop this far before its end."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class FrameState:
-    """Everybody at one frame.
+    """The road users in one frame.
 
     Attributes:
-        spawns: by body, with the speeds of this moment.
-        poses: by body.
+        spawns: the road users by body, with their places and speeds in this frame.
+        poses: their poses in the world, by body.
     """
 
     spawns: Mapping[str, Spawn]
@@ -38,10 +42,10 @@ class FrameState:
 
 
 class SequenceSimulator:
-    """Drives casts through time."""
+    """Simulates the road users of samples through the frames of a sequence."""
 
     def __init__(self, scene_name: str, lanes: LaneGraph, space: PlacementSpace) -> None:
-        """Takes the town's lanes and what feels overlaps."""
+        """Simulates on the lanes of a town; the placement model finds overlaps."""
         self._scene_name = scene_name
         self._lanes = lanes
         self._space = space
@@ -50,13 +54,20 @@ class SequenceSimulator:
     def drive(
         self, road_users: RoadUsers, seed: int, sequence: int, frames: int, interval_s: float
     ) -> list[FrameState]:
-        """All frames of a sequence.
+        """Simulates all frames of a sequence.
 
-        It is driven, who overlaps is taken out of the cast, and it is driven again, until nobody does. So there may be
-        fewer on the road than the least count of the scene's limits, which holds for who is placed.
+        After a simulation in which an actor overlaps another one, that actor is removed and the sequence is simulated
+        again, until there is no overlap. The frames may therefore show fewer road users than the least count of the
+        scene, which holds when they are placed.
+
+        Args:
+            road_users: at the start; actors that are removed are removed there.
+            seed, sequence: keys of the draws.
+            frames: number of frames.
+            interval_s: time between two frames.
 
         Raises:
-            PlacementError: the ego car itself cannot drive without an overlap.
+            PlacementError: the ego car cannot drive without an overlap.
         """
         while True:
             states, overlapping = self._simulate_once(road_users, seed, sequence, frames, interval_s)
@@ -72,31 +83,31 @@ class SequenceSimulator:
     def _simulate_once(
         self, road_users: RoadUsers, seed: int, sequence: int, frames: int, interval_s: float
     ) -> tuple[list[FrameState], str | None]:
-        """Drives until the end or until somebody overlaps."""
+        """Simulates until the end or until an actor overlaps: the frames, and that actor's body or None."""
         duration_s = frames * interval_s
-        drivers = {
-            body: self._driver(road_users, spawn, seed, sequence, duration_s)
+        vehicles = {
+            body: self._moving_vehicle(road_users, spawn, seed, sequence, duration_s)
             for body, spawn in road_users.spawns.items()
             if spawn.lane
         }
-        walkers = {
-            body: self._walker(spawn)
+        people = {
+            body: self._moving_person(spawn)
             for body, spawn in road_users.spawns.items()
             if spawn.walk is not None and spawn.speed_mps > 0
         }
         grounded = [
             disc
             for body, spawn in road_users.spawns.items()
-            if body not in drivers and body not in walkers
+            if body not in vehicles and body not in people
             for disc in _discs(spawn)
         ]
-        traffic = TrafficSimulation(list(drivers.values()), list(walkers.values()), grounded, self._junctions)
+        traffic = TrafficSimulation(list(vehicles.values()), list(people.values()), grounded, self._junctions)
         order = {body: number for number, body in enumerate(road_users.spawns)}
         states: list[FrameState] = []
         for frame in range(frames):
             if frame:
                 traffic.advance(interval_s)
-            state, fallen = self._frame_state(road_users, drivers, walkers, is_still=frames == 1)
+            state, fallen = self._frame_state(road_users, vehicles, people, is_still=frames == 1)
             pairs = self._space.overlaps(state.poses)
             overlapping = [max(pair, key=lambda body: order.get(body, -1)) for pair in pairs] + fallen
             if overlapping:
@@ -107,32 +118,35 @@ class SequenceSimulator:
     def _frame_state(
         self,
         road_users: RoadUsers,
-        drivers: Mapping[str, MovingVehicle],
-        walkers: Mapping[str, MovingPedestrian],
+        vehicles: Mapping[str, MovingVehicle],
+        people: Mapping[str, MovingPedestrian],
         *,
         is_still: bool,
     ) -> tuple[FrameState, list[str]]:
-        """Where everybody is now, and who has no ground below.
+        """The road users at this moment, and the bodies of those that have no ground below.
 
-        A single picture keeps to the pieces of lanes and walks, as its data set's seed has always placed it.
+        In a single picture vehicles and people head along their piece of the lane or walk; in motion they turn
+        steadily from piece to piece.
         """
         spawns: dict[str, Spawn] = {}
         poses: dict[str, RigidTransform] = {}
         fallen: list[str] = []
         for body, spawn in road_users.spawns.items():
-            if body in drivers:
-                driver = drivers[body]
+            if body in vehicles:
+                vehicle = vehicles[body]
                 half_length_m = spawn.actor_type.half_length_m
                 if is_still:
-                    point, yaw_rad = vehicle_pose(driver.route.line, driver.s_m, half_length_m, driver.lateral_m)
-                    now = _at(spawn, point, yaw_rad, driver.speed_mps)
+                    point, yaw_rad = vehicle_pose(vehicle.route.line, vehicle.s_m, half_length_m, vehicle.lateral_m)
+                    now = _at(spawn, point, yaw_rad, vehicle.speed_mps)
                 else:
-                    point, yaw_rad, pace = moving_pose(driver.route.line, driver.s_m, half_length_m, driver.lateral_m)
-                    now = _at(spawn, point, yaw_rad, driver.speed_mps * pace)
-            elif body in walkers:
-                walker = walkers[body]
-                point, yaw_rad = walker.first_place() if is_still else walker.place()
-                now = _at(spawn, point, yaw_rad, walker.speed_mps)
+                    point, yaw_rad, pace = moving_pose(
+                        vehicle.route.line, vehicle.s_m, half_length_m, vehicle.lateral_m
+                    )
+                    now = _at(spawn, point, yaw_rad, vehicle.speed_mps * pace)
+            elif body in people:
+                person = people[body]
+                point, yaw_rad = person.first_place() if is_still else person.place()
+                now = _at(spawn, point, yaw_rad, person.speed_mps)
             else:
                 spawns[body], poses[body] = spawn, road_users.poses[body]
                 continue
@@ -143,7 +157,7 @@ class SequenceSimulator:
             spawns[body], poses[body] = now, grounded.world_from_actor
         return FrameState(spawns=spawns, poses=poses), fallen
 
-    def _driver(
+    def _moving_vehicle(
         self, road_users: RoadUsers, spawn: Spawn, seed: int, sequence: int, duration_s: float
     ) -> MovingVehicle:
         lane = self._lanes.lanes[spawn.lane]
@@ -155,7 +169,7 @@ class SequenceSimulator:
         elif spawn.actor_type.vehicle is not None:
             cruise_mps = min(cruise_mps, spawn.actor_type.vehicle.cruise_mps)
         way = road_users.required_lanes.get(spawn.body, (spawn.lane,))
-        # The ego car and its truck turn the same way at every junction, because they draw the same numbers.
+        # The ego car and its truck draw the same numbers, so that they turn the same way at every junction.
         turns = derive_rng(
             seed, self._scene_name, "route", sequence, "leads" if spawn.body in road_users.protected else spawn.body
         )
@@ -173,7 +187,7 @@ class SequenceSimulator:
             half_width_m=spawn.actor_type.half_width_m,
         )
 
-    def _walker(self, spawn: Spawn) -> MovingPedestrian:
+    def _moving_person(self, spawn: Spawn) -> MovingPedestrian:
         assert spawn.walk is not None
         walk = self._lanes.walks[spawn.walk.walk]
         return MovingPedestrian(

@@ -1,7 +1,9 @@
-"""Traffic through time: vehicles follow their routes by the intelligent driver model, people walk.
+"""Simulates traffic: vehicles follow their routes by the intelligent driver model, people walk.
 
-Vehicles keep their distance to whatever stands or moves in the strip ahead of them, give way where lanes of a junction
-cross, and stop where the road ends. Nothing here is random: the same start gives the same traffic.
+The model is that of Treiber, Hennecke and Helbing, "Congested traffic states in empirical observations and microscopic
+simulations" (2000). Vehicles keep their distance to whatever stands or moves in the strip of road ahead of them, give
+way where lanes of a junction conflict, and stop where the road ends. Nothing is random: the same start gives the same
+traffic.
 """
 
 from __future__ import annotations
@@ -24,33 +26,35 @@ STRIP_STEP_M = 1.0
 SIDE_MARGIN_M = 0.25
 PERSON_RADIUS_M = 0.35
 PERSON_REACH_M = 0.9
-"""People look this far ahead before they take a step."""
+"""A person takes a step if nothing is within this distance ahead."""
 
 TURNING_M = 1.5
-"""Way before and after a corner in which people turn, for each metre beside the line, of which there is one at least:
-nobody steps back at a right angle, on its inside either.
+"""People turn at a corner of their line over this distance before and after it, times their distance from the line (at
+least 1 m). Over a shorter distance, people on the inside of the corner would move backwards.
 """
 
 PERSON_FORESIGHT_S = (0.0, 0.7, 1.4)
-"""Drivers see people where they are and where they will be."""
+"""Vehicles keep clear of people where these are now and where they will be after these times, in seconds."""
 
 HARDEST_SLOWING = 2.5
-"""Nobody brakes hard only for being too fast: the model's term for that goes no further."""
+"""Upper bound of the model's term for speed: a vehicle that is only too fast does not brake hard."""
 
 ACCELERATION_MPS2, BRAKING_MPS2, HARDEST_MPS2 = 1.6, 2.0, 8.0
 STANDSTILL_GAP_M, HEADWAY_S = 2.0, 1.2
 GIVE_WAY_M = 25.0
-"""Drivers this near to a junction ask for their way through it."""
+"""A vehicle that is this near to a junction claims its lane through it."""
 
 
 @dataclass(slots=True, eq=False, kw_only=True)
 class MovingVehicle:
-    """A vehicle under way.
+    """A vehicle in motion.
 
     Attributes:
-        route, s_m, lateral_m: where it is going, and where it is on it.
-        speed_mps, cruise_mps: now, and on a free road.
-        front_m, rear_m, half_width_m: of the vehicle, from its middle.
+        route: the lanes that it follows.
+        s_m, lateral_m: arc length of its middle on the route, and distance to the left of it.
+        speed_mps: its speed.
+        cruise_mps: the speed that it drives on a free road.
+        front_m, rear_m, half_width_m: distances of its front, rear and sides from its middle.
     """
 
     route: Route
@@ -65,13 +69,15 @@ class MovingVehicle:
 
 @dataclass(slots=True, eq=False, kw_only=True)
 class MovingPedestrian:
-    """A person under way.
+    """A person in motion.
 
     Attributes:
-        line, s_m, lateral_m: sidewalk or crossing, and where on it.
-        direction: 1 along the line, -1 against it.
-        pace_mps, speed_mps: unhindered, and now.
-        beyond_m: how far past the end of the line the walk goes on, off a road; negative for stopping before.
+        line: centre line of the sidewalk or crosswalk.
+        s_m, lateral_m: arc length on the line, and distance to the left of it.
+        direction: 1 for walking along the line, -1 for walking against it.
+        pace_mps: the speed at which the person walks where nothing is in the way.
+        speed_mps: the speed now.
+        beyond_m: how far the person walks past the end of the line; negative for stopping before the end.
     """
 
     line: Polyline
@@ -84,31 +90,31 @@ class MovingPedestrian:
 
     @property
     def is_at_end(self) -> bool:
-        """Whether the walk ends here."""
+        """Whether the person has reached the end of the walk."""
         left_m = self.line.length_m - self.s_m if self.direction > 0 else self.s_m
         return left_m < -self.beyond_m
 
     def place(self) -> tuple[Array, float]:
-        """Point on the ground and heading, under way."""
+        """(3,) point on the ground, and heading in radians, in motion."""
         heading_rad = self.line.heading(self.s_m, TURNING_M * max(1.0, abs(self.lateral_m)))
         point = offset_left(self.line.at(self.s_m)[0], heading_rad, self.lateral_m)
         return point, heading_rad if self.direction > 0 else heading_rad + math.pi
 
     def first_place(self) -> tuple[Array, float]:
-        """The same in a picture without a before and after."""
+        """The same for a single picture: the heading is that of the segment of the line."""
         point, heading_rad = self.line.at(self.s_m, self.lateral_m)
         return point, heading_rad if self.direction > 0 else heading_rad + math.pi
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Discs:
-    """What stands in the way, as discs.
+    """Obstacles of the traffic, each covered by discs on the ground.
 
     Attributes:
-        centres_m: (N, 3).
-        radii_m: (N,).
-        velocities_mps: (N, 2).
-        owners: (N,) index of the driver, -1 for others.
+        centres_m: (N, 3) middles of the discs.
+        radii_m: (N,) their radii.
+        velocities_mps: (N, 2) their velocities.
+        owners: (N,) index of the vehicle that a disc belongs to; -1 for objects that stand still, -2 for people.
     """
 
     centres_m: Array
@@ -120,7 +126,16 @@ class Discs:
 def vehicle_discs(
     point_m: Array, heading_rad: float, front_m: float, rear_m: float, half_width_m: float
 ) -> list[tuple[float, float, float, float]]:
-    """Discs (x, y, z, radius) that cover a vehicle."""
+    """Discs that together cover a vehicle.
+
+    Args:
+        point_m: (3,) point under its middle.
+        heading_rad: its heading.
+        front_m, rear_m, half_width_m: distances of its front, rear and sides from its middle.
+
+    Returns:
+        (x, y, z, radius) of each disc, in metres.
+    """
     length_m = front_m + rear_m
     count = max(1, math.ceil(length_m / (1.5 * half_width_m)))
     c, s = math.cos(heading_rad), math.sin(heading_rad)
@@ -133,27 +148,33 @@ def vehicle_discs(
 
 
 class TrafficSimulation:
-    """Drivers and walkers among things that stand still."""
+    """Vehicles and people in motion among obstacles that stand still."""
 
     def __init__(
         self,
-        drivers: Sequence[MovingVehicle],
-        walkers: Sequence[MovingPedestrian],
-        grounded: Sequence[tuple[float, float, float, float]],
+        vehicles: Sequence[MovingVehicle],
+        people: Sequence[MovingPedestrian],
+        obstacles: Sequence[tuple[float, float, float, float]],
         junctions: Junctions,
     ) -> None:
-        """Takes the moving by reference and moves them; `grounded` are discs (x, y, z, radius)."""
-        self.drivers = list(drivers)
-        self.walkers = list(walkers)
-        self._standing = list(grounded)
+        """Prepares a simulation; no vehicle is faster than it can brake for what is ahead.
+
+        Args:
+            vehicles, people: the road users, changed in place.
+            obstacles: discs (x, y, z, radius) in metres that stand still.
+            junctions: conflicts between the junction lanes of the town.
+        """
+        self.vehicles = list(vehicles)
+        self.people = list(people)
+        self._obstacles = list(obstacles)
         self._junctions = junctions
-        for index, driver in enumerate(self.drivers):
+        for index, vehicle in enumerate(self.vehicles):
             gap_m, _ = self._gap(index, self._discs())
             brakeable_mps = math.sqrt(2 * BRAKING_MPS2 * max(0.0, gap_m - STANDSTILL_GAP_M))
-            driver.speed_mps = min(driver.speed_mps, driver.cruise_mps, brakeable_mps)
+            vehicle.speed_mps = min(vehicle.speed_mps, vehicle.cruise_mps, brakeable_mps)
 
     def advance(self, duration_s: float) -> None:
-        """Moves everybody on in time."""
+        """Moves all road users by a time span, in steps of at most `MAX_STEP_S`."""
         steps = max(1, math.ceil(duration_s / MAX_STEP_S - 1e-9))
         for _ in range(steps):
             self._step(duration_s / steps)
@@ -161,44 +182,44 @@ class TrafficSimulation:
     def _step(self, step_s: float) -> None:
         discs = self._discs()
         stops = self._stop_lines()
-        accelerations = [self._acceleration(index, discs, stops[index]) for index in range(len(self.drivers))]
-        walking = self._free_walkers(discs)
-        for driver, acceleration in zip(self.drivers, accelerations, strict=True):
-            driver.speed_mps = max(0.0, driver.speed_mps + acceleration * step_s)
-            driver.s_m += driver.speed_mps * step_s
-        for walker, is_free in zip(self.walkers, walking, strict=True):
-            walker.speed_mps = walker.pace_mps if is_free else 0.0
-            walker.s_m += walker.direction * walker.speed_mps * step_s
+        accelerations = [self._acceleration(index, discs, stops[index]) for index in range(len(self.vehicles))]
+        steps_allowed = self._free_to_step(discs)
+        for vehicle, acceleration in zip(self.vehicles, accelerations, strict=True):
+            vehicle.speed_mps = max(0.0, vehicle.speed_mps + acceleration * step_s)
+            vehicle.s_m += vehicle.speed_mps * step_s
+        for person, is_free in zip(self.people, steps_allowed, strict=True):
+            person.speed_mps = person.pace_mps if is_free else 0.0
+            person.s_m += person.direction * person.speed_mps * step_s
 
     def _acceleration(self, index: int, discs: Discs, stop_m: float) -> float:
-        """By the intelligent driver model."""
-        driver = self.drivers[index]
+        """Acceleration of a vehicle in m/s², by the intelligent driver model; `stop_m` is the way to its stop line."""
+        vehicle = self.vehicles[index]
         gap_m, leader_mps = self._gap(index, discs)
         if stop_m < gap_m:
             gap_m, leader_mps = stop_m, 0.0
-        speed_mps = driver.speed_mps
+        speed_mps = vehicle.speed_mps
         closing = speed_mps * (speed_mps - leader_mps) / (2 * math.sqrt(ACCELERATION_MPS2 * BRAKING_MPS2))
         wanted_m = STANDSTILL_GAP_M + max(0.0, speed_mps * HEADWAY_S + closing)
-        cruise_mps = min(driver.cruise_mps, driver.route.speed_at(driver.s_m))
+        cruise_mps = min(vehicle.cruise_mps, vehicle.route.speed_at(vehicle.s_m))
         free = min(HARDEST_SLOWING, (speed_mps / max(cruise_mps, 0.1)) ** 4)
         acceleration = ACCELERATION_MPS2 * (1 - free - (wanted_m / max(gap_m, 0.1)) ** 2)
         return max(-HARDEST_MPS2, acceleration)
 
     def _gap(self, index: int, discs: Discs) -> tuple[float, float]:
-        """Free way ahead of a driver's front, and the speed of what ends it."""
-        driver = self.drivers[index]
-        front_s_m = driver.s_m + driver.front_m
-        gap_m = driver.route.line.length_m - front_s_m if driver.route.is_dead_end else math.inf
+        """Free distance ahead of a vehicle's front, and the speed in m/s of the object at its end."""
+        vehicle = self.vehicles[index]
+        front_s_m = vehicle.s_m + vehicle.front_m
+        gap_m = vehicle.route.line.length_m - front_s_m if vehicle.route.is_dead_end else math.inf
         others = discs.owners != index
         if not others.any():
             return gap_m, 0.0
         ahead_m = np.arange(0.0, LOOK_AHEAD_M, STRIP_STEP_M)
-        strip_m, headings = driver.route.line.sample(front_s_m + ahead_m, driver.lateral_m)
+        strip_m, headings = vehicle.route.line.sample(front_s_m + ahead_m, vehicle.lateral_m)
         centres_m, radii_m = discs.centres_m[others], discs.radii_m[others]
         offsets = strip_m[:, None, :] - centres_m[None]
-        near = np.hypot(offsets[..., 0], offsets[..., 1]) < radii_m + driver.half_width_m + SIDE_MARGIN_M
+        near = np.hypot(offsets[..., 0], offsets[..., 1]) < radii_m + vehicle.half_width_m + SIDE_MARGIN_M
         near &= np.abs(offsets[..., 2]) < LEVEL_M
-        # What touches the strip only beside the car's own front is beside it, not ahead of it.
+        # An object that touches the strip only beside the front of the vehicle is not ahead of it.
         offset_left = (offsets[0, :, 0] * np.cos(headings[0]) + offsets[0, :, 1] * np.sin(headings[0])) > 0
         near &= ~offset_left
         hits = near.any(axis=1)
@@ -212,14 +233,14 @@ class TrafficSimulation:
         return float(ahead_m[first]), max(0.0, float(speeds.min()))
 
     def _stop_lines(self) -> list[float]:
-        """How far ahead each driver must stop to give way; infinite where it need not."""
+        """Distance ahead at which each vehicle must stop to give way; infinite where it need not stop."""
         claims: list[tuple[float, int, str]] = []
-        for index, driver in enumerate(self.drivers):
-            rear_m, front_m = driver.s_m - driver.rear_m, driver.s_m + driver.front_m
-            for lane, start_m, end_m in self._junctions.crossings(driver.route):
+        for index, vehicle in enumerate(self.vehicles):
+            rear_m, front_m = vehicle.s_m - vehicle.rear_m, vehicle.s_m + vehicle.front_m
+            for lane, start_m, end_m in self._junctions.crossings(vehicle.route):
                 if end_m > rear_m and start_m - front_m < GIVE_WAY_M:
                     claims.append((max(0.0, start_m - front_m), index, lane))
-        stops = [math.inf] * len(self.drivers)
+        stops = [math.inf] * len(self.vehicles)
         granted: list[tuple[int, str]] = []
         for distance_m, index, lane in sorted(claims):
             blocked = any(
@@ -231,11 +252,11 @@ class TrafficSimulation:
                 granted.append((index, lane))
         return stops
 
-    def _free_walkers(self, discs: Discs) -> list[bool]:
-        """Who may take a step: nothing in the way, and not at the end of the walk."""
-        if not self.walkers:
+    def _free_to_step(self, discs: Discs) -> list[bool]:
+        """For each person, whether nothing is in the way and the end of the walk is not reached."""
+        if not self.people:
             return []
-        places = [walker.place() for walker in self.walkers]
+        places = [person.place() for person in self.people]
         points_m = np.array([point[:2] for point, _ in places])
         headings = np.array([[math.cos(heading), math.sin(heading)] for _, heading in places])
         ahead_m = points_m + PERSON_REACH_M * headings
@@ -246,20 +267,20 @@ class TrafficSimulation:
         if things.any():
             distances_m = np.linalg.norm(ahead_m[:, None] - discs.centres_m[None, things, :2], axis=-1)
             free &= (distances_m >= discs.radii_m[things] + PERSON_RADIUS_M).all(axis=1)
-        return [bool(ok) and not walker.is_at_end for ok, walker in zip(free, self.walkers, strict=True)]
+        return [bool(ok) and not person.is_at_end for ok, person in zip(free, self.people, strict=True)]
 
     def _discs(self) -> Discs:
-        """Owners: drivers by number, -1 for what stands still, -2 for people."""
+        """Discs of all obstacles, vehicles and people, with the owners that `Discs` describes."""
         rows: list[tuple[float, float, float, float, float, float, float]] = []
-        rows += [(x, y, z, radius, 0.0, 0.0, -1.0) for x, y, z, radius in self._standing]
-        for index, driver in enumerate(self.drivers):
-            point, heading_rad = driver.route.line.at(driver.s_m, driver.lateral_m)
-            vx, vy = driver.speed_mps * math.cos(heading_rad), driver.speed_mps * math.sin(heading_rad)
-            discs = vehicle_discs(point, heading_rad, driver.front_m, driver.rear_m, driver.half_width_m)
+        rows += [(x, y, z, radius, 0.0, 0.0, -1.0) for x, y, z, radius in self._obstacles]
+        for index, vehicle in enumerate(self.vehicles):
+            point, heading_rad = vehicle.route.line.at(vehicle.s_m, vehicle.lateral_m)
+            vx, vy = vehicle.speed_mps * math.cos(heading_rad), vehicle.speed_mps * math.sin(heading_rad)
+            discs = vehicle_discs(point, heading_rad, vehicle.front_m, vehicle.rear_m, vehicle.half_width_m)
             rows += [(*disc, vx, vy, float(index)) for disc in discs]
-        for walker in self.walkers:
-            point, heading_rad = walker.place()
-            vx, vy = walker.pace_mps * math.cos(heading_rad), walker.pace_mps * math.sin(heading_rad)
+        for person in self.people:
+            point, heading_rad = person.place()
+            vx, vy = person.pace_mps * math.cos(heading_rad), person.pace_mps * math.sin(heading_rad)
             for ahead_s in PERSON_FORESIGHT_S:
                 x, y = float(point[0]) + vx * ahead_s, float(point[1]) + vy * ahead_s
                 rows.append((x, y, float(point[2]), PERSON_RADIUS_M, vx, vy, -2.0))

@@ -1,4 +1,4 @@
-"""Drawing road users: which asset, where, how fast. Drafts lie on the ground plan; placement stands them up."""
+"""Draws road users: asset, place on the ground plan, speed and colour. Placement then puts them on the ground."""
 
 from __future__ import annotations
 
@@ -18,25 +18,30 @@ from gear.world.roads.routes import vehicle_pose
 from gear.world.traffic.footprints import Footprint
 
 JUNCTION_WEIGHT = 0.4
+"""How often a metre of a junction lane is drawn, relative to other lanes."""
+
 CROSSING_WEIGHT = 2.5
+"""How often a metre of a crosswalk is drawn, relative to sidewalks."""
+
 STANDING_SHARE = 0.2
-"""Share of the vehicles on lanes that stand still, as in a queue."""
+"""Share of the vehicles on lanes, outside of junctions, that stand still as in a queue."""
 
 MOTORWAY_MPS = 20.0
-"""Nobody cycles where traffic is this fast."""
+"""Vehicles that are slower than this keep off lanes with at least this speed."""
 
 SIDE_CLEARANCE_M = 0.35
-"""People keep this far from the edge of a sidewalk."""
+"""Least distance of people from the edge of a sidewalk."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WalkPlace:
-    """Where a person is on a sidewalk or crosswalk.
+    """The place of a person on a sidewalk or crosswalk.
 
     Attributes:
-        walk: its name.
-        s_m, lateral_m: along its line, and to its left.
-        direction: 1 along the line, -1 against it.
+        walk: name of the sidewalk or crosswalk.
+        s_m: arc length on its line.
+        lateral_m: distance to the left of its line.
+        direction: 1 for walking along the line, -1 for walking against it.
     """
 
     walk: str
@@ -47,17 +52,20 @@ class WalkPlace:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Spawn:
-    """A road user as drawn.
+    """A road user as it was drawn.
 
     Attributes:
-        role: as in its record.
+        role: its role in the record.
         actor_type: its asset, measured.
         body: its body in the placement model.
-        x_m, y_m, near_z_m, yaw_rad: place and heading; the ground is near that height.
-        speed_mps: along the heading.
-        paint_rgb: colour of its paint.
-        lane, s_m, lateral_m: where on which lane it drives; "" for what does not.
-        walk: where it walks; None for vehicles.
+        x_m, y_m: its place in the world.
+        near_z_m: height near which the ground is looked for.
+        yaw_rad: its heading, counter-clockwise from east.
+        speed_mps: its speed along the heading.
+        paint_rgb: linear albedo of its paint, 0..1; None for an asset without a palette.
+        lane: name of the lane that it drives on; "" for people and parked vehicles.
+        s_m, lateral_m: arc length on that lane, and distance to its left.
+        walk: its place on a sidewalk or crosswalk; None for vehicles.
     """
 
     role: Role
@@ -76,7 +84,7 @@ class Spawn:
 
     @property
     def footprint(self) -> Footprint:
-        """What it covers of the ground."""
+        """The rectangle of ground that it covers."""
         actor_type = self.actor_type
         return Footprint(
             self.x_m, self.y_m, self.near_z_m, self.yaw_rad, actor_type.half_length_m, actor_type.half_width_m
@@ -85,17 +93,17 @@ class Spawn:
 
 @dataclass(slots=True, eq=False)
 class FreeSlots:
-    """What is left of the pool while a sample is drawn.
+    """The slots of the pool that are still free while a sample is drawn.
 
     Attributes:
-        bodies: free bodies by asset.
+        bodies: bodies of the free slots, by the name of their asset.
     """
 
     bodies: dict[str, list[str]] = field(default_factory=dict)
 
     @staticmethod
     def of(slots: Sequence[Slot]) -> FreeSlots:
-        """The whole pool, but for what bears a surface."""
+        """All slots but that of the carrier."""
         free = FreeSlots()
         for slot in slots:
             if not slot.carries_surface:
@@ -103,15 +111,15 @@ class FreeSlots:
         return free
 
     def take(self, asset: str) -> str:
-        """A free body of an asset."""
+        """Takes a free slot of an asset and returns its body."""
         return self.bodies[asset].pop(0)
 
     def release(self, asset: str, body: str) -> None:
-        """A body is free again."""
+        """Frees the slot of a body again."""
         self.bodies[asset].append(body)
 
     def draw(self, types: Mapping[str, ActorType], rng: np.random.Generator, *, people: bool) -> ActorType | None:
-        """A kind that still has a free body, by how common it is; None where all are taken."""
+        """Draws an asset with a free slot, by the weights of the assets; None where no slot is free."""
         kinds = [
             actor_type
             for name, actor_type in types.items()
@@ -124,7 +132,7 @@ class FreeSlots:
 
 
 def draw_paint(actor_type: ActorType, rng: np.random.Generator) -> Vec3 | None:
-    """A colour of its palette."""
+    """Draws a colour of an asset's palette by its weights, as linear albedo; None for an asset without a palette."""
     palette = actor_type.facts.palette
     total = sum(weight for _, weight in palette)
     if total <= 0:
@@ -137,7 +145,7 @@ class Spawner:
     """Draws places on the lanes, walks and bays of one town."""
 
     def __init__(self, lanes: LaneGraph) -> None:
-        """Cuts the town's lines into pieces."""
+        """Cuts the lanes and walks of a town into pieces that can be drawn."""
         self.lanes = lanes
         self.lane_table = LineTable.of(
             (lane.name, lane.line, JUNCTION_WEIGHT if lane.is_junction else 1.0) for lane in lanes.lanes.values()
@@ -148,13 +156,13 @@ class Spawner:
         self._bays_m = np.array([bay.position_m for bay in lanes.bays]).reshape(-1, 3)
 
     def bays_inside(self, region: Region) -> list[ParkingBay]:
-        """Bays whose middle lies inside a region."""
+        """Parking bays whose middle lies inside a region."""
         return (
             [self.lanes.bays[i] for i in np.flatnonzero(region.holds(self._bays_m[:, :2]))] if len(self._bays_m) else []
         )
 
     def is_allowed_on(self, actor_type: ActorType, lane: str) -> bool:
-        """Whether such a vehicle is met on a lane: bicycles keep off motorways."""
+        """Whether such a vehicle uses a lane: slow ones keep off lanes with the speed of a motorway."""
         vehicle = actor_type.vehicle
         is_slow = vehicle is not None and vehicle.max_speed_mps < MOTORWAY_MPS
         return not is_slow or self.lanes.lanes[lane].speed_mps < MOTORWAY_MPS
@@ -168,7 +176,17 @@ class Spawner:
         s_m: float,
         rng: np.random.Generator,
     ) -> Spawn:
-        """A vehicle on a lane, a little off its middle and its heading; two-wheelers keep to the right."""
+        """Draws a vehicle at a place on a lane.
+
+        It is a little beside the centre line and turned a little; two-wheelers keep to the right edge.
+
+        Args:
+            actor_type: its asset.
+            body: its body in the placement model.
+            role: its role in the record.
+            lane, s_m: the lane, and the arc length on it.
+            rng: source of the draws.
+        """
         road = self.lanes.lanes[lane]
         room_m = max(0.0, road.width_m / 2 - actor_type.half_width_m - 0.2)
         lateral_m = float(np.clip(rng.normal(0.0, 0.12), -room_m, room_m))
@@ -196,7 +214,7 @@ class Spawner:
         )
 
     def in_bay(self, actor_type: ActorType, body: str, bay: ParkingBay, rng: np.random.Generator) -> Spawn | None:
-        """A parked vehicle, or None where it does not fit."""
+        """Draws a parked vehicle in a bay; None where the bay is too small for it."""
         spare_m = bay.length_m / 2 - actor_type.half_length_m, bay.width_m / 2 - actor_type.half_width_m
         if min(spare_m) < 0:
             return None
@@ -217,9 +235,18 @@ class Spawner:
     def on_walk(
         self, actor_type: ActorType, body: str, pieces: npt.NDArray[np.intp], rng: np.random.Generator
     ) -> Spawn | None:
-        """A person on a sidewalk or crossing: walkers keep to their right half, those who stand look anywhere.
+        """Draws a person on a sidewalk or crosswalk.
 
-        Nobody stands about on a crossing: None where that was drawn.
+        People who walk keep to the right half; people who stand face any direction.
+
+        Args:
+            actor_type: the asset of the person.
+            body: its body in the placement model.
+            pieces: (N,) indices of the pieces of walks to draw from.
+            rng: source of the draws.
+
+        Returns:
+            The person; None where a person who stands was drawn on a crosswalk.
         """
         name, s_m = self.walk_table.draw(pieces, rng)
         walk = self.lanes.walks[name]

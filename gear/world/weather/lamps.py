@@ -1,4 +1,4 @@
-"""Lamps and windows of a compiled town, found by the materials and the colours of their glass."""
+"""Finds the lamps and the lit windows of a compiled town, by the materials of their glass."""
 
 from __future__ import annotations
 
@@ -16,32 +16,35 @@ from gear.values.geometry import Array
 from gear.world.assets.geom_triangles import static_geoms, world_triangles
 
 PALETTE, LAMP_GLASS = "palette", (0.5, 0.5, 0.625, 0.625)
-"""Material of gear's street furniture, and where its picture has the glass of lamps: the least u and v, v from above,
-and the largest."""
+"""Material of gear's street furniture, and the part of its texture that is the glass of lamps: least u and v, largest u
+and v, with v from the top."""
 
 LAMP_MATERIAL = "lamp_glass"
-"""A material of this name is lamp glass all over."""
+"""A material of this name is the glass of lamps as a whole."""
 
 STREET_INTENSITY, GLOBE_INTENSITY = 24.0, 2.2
 STREET_COLOUR, GLOBE_COLOUR = (1.0, 0.80, 0.55), (1.0, 0.70, 0.38)
 STREET_REACH_M, GLOBE_REACH_M = 32.0, 18.0
 ONE_LAMP_M = 0.9
-"""Glass that lies closer together is one lamp's."""
+"""Triangles of glass that are closer together than this belong to one lamp."""
 
 DOWNWARD = 0.7
+"""Length of the mean normal of a lamp's glass above which the lamp shines in one direction, as street lamps do."""
+
 STANDARD_AREA_M2 = 0.15
+"""Area of glass of a street lamp with the usual intensity; intensity grows with the area, up to twice."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Glazing:
-    """Where a material's picture has panes, and how they look with light behind them.
+    """The panes in the texture of a material, and their look when they are lit.
 
     Attributes:
-        columns: panes to a unit of u; None for one to a quad.
-        u, v: part of a pane's cell that is glass, v from above.
-        lit: share of the panes.
-        gain: how often the frame's own light they show.
-        light: what they show besides, in shares of full scale.
+        columns: number of panes in one unit of u; None for one pane in each quad.
+        u, v: least and largest texture coordinate of the glass inside of a pane's cell, with v from the top.
+        lit: share of the panes that are lit.
+        gain: factor of the frame's own light on a lit pane.
+        light: light that a lit pane adds, as a share of full scale.
     """
 
     columns: int | None = None
@@ -61,13 +64,13 @@ GLAZINGS = {
         for name in ("far_facades", "far_facades_warm", "far_facades_dark")
     },
 }
-"""By material."""
+"""Panes by the name of the material."""
 
 WARM, COOL = np.array([1.0, 0.78, 0.50]), np.array([0.80, 0.92, 1.0])
 
 
 def _standing(model: mujoco.MjModel, names: Collection[str]) -> Iterator[tuple[str, int]]:
-    """Materials of these names and the geoms of the town that wear them."""
+    """Yields (name, geom id) for the geoms of the town whose material has one of the names."""
     for geom in np.flatnonzero(static_geoms(model) & (model.geom_matid >= 0)).tolist():
         name = model.mat(int(model.geom_matid[geom])).name
         if name in names:
@@ -75,7 +78,7 @@ def _standing(model: mujoco.MjModel, names: Collection[str]) -> Iterator[tuple[s
 
 
 def _texture_places(model: mujoco.MjModel, geom: int) -> Array | None:
-    """(N, 3, 2) texture coordinates of a mesh's triangles, v from above; None where it has none."""
+    """(N, 3, 2) texture coordinates of a mesh's triangles, v from the top; None for a geom without them."""
     mesh = int(model.geom_dataid[geom])
     if model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_MESH or model.mesh_texcoordadr[mesh] < 0:
         return None
@@ -85,7 +88,18 @@ def _texture_places(model: mujoco.MjModel, geom: int) -> Array | None:
 
 
 def find_lamps(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, Lamps]:
-    """Street lamps by kind: `street` shines down, `globe` all around."""
+    """Finds the street lamps of a town.
+
+    Args:
+        model: compiled; its meshes must not have been released.
+        data: with kinematics up to date.
+
+    Returns:
+        The lamps by kind: `street` shines down, `globe` in all directions.
+
+    Raises:
+        ValueError: a geom of lamp glass has no finite surface.
+    """
     glass = []
     for name, geom in _standing(model, (PALETTE, LAMP_MATERIAL)):
         places = _texture_places(model, geom)
@@ -142,12 +156,12 @@ def _placed(found: Sequence[tuple[Array, Array, float]], intensity: float) -> di
 
 
 def find_windows(model: mujoco.MjModel, data: mujoco.MjData, rng: np.random.Generator) -> LitWindows:
-    """The panes behind which there is light.
+    """Finds the windows of a town and draws which of them are lit.
 
     Args:
-        model: compiled.
-        data: kinematics up to date.
-        rng: draws who is at home.
+        model: compiled; its meshes must not have been released.
+        data: with kinematics up to date.
+        rng: draws the lit panes, their brightness and their colour.
     """
     panes: list[Array] = []
     geoms: list[npt.NDArray[np.int32]] = []
@@ -179,15 +193,24 @@ def find_windows(model: mujoco.MjModel, data: mujoco.MjData, rng: np.random.Gene
 
 
 def _quads(corners: Array, uv: Array) -> tuple[Array, Array]:
-    """(N, 4, 3) and (N, 4, 2): triangles that follow each other as one quad (a, b, c, d), along whichever diagonal they
-    were cut: (a, b, c) and (a, c, d), or (a, b, d) and (b, c, d), as MuJoCo does where neither is shorter."""
+    """Joins pairs of consecutive triangles that form a quad (a, b, c, d).
+
+    A quad may be cut along either diagonal: into (a, b, c) and (a, c, d), or into (a, b, d) and (b, c, d).
+
+    Args:
+        corners: (T, 3, 3) corners of the triangles.
+        uv: (T, 3, 2) their texture coordinates.
+
+    Returns:
+        (N, 4, 3) corners and (N, 4, 2) texture coordinates of the quads.
+    """
 
     def meet(corner: int, others: int) -> npt.NDArray[np.bool_]:
         return np.asarray(np.isclose(corners[:-1, corner], corners[1:, others]).all(axis=1))
 
     is_fan = meet(0, 0) & meet(2, 1)
     fits = is_fan | (meet(1, 0) & meet(2, 2))
-    # No triangle twice: of fits that follow each other every other one counts.
+    # No triangle belongs to two quads: of consecutive pairs every other one counts.
     places = np.arange(len(fits))
     fits &= (places - np.maximum.accumulate(np.where(fits, -1, places))) % 2 == 1
 
@@ -201,7 +224,7 @@ def _quads(corners: Array, uv: Array) -> tuple[Array, Array]:
 
 
 def _panes(quads: Array, uv: Array, glazing: Glazing) -> Array:
-    """(M, 4, 3) panes of (N, 4, 3) quads with (N, 4, 2) texture coordinates."""
+    """(M, 4, 3) corners of the panes in (N, 4, 3) quads with (N, 4, 2) texture coordinates."""
     # Two sides of a quad meet in its first corner; u runs along one of them.
     second, last = uv[:, 1] - uv[:, 0], uv[:, 3] - uv[:, 0]
     is_first = np.abs(second[:, 0]) > np.abs(last[:, 0])
@@ -224,6 +247,6 @@ def _panes(quads: Array, uv: Array, glazing: Glazing) -> Array:
         low = quad[:, 0] + s * (quad[:, 1] - quad[:, 0])
         corners.append(low + t * (quad[:, 3] + s * (quad[:, 2] - quad[:, 3]) - low))
     panes = np.stack(corners, axis=1)
-    # Their order around the pane is that of the quad, so that both face the same way.
+    # The corners of a pane have the order of its quad, so that both face the same way.
     turned = (is_first ^ u_grows ^ v_grows)[owner]
     return np.where(turned[:, None, None], panes, panes[:, ::-1])

@@ -1,7 +1,7 @@
-"""What a weather's sun and sky are worth in the renderers' units, at an exposure fixed per weather.
+"""The light of a weather in the units of a linear frame, at an exposure that is fixed for each weather.
 
-The exposure puts a white wall (albedo 0.7) that faces the brightest direction at `WHITE_LEVEL` of the frame's full
-scale.
+The exposure gives a white wall (albedo `WHITE_ALBEDO`) that faces the brightest direction `WHITE_LEVEL` of the frame's
+full scale.
 """
 
 from __future__ import annotations
@@ -22,27 +22,28 @@ Floats = npt.NDArray[np.float64]
 WHITE_ALBEDO = 0.7
 WHITE_LEVEL = 0.85
 SKY_LEVEL = 0.9
+"""Most that the exposure may give to the bright parts of the sky (their 90 % quantile)."""
 
 SKY_FACE_PX = 512
 STREET_FACE_PX = 128
 STREET_ALBEDO = np.array([0.30, 0.27, 0.23])
 STREET_TOP = 0.72
-"""Sine of the height to which houses stand about a street."""
+"""Sine of the elevation up to which the houses along a street reach."""
 
 STREET_SHARE = 0.65
-"""How much of the sky below that height they hide."""
+"""Share of the sky below that elevation that houses hide."""
 
 STREET_SUNLIT = 0.45
-"""Share of what a street shows that the sun reaches."""
+"""Share of the visible surfaces of a street that the sun reaches."""
 
 BOUNCE_GAIN = 1.25
-"""Light that streets and houses throw back and forth, which no renderer of ours follows."""
+"""Factor for the light that streets and houses reflect to each other, which the renderers do not compute."""
 
 NIGHT_SKY_SHARE = 0.2
-"""How bright the night's sky looks beside the light that streets have then: that is mostly a town's own."""
+"""Brightness of the night sky, as a share of the light on the streets, which mostly comes from the town itself."""
 
 LAMPLIT_HOUSES = np.array([0.10, 0.075, 0.05])
-"""What the fronts of a street show in the light of its lamps, in shares of the frame's full scale."""
+"""Radiance of house fronts in the light of street lamps, as a share of the frame's full scale."""
 
 FACE_ORDER = "RLUDFB"
 _INTEGRATION_PX = 16
@@ -50,14 +51,14 @@ _INTEGRATION_PX = 16
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Lighting:
-    """Sun and sky in units of the frame: radiance 1.0 is full scale.
+    """Sun and sky in units of the frame, where a radiance of 1.0 is full scale.
 
     Attributes:
-        towards_sun: (3,) unit vector.
-        sun: (3,) what a surface of albedo pi that faces the sun would radiate.
-        ambient: (3,) radiance of the sky, averaged over what a roof sees.
-        sky_faces: (6 * size, size, 3) uint8 sRGB, a strip of the faces in `FACE_ORDER`.
-        street_faces: as `sky_faces`, smaller: the light that falls into a street, from the sky and from its houses.
+        towards_sun: (3,) unit vector towards the sun, in the world.
+        sun: (3,) irradiance of a surface that faces the sun, per linear sRGB channel.
+        ambient: (3,) irradiance of a level surface by the sky, divided by pi.
+        sky_faces: (6 * size, size, 3) uint8 sRGB picture of the sky, the faces of a cube in `FACE_ORDER`.
+        street_faces: as `sky_faces`, smaller: the light that falls into a street from the sky and from its houses.
     """
 
     towards_sun: Floats
@@ -68,11 +69,11 @@ class Lighting:
 
 
 HORIZON_AZIMUTHS = 64
-"""Directions for which the light of distant air is known."""
+"""Number of azimuths for which `airlight` gives the light of distant air."""
 
 
 def lighting_of(weather: Weather, *, sky_face_px: int = SKY_FACE_PX) -> Lighting:
-    """Light of a weather."""
+    """Computes the light of a weather; `sky_face_px` is the size of a face of `Lighting.sky_faces`."""
     sky = Sky.of(weather)
     exposure, from_above = _exposure(sky)
     shown = exposure * _looks(sky)
@@ -89,9 +90,15 @@ def lighting_of(weather: Weather, *, sky_face_px: int = SKY_FACE_PX) -> Lighting
 
 
 def mirrored_radiance(weather: Weather, rows: int, columns: int) -> Floats:
-    """(rows, columns, 3) what still water in a street mirrors, in units of the frame.
+    """The radiance that still water in a street mirrors.
 
-    Rows stand at evenly spaced sines of height, from level to overhead; column 0 is east, counter-clockwise.
+    Args:
+        weather: sun and sky.
+        rows: number of elevations, with evenly spaced sines from the horizon to the zenith.
+        columns: number of azimuths, evenly spaced counter-clockwise from east.
+
+    Returns:
+        (rows, columns, 3) radiance in units of the frame, at most 1.
     """
     sky = Sky.of(weather)
     elevation, azimuth = np.meshgrid(
@@ -103,12 +110,15 @@ def mirrored_radiance(weather: Weather, rows: int, columns: int) -> Floats:
 
 
 def lamplit_houses(rows: int) -> Floats:
-    """(rows, 1, 3) what still water mirrors at night of houses in lamplight; rows as `mirrored_radiance`'s."""
+    """(rows, 1, 3) radiance in units of the frame that still water mirrors of houses in the light of lamps at night.
+
+    Rows are those of `mirrored_radiance`.
+    """
     return np.asarray(_house_share(np.linspace(0, 1, rows))[:, None, None] * LAMPLIT_HOUSES)
 
 
 def _in_street(sky: Sky, directions: Floats) -> Floats:
-    """(..., 3) kcd/m² between houses: they hide the lower sky and throw back their share of sun and sky."""
+    """(..., 3) kcd/m² in a street: houses hide the lower sky and reflect their share of the light of sun and sky."""
     radiance = sky.radiance(directions)
     _, from_above = _exposure(sky)
     sunlit = STREET_SUNLIT * sky.sun_klx * max(float(np.hypot(*sky.towards_sun[:2])), 0.3)
@@ -117,13 +127,16 @@ def _in_street(sky: Sky, directions: Floats) -> Floats:
 
 
 def _house_share(height: Floats) -> Floats:
-    """Share of a direction, by the sine of its height, that houses hide."""
+    """Share of the sky that houses hide, by the sine of the elevation."""
     t = np.clip((height / STREET_TOP - 0.35) / 0.65, 0.0, 1.0)
     return np.where(height > -0.02, STREET_SHARE * (1 - t * t * (3 - 2 * t)), 0.0)
 
 
 def ambient_radiance(weather: Weather) -> Floats:
-    """(3, 3) what a white surface shows that faces up, sideways on average, and down, by channel, without the sun."""
+    """(3, 3) radiance, in units of the frame, of a white surface without the sun's light.
+
+    Rows: a surface that faces up, one that faces sideways (mean over all azimuths), one that faces down.
+    """
     sky = Sky.of(weather)
     coarse, solid_angle = face_directions(_INTEGRATION_PX), _solid_angles(_INTEGRATION_PX)
     light = np.minimum(BOUNCE_GAIN * _exposure(sky)[0] * _in_street(sky, coarse), 1.0)
@@ -134,10 +147,10 @@ def ambient_radiance(weather: Weather) -> Floats:
 
 
 def airlight(weather: Weather) -> Floats:
-    """(`HORIZON_AZIMUTHS`, 3) light of distant air by azimuth, counter-clockwise from east, in units of the frame.
+    """(`HORIZON_AZIMUTHS`, 3) radiance of distant air by azimuth, counter-clockwise from east, in units of the frame.
 
-    Once the sun is down it no longer reaches the air of the street, which has the colour of the light from the whole
-    sky: the glow low in the west does not dye a fog.
+    After sunset the sun no longer reaches the air of the street, which then has the colour of the light from the whole
+    sky: the glow in the west does not colour a fog.
     """
     sky = Sky.of(weather)
     exposure, roof_klx = _exposure(sky)
@@ -149,12 +162,12 @@ def airlight(weather: Weather) -> Floats:
 
 
 def _looks(sky: Sky) -> float:
-    """How bright the sky looks for the light that it stands for."""
+    """Factor of the radiance of the sky, as it is seen, for the light that it gives."""
     return float(NIGHT_SKY_SHARE**sky.night)
 
 
 def _exposure(sky: Sky) -> tuple[float, Floats]:
-    """The frame's share by kcd/m², and (3,) klx that a roof gets from the sky."""
+    """The exposure, in units of the frame per kcd/m², and the (3,) illuminance in klx of a roof by the sky."""
     coarse = face_directions(_INTEGRATION_PX)
     radiance, solid_angle = sky.radiance(coarse, with_disc=False), _solid_angles(_INTEGRATION_PX)
     flat_sun = np.array([*sky.towards_sun[:2], 0.0])
@@ -169,15 +182,15 @@ def _exposure(sky: Sky) -> tuple[float, Floats]:
 
 
 def face_directions(size: int) -> Floats:
-    """(6, size, size, 3) unit vectors into the world through the texels of MuJoCo's skybox, faces in `FACE_ORDER`.
+    """(6, size, size, 3) unit vectors in the world through the texels of MuJoCo's skybox, with faces in `FACE_ORDER`.
 
-    The cube is OpenGL's, turned so that its y points up in the world: the picture `right` is east, `back` is north.
+    The cube is OpenGL's, turned so that its y points up in the world: the face `right` is east, `back` is north.
     """
     return np.stack(list(_faces(size)))
 
 
 def _faces(size: int) -> Iterator[Floats]:
-    """`face_directions`, one by one: all of them and what is worked out from them would be memory anew at each step."""
+    """The faces of `face_directions` one by one, which takes a sixth of the memory."""
     ticks = (np.arange(size) + 0.5) / size * 2 - 1
     column, row = np.meshgrid(ticks, ticks)
     one = np.ones_like(column)
@@ -195,20 +208,20 @@ def _faces(size: int) -> Iterator[Floats]:
 
 
 def _solid_angles(size: int) -> Floats:
-    """(1, size, size) steradians of a face's texels."""
+    """(1, size, size) solid angles in steradians of the texels of a face."""
     ticks = (np.arange(size) + 0.5) / size * 2 - 1
     column, row = np.meshgrid(ticks, ticks)
     return np.asarray((2 / size) ** 2 / (1 + column**2 + row**2) ** 1.5)[None]
 
 
 def _irradiance(radiance: Floats, directions: Floats, solid_angle: Floats, normal: Floats) -> Floats:
-    """(3,) of a surface with that normal."""
+    """(3,) irradiance of a surface with a given normal."""
     weight = np.maximum(directions @ normal, 0.0) * solid_angle
     return np.asarray(np.tensordot(weight, radiance, axes=3))
 
 
 def encode_srgb(light: Floats) -> UInt8Image:
-    """Linear light, 1.0 is full scale, to sRGB bytes."""
+    """Converts linear light, of which 1.0 is full scale, to sRGB bytes."""
     steps = (np.clip(light, 0.0, 1.0) * (len(_SRGB_BYTES) - 1) + 0.5).astype(np.uint16)
     return _SRGB_BYTES[steps]
 
@@ -220,4 +233,4 @@ def _srgb_bytes() -> UInt8Image:
 
 
 _SRGB_BYTES = _srgb_bytes()
-"""(65536,) sRGB bytes of evenly spaced light."""
+"""(65536,) sRGB bytes of linear light from 0 to 1, evenly spaced."""

@@ -1,4 +1,4 @@
-"""A town at night, for the camera: its lamps and windows, and how much of the even light is left."""
+"""A town at night: its lamps and windows, and the share of the ambient light that is left."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from gear.world.weather.shadow_casters import find_shadow_casters
 from gear.world.world import World
 
 LEVEL, SKY_LEVEL = 0.03, 0.14
-"""Of even light, on the ground and in the sky, when the sun's is gone."""
+"""Shares of the ambient light that are left on the ground and in the sky when the sun's light is gone."""
 
 GAUGE_SHARE = 0.72
-"""Of a vehicle's width that lies between its headlamps."""
+"""Distance between two headlamps as a share of the vehicle's width."""
 
 
 def night_of(world: World, weather: Weather, renderer_name: str) -> Night | None:
-    """What the night adds to a world's frames; nothing while the sun is up.
+    """The light sources of a world at night; None while the sun is up.
 
     Args:
-        world: compiled; its meshes must still be there.
-        weather: light and air.
-        renderer_name: who renders.
+        world: its meshes must not have been released.
+        weather: its `night` decides how far the lamps outshine the sky.
+        renderer_name: name of the renderer, since classic frames hold display values.
 
     Raises:
-        TownError: the glass of a lamp has no surface that could shine.
+        TownError: the glass of a lamp has no finite surface.
     """
     if not weather.night:
         return None

@@ -1,4 +1,4 @@
-"""Weather: the presets, and what a weather does to a world's MJCF."""
+"""The weather presets, and the changes that a weather makes to a world's MJCF."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _CLASSIC_WHITE = 1.1
 _CLASSIC_SKY_SHARE = (0.48, 0.95)
 _CLASSIC_TINT = 0.2
 _CLASSIC_LEAST_SUN = 1e-3
-"""More than nothing, since what Filament multiplies is divided by it."""
+"""Least strength of the sun in OpenGL: Filament's intensity is divided by it."""
 
 
 def _read_presets() -> dict[str, Weather]:
@@ -49,17 +49,17 @@ def apply_weather(
     lighting: Lighting | None = None,
     geom_materials: Sequence[GeomMaterial] = (),
 ) -> None:
-    """Puts a weather into a composed world, in place of the light that its town came with.
+    """Replaces the light of a composed world by that of a weather, and makes its ground wet.
 
-    - a light `sun`, a texture `sky` as the sky's picture, and the same picture as a light for Filament;
-    - wet materials: what lies open to the rain is darker and smoother;
-    - colours of materials and geoms are read as linear albedo by both renderers.
+    The world gets a light `sun`, a skybox texture `sky`, and a cube texture as an image light for Filament. Materials
+    of open ground are darker and smoother the wetter the weather is. Renderers are told that the colours of materials
+    and geoms are linear albedo.
 
     Args:
-        root: of the world.
-        weather: to put there.
-        lighting: of it, where that is known already.
-        geom_materials: default class and own material of geoms of the world that are not in the tree.
+        root: the MJCF of the world, changed in place.
+        weather: the weather.
+        lighting: its light; computed here if None.
+        geom_materials: default class and own material (None for none) of the geoms that are not in the tree.
     """
     lighting = lighting or lighting_of(weather)
     _remove_old_light(root)
@@ -69,12 +69,12 @@ def apply_weather(
     if amount > 0:
         wet_materials(root, amount, geom_materials)
     root.custom.add("text", name="filament.material.base_color_type", data="linear")
-    # Gear's renderers have their own, which costs less and loses no memory.
+    # Filament's ambient occlusion is off: the camera pipeline has its own, which is faster and leaks no memory.
     root.custom.add("numeric", name="filament.ao.enabled", data=[0])
 
 
 def wetness(weather: Weather) -> float:
-    """How wet open ground is, 0..1: by itself, by its puddles or by the rain that falls."""
+    """Wetness of open ground, 0..1: the largest of the weather's wetness, its puddles and its rain."""
     return float(min(1.0, max(weather.wetness, 1.4 * weather.precipitation_deposits, weather.precipitation) / 100))
 
 
@@ -90,7 +90,7 @@ def _remove_old_light(root: mjcf.RootElement) -> None:
 
 
 def _add_sky(root: mjcf.RootElement, lighting: Lighting) -> None:
-    """The sky as a picture, and as light what a street gets of it."""
+    """Adds the picture of the sky, and the light of a street as an image light."""
     _add_cube(root, "sky", "skybox", lighting.sky_faces)
     street = _add_cube(root, "street_light", "cube", lighting.street_faces)
     root.worldbody.add("light", name="sky", type="image", texture=street, intensity=FULL_SCALE_LUX, diffuse=(0, 0, 0))
@@ -110,12 +110,12 @@ def _add_cube(root: mjcf.RootElement, name: str, kind: str, faces: UInt8Image) -
 
 
 def _add_sun(root: mjcf.RootElement, lighting: Lighting, night: float) -> None:
-    """The sun for both renderers, and for OpenGL the sky's ambient light as well.
+    """Adds the sun for both renderers, and the ambient light of the sky for the classic OpenGL renderer.
 
-    Filament multiplies `intensity` and `diffuse`; OpenGL knows `diffuse` alone. It shows light as it is added up,
-    without a tone curve, so its shares of sun and sky are those of display values. Its ambient light hangs on the
-    headlight because shadows would swallow that of the sun. At night it has no sun, as Filament has none: the night is
-    laid over frames of even light, and white that has more than that clips.
+    Filament multiplies `intensity` and `diffuse`; OpenGL knows `diffuse` alone. OpenGL adds light up as display values,
+    so its shares of sun and sky are those of display values. Its ambient light belongs to the headlight, since shadows
+    would remove the ambient light of the sun. At night neither renderer has a sun: the camera pipeline adds the night
+    to frames of ambient light, in which a brighter white would clip.
     """
     sunlit = lighting.ambient + lighting.sun
     sky_share = float(np.clip((_display(lighting.ambient) / _display(sunlit)).mean(), *_CLASSIC_SKY_SHARE))

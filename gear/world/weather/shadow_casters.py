@@ -1,4 +1,4 @@
-"""What stands in a compiled town and throws shadows in the light of lamps."""
+"""Finds the triangles of a compiled town that cast shadows in the light of lamps."""
 
 from __future__ import annotations
 
@@ -16,12 +16,15 @@ _ENDLESS = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
 def find_shadow_casters(
     model: mujoco.MjModel, data: mujoco.MjData, label_code: npt.NDArray[np.uint8]
 ) -> npt.NDArray[np.float32]:
-    """(N, 3, 3) triangles in the world of all that is seen of a town and its boards, but for the ground.
+    """The visible triangles of a town and its boards, without the ground.
 
     Args:
-        model: compiled; its meshes must still be there.
-        data: kinematics up to date.
-        label_code: (ngeom,) labels of all geoms.
+        model: compiled; its meshes must not have been released.
+        data: with kinematics up to date.
+        label_code: (ngeom,) uint8 labels of all geoms.
+
+    Returns:
+        (N, 3, 3) float32 corners of the triangles in the world, in metres.
     """
     chosen = static_geoms(model) & (model.geom_group < FIRST_HIDDEN_GROUP) & ~np.isin(label_code, GROUND_CODES)
     found = [np.zeros((0, 3, 3), np.float32)]

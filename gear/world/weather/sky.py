@@ -1,4 +1,4 @@
-"""The sky as radiance by direction: the analytic daylight of Preetham, Shirley and Smits (1999), with clouds before it.
+"""The radiance of the sky by direction: the analytic daylight of Preetham, Shirley and Smits (1999), with clouds.
 
 Directions are unit vectors in the world (x east, y north, z up). Radiance is in kcd/m² per linear sRGB channel, so
 that a white surface under it and a sun in klx can be compared.
@@ -20,7 +20,7 @@ from gear.values.scene import Weather
 Floats = npt.NDArray[np.float64]
 
 _MIN_ALTITUDE_RAD = math.radians(1.5)
-"""The formulas hold for a sun above the horizon; a lower one lights the sky as if it stood here, only more weakly."""
+"""The formulas hold for a sun above the horizon. A lower sun lights the sky as one at this altitude, but less."""
 
 _NIGHT_TINT = np.array([0.72, 0.84, 1.0])
 _NIGHT_CLOUDS = np.array([1.25, 1.12, 1.0])
@@ -30,8 +30,8 @@ _WAVELENGTHS_UM = np.array([0.610, 0.550, 0.465])
 _RGB_FROM_XYZ = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 _D65 = (0.3127, 0.3290)
 _SATURATION = 0.7
-"""Share of the model's own colour that is kept: without it a clear sky's light on a level surface would be bluer (2.5
-times as much blue as red) than the 10 000 to 12 000 K that skylight has."""
+"""Factor of the model's saturation. At 1 the light of a clear sky on a level surface would have 2.5 times as much blue
+as red, more than skylight of 10 000 to 12 000 K."""
 
 _HORIZON_BLUR = 0.035
 _DISC_COSINE = math.cos(math.radians(0.5))
@@ -62,9 +62,9 @@ class Sky:
     """Sun and sky of one weather.
 
     Attributes:
-        towards_sun: (3,) unit vector.
-        sun_klx: (3,) illuminance of a surface that faces the sun, behind its clouds.
-        cloud_cover: 0..1, what clouds and rain together cover.
+        towards_sun: (3,) unit vector towards the sun, in the world.
+        sun_klx: (3,) illuminance in klx, per linear sRGB channel, of a surface that faces the sun, below the clouds.
+        cloud_cover: share of the sky that clouds cover, 0..1.
         turbidity: haziness of the clear air; 2 is very clear.
         blueness: how saturated the clear sky is; 1 is that of clear air.
         night: 0 while the sun is up, 1 once its light is gone from the sky.
@@ -79,7 +79,7 @@ class Sky:
 
     @staticmethod
     def of(weather: Weather) -> Sky:
-        """The sky that CARLA's parameters mean."""
+        """The sky of CARLA's weather parameters."""
         altitude = math.radians(weather.sun_altitude_deg)
         azimuth = math.radians(weather.sun_azimuth_deg)
         shown_altitude = max(altitude, _MIN_ALTITUDE_RAD)
@@ -105,19 +105,21 @@ class Sky:
         )
 
     def radiance(self, directions: Floats, *, with_disc: bool = True) -> Floats:
-        """(..., 3) unit vectors to (..., 3) kcd/m²: sky and clouds above the horizon, sunlit ground below it.
+        """Radiance by direction: sky and clouds above the horizon, sunlit ground below it.
 
         Args:
-            directions: into the world.
-            with_disc: also the sun's own disc, where a picture of the sky is wanted; without it, what the sky adds to
-                the sun. A few directions cannot stand for light from a disc so small: one that meets it counts for
-                thirty suns.
+            directions: (..., 3) unit vectors in the world.
+            with_disc: whether the disc of the sun is included, as for a picture of the sky. It must be left out where
+                light is integrated over a few directions: one that meets the small disc would count for thirty suns.
+
+        Returns:
+            (..., 3) kcd/m² per linear sRGB channel.
         """
         flat = directions.reshape(-1, 3)
         ground = self._ground()
         result = np.broadcast_to(ground, flat.shape).copy()
         seen = np.flatnonzero(flat[:, 2] > -_HORIZON_BLUR)
-        # What stays in a processor's cache is done in half the time, and needs no fresh memory at every step.
+        # Blocks that stay in the processor's cache take half the time, and need no new memory at every step.
         for begin in range(0, len(seen), _AT_A_TIME):
             some = seen[begin : begin + _AT_A_TIME]
             rays = flat[some]
@@ -126,10 +128,16 @@ class Sky:
         return result.reshape(directions.shape)
 
     def horizon_radiance(self, azimuths: int) -> Floats:
-        """(azimuths, 3) kcd/m² around the horizon, counter-clockwise from east: the colour of distant air.
+        """Radiance of distant air around the horizon.
 
-        Light is scattered more than once before it comes from there, so it is half the direction's and half that of
-        all; glare about the sun is bounded.
+        Light from there has been scattered several times, so it is the mean of the direction's own radiance and of the
+        mean over all directions; the glare around the sun is bounded.
+
+        Args:
+            azimuths: number of directions, evenly spaced counter-clockwise from east.
+
+        Returns:
+            (azimuths, 3) kcd/m².
         """
         angles = np.linspace(0, 2 * math.pi, azimuths, endpoint=False)
         ring = np.column_stack([np.cos(angles), np.sin(angles), np.full_like(angles, 0.04)])
@@ -143,7 +151,7 @@ class Sky:
         return np.asarray(_GROUND_ALBEDO * (self.sun_klx * self.towards_sun[2] / math.pi + zenith))
 
     def _above(self, directions: Floats, *, with_disc: bool) -> Floats:
-        """(N, 3) radiance where there is no ground."""
+        """(N, 3) kcd/m² of sky and clouds, also for directions below the horizon."""
         clear = self._clear(directions)
         towards_sun = directions @ self.towards_sun
         if with_disc:
@@ -154,7 +162,7 @@ class Sky:
         return np.asarray(clear + opacity * (clouds - clear))
 
     def _clear(self, directions: Floats) -> Floats:
-        """Clear air, (N, 3)."""
+        """(N, 3) kcd/m² of the clear sky."""
         zenith_angle = math.acos(float(np.clip(self.towards_sun[2], -1, 1)))
         cos_view = np.maximum(directions[:, 2], 0.01)
         cos_sun = np.clip(directions @ self.towards_sun, -1, 1)
@@ -166,7 +174,7 @@ class Sky:
             for name, zenith in zeniths.items()
         }
         luminance, x, y = values["Y"], values["x"], values["y"]
-        # The model's horizon is too red under a high sun: what the eye sees there is whitish.
+        # Under a high sun the model's horizon is too red; real horizons are whitish.
         whitish = self.towards_sun[2] * np.exp(-directions[:, 2].clip(0) / 0.12)
         tint = _SATURATION * self.blueness * (1 - 0.8 * whitish)
         x, y = _D65[0] + tint * (x - _D65[0]), _D65[1] + tint * (y - _D65[1])
@@ -174,11 +182,11 @@ class Sky:
         day = np.maximum(xyz @ _RGB_FROM_XYZ.T, 0.0)
         if not self.night:
             return np.asarray(day)
-        # The glow about where the sun went down fades away with it.
+        # The glow around the sunset fades with the night.
         return np.asarray(day + self.night * (_NIGHT_TINT * zeniths["Y"] - day))
 
     def _cloud_base(self) -> Floats:
-        """(3,) mean radiance of clouds: bright when they are few, a third as bright when they cover everything."""
+        """(3,) mean radiance of clouds in kcd/m²; those of an overcast sky have half the radiance of few ones."""
         beam = _beam_klx(math.asin(self.towards_sun[2]), self.turbidity)
         global_klx = beam * self.towards_sun[2] + 0.18 * beam.mean()
         tint = 0.4 - 0.3 * self.cloud_cover
@@ -191,17 +199,17 @@ class Sky:
         return np.asarray(day + self.night * (_NIGHT_CLOUDS * zenith - day))
 
     def _clouds(self, noise: Floats, height: Floats, towards_sun: Floats) -> Floats:
-        """(N, 3): bright where thin and near the sun; where overcast, brighter overhead, as the CIE's overcast sky."""
+        """(N, 3) kcd/m² of clouds: bright where thin and near the sun; an overcast sky is that of the CIE."""
         overcast = (1 + 2 * np.maximum(height, 0)) * (3 / 7)
         shade = (1.2 - 0.45 * noise) * (1 + self.cloud_cover**2 * (overcast - 1))
         glow = 0.8 * (1 - self.cloud_cover) * np.exp((towards_sun - 1) / 0.08)
         return np.asarray((shade + glow)[:, None] * self._cloud_base())
 
     def _opacity(self, noise: Floats, height: Floats) -> Floats:
-        """(N,) 0..1: the noise is spread evenly, so the share of sky above the threshold is the cover."""
+        """(N,) opacity of the clouds, 0..1. The noise is uniform, so the share above the threshold is the cover."""
         edge = 1 - 1.15 * self.cloud_cover
         opacity = _smooth_step(edge - 0.05, edge + 0.18, noise)
-        # Distant clouds melt into the haze of the horizon.
+        # Distant clouds fade into the haze of the horizon.
         return np.asarray(opacity * (1 - (1 - self.cloud_cover) * (1 - _smooth_step(0.02, 0.2, height))))
 
 
@@ -211,7 +219,7 @@ def _smooth_step(low: float, high: float, value: Floats) -> Floats:
 
 
 def _beam_klx(altitude_rad: float, turbidity: float) -> Floats:
-    """(3,) direct normal illuminance under a clear sky: Rayleigh and Ångström extinction along Kasten's air mass."""
+    """(3,) direct normal illuminance in klx under a clear sky: Rayleigh and Ångström extinction, Kasten's air mass."""
     altitude_deg = math.degrees(altitude_rad)
     air_mass = 1 / (math.sin(altitude_rad) + 0.15 * (altitude_deg + 3.885) ** -1.253)
     rayleigh = 0.008735 * _WAVELENGTHS_UM**-4.08
@@ -220,7 +228,7 @@ def _beam_klx(altitude_rad: float, turbidity: float) -> Floats:
 
 
 def _zenith(turbidity: float, sun_zenith_rad: float) -> dict[str, float]:
-    """Luminance (kcd/m²) and chromaticities at the zenith."""
+    """Luminance `Y` in kcd/m² and chromaticities `x`, `y` at the zenith, by Preetham's appendix A.2."""
     chi = (4 / 9 - turbidity / 120) * (math.pi - 2 * sun_zenith_rad)
     powers = np.array([sun_zenith_rad**3, sun_zenith_rad**2, sun_zenith_rad, 1.0])
     rows = np.array([turbidity**2, turbidity, 1.0])
@@ -246,11 +254,11 @@ _OCTAVES = (4, 8, 16, 32, 64, 128, 256)
 
 @cache
 def _cloud_tile() -> npt.NDArray[np.float32]:
-    """(`TILE_PX`, `TILE_PX`) noise, the same in every process."""
+    """(`TILE_PX`, `TILE_PX`) float32 noise of the clouds, the same in every process."""
     return periodic_noise(derive_rng(0, "sky", "clouds"), _OCTAVES, 0.85)
 
 
 def _cloud_noise(directions: Floats) -> Floats:
-    """(N, 3) directions to (N,) noise on a layer of clouds that the Earth's curve brings down at the horizon."""
+    """(N,) noise at (N, 3) directions, on a layer of clouds that meets the horizon as the curved Earth makes it."""
     reach = 0.16 * TILE_PX / (np.maximum(directions[:, 2], 0.0) + 0.1)
     return sampled(_cloud_tile(), directions[:, 0] * reach, directions[:, 1] * reach).astype(np.float64)

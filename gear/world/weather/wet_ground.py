@@ -1,6 +1,7 @@
-"""Wet ground: what lies open to the rain, darker and smoother.
+"""Makes open ground wet: its materials become darker and smoother.
 
-Water fills the pores, so that less light comes back from inside, and the surface mirrors more sharply.
+Water fills the pores, so that less light is reflected from inside of the material and the surface reflects more
+sharply.
 """
 
 from __future__ import annotations
@@ -18,22 +19,22 @@ from gear.world.compilation.instances import class_name
 from gear.world.compilation.quiet_mjcf import mjcf
 
 WET_LABELS = frozenset({"road", "road_marking", "sidewalk", "parking", "ground"})
-"""What lies open to the rain and holds its water."""
+"""Labels of the ground that rain makes wet."""
 
 GeomMaterial = tuple[str, str | None]
-"""A default class, and a material that a geom has besides."""
+"""The default class of a geom, and the material that the geom itself names, or None."""
 
 _DARKENING = 0.45
 _SMOOTHING = 0.7
 
 
 def wet_materials(root: mjcf.RootElement, amount: float, geom_materials: Sequence[GeomMaterial] = ()) -> None:
-    """Wets the materials of open ground.
+    """Makes the materials of open ground wet.
 
     Args:
-        root: of a world.
-        amount: 0 is dry, 1 as wet as can be.
-        geom_materials: default class and own material of geoms of the world that are not in the tree.
+        root: the MJCF of a world, changed in place.
+        amount: wetness, 0 is dry, 1 is as wet as possible.
+        geom_materials: default class and own material of the geoms that are not in the tree.
     """
     for material in _open_materials(root, geom_materials):
         rgba = np.array(material.rgba if material.rgba is not None else (1.0, 1.0, 1.0, 1.0))
@@ -44,19 +45,19 @@ def wet_materials(root: mjcf.RootElement, amount: float, geom_materials: Sequenc
 
 
 def wet_own_colours(model: mujoco.MjModel, label_code: npt.NDArray[np.uint8], amount: float) -> None:
-    """Darkens open ground that its geom colours, not its material.
+    """Darkens the geoms of open ground that have a colour of their own instead of a material.
 
     Args:
-        model: compiled; its geoms' colours are changed.
-        label_code: (ngeom,) what each geom is.
-        amount: 0 is dry, 1 as wet as can be.
+        model: compiled; the colours of its geoms are changed in place.
+        label_code: (ngeom,) uint8 labels of the geoms.
+        amount: wetness, 0 is dry, 1 is as wet as possible.
     """
     is_open = np.isin(label_code, [LABEL_BY_NAME[name].code for name in WET_LABELS])
     model.geom_rgba[is_open & has_own_colour(model), :3] *= np.float32(1 - _DARKENING * amount)
 
 
 def _open_materials(root: mjcf.RootElement, geom_materials: Sequence[GeomMaterial]) -> list[Any]:
-    """Materials of geoms whose label is in `WET_LABELS`, each once."""
+    """The materials of geoms with a label in `WET_LABELS`, each once."""
     pairs: list[tuple[Any, Any]] = [
         (root.find("default", name), None if own is None else root.find("material", own))
         for name, own in geom_materials
@@ -72,8 +73,8 @@ def _is_open(class_name: str) -> bool:
 
 
 def _inherited_material(default: Any) -> Any:
-    """The material that a default class, or one that it stands in, gives its geoms."""
-    # Of a class that went around dm_control only the name is here, and such a one gives no material.
+    """The material that a default class, or a class around it, gives to geoms."""
+    # A class that went around dm_control is known by name alone; such classes name no material.
     while default is not None and not isinstance(default, str) and default.tag == "default":
         if default.geom is not None and default.geom.material is not None:
             return default.geom.material
