@@ -54,5 +54,5 @@ spec = AttackSpec(
 
 @hookimpl
 def gear_attacks() -> list[AttackSpec[ArtConfig]]:
-    """Found by gear through the entry point in pyproject.toml."""
+    """Called by gear, which finds this module through the entry point in pyproject.toml."""
     return [spec]

@@ -59,5 +59,5 @@ spec = DefenseSpec(
 
 @hookimpl
 def gear_defenses() -> list[DefenseSpec[JediConfig]]:
-    """Found by gear through the entry point in pyproject.toml."""
+    """Called by gear, which finds this module through the entry point in pyproject.toml."""
     return [spec]

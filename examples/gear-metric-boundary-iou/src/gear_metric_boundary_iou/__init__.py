@@ -46,5 +46,5 @@ spec: MetricSpec[BoundaryIouConfig] = MetricSpec(
 
 @hookimpl
 def gear_metrics() -> list[MetricSpec[BoundaryIouConfig]]:
-    """Found by gear through the entry point in pyproject.toml."""
+    """Called by gear, which finds this module through the entry point in pyproject.toml."""
     return [spec]

@@ -27,11 +27,11 @@ class FolderConfig:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LabelledConfig(FolderConfig):
-    """Options of a network that has classes.
+    """Options of a network with classes.
 
     Attributes:
-        classes: names of the network's classes, and what the task calls them: `{tarmac: road}`. Classes that both call
-            the same, and usual synonyms, need not be there; what has no match is left out.
+        classes: the task's names of the network's classes, by the network's names: `{tarmac: road}`. Classes with equal
+            names and usual synonyms need no entry; classes without a match are left out.
     """
 
     classes: dict[str, str] = field(default_factory=dict)
@@ -42,7 +42,7 @@ class DetectorConfig(LabelledConfig):
     """Options of a detector.
 
     Attributes:
-        least_score: detections that are less sure are dropped.
+        least_score: smallest score, 0..1, of a detection that is reported.
     """
 
     least_score: float = 0.05
@@ -57,9 +57,9 @@ class DepthConfig(FolderConfig):
     """Options of a depth network.
 
     Attributes:
-        inverse_scale: a network of relative depth says how near things are, in units of its own; metres are
-            1 / (inverse_scale * what it says + inverse_shift). 0 for a network that says metres.
-        inverse_shift: see there, in 1/m.
+        inverse_scale: for networks of relative depth, whose output is an inverse depth without unit: depth in metres is
+            1 / (inverse_scale * output + inverse_shift). 0 for networks whose output is in metres.
+        inverse_shift: see `inverse_scale`, in 1/m.
     """
 
     inverse_scale: float = 0.0
@@ -71,21 +71,23 @@ class DepthConfig(FolderConfig):
 
 
 def build_semseg(config: LabelledConfig) -> Model:
-    """Imports torch and transformers only when somebody asks for the model; so do the others."""
+    """A semantic segmentation network. torch and transformers are imported here, so that listing plugins stays
+    quick.
+    """
     from gear_model_transformers.segmentation import Segmenter
 
     return Segmenter(config)
 
 
 def build_depth(config: DepthConfig) -> Model:
-    """A depth network."""
+    """A depth network from a folder."""
     from gear_model_transformers.depth import DepthNetwork
 
     return DepthNetwork(config)
 
 
 def build_detect2d(config: DetectorConfig) -> Model:
-    """A detector."""
+    """A detector from a folder."""
     from gear_model_transformers.detection import Detector
 
     return Detector(config)
@@ -127,5 +129,5 @@ detect2d: ModelSpec[DetectorConfig] = ModelSpec(
 
 @hookimpl
 def gear_models() -> list[ModelSpec[Any]]:
-    """Found by gear through the entry point in pyproject.toml."""
+    """Called by gear, which finds this module through the entry point in pyproject.toml."""
     return [semseg, depth, detect2d]

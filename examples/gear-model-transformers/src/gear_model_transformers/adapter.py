@@ -1,8 +1,4 @@
-"""What the three adapters share: the folder, the image processor, gear's `Model` protocol, the names of classes.
-
-Before and after the network stands the image processor that its authors gave it. It takes tensors and lets gradients
-pass, so that attacks reach the pixels through resizing and normalisation as they are.
-"""
+"""What the three adapters have in common: folder, image processor, gear's `Model` protocol, names of classes."""
 
 from __future__ import annotations
 
@@ -29,7 +25,7 @@ logger = logging.getLogger(__name__)
 
 
 class FolderModel(nn.Module, ABC):
-    """A network of a folder behind gear's `Model` protocol.
+    """A network from a folder with gear's `Model` protocol.
 
     Attributes:
         network: of transformers.
@@ -55,21 +51,21 @@ class FolderModel(nn.Module, ABC):
         return self.outputs(pictures) if targets is None else self.losses(pictures, targets)
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """None: every family names its layers otherwise."""
+        """No feature maps, since every family names its layers differently."""
         return {}
 
     def seen(self, pictures: Tensor) -> Mapping[str, Tensor]:
-        """What the network takes: the pictures resized and normalised, and what else its family wants."""
+        """Inputs of the network: the pictures resized and normalised, and whatever else its family needs."""
         features: Mapping[str, Tensor] = self.processor(images=pictures * 255, return_tensors="pt")
         return features
 
     @abstractmethod
     def outputs(self, pictures: Tensor) -> Mapping[str, Tensor]:
-        """Named outputs of a batch."""
+        """Outputs of a batch by name."""
 
     @abstractmethod
     def losses(self, pictures: Tensor, targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """Named losses of a batch and its samples."""
+        """Losses of a batch by name."""
 
     @abstractmethod
     def answer(self, picture: Tensor) -> Any:
@@ -77,7 +73,7 @@ class FolderModel(nn.Module, ABC):
 
 
 def open_folder(folder: Path, kinds: Sequence[str]) -> tuple[nn.Module, Any]:
-    """The network and the image processor of a folder, without the net and without pickles.
+    """The network and the image processor of a folder, without network access and without pickles.
 
     Raises:
         GearError: something is missing, or the network is of another kind.
@@ -110,15 +106,15 @@ def open_folder(folder: Path, kinds: Sequence[str]) -> tuple[nn.Module, Any]:
 
 
 def numbers_of_classes(network: nn.Module, known: Mapping[str, int], config: LabelledConfig) -> dict[int, int]:
-    """The task's numbers by the network's, for classes that both have.
+    """The task's class numbers by those of the network, for classes that both have.
 
     Args:
         network: one with classes.
         known: the task's numbers by name.
-        config: says what else is the same.
+        config: states which further names are equal.
 
     Raises:
-        GearError: nothing matches, or `classes` names what is not there.
+        GearError: nothing matches, or `classes` has a name that the network or the task lacks.
     """
     own: Any = network.config
     names = {int(index): name for index, name in own.id2label.items()}

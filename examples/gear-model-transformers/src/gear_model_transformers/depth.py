@@ -1,4 +1,4 @@
-"""Depth: networks that say metres, and networks that say how near things are."""
+"""Depth networks with metric outputs and with relative inverse depth."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class DepthNetwork(FolderModel):
             raise GearError(f"{config.folder}: {hint}")
 
     def outputs(self, pictures: Tensor) -> Mapping[str, Tensor]:
-        """The processor undoes what it did: padding, an assumed field of view, the size."""
+        """`depth_m`; the image processor undoes its padding, its assumed field of view and its resizing."""
         said = self.network(**self.seen(pictures))
         undo = self.processor.post_process_depth_estimation
         sizes = [tuple(pictures.shape[2:])] * len(pictures)
@@ -43,13 +43,13 @@ class DepthNetwork(FolderModel):
         return {"depth_m": depth.clamp(min=NEAREST_M)}
 
     def losses(self, pictures: Tensor, targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """Mean absolute difference of logarithms where depth is known."""
+        """Mean absolute difference of logarithms over pixels with ground truth."""
         truth = torch.from_numpy(np.stack([sample.depth_m for sample in targets])).to(pictures.device)
         is_known = torch.isfinite(truth)
         error = (self.outputs(pictures)["depth_m"].log() - truth.where(is_known, 1.0).log()).abs()
         return {"log_l1": (error * is_known).sum() / is_known.sum().clamp_min(1)}
 
     def answer(self, picture: Tensor) -> npt.NDArray[np.float32]:
-        """(H, W) float32 metres."""
+        """(H, W) float32 depth in metres of a batch of one."""
         metres: npt.NDArray[np.float32] = self.outputs(picture)["depth_m"][0].cpu().numpy()
         return metres

@@ -1,4 +1,4 @@
-"""Object detection: DETR and its many descendants, which all say classes and boxes."""
+"""Object detection with DETR and its descendants, whose outputs are classes and boxes of object queries."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from gear_model_transformers.adapter import FolderModel, numbers_of_classes
 
 
 class Detector(FolderModel):
-    """`logits` (B, N, classes) and `pred_boxes` (B, N, 4), middle and size as shares of the picture's."""
+    """Outputs: `logits` (B, N, classes) and `pred_boxes` (B, N, 4), centre and size as shares of the picture's."""
 
     def __init__(self, config: DetectorConfig) -> None:
         super().__init__(config, "AutoModelForObjectDetection")
@@ -23,7 +23,7 @@ class Detector(FolderModel):
         self.category_ids = numbers_of_classes(self.network, known, config)
 
     def outputs(self, pictures: Tensor) -> Mapping[str, Tensor]:
-        """One row a query."""
+        """`logits` and `pred_boxes`, one row for each of N object queries."""
         said = self.network(**self.seen(pictures))
         return {"logits": said.logits, "pred_boxes": said.pred_boxes}
 
@@ -33,7 +33,7 @@ class Detector(FolderModel):
         return {"set_loss": self.network(**self.seen(pictures), labels=labels).loss}
 
     def labels(self, sample: Any, pictures: Tensor) -> dict[str, Tensor]:
-        """A sample's objects as transformers has them."""
+        """A sample's objects in the format of transformers."""
         index_of = {category: index for index, category in reversed(self.category_ids.items())}
         things = [thing for thing in sample.objects if not thing.is_ignored and thing.category_id in index_of]
         size = torch.tensor([pictures.shape[3], pictures.shape[2]])
@@ -43,7 +43,9 @@ class Detector(FolderModel):
         return {"class_labels": classes.to(pictures.device), "boxes": boxes.to(pictures.device)}
 
     def answer(self, picture: Tensor) -> tuple[Detection, ...]:
-        """Each family's processor knows what its scores mean; boxes are clipped to the picture, surest first."""
+        """COCO detections by falling score; the family's processor interprets the scores, and boxes are clipped to the
+        picture.
+        """
         height, width = picture.shape[2:]
         said = self.network(**self.seen(picture))
         sizes = torch.tensor([[height, width]], device=picture.device)

@@ -1,4 +1,4 @@
-"""Semantic segmentation: networks that say a class for every pixel, and networks that say masks and what each shows."""
+"""Semantic segmentation with networks that classify pixels, and with networks that predict masks and their classes."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Segmenter(FolderModel):
         self.label_ids: npt.NDArray[np.uint8] = np.array([label.id for label in EVALUATED], np.uint8)
 
     def outputs(self, pictures: Tensor) -> Mapping[str, Tensor]:
-        """Several classes of the network that are one of Cityscapes' add up."""
+        """`logits`; probabilities of several classes of the network that are one of Cityscapes add up."""
         theirs = self.their_logits(pictures)
         nothing = torch.full_like(theirs[:, 0], UNKNOWN_LOGIT)
         ours = torch.stack([theirs[:, each].logsumexp(1) if each else nothing for each in self.indices], dim=1)
@@ -55,7 +55,7 @@ class Segmenter(FolderModel):
         return (scores + LEAST).log()
 
     def losses(self, pictures: Tensor, targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """Cross-entropy over the pixels whose class the network knows."""
+        """Cross-entropy over the pixels whose class the network has."""
         ids = train_ids(targets, pictures.device)
         known = torch.tensor([number for number, each in enumerate(self.indices) if each], device=ids.device)
         is_known = torch.isin(ids, known)
@@ -64,7 +64,7 @@ class Segmenter(FolderModel):
         return {"cross_entropy": (each * is_known).sum() / is_known.sum().clamp_min(1)}
 
     def answer(self, picture: Tensor) -> npt.NDArray[np.uint8]:
-        """(H, W) uint8 label ids."""
+        """(H, W) uint8 Cityscapes label ids of a batch of one."""
         answer: npt.NDArray[np.uint8] = self.label_ids[self.outputs(picture)["logits"][0].argmax(0).cpu().numpy()]
         return answer
 

@@ -22,7 +22,7 @@ class PanopticConfig(CameraOptions):
 
 
 def build(config: PanopticConfig) -> Task[Any, Any]:
-    """Imports what is heavy only when somebody asks for the task."""
+    """The task. Its module is imported here, so that listing plugins stays quick."""
     from gear_task_panoptic.panoptic import PanopticTask
 
     return PanopticTask(config)
@@ -34,8 +34,8 @@ class PartsConfig:
 
     Attributes:
         model: name of a semantic segmentation network.
-        weights: its option of this name; "" leaves it at its default.
-        least_px: smaller parts are void.
+        weights: that network's option `weights`; "" keeps its default.
+        least_px: parts with fewer pixels are void.
     """
 
     model: str = "ddrnet23_slim"
@@ -48,7 +48,7 @@ class PartsConfig:
 
 
 def build_parts(config: PartsConfig) -> Model:
-    """Imports what is heavy only when somebody asks for the model."""
+    """The model. Its module is imported here, so that listing plugins stays quick."""
     from gear_task_panoptic.baseline import Parts
 
     return Parts(config)
@@ -75,11 +75,11 @@ spec: TaskSpec[PanopticConfig] = TaskSpec(
 
 @hookimpl
 def gear_tasks() -> list[TaskSpec[PanopticConfig]]:
-    """Found by gear through the entry point in pyproject.toml."""
+    """Called by gear, which finds this module through the entry point in pyproject.toml."""
     return [spec]
 
 
 @hookimpl
 def gear_models() -> list[ModelSpec[PartsConfig]]:
-    """The baseline."""
+    """The baseline model of the task."""
     return [parts]

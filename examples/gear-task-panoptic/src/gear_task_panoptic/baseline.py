@@ -1,4 +1,4 @@
-"""A baseline model: every connected part of what a semantic segmentation calls a thing is one."""
+"""A baseline model: each connected component of a thing class in a semantic segmentation is one instance."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 class Parts:
-    """Any of gear's segmentation models behind the task `panoptic`."""
+    """A semantic segmentation network of gear as a model of the task `panoptic`."""
 
     def __init__(self, config: PartsConfig) -> None:
         settings = [f"weights={config.weights}"] if config.weights else []
@@ -33,20 +33,20 @@ class Parts:
         self.least_px = config.least_px
 
     def predict(self, views: Mapping[str, UInt8Image]) -> Panoptic:
-        """Segments of the label ids that the network sees."""
+        """Segments made of the network's label ids."""
         return as_panoptic(in_parts(self.inner.predict(views), self.least_px))
 
     def forward(self, views: Mapping[str, Tensor], targets: Sequence[Any] | None = None) -> Mapping[str, Tensor]:
-        """The segmentation's own outputs and losses."""
+        """Outputs and losses of the semantic segmentation network."""
         return self.inner.forward(views, None if targets is None else [_labelled(one.panoptic) for one in targets])
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """None of its own."""
+        """No feature maps."""
         return {}
 
 
 def in_parts(label_ids: npt.NDArray[np.uint8], least_px: int) -> npt.NDArray[np.uint16]:
-    """Cityscapes instance ids; parts smaller than `least_px` are void."""
+    """(H, W) Cityscapes instance ids from label ids; components smaller than `least_px` are void."""
     instances = label_ids.astype(np.uint16)
     for label in THINGS & set(np.unique(label_ids).tolist()):
         parts, count = ndimage.label(label_ids == label)
@@ -60,6 +60,6 @@ def in_parts(label_ids: npt.NDArray[np.uint8], least_px: int) -> npt.NDArray[np.
 
 
 def _labelled(panoptic: Panoptic) -> SimpleNamespace:
-    """What the losses of a segmentation look at."""
+    """What the losses of semantic segmentation read of a sample."""
     ids = panoptic.ids
     return SimpleNamespace(label_ids=np.where(ids >= INSTANCE_FACTOR, ids // INSTANCE_FACTOR, ids).astype(np.uint8))

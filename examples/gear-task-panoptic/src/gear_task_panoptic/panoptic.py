@@ -1,4 +1,4 @@
-"""The task itself: segments from the id buffer, COCO panoptic's files, panoptic quality."""
+"""The task: segments from the id buffer, files of COCO panoptic, panoptic quality."""
 
 from __future__ import annotations
 
@@ -42,17 +42,17 @@ class PanopticSample(Sample):
 
 
 class PanopticTask:
-    """`images`, `annotations/panoptic_<split>` and its JSON."""
+    """Pictures in `images`, id maps in `annotations/panoptic_<split>`, and COCO panoptic's JSON."""
 
     def __init__(self, config: PanopticConfig) -> None:
         self.config = config
 
     def rig(self) -> Rig:
-        """One camera."""
+        """One camera on the ego car."""
         return Rig(cameras=(self.config.mount(VIEW),), follows_road=self.config.follows_road)
 
     def ground_truth(self, frame: Frame, record: SceneRecord) -> PanopticSample:
-        """Reads segments off the id buffer; classes that Cityscapes does not evaluate are void."""
+        """Segments from the id buffer; classes that Cityscapes does not evaluate are void."""
         instances = instance_map(frame.views[VIEW].geom_id, frame.geoms, frame.objects)
         return PanopticSample(
             record=record,
@@ -62,13 +62,13 @@ class PanopticTask:
         )
 
     def encode(self, sample: PanopticSample, info: SplitInfo) -> Encoded:
-        """The picture, and the ids as colours: R + 256 G + 65536 B."""
+        """The picture, and the id map as colours: R + 256 G + 65536 B."""
         image, labels = _paths(info.split, sample.record.index)
         files = {image: encode_rgb(sample.images[VIEW]), labels: encode_rgb(id_to_rgb(sample.panoptic.ids))}
         return Encoded(files=files, facts={"segments_info": segments_info(sample.panoptic)})
 
     def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
-        """COCO panoptic's JSON."""
+        """The index file of a split: COCO panoptic's JSON."""
         images, annotations = [], []
         for sidecar in sidecars:
             record = sidecar.record
@@ -92,7 +92,7 @@ class PanopticTask:
         return {f"annotations/panoptic_{info.split}.json": (json.dumps(table, indent=1) + "\n").encode()}
 
     def decode(self, root: Path, sidecar: Sidecar, info: SplitInfo) -> PanopticSample:
-        """Reads a sample back."""
+        """Reads a sample back from its files."""
         image, labels = _paths(info.split, sidecar.record.index)
         infos = expect(sidecar.facts, "segments_info", place=root / labels)["segments_info"]
         segments = tuple(
@@ -106,34 +106,34 @@ class PanopticTask:
         )
 
     def as_prediction(self, sample: PanopticSample) -> Panoptic:
-        """The segments."""
+        """The ground-truth segments as a perfect prediction."""
         return sample.panoptic
 
     def evaluator(self) -> QualityEvaluator:
-        """Panoptic quality."""
+        """A fresh, empty evaluator of panoptic quality."""
         return QualityEvaluator(THINGS)
 
     def without(self, sample: PanopticSample, masks: Masks) -> PanopticSample:
-        """Void inside the mask; segments that lie there altogether are gone."""
+        """The sample with void inside the mask; segments that lie inside completely are removed."""
         ids = np.where(masks[VIEW], np.int32(VOID), sample.panoptic.ids)
         left = set(np.unique(ids).tolist())
         segments = tuple(segment for segment in sample.panoptic.segments if segment.id in left)
         return replace(sample, panoptic=Panoptic(ids=ids, segments=segments))
 
     def encode_prediction(self, sample: PanopticSample, prediction: Panoptic, info: SplitInfo) -> Encoded:
-        """The ids as colours; their segments wait in the facts for the split's one file."""
+        """The id map as colours; the facts keep the segments for the result file of the split."""
         segments = [[one.id, one.category_id, int(one.is_crowd)] for one in prediction.segments]
         path = f"panoptic/{sample.record.index:06d}.png"
         return Encoded(files={path: encode_rgb(id_to_rgb(prediction.ids))}, facts={"segments": segments})
 
     def decode_prediction(self, root: Path, sample: PanopticSample, facts: Any, info: SplitInfo) -> Panoptic:
-        """The inverse."""
+        """Reads predicted segments back from their files."""
         ids = rgb_to_id(read_rgb(root, f"panoptic/{sample.record.index:06d}.png"))
         segments = tuple(Segment(id=i, category_id=c, is_crowd=bool(crowd)) for i, c, crowd in facts["segments"])
         return Panoptic(ids=ids, segments=segments)
 
     def finalise_predictions(self, facts: Sequence[tuple[SceneRecord, Any]], info: SplitInfo) -> Mapping[str, bytes]:
-        """COCO panoptic's results file."""
+        """The result file of a split in the format of COCO panoptic."""
         annotations = [
             {
                 "image_id": record.index + 1,
@@ -145,7 +145,7 @@ class PanopticTask:
         return {"panoptic.json": (json.dumps({"annotations": annotations}, indent=1) + "\n").encode()}
 
     def preview(self, sample: PanopticSample) -> Mapping[str, UInt8Image]:
-        """The classes' colours over the picture, borders between segments in white."""
+        """The picture with class colours over it and white borders between segments: (H, W, 3) uint8."""
         ids = sample.panoptic.ids
         labels = np.where(ids >= INSTANCE_FACTOR, ids // INSTANCE_FACTOR, ids).astype(np.uint8)
         mixed = 0.45 * sample.images[VIEW] + 0.55 * colour_map(labels)[..., :3]
@@ -197,7 +197,7 @@ def id_to_rgb(ids: IdMap) -> UInt8Image:
 
 
 def rgb_to_id(rgb: UInt8Image) -> IdMap:
-    """The inverse."""
+    """(H, W) int32 ids from (H, W, 3) uint8 colours: R + 256 G + 65536 B."""
     wide = rgb.astype(np.int32)
     ids: IdMap = wide[..., 0] + (wide[..., 1] << 8) + (wide[..., 2] << 16)
     return ids

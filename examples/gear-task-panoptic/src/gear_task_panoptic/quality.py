@@ -19,9 +19,9 @@ class Segment:
     """One segment of a picture.
 
     Attributes:
-        id: in the id map, above 0.
+        id: its number in the id map, above 0.
         category_id: Cityscapes label id.
-        is_crowd: things of a class that are not told apart; never evaluated.
+        is_crowd: whether it covers several objects that are not separated; crowds are never evaluated.
     """
 
     id: int
@@ -43,11 +43,11 @@ class Panoptic:
 
 
 class HasPanoptic(Protocol):
-    """A sample with ground truth."""
+    """A sample with ground-truth segments."""
 
     @property
     def panoptic(self) -> Panoptic:
-        """Its segments."""
+        """The ground-truth segments of the picture."""
         ...
 
 
@@ -59,20 +59,20 @@ class QualityEvaluator:
         self.counts: dict[int, list[float]] = {}
 
     def update(self, sample: HasPanoptic, prediction: Panoptic) -> Mapping[str, float]:
-        """Takes one picture in; returns its own metrics."""
+        """Takes one picture in; returns the metrics of this picture."""
         own = QualityEvaluator(self.things)
         own.counts = match(sample.panoptic, prediction)
         self.merge(own)
         return own.result()
 
     def merge(self, other: Any) -> None:
-        """Takes in what another one has gathered."""
+        """Takes in what another evaluator of this class has gathered."""
         for category, counts in other.counts.items():
             mine = self.counts.setdefault(category, [0.0, 0.0, 0.0, 0.0])
             self.counts[category] = [a + b for a, b in zip(mine, counts, strict=True)]
 
     def result(self) -> Mapping[str, float]:
-        """NaN where nothing counts."""
+        """`pq`, `sq`, `rq`, `pq_things` and `pq_stuff` over all pictures, 0..1; NaN where nothing counts."""
         rows = {c: _quality(*counts) for c, counts in self.counts.items() if sum(counts[1:]) > 0}
         metrics = {name: _mean([row[i] for row in rows.values()]) for i, name in enumerate(("pq", "sq", "rq"))}
         for name, wanted in (("pq_things", True), ("pq_stuff", False)):
