@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from gear.collecting.forecast import Forecast
 from gear.collecting.job import Job
 from gear.collecting.pipeline import collect_samples
 from gear.collecting.session import open_session
@@ -82,10 +83,13 @@ def _collect_missing(job: Job, store: Store, executor: Executor, callbacks: Call
     missing = store.missing()
     finished = job.plan.samples - len(missing)
 
-    def done(_: int) -> None:
+    forecast = Forecast(store, len(missing), callbacks.on_warning)
+
+    def done(index: int) -> None:
         nonlocal finished
         finished += 1
         callbacks.on_progress(finished, job.plan.samples)
+        forecast.sample_done(index)
 
     callbacks.on_progress(finished, job.plan.samples)
     executor.run(partial(_make_samples, job), missing, done)

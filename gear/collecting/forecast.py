@@ -1,0 +1,87 @@
+"""The disk space and the time that a collection needs, from its first samples."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable
+
+from gear.contracts.tasks import Sidecar
+from gear.dataset.files import inside
+from gear.dataset.layout import sidecar_path
+from gear.dataset.sidecar import read_sidecar
+from gear.dataset.store import Store
+from gear.reporting.pace import duration_text
+from gear.values.errors import GearError
+from gear.values.progress import Warn
+
+FIRST = 3
+"""Samples that a forecast is made from."""
+
+LARGE_BYTES, LONG_S = 2 * 10**9, 1800.0
+"""A collection that needs more is announced with its size and time."""
+
+UNITS = ("bytes", "kB", "MB", "GB", "TB", "PB")
+
+
+class Forecast:
+    """Measures the first samples of a collection, and refuses one that the disk cannot hold."""
+
+    def __init__(
+        self, store: Store, missing: int, on_warning: Warn, clock_s: Callable[[], float] = time.monotonic
+    ) -> None:
+        """Args:
+        store: of the split.
+        missing: number of samples to be made.
+        on_warning: called once with what a large collection needs.
+        clock_s: seconds from any start.
+        """
+        self._store, self._missing, self._on_warning, self._clock_s = store, missing, on_warning, clock_s
+        self._sizes: list[int] = []
+        self._first_s = 0.0
+
+    def sample_done(self, index: int) -> None:
+        """Takes in a finished sample; the first `FIRST` ones count.
+
+        Raises:
+            GearError: the disk has less room than all samples need.
+        """
+        if len(self._sizes) >= min(FIRST, self._missing):
+            return
+        if not self._sizes:
+            self._first_s = self._clock_s()
+        self._sizes.append(_bytes_of(self._store, index))
+        if len(self._sizes) == min(FIRST, self._missing):
+            self._forecast()
+
+    def _forecast(self) -> None:
+        made = len(self._sizes)
+        needed = sum(self._sizes) / made * (self._missing - made)
+        free = shutil.disk_usage(self._store.root).free
+        if needed > free:
+            raise GearError(
+                f"{self._store.root}: {self._missing} samples need about {size_text(needed)} more, and "
+                f"{size_text(free)} are free there; collect fewer with --samples N, or give --out on another disk"
+            )
+        each_s = (self._clock_s() - self._first_s) / max(made - 1, 1)  # the first one includes compiling the world
+        left_s = each_s * (self._missing - made)
+        if needed > LARGE_BYTES or left_s > LONG_S:
+            self._on_warning(
+                f"{self._missing} samples need about {size_text(needed)} of the {size_text(free)} that are free, and "
+                f"{duration_text(left_s)}"
+            )
+
+
+def size_text(size: float) -> str:
+    """A size for a person, in powers of 1000: `3.2 GB`."""
+    power = 0
+    while size >= 999.5 and power < len(UNITS) - 1:
+        size, power = size / 1000, power + 1
+    return f"{size:.0f} {UNITS[power]}" if power == 0 or size >= 99.5 else f"{size:.2g} {UNITS[power]}"
+
+
+def _bytes_of(store: Store, index: int) -> int:
+    """Bytes of a sample's files and of its sidecar."""
+    path = inside(store.root, sidecar_path(store.split, index))
+    sidecar: Sidecar = read_sidecar(path)
+    return path.stat().st_size + sum(inside(store.root, name).stat().st_size for name in sidecar.files)

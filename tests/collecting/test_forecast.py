@@ -1,0 +1,50 @@
+"""What a collection needs, from its first samples: announced when it is large, refused when the disk is too small."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from gear.collecting import forecast
+from gear.collecting.forecast import Forecast, size_text
+from gear.values.errors import GearError
+
+
+def run(
+    monkeypatch: pytest.MonkeyPatch, *, samples: int, sample_bytes: int, free: int, sample_s: float = 1.0
+) -> list[str]:
+    """The lines that a collection of equal samples is announced with."""
+    now_s, said = [0.0], list[str]()
+    monkeypatch.setattr(forecast, "_bytes_of", lambda store, index: sample_bytes)
+    monkeypatch.setattr(forecast.shutil, "disk_usage", lambda root: SimpleNamespace(free=free))
+    store: Any = SimpleNamespace(root=Path("data"))
+    watched = Forecast(store, samples, said.append, lambda: now_s[0])
+    for index in range(min(samples, 10)):
+        now_s[0] += sample_s if index else 500.0  # the first one waits for the world
+        watched.sample_done(index)
+    return said
+
+
+def test_a_collection_that_the_disk_cannot_hold_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = r"data: 1000000 samples need about 12 TB more, and 20 GB are free there; collect fewer with --samples"
+    with pytest.raises(GearError, match=problem):
+        run(monkeypatch, samples=1_000_000, sample_bytes=12_000_000, free=20_000_000_000)
+    assert run(monkeypatch, samples=100, sample_bytes=10_000, free=970_000) == []
+    with pytest.raises(GearError):
+        run(monkeypatch, samples=100, sample_bytes=10_000, free=969_999)
+
+
+def test_a_large_one_is_announced_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    said = run(monkeypatch, samples=7203, sample_bytes=1_000_000, free=10**12, sample_s=2.0)
+    assert said == ["7203 samples need about 7.2 GB of the 1 TB that are free, and 4.0 hours"]
+    assert run(monkeypatch, samples=1000, sample_bytes=1000, free=10**12) == []
+    assert run(monkeypatch, samples=1, sample_bytes=1000, free=10**12) == []
+
+
+def test_sizes_in_words() -> None:
+    assert [size_text(size) for size in (3, 999, 1000, 4.24e6, 105e9, 2e20)] == [
+        "3 bytes", "999 bytes", "1 kB", "4.2 MB", "105 GB", "200000 PB",
+    ]  # fmt: skip
