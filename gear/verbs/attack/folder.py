@@ -141,6 +141,8 @@ def _check_whole(root: Path, notes: Json) -> None:
         if notes["masking"] is not None:
             for key in ("promised", "kept"):
                 from_json(float, notes["masking"][key], key)
+        if notes.get("achieved") is not None:  # older folders have none
+            from_json(dict[str, dict[str, float | None] | None], notes["achieved"], "achieved")
     except (KeyError, FieldError) as error:
         raise ReplaceableError(root / NOTES, BROKEN) from error
     for name, digest in notes["patches"].items():

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
 from gear.contracts.attacks import Patch
+from gear.reporting.pace import plural, rate_text
+from gear.values.resources import data_dir
 from gear.values.serial import Json
 
 
@@ -30,11 +33,12 @@ class AttackReport:
         done = self.facts["steps_done"]
         lines = [
             f"{self.out}: {len(self.patches)} patch{'es' * (len(self.patches) > 1)} after {done} steps"
-            + (f", {self.facts['steps_per_s']:.2f} a second" if self.facts["steps_per_s"] else "")
+            + (f", {rate_text(self.facts['steps_per_s'])}" if self.facts["steps_per_s"] else "")
             + ("" if self.made else " (there already)")
         ]
         if self.facts["stopped"]:
             lines.append(f"ended early: {self.facts['stopped']}")
+        lines += self._achieved()
         if (
             self.facts["masking"] is not None
             and self.facts["masking"]["kept"] < 0.5 * self.facts["masking"]["promised"]
@@ -43,4 +47,24 @@ class AttackReport:
                 "the objective follows its gradient only in part: gradients are masked, so a stronger attack may exist "
                 "(see masking in attack.json)"
             )
+        lines.append(f"next: {self.next_command}")
         return "\n".join(lines)
+
+    @property
+    def next_command(self) -> str:
+        """The command that collects test pictures of the scene with the patches in it."""
+        town, _, scene = self.facts["data"][0]["scene"].partition("/")
+        is_ours = (data_dir("mjcf") / "towns" / f"{town}.xml").is_file()
+        words = ["gear", "collect", "--task", self.facts["task"], "--scene", scene, "--split", "test"]
+        where = ["--town", town if is_ours else "FILE"]
+        return shlex.join([*words, *where, "--patch", str(self.out)])
+
+    def _achieved(self) -> list[str]:
+        """The objective with these patches beside the objective with random ones."""
+        lines = []
+        for name, found in (self.facts.get("achieved") or {}).items():
+            if found is not None and None not in (found["random"], found["patch"]):
+                samples = f"{found['samples']:g} {name} {plural('sample', found['samples'])}"
+                values = f"{found['random']:.4g} with random patches, {found['patch']:.4g} with these"
+                lines.append(f"objective on {samples}: {values}")
+        return lines

@@ -33,6 +33,7 @@ from gear.values.errors import GearError, PluginError
 from gear.values.progress import Callbacks, Progress, Warn
 from gear.values.rng import derive_rng
 from gear.values.serial import Json
+from gear.verbs.attack.achieved import MOST_SAMPLES, compared, plain
 from gear.verbs.attack.folder import begin, read_patches, tidy
 from gear.verbs.attack.job import Job, resolve
 from gear.verbs.attack.models import FLAG, build_model
@@ -54,6 +55,7 @@ class _Made:
         settings: settings of the attack, completed by the task.
         seen: samples that were optimised on.
         objective: the objective that was maximised.
+        held, held_objective: validation samples and the objective on them.
         recorder: monitor of the attack.
         steps_done: number of steps.
     """
@@ -62,6 +64,8 @@ class _Made:
     settings: Any
     seen: Scenes
     objective: Objective
+    held: Scenes
+    held_objective: Objective
     recorder: Recorder
     steps_done: int
 
@@ -256,6 +260,8 @@ def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, o
         settings=settings,
         seen=seen,
         objective=objective,
+        held=held,
+        held_objective=held_objective,
         recorder=recorder,
         steps_done=done,
     )
@@ -287,9 +293,21 @@ def _facts(job: Job, network: Model, plan: Json, made: _Made) -> Json:
         "gradient": _gradient_facts(recorder.curves.get("gradient", [])),
         "masking": {"promised": promised, "kept": kept} if promised and np.isfinite([promised, kept]).all() else None,
         "patches": {patch.name: sha256(as_picture(patch).tobytes()) for patch in made.patches},
-        "curves": {name: [_plain(value) for value in curve] for name, curve in recorder.curves.items()},
-        "validation_harm": [[step, _plain(harm)] for step, harm in recorder.judged],
+        "curves": {name: [plain(value) for value in curve] for name, curve in recorder.curves.items()},
+        "achieved": None if job.spec.is_control else _achieved(job, network, made),
+        "validation_harm": [[step, plain(harm)] for step, harm in recorder.judged],
     }
+
+
+def _achieved(job: Job, network: Model, made: _Made) -> Json:
+    """The objective with random patches and with those of the attack, on training and on validation samples."""
+    found = {
+        "training": compared(made.seen, network, made.objective, made.patches, job.seed, MOST_SAMPLES),
+        "validation": None,
+    }
+    if job.validation:
+        found["validation"] = compared(made.held, network, made.held_objective, made.patches, job.seed)
+    return found
 
 
 def _gradient_facts(norms: Sequence[float]) -> Json:
@@ -297,7 +315,3 @@ def _gradient_facts(norms: Sequence[float]) -> Json:
     if not known:
         return None
     return {"least": min(known), "median": float(np.median(known)), "zero_steps": sum(value == 0 for value in known)}
-
-
-def _plain(value: float) -> float | None:
-    return float(f"{value:.6g}") if np.isfinite(value) else None

@@ -48,11 +48,14 @@ class Scenes:
             samples, [open_compositor(compositor, dataset, device=device, cache=cache) for dataset in datasets]
         )
 
-    def harm(self, model: Model, objective: Objective, patches: Sequence[Patch]) -> float:
-        """Mean of the objective over the samples, for patches without random transforms."""
+    def harm(
+        self, model: Model, objective: Objective, patches: Sequence[Patch], indexes: Sequence[int] | None = None
+    ) -> float:
+        """Mean of the objective over the samples, or over some of them, for patches without random transforms."""
+        chosen = range(len(self.samples)) if indexes is None else indexes
         tensors = [torch.from_numpy(patch.rgb.copy()).permute(2, 0, 1) for patch in patches]
         with torch.no_grad(), frozen(model):
-            values = [float(self.value(model, objective, tensors, [index])) for index in range(len(self.samples))]
+            values = [float(self.value(model, objective, tensors, [index])) for index in chosen]
         return float(np.mean(values))
 
     def value(self, model: Model, objective: Objective, patches: Sequence[Tensor], indexes: Sequence[int]) -> Tensor:

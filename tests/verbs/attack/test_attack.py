@@ -117,7 +117,14 @@ def test_a_patch_folder_is_whole(small: Small, install: Install, tmp_path: Path)
     assert cv2.imread(str(out / "figures" / "curves.png")).shape[0] > 100
     assert cv2.imread(str(out / "figures" / "samples.png")).shape == (2 * 160, 2 * 320, 3)
     assert not (out / CHECKPOINT).exists()
-    assert "4 steps" in report.summary()
+    achieved = notes["achieved"]["training"]
+    assert (
+        achieved["samples"] == 2 and achieved["patch"] > achieved["random"] and notes["achieved"]["validation"] is None
+    )
+    said = (
+        f"objective on 2 training samples: {achieved['random']:.4g} with random patches, {achieved['patch']:.4g} with"
+    )
+    assert "4 steps" in report.summary() and said in report.summary()
 
 
 def test_what_is_there_is_not_made_again(small: Small, install: Install, tmp_path: Path) -> None:
@@ -184,6 +191,9 @@ def test_the_best_on_validation_is_kept(small: Small, install: Install, tmp_path
         small(), model="tiny_segmenter", out=tmp_path, steps=6, settings=SMALL, val=small(split="val"), every=2
     )
     assert [step for step, _ in report.facts["validation_harm"]] == [2, 4, 6]
+    held_out = report.facts["achieved"]["validation"]
+    assert held_out["patch"] == max(harm for _, harm in report.facts["validation_harm"])
+    assert f"objective on {held_out['samples']} validation samples: " in report.summary()
 
 
 def test_patience_ends_it(tmp_path: Path) -> None:
@@ -400,7 +410,10 @@ def test_what_is_not_there_to_be_attacked_is_said(small: Small, install: Install
 def test_a_control_takes_no_steps(small: Small, install: Install, tmp_path: Path) -> None:
     report = attack(small(), model="tiny_segmenter", out=tmp_path, attack="control", settings=SMALL[:2])
     assert (report.facts["steps_done"], report.facts["steps_per_s"], report.facts["masking"]) == (0, None, None)
-    assert report.summary().splitlines() == [f"{tmp_path}: 1 patch after 0 steps"]
+    first, then = report.summary().splitlines()
+    assert first == f"{tmp_path}: 1 patch after 0 steps"
+    assert then == f"next: gear collect --task semseg --scene board --split test --town FILE --patch {tmp_path}"
+    assert report.facts["achieved"] is None
 
 
 def test_a_control_is_like_what_is_there_now(small: Small, install: Install, tmp_path: Path) -> None:

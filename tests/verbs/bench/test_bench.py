@@ -94,7 +94,7 @@ def _check_metrics(report: BenchReport) -> None:
 
 def _check_files(out: Path, report: BenchReport) -> None:
     assert sorted(path.name for path in out.iterdir()) == [
-        "bench.csv", "bench.json", "bench.yml", "data", "evaluations", "metrics", "patches", "report.html", "table.txt",
+        "bench.csv", "bench.json", "bench.yml", "data", "evaluations", "figures", "patches", "report.html", "table.txt",
     ]  # fmt: skip
     written: Any = json.loads((out / "bench.json").read_text())
     assert written == json.loads(json.dumps(report.as_json()))
