@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gear.contracts.attacks import Patch
+from gear.contracts.attacks import Objective, Patch
 from gear.contracts.models import Model
-from gear.contracts.attacks import Objective
 from gear.values.rng import derive_rng
 from gear.values.serial import Json
 from gear.verbs.attack.scenes import Scenes
