@@ -11,7 +11,7 @@ from pathlib import Path
 from gear.contracts.tasks import SplitInfo
 from gear.dataset.files import inside, write_whole
 from gear.dataset.layout import GEAR, plan_path
-from gear.dataset.sidecar import dump_json, load_json
+from gear.dataset.sealed_json import load_sealed, sealed_json
 from gear.values.errors import DatasetError, FieldError, OutdatedError, ReplaceableError
 from gear.values.serial import Json, from_json, to_json
 
@@ -27,6 +27,8 @@ class Plan:
         info: names for the format's index files.
         samples: how many frames the split has.
         auxiliary: kinds of further files that each sample owns: `probes`. Pictures and labels do not depend on them.
+        recipe: the collection's config without paths, from which a damaged file can be made again; None in datasets of
+            earlier versions. It decides no bytes beyond those that `content` decides.
     """
 
     task: dict[str, str]
@@ -36,6 +38,7 @@ class Plan:
     info: SplitInfo
     samples: int
     auxiliary: tuple[str, ...] = ()
+    recipe: Json = None
 
     @property
     def twin_key(self) -> str:
@@ -49,10 +52,11 @@ class Plan:
         return _digest(content | ({"auxiliary": list(self.auxiliary)} if self.auxiliary else {}))
 
     def as_json(self) -> Json:
-        """As written. Auxiliary files are only spoken of where there are any."""
+        """The content of its file. Entries of auxiliary files and of a recipe are only there where the plan has any."""
         content = to_json(self)
-        if not self.auxiliary:
-            del content["auxiliary"]
+        for name in ("auxiliary", "recipe"):
+            if not getattr(self, name):
+                del content[name]
         return content
 
 
@@ -67,7 +71,7 @@ def refuse_copy(root: Path, split: str) -> None:
         DatasetError: its plan, however old, is that of another split.
     """
     try:
-        there = load_json(inside(root, plan_path(split)))
+        there = load_sealed(inside(root, plan_path(split)))
     except DatasetError:  # gone or damaged
         return
     _refuse_copy(root, split, there)
@@ -91,7 +95,7 @@ def read_plan(root: Path, split: str) -> Plan | None:
     path = inside(root, plan_path(split))
     if not path.exists():
         return None
-    content = load_json(path)
+    content = load_sealed(path)
     _refuse_copy(root, split, content)
     try:
         plan: Plan = from_json(Plan, content, "plan")
@@ -144,8 +148,17 @@ def begin(root: Path, plan: Plan) -> None:
         raise ReplaceableError(
             root, f"split {split!r} was begun with {there.samples} samples, {plan.samples} were asked for"
         )
-    if there is None or there.samples != plan.samples:
-        write_whole(root, plan_path(split), dump_json(plan.as_json()))
+    if there is None or there.as_json() != plan.as_json():
+        write_plan(root, plan)
+
+
+def write_plan(root: Path, plan: Plan) -> None:
+    """Writes the plan of a split.
+
+    Raises:
+        DatasetError: the disk refuses.
+    """
+    write_whole(root, plan_path(plan.info.split), sealed_json(plan.as_json()))
 
 
 def differences(old: Json, new: Json, key: str = "") -> list[str]:
@@ -153,7 +166,7 @@ def differences(old: Json, new: Json, key: str = "") -> list[str]:
     if isinstance(old, dict) and isinstance(new, dict):
         found: list[str] = []
         for name in sorted(old.keys() | new.keys()):
-            if name in ("samples", "info") and not key:
+            if name in ("samples", "info", "recipe") and not key:
                 continue
             found += differences(old.get(name), new.get(name), f"{key}.{name}" if key else name)
         return found

@@ -19,9 +19,10 @@ import numpy as np
 
 from gear.camera.response import Encoding, Response
 from gear.contracts.tasks import Auxiliary, Sidecar
-from gear.dataset.files import inside, read_bytes
+from gear.dataset.files import inside
 from gear.dataset.layout import auxiliary_path, sidecar_path
-from gear.dataset.reading import Dataset
+from gear.dataset.reading import Dataset, check_hash
+from gear.dataset.sealed_json import REPAIR
 from gear.dataset.sidecar import no_sidecar
 from gear.formats.png import decode_plain
 from gear.values.errors import DatasetError, FieldError
@@ -153,9 +154,11 @@ def _read(dataset: Dataset[Any], sidecar: Sidecar, view: str, surface: str) -> P
         except (KeyError, FieldError) as error:
             raise no_sidecar(place, error) from error
         path = inside(dataset.root, file.path)
-        damaged = DatasetError(path, "is no probe; delete the sample's sidecar and run the same collection again")
+        damaged = DatasetError(path, f"is no probe; {REPAIR}")
         try:
-            picture = decode_plain(read_bytes(path))
+            picture = decode_plain(check_hash(dataset.root, file.path, sidecar.files[file.path]))
+        except KeyError as error:
+            raise no_sidecar(place, error) from error
         except ValueError as error:
             raise damaged from error
         if picture.dtype != np.uint16 or picture.ndim != 3:

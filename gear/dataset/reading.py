@@ -12,7 +12,8 @@ from gear.dataset.files import inside, read_bytes, sha256
 from gear.dataset.html_preview import preview_table
 from gear.dataset.layout import manifest_path, plan_path, sidecar_path
 from gear.dataset.plan import Plan
-from gear.dataset.sidecar import load_json, no_sidecar, read_sidecar
+from gear.dataset.sealed_json import REPAIR, DamagedError, load_sealed
+from gear.dataset.sidecar import no_sidecar, read_sidecar
 from gear.values.errors import DatasetError, FieldError
 from gear.values.serial import Json, from_json
 
@@ -62,6 +63,7 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
         if isinstance(index, slice):
             return [self[i] for i in range(*index.indices(len(self)))]
         sidecar = self.sidecar(index)
+        self._refuse_damaged(sidecar)
         try:
             return self.task.decode(self.root, sidecar, self.plan.info)
         except FieldError as error:  # facts are the task's own, which reads them with `from_json`
@@ -80,6 +82,17 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
         if not -len(self) <= index < len(self):
             raise IndexError(f"sample {index} of {len(self)}")
         return read_sidecar(inside(self.root, sidecar_path(self.plan.info.split, index % len(self))))
+
+    def _refuse_damaged(self, sidecar: Sidecar) -> None:
+        """Checks the files that a sample is decoded from against the hashes in its sidecar.
+
+        Raises:
+            DamagedError: one is missing, or is not the one that was written.
+        """
+        auxiliary = {file.path for file in sidecar.auxiliary.values()}
+        for relative, digest in sidecar.files.items():
+            if relative not in auxiliary:
+                check_hash(self.root, relative, digest)
 
     def named(self, what: str) -> str:
         """Name of the `renderer` or the `weather` that the manifest says it was made with.
@@ -122,6 +135,27 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
         return path.is_file() and sha256(read_bytes(path)) == digest
 
 
+def check_hash(root: Path, relative: str, digest: str) -> bytes:
+    """The bytes of a dataset's file, which must be those that were written.
+
+    Args:
+        root: of the dataset.
+        relative: path of the file in it.
+        digest: SHA-256 of the file as it was written.
+
+    Raises:
+        DamagedError: it is missing, or has other bytes.
+        DatasetError: it cannot be read, or lies outside the root.
+    """
+    path = inside(root, relative)
+    if not path.exists():
+        raise DamagedError(path, f"is gone; {REPAIR}")
+    data = read_bytes(path)
+    if sha256(data) != digest:
+        raise DamagedError(path, f"is damaged: its content does not match the sha256 in its sidecar; {REPAIR}")
+    return data
+
+
 def read_manifest(root: Path, plan: Plan) -> Json:
     """The manifest of a finished split.
 
@@ -134,7 +168,7 @@ def read_manifest(root: Path, plan: Plan) -> Json:
     finish = "run its `gear collect` again to complete it"
     if not path.exists():
         raise DatasetError(root, f"split {split!r} is not finished; {finish}")
-    manifest = load_json(path)
+    manifest = load_sealed(path)
     remedy = "delete it and run the same collection again"
     try:
         samples = manifest["samples"]

@@ -11,10 +11,13 @@ from typing import Any
 from gear.contracts.tasks import Auxiliary, Encoded, Sample, Sidecar, Task
 from gear.dataset.files import clear_scratch, inside, read_bytes, sha256, sync_folder, write_whole
 from gear.dataset.guarded_paths import owned, refuse_links, remove_empty_folders, remove_file, remove_files
+from gear.dataset.hashing import file_hash, in_threads
+from gear.dataset.json_text import dump_json, load_json
 from gear.dataset.layout import GEAR, begun_path, manifest_path, patch_path, plan_path, sidecar_path, split_folder
 from gear.dataset.locks import at_work, is_at_work, turn
 from gear.dataset.plan import Plan, begin, read_plan, refuse_copy, refuse_other_tasks
-from gear.dataset.sidecar import dump_json, load_json, no_sidecar, read_sidecar, sidecar_bytes
+from gear.dataset.sealed_json import REPAIR, DamagedError, load_sealed, sealed_json
+from gear.dataset.sidecar import no_sidecar, read_sidecar, sidecar_bytes
 from gear.values.errors import DatasetError, FieldError, ReplaceableError
 from gear.values.serial import Json
 
@@ -62,17 +65,17 @@ class Store:
             self._keep_patch(patch_path(self.plan.info.patch_label, name), data)
 
     def _refuse_changed(self) -> None:
-        """The manifest that is written at the end would take changed sidecars for collected ones."""
-        there = _load_if_whole(inside(self.root, manifest_path(self.split)))
+        """Refuses sidecars that were changed: the manifest that is written at the end would vouch for them."""
+        try:
+            there = load_sealed(inside(self.root, manifest_path(self.split)))
+        except DatasetError:  # missing, or damaged and written anew when the split is closed
+            return
         hashes = there.get("sidecars") if isinstance(there, dict) else None
         for relative, digest in hashes.items() if isinstance(hashes, dict) else ():
             path = inside(self.root, relative)
             if path.exists() and sha256(read_bytes(path)) != digest:
                 read_sidecar(path)  # says more of what cannot be true
-                problem = (
-                    "is not what the manifest says that was collected; delete it and run the same collection again"
-                )
-                raise DatasetError(path, problem)
+                raise DamagedError(path, f"is not what the manifest says that was collected; {REPAIR}")
 
     def _keep_patch(self, relative: str, data: bytes) -> None:
         """Copies a patch into the dataset, unless another split shows another one of the same name."""
@@ -155,6 +158,36 @@ class Store:
         there = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
         return [i for i in range(self.plan.samples) if f"{i:06d}.json" not in there]
 
+    def refuse_damaged(self) -> None:
+        """Checks all files of the samples that are there against the hashes in their sidecars.
+
+        A sample that lacks a file loses its sidecar, so that it is made again. A changed file is never overwritten
+        without being asked: somebody may have edited it.
+
+        Raises:
+            DamagedError: a file is not the one that was written.
+        """
+        missing = set(self.missing())
+        indices = [index for index in range(self.plan.samples) if index not in missing]
+        incomplete: list[str] = []
+        changed: list[str] = []
+        for index, (lacking, different) in zip(indices, in_threads(self._damage_of, indices), strict=True):
+            if lacking:
+                incomplete.append(sidecar_path(self.split, index))
+            changed += different
+        if changed:
+            more = f" (and {len(changed) - 1} more)" if len(changed) > 1 else ""
+            raise DamagedError(inside(self.root, changed[0]), f"is not as it was written{more}; {REPAIR}")
+        remove_files(self.root, incomplete)
+
+    def _damage_of(self, index: int) -> tuple[list[str], list[str]]:
+        """Files of a sample that are missing, and files that are not those that its sidecar names."""
+        path = inside(self.root, sidecar_path(self.split, index))
+        hashes = read_sidecar(path).files
+        lacking = [relative for relative in hashes if not inside(self.root, relative).is_file()]
+        there = hashes.keys() - set(lacking)
+        return lacking, sorted(name for name in there if file_hash(inside(self.root, name)) != hashes[name])
+
     def write(
         self, sample: Sample, encoded: Encoded, auxiliary: Mapping[str, tuple[Auxiliary, bytes]] | None = None
     ) -> None:
@@ -194,6 +227,12 @@ class Store:
     def _hashes_of_sidecars(self) -> dict[str, str]:
         paths = [sidecar_path(self.split, index) for index in range(self.plan.samples)]
         return {relative: sha256(read_bytes(inside(self.root, relative))) for relative in paths}
+
+    def _patches(self) -> dict[str, Json]:
+        """The manifest's entry of the copies of the patches; none where the split shows no patch."""
+        folder = inside(self.root, patch_path(self.plan.patch["label"], "patch_0.png")).parent
+        paths = [path for path in sorted(folder.glob("patch_*.png")) if path.is_file()]
+        return {"patches": {_relative(self.root, path): sha256(read_bytes(path)) for path in paths}} if paths else {}
 
     def close(self, task: Task[Any, Any], facts: Mapping[str, Json]) -> None:
         """Writes the format's index files and then the manifest; nothing where a run of more samples has begun since:
@@ -235,8 +274,9 @@ class Store:
             ],
             "indexes": indexes,
             "sidecars": self._hashes_of_sidecars(),
+            **self._patches(),
         }
-        data = dump_json(manifest)
+        data = sealed_json(manifest)
         target = inside(self.root, manifest_path(self.split))
         if not (target.exists() and target.read_bytes() == data):
             write_whole(self.root, manifest_path(self.split), data)
@@ -320,13 +360,13 @@ def remove_split(root: Path, split: str) -> None:
     samples = sorted(owned(root, f"{split_folder(split)}/samples").glob("*.json"))
     notes = sorted(owned(root, begun_path(split, "x")).parent.glob("*.json"))
     manifest = folder / "manifest.json"
-    listed = _load_if_whole(manifest)
+    listed = _load_if_json(manifest)
     doomed = [_relative(root, manifest), *_files_named(listed)]
     for path in samples:
-        doomed += [_relative(root, path), *_files_named(_load_if_whole(path))]
+        doomed += [_relative(root, path), *_files_named(_load_if_json(path))]
     doomed += _files_of_samples(listed)
     for path in notes:
-        doomed += [*_files_named(_load_if_whole(path)), _relative(root, path)]
+        doomed += [*_files_named(_load_if_json(path)), _relative(root, path)]
     label = _patch_label(root, split)
     copies = owned(root, patch_path(label or "none", "patch_0.png")).parent
     remove_files(root, [*doomed, plan_path(split)])
@@ -353,8 +393,8 @@ def _files_of_samples(there: Json) -> list[str]:
     return [name for one in (samples if isinstance(samples, list) else ()) for name in _names(one, "files")]
 
 
-def _load_if_whole(path: Path) -> Json:
-    """What a JSON file says; None where it is gone or damaged."""
+def _load_if_json(path: Path) -> Json:
+    """The content of a JSON file; None where it is missing or no JSON."""
     try:
         return load_json(path)
     except DatasetError:

@@ -25,7 +25,7 @@ from gear.values.rig import CameraMount
 from gear.values.scene import SceneRecord, Vec3
 from gear.values.serial import Json
 
-REPAIR = "delete its sample's sidecar (gear/<split>/samples/<number>.json) and run the same collection again"
+REPAIR = "`gear verify DIR --repair` makes it again"
 """What to do about a file that is gone or damaged."""
 
 

@@ -1,0 +1,72 @@
+"""JSON text as gear writes and reads it: finite numbers and whole characters only."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from pathlib import Path
+
+from gear.dataset.files import read_bytes
+from gear.values.errors import DatasetError
+from gear.values.serial import Json
+
+
+def dump_json(value: Json) -> bytes:
+    """JSON as gear writes it: one key a line, keys in the order given, a newline at the end."""
+    return (json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+def load_json(path: Path) -> Json:
+    """Reads a JSON file.
+
+    Raises:
+        DatasetError: it is missing or not JSON, as `parse_json` has it.
+    """
+    data = read_bytes(path)
+    try:
+        return parse_json(data)
+    except (ValueError, RecursionError) as error:  # brackets in brackets, too
+        raise DatasetError(path, f"is not JSON ({error}); delete it and run the same collection again") from error
+
+
+def parse_json(data: bytes | str) -> Json:
+    """The value of a JSON text.
+
+    Raises:
+        ValueError, RecursionError: it is no JSON, or holds what `dump_json` never writes: numbers that are not finite,
+            or half characters (lone surrogates), which cannot be printed, drawn or used in names of files.
+    """
+    value = json.loads(data, parse_constant=_no_number, parse_float=_number, parse_int=_integer)
+    text = data if isinstance(data, str) else data.decode("latin-1")
+    if "\\ud" in text or "\\uD" in text:
+        json.dumps(value, ensure_ascii=False).encode()
+    return value
+
+
+def _no_number(word: str) -> Json:
+    """Refuses the words for numbers that Python's reader accepts beyond JSON.
+
+    Raises:
+        ValueError: always.
+    """
+    raise ValueError(f"{word} is no number of JSON")
+
+
+def _number(text: str) -> float:
+    """Raises:
+    ValueError: the number is too large for a float, and would be infinite.
+    """
+    value = float(text)
+    if math.isinf(value):
+        raise ValueError(f"{text[:20]} is too large a number")
+    return value
+
+
+def _integer(text: str) -> int:
+    """Raises:
+    ValueError: the number is too large to be combined with floats.
+    """
+    if len(text) > sys.float_info.max_10_exp:
+        raise ValueError(f"{text[:20]}… is too large a number")
+    return int(text)

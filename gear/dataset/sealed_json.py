@@ -1,0 +1,68 @@
+"""JSON files that carry the SHA-256 of their own content, so that a single changed byte is noticed.
+
+The last entry of a sealed file is `"sha256"`: the digest of the file as it would be without that entry. Files without a
+seal are accepted: earlier versions of gear wrote none, and other programs that rewrite a file drop its layout.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+from gear.dataset.files import read_bytes
+from gear.dataset.json_text import dump_json, parse_json
+from gear.values.errors import DatasetError
+from gear.values.serial import Json
+
+SEAL = "sha256"
+HEAD, TAIL, END = b',\n "sha256": "', b'"\n}\n', b"\n}\n"
+DIGITS = 64
+LENGTH = len(HEAD) + DIGITS + len(TAIL)
+
+MOST_CHANGED = 4
+"""A seal of which so many characters have changed is still recognised, as a damaged one."""
+
+REPAIR = "`gear verify DIR --repair` makes it again"
+
+
+class DamagedError(DatasetError):
+    """A file whose bytes are not those that gear wrote."""
+
+
+def sealed_json(content: dict[str, Json]) -> bytes:
+    """The bytes of a JSON object with its seal."""
+    body = dump_json(content)
+    return body[: -len(END)] + HEAD + hashlib.sha256(body).hexdigest().encode() + TAIL
+
+
+def load_sealed(path: Path) -> Json:
+    """Reads a sidecar, a plan or a manifest, and checks its seal where it has one.
+
+    Returns:
+        The content without the seal.
+
+    Raises:
+        DamagedError: it does not match its seal, or is no JSON.
+        DatasetError: it cannot be read.
+    """
+    data = read_bytes(path)
+    if not is_whole(data):
+        raise DamagedError(path, f"is damaged: its content does not match its own sha256; {REPAIR}")
+    try:
+        content = parse_json(data)
+    except (ValueError, RecursionError) as error:  # brackets in brackets, too
+        problem = f"is not JSON ({error}); {REPAIR}, or delete it and run the same collection again"
+        raise DamagedError(path, problem) from error
+    if isinstance(content, dict):
+        content.pop(SEAL, None)
+    return content
+
+
+def is_whole(data: bytes) -> bool:
+    """Whether a file matches its seal; true of files that have none."""
+    seal = data[-LENGTH:]
+    frame, wanted = seal[: len(HEAD)] + seal[-len(TAIL) :], HEAD + TAIL
+    if len(seal) < LENGTH or sum(one != other for one, other in zip(frame, wanted, strict=True)) > MOST_CHANGED:
+        return True
+    body = data[:-LENGTH] + END
+    return seal == HEAD + hashlib.sha256(body).hexdigest().encode() + TAIL
