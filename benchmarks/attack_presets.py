@@ -19,7 +19,7 @@ from pathlib import Path
 
 import gear
 from gear.contracts.specs import TaskSpec
-from gear.dataset.sidecar import load_json
+from gear.dataset.json_text import load_json
 from gear.plugins.build import find
 
 ATTACKS = ["scene_specific", "carla_gear"]

@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from gear.verbs.towns.facts import Town, read_town, towns
     from gear.verbs.towns.write import TownReport, write_town
     from gear.verbs.train.run import TrainReport, train
+    from gear.verbs.verify.report import VerifyReport
+    from gear.verbs.verify.run import verify
     from gear.verbs.weights.average import average_weights
     from gear.verbs.weights.convert import ConvertReport, convert_weights
     from gear.view.write import ViewReport, write_view
@@ -55,6 +57,7 @@ __all__ = [
     "TownReport",
     "TrainReport",
     "Twins",
+    "VerifyReport",
     "ViewReport",
     "attack",
     "average_weights",
@@ -73,6 +76,7 @@ __all__ = [
     "sheet",
     "towns",
     "train",
+    "verify",
     "write_town",
     "write_view",
 ]
@@ -93,6 +97,7 @@ _HOME = {
     "TownReport": "gear.verbs.towns.write",
     "TrainReport": "gear.verbs.train.run",
     "Twins": "gear.plugins.datasets",
+    "VerifyReport": "gear.verbs.verify.report",
     "ViewReport": "gear.view.write",
     "attack": "gear.verbs.attack.run",
     "bench": "gear.verbs.bench.run",
@@ -111,6 +116,7 @@ _HOME = {
     "sheet": "gear.verbs.sheet",
     "towns": "gear.verbs.towns.facts",
     "train": "gear.verbs.train.run",
+    "verify": "gear.verbs.verify.run",
     "write_town": "gear.verbs.towns.write",
     "write_view": "gear.view.write",
 }

@@ -116,6 +116,7 @@ def resolve(config: CollectionConfig) -> Job:
         info=info,
         samples=split.samples * split.frames,
         auxiliary=("probes",) if config.probes else (),
+        recipe=recipe_of(config),
     )
     return Job(
         config=config,
@@ -128,6 +129,14 @@ def resolve(config: CollectionConfig) -> Job:
         renderer=renderer,
         task_notes=task_notes,
     )
+
+
+def recipe_of(config: CollectionConfig) -> Json:
+    """A collection's config without what belongs to one machine: its paths."""
+    recipe: Json = to_plain(config)
+    for name in ("root", "patch", "town", "scenes", "simulation", *(() if config.probes else ("probes",))):
+        recipe.pop(name)
+    return recipe
 
 
 def _scene_content(scene: SceneSpec) -> Json:

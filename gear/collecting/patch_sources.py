@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.contracts.tasks import NO_PATCH, RANDOM_PATCH
-from gear.dataset.sidecar import load_json
+from gear.dataset.json_text import load_json
 from gear.formats.picture_size import check_size
 from gear.formats.png_chunks import check_chunks
 from gear.networks.shipped import shipped_patches

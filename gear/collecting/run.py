@@ -6,13 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from gear.collecting.forecast import Forecast
 from gear.collecting.job import Job
 from gear.collecting.pipeline import collect_samples
 from gear.collecting.session import open_session
-from gear.config.dump import to_plain
 from gear.dataset.executors.executor import Done, Executor, InThisProcess
 from gear.dataset.executors.processes import Processes
 from gear.dataset.store import Store
@@ -71,6 +69,7 @@ def run_job(
     store = Store(job.root, job.plan)
     plugin = find("task", job.config.task)
     with store.begun(job.patch.files, force=force):
+        store.refuse_damaged()
         made = _collect_missing(job, store, executor or InThisProcess(), callbacks or Callbacks())
         task = build(plugin, job.config.options)
         with blamed(plugin, "finalise"):
@@ -104,9 +103,6 @@ def _make_samples(job: Job, indices: Iterator[int], done: Done) -> None:
 
 def manifest_facts(job: Job) -> dict[str, Json]:
     """The facts of the manifest beside hashes; none depends on paths of the machine, the clock or the workers."""
-    config: dict[str, Any] = to_plain(job.config)
-    for name in ("root", "patch", "town", "scenes", "simulation", *(() if job.config.probes else ("probes",))):
-        config.pop(name)
     return {
         "task": dict(job.plan.task),
         "options": job.plan.options,
@@ -118,5 +114,5 @@ def manifest_facts(job: Job) -> dict[str, Json]:
         "scene": job.plan.content["scene"],
         "weather": to_json(job.weather),
         "assets": job.plan.content["assets"],
-        "config": config,
+        "config": job.plan.recipe,
     }

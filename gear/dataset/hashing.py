@@ -16,7 +16,8 @@ PIECE_BYTES = 1 << 20
 MOST_THREADS = 8
 """Beyond that the disk decides: `hashlib` releases Python's lock, so threads hash side by side."""
 
-S, T = TypeVar("S"), TypeVar("T")
+S = TypeVar("S")
+T = TypeVar("T")
 
 
 def file_hash(path: Path) -> str:

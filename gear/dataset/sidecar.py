@@ -5,15 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from gear.contracts.tasks import Auxiliary, Sidecar
-from gear.dataset.json_text import dump_json, load_json
 from gear.dataset.sealed_json import REPAIR, load_sealed, sealed_json
 from gear.dataset.sidecar_validation import check_numbers, check_sidecar
 from gear.values.errors import DatasetError, FieldError
 from gear.values.ground_truth import SurfaceTruth
 from gear.values.scene import SceneRecord
 from gear.values.serial import from_json, to_json
-
-__all__ = ["dump_json", "load_json", "no_sidecar", "read_sidecar", "sidecar_bytes"]
 
 
 def sidecar_bytes(sidecar: Sidecar) -> bytes:

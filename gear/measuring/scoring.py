@@ -11,9 +11,9 @@ from typing import Any
 from gear.contracts.evaluation import KeepsPredictions, Maskable
 from gear.contracts.tasks import Sample
 from gear.dataset.files import explained, inside, read_bytes, sha256, write_whole
+from gear.dataset.json_text import dump_json, load_json
 from gear.dataset.output_checks import check_encoded
 from gear.dataset.reading import Dataset
-from gear.dataset.sidecar import dump_json, load_json
 from gear.measuring.guarded_model import Answer, plugin_error
 from gear.measuring.metric_json import known_json
 from gear.measuring.patch_area import MASK_METRICS, mask_metrics, patch_masks, widened

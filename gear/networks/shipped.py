@@ -10,7 +10,7 @@ from pathlib import Path
 
 from safetensors import SafetensorError, safe_open
 
-from gear.dataset.sidecar import parse_json
+from gear.dataset.json_text import parse_json
 from gear.networks.options import NONE, SHIPPED
 from gear.values.entry_points import installed_entry_points
 from gear.values.errors import GearError

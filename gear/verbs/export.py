@@ -6,9 +6,10 @@ import contextlib
 from collections.abc import Iterable
 from pathlib import Path
 
-from gear.dataset.files import explained, inside, read_bytes, sync_folder, write_whole
+from gear.dataset.files import explained, read_bytes, sync_folder, write_whole
 from gear.dataset.guarded_paths import owned, remove_empty_folders, remove_files, remove_tree
 from gear.dataset.locks import alone_at_work
+from gear.dataset.reading import check_hash
 from gear.dataset.store import check_output, plan_of, splits_of
 from gear.formats.exports import SplitRecords, layouts
 from gear.plugins.datasets import open_dataset
@@ -49,6 +50,7 @@ def export(
         raise UnknownNameError("layout", layout, known)
     source, target = Path(dataset), Path(out).resolve()
     splits: list[SplitRecords] = []
+    hashes: dict[str, str] = {}
     for name in splits_of(source):
         plan = plan_of(source, name)
         if plan.task["name"] != known[layout].task:
@@ -56,10 +58,13 @@ def export(
                 source, f"is a {plan.task['name']} dataset; the layout {layout!r} is for {known[layout].task}"
             )
         opened = open_dataset(source, name)
-        records = tuple(opened.sidecar(i).record for i in range(len(opened)))
+        sidecars = [opened.sidecar(index) for index in range(len(opened))]
+        records = tuple(sidecar.record for sidecar in sidecars)
+        for sidecar in sidecars:
+            hashes |= sidecar.files
         splits.append(SplitRecords(info=plan.info, records=records))
     _check_target(target)
-    tree = known[layout].tree(splits, lambda path: read_bytes(inside(source, path)))
+    tree = known[layout].tree(splits, lambda path: check_hash(source, path, hashes.get(path, "")))
     unfinished = owned(target.parent, f".{target.name}{UNFINISHED}")
     check_output(unfinished, "delete it, or use another --out")
     with alone_at_work(unfinished):

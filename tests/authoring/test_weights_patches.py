@@ -30,7 +30,7 @@ from gear.config.nodes import parse_file
 from gear.config.reader import read_node
 from gear.contracts.hookspecs import hookimpl
 from gear.dataset.files import write_alone
-from gear.dataset.sidecar import dump_json
+from gear.dataset.json_text import dump_json
 from gear.measuring.gap.picture_gap import PictureGap
 from gear.measuring.gap.report import GapReport, SampleGap
 from gear.plugins import build as building

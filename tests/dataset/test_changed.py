@@ -35,7 +35,7 @@ def test_a_sidecar_that_was_edited_is_not_collected_over(tmp_path: Path) -> None
     assert open_dataset(tmp_path).verify() == [SIDECAR]
     edited = tree(tmp_path)
     for samples in (3, 4):
-        with pytest.raises(DatasetError, match=rf"{SIDECAR}: is not what the manifest says .*; delete it and run"):
+        with pytest.raises(DatasetError, match=rf"{SIDECAR}: is damaged: .*; `gear verify DIR --repair`"):
             Store(tmp_path, plan(samples=samples)).open({})
     assert tree(tmp_path) == edited
     (tmp_path / SIDECAR).unlink()
@@ -43,9 +43,19 @@ def test_a_sidecar_that_was_edited_is_not_collected_over(tmp_path: Path) -> None
     assert tree(tmp_path) == whole and open_dataset(tmp_path).verify() == []
 
 
+def test_a_sidecar_that_another_program_has_rewritten_is_not_collected_over(tmp_path: Path) -> None:
+    fill(tmp_path, plan())
+    sidecar = json.loads((tmp_path / SIDECAR).read_text(encoding="utf-8"))
+    (tmp_path / SIDECAR).write_text(json.dumps(sidecar), encoding="utf-8")
+    with pytest.raises(DatasetError, match=rf"{SIDECAR}: is not what the manifest says .*; `gear verify DIR --repair`"):
+        Store(tmp_path, plan()).open({})
+
+
 def test_a_damaged_sidecar_is_told_before_more_is_collected(tmp_path: Path) -> None:
     fill(tmp_path, plan())
-    edit(tmp_path / SIDECAR, '"seed": 5', '"seed": "five"')
+    sidecar = json.loads((tmp_path / SIDECAR).read_text(encoding="utf-8"))
+    sidecar["record"]["seed"] = "five"
+    (tmp_path / SIDECAR).write_text(json.dumps(sidecar), encoding="utf-8")
     with pytest.raises(DatasetError, match=r"000001.json: is not a sidecar .*record.seed: expected int, got 'five'"):
         Store(tmp_path, plan()).open({})
 

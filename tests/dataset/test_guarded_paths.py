@@ -31,6 +31,7 @@ ALLOWED = {
     "plugins/probe_process.py": {"open"},  # a temporary file of the parent process
     "verbs/export.py": {"replace"},  # of the whole tree into its place
     "verbs/scaffold/write.py": {"rename", "rmtree", "write_text"},  # of a folder that it has just made
+    "verbs/verify/recipe.py": {"write_bytes"},  # into a temporary folder
     "world/compilation/world_cache.py": {"rename", "rmtree", "unlink", "open"},  # gear's own cache
     "world/compilation/mjb.py": {"open"},  # likewise
     "world/compilation/compiled_world.py": {"write_text"},  # into a temporary folder

@@ -23,13 +23,13 @@ from tests.dataset.test_store import fill, plan, tree
 def test_replacing_a_split_reads_each_of_its_files_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The manifest of a hundred thousand samples is the longest of them."""
     fill(tmp_path, plan())
-    read, load = list[Path](), store.load_sealed
+    read, load = list[Path](), store.load_json
 
     def counted(path: Path) -> object:
         read.append(path)
         return load(path)
 
-    monkeypatch.setattr(store, "load_sealed", counted)
+    monkeypatch.setattr(store, "load_json", counted)
     remove_split(tmp_path, "test")
     assert sorted(path.name for path in read) == ["000000.json", "000001.json", "000002.json", "manifest.json"]
     assert not tree(tmp_path)

@@ -13,8 +13,9 @@ import pytest
 
 from gear.config.nodes import parse_text
 from gear.contracts.tasks import SplitInfo
+from gear.dataset.json_text import load_json
 from gear.dataset.plan import Plan
-from gear.dataset.sidecar import load_json, read_sidecar
+from gear.dataset.sidecar import read_sidecar
 from gear.dataset.store import Store
 from gear.plugins.build import build_task
 from gear.plugins.datasets import open_dataset

@@ -16,9 +16,10 @@ import pytest
 
 from gear.contracts.tasks import Encoded, Sample, Sidecar, SplitInfo
 from gear.dataset.files import write_whole
+from gear.dataset.json_text import dump_json
 from gear.dataset.layout import manifest_path, sidecar_path
 from gear.dataset.reading import Dataset
-from gear.dataset.sidecar import dump_json, sidecar_bytes
+from gear.dataset.sidecar import sidecar_bytes
 from gear.plugins.datasets import open_dataset
 from gear.values.frames import Frame, UInt8Image
 from gear.values.rig import CameraMount, Rig

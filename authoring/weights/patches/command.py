@@ -16,7 +16,7 @@ from authoring.weights.patches.run import Gear, Told, gear_process, make_patch, 
 from authoring.weights.patches.summary import table
 from authoring.weights.plan import TOWNS, TRAINING_OPTIONS
 from gear.dataset.files import write_alone
-from gear.dataset.sidecar import dump_json
+from gear.dataset.json_text import dump_json
 from gear.networks.options import SHIPPED
 from gear.values.errors import GearError
 from gear.values.serial import Json

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from authoring.weights.patches.plan import EFFECT, OUTSIDE, TASK, PatchPlan
-from gear.dataset.sidecar import load_json
+from gear.dataset.json_text import load_json
 from gear.values.serial import Json
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from gear.dataset.files import write_alone
-from gear.dataset.sidecar import dump_json
+from gear.dataset.json_text import dump_json
 from gear.networks.shipped import CHECKOUT
 from gear.values.serial import Json
 

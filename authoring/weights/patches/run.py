@@ -13,7 +13,7 @@ from authoring.weights.patches.effect import read_again, read_effect
 from authoring.weights.patches.install import PATCHES
 from authoring.weights.patches.plan import PatchPlan
 from gear.dataset.files import sha256, write_alone
-from gear.dataset.sidecar import dump_json, load_json
+from gear.dataset.json_text import dump_json, load_json
 from gear.networks.options import SHIPPED
 from gear.networks.shipped import resolve
 from gear.plugins.build import find

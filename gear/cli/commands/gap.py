@@ -71,7 +71,7 @@ def add_places(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Compares the pictures and prints the table."""
     from gear.cli.requests import guard_of, request_of
-    from gear.dataset.sidecar import dump_json
+    from gear.dataset.json_text import dump_json
     from gear.measuring.gap.request import GapRequest
     from gear.measuring.gap.run import measure_gap
     from gear.reporting.display import Display

@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Writes the page and prints its path."""
+    """Writes the page and prints its path; the exit code is 1 when samples could not be shown."""
     from gear.reporting.display import Display
     from gear.view.write import write_view
 
@@ -54,4 +54,4 @@ def run(args: argparse.Namespace) -> int:
             on_progress=display.callbacks.on_progress,
         )
     print(report.summary())
-    return 0
+    return 1 if report.problems else 0

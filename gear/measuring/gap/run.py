@@ -14,9 +14,9 @@ import numpy as np
 
 from gear.collecting.patch_sources import digest_of, read_patch
 from gear.dataset.files import clear_scratch, explained, inside, write_whole
+from gear.dataset.json_text import dump_json
 from gear.dataset.layout import patch_path
 from gear.dataset.reading import Dataset, Twins, pair_twins
-from gear.dataset.sidecar import dump_json
 from gear.dataset.store import check_output
 from gear.measuring.gap.effect import RENDERED, Effect
 from gear.measuring.gap.picture_gap import picture_gap, visible_mask

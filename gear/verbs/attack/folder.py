@@ -14,8 +14,8 @@ from gear.collecting.patch_sources import read_patch
 from gear.contracts.attacks import Patch, surface_of
 from gear.dataset.files import clear_scratch, read_bytes, sha256, write_whole
 from gear.dataset.guarded_paths import remove_files, remove_tree
+from gear.dataset.json_text import dump_json
 from gear.dataset.plan import differences
-from gear.dataset.sidecar import dump_json
 from gear.dataset.store import check_output
 from gear.measuring.patch_checks import is_picture
 from gear.values.errors import DatasetError, FieldError, OutdatedError, ReplaceableError

@@ -14,8 +14,8 @@ from gear.config.reader import read_node
 from gear.contracts.attacks import WithInputFiles
 from gear.contracts.specs import AttackSpec
 from gear.dataset.files import sha256
+from gear.dataset.json_text import dump_json
 from gear.dataset.reading import Dataset, scenes_of
-from gear.dataset.sidecar import dump_json
 from gear.dataset.store import plan_of, splits_of
 from gear.measuring.guard import OpenedGuard, open_guard
 from gear.measuring.plugin_selection import Chosen

@@ -12,7 +12,7 @@ from safetensors.numpy import save as to_bytes
 
 from gear.contracts.attacks import Patch
 from gear.dataset.files import write_whole
-from gear.dataset.sidecar import dump_json
+from gear.dataset.json_text import dump_json
 from gear.formats.png import encode_rgb
 from gear.values.frames import UInt8Image
 from gear.values.serial import Json

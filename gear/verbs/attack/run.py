@@ -18,8 +18,8 @@ from gear.config.dump import to_plain
 from gear.contracts.attacks import Budget, Objective, Patch, WithObjective, WithTaskOptions
 from gear.contracts.models import Model
 from gear.dataset.files import sha256
+from gear.dataset.json_text import dump_json
 from gear.dataset.locks import alone_at_work
-from gear.dataset.sidecar import dump_json
 from gear.measuring.guard import Guard
 from gear.measuring.guarded_model import weights_digest
 from gear.measuring.patch_checks import check_patches

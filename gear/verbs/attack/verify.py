@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from gear.dataset.json_text import load_json
 from gear.dataset.reading import scenes_of
-from gear.dataset.sidecar import load_json
 from gear.measuring.gap.report import GapReport
 from gear.measuring.gap.request import GapRequest
 from gear.measuring.gap.run import measure_gap

@@ -18,7 +18,7 @@ from gear.config.reader import read_node
 from gear.contracts.specs import AttackSpec
 from gear.dataset.files import clear_scratch, explained, write_whole
 from gear.dataset.guarded_paths import remove_tree
-from gear.dataset.sidecar import dump_json
+from gear.dataset.json_text import dump_json
 from gear.dataset.store import check_output
 from gear.measuring.plugin_selection import check_optics
 from gear.reporting.display import displayed

@@ -14,8 +14,8 @@ import numpy as np
 from gear.contracts.defenses import DefenseResult
 from gear.contracts.specs import DefenseSpec
 from gear.dataset.files import inside, read_bytes, sha256, write_whole
+from gear.dataset.json_text import dump_json, load_json
 from gear.dataset.reading import Dataset
-from gear.dataset.sidecar import dump_json, load_json
 from gear.formats.png import encode_labels
 from gear.values.errors import DatasetError, FieldError
 from gear.values.serial import from_json, to_json

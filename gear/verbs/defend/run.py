@@ -12,7 +12,7 @@ from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
 from gear.contracts.specs import DefenseSpec
 from gear.dataset.files import clear_scratch, explained, inside, write_whole
-from gear.dataset.sidecar import dump_json, load_json
+from gear.dataset.json_text import dump_json, load_json
 from gear.dataset.store import check_output
 from gear.measuring.checked_defense import CheckedDefense
 from gear.plugins.build import NO_OPTIONS, build, find

@@ -11,10 +11,10 @@ from typing import Any
 
 from gear.config.dump import to_plain
 from gear.dataset.files import clear_scratch, inside, write_whole
+from gear.dataset.json_text import dump_json, load_json
 from gear.dataset.locks import alone_at_work
 from gear.dataset.plan import differences
 from gear.dataset.reading import Dataset
-from gear.dataset.sidecar import dump_json, load_json
 from gear.dataset.store import check_output
 from gear.measuring.dataset_run import evaluate_row
 from gear.measuring.guard import Guard, open_guard

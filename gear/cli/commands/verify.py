@@ -1,0 +1,46 @@
+"""`gear verify`."""
+
+from __future__ import annotations
+
+import argparse
+
+EXAMPLE = """examples:
+  gear verify data/semseg/town10-billboard01-ClearNoon/none
+  gear verify data/twin --repair
+  gear verify data/twin --json > report.json
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the command's flags."""
+    parser.epilog = EXAMPLE
+    parser.add_argument("dataset", help="root of a dataset")
+    parser.add_argument("--split", help="split to check (all)")
+    parser.add_argument("--repair", action="store_true", help="make again what is damaged or missing")
+    parser.add_argument("--json", action="store_true", help="print the report as JSON")
+    parser.add_argument("--patch", help="patch that the dataset shows, where its own copy is damaged")
+    parser.add_argument("--town", metavar="FILE", help="MJCF file of a town that is none of gear's own")
+    parser.add_argument("--scenes", metavar="FILE", help="scene library of that town")
+    parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes that make samples again (1)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Prints one line for each file that is not as it was written; the exit code is 1 when there are any."""
+    import json
+
+    from gear.reporting.display import Display
+    from gear.verbs.verify.run import verify
+
+    with Display("verify") as display:
+        report = verify(
+            args.dataset,
+            split=args.split,
+            repair=args.repair,
+            patch=args.patch,
+            town=args.town,
+            scenes=args.scenes,
+            workers=max(args.workers, 1),
+            on_progress=display.callbacks.on_progress,
+        )
+    print(json.dumps(report.as_json(), indent=1) if args.json else "\n".join(report.lines()))
+    return 0 if report.is_whole else 1

@@ -1,0 +1,236 @@
+"""Checks every file that gear wrote into a dataset: is it there, and are its bytes those that were written?
+
+Every byte is covered: pictures, labels and probes by the hashes in their sample's sidecar; sidecars, indexes and
+patches by those in the manifest; sidecars, manifest and plan by their own seals (`gear.dataset.sealed_json`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from gear.dataset.files import inside
+from gear.dataset.hashing import file_hash, in_threads
+from gear.dataset.layout import GEAR, manifest_path, patch_path, plan_path, sidecar_path, split_folder
+from gear.dataset.plan import Plan, read_plan
+from gear.dataset.scratch import SCRATCH
+from gear.dataset.sealed_json import load_sealed
+from gear.dataset.sidecar import read_sidecar
+from gear.values.errors import DatasetError
+from gear.values.progress import Progress
+from gear.values.serial import Json
+
+Problem = Literal["damaged", "missing", "unexpected"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, order=True)
+class Finding:
+    """One file that is not as it should be.
+
+    Attributes:
+        path: relative to the dataset's root.
+        problem: `damaged`: other bytes than were written; `missing`; `unexpected`: not of the dataset, in a folder that
+            readers of the format list.
+        detail: more, for a person.
+    """
+
+    path: str
+    problem: Problem
+    detail: str = ""
+
+    def line(self) -> str:
+        """One line for a person."""
+        return f"{self.problem:<10} {self.path}" + f" ({self.detail})" * bool(self.detail)
+
+
+@dataclass(slots=True, kw_only=True)
+class SplitCheck:
+    """What a check of one split found.
+
+    Attributes:
+        split: its name.
+        plan: its plan; None where that is missing or damaged.
+        manifest: its manifest; None where that is missing or damaged.
+        samples: how many samples it should hold.
+        broken_samples: indices of samples of which a file or the sidecar is missing or damaged.
+        known: paths of all files that belong to the split.
+        findings: the files that are not as they should be.
+    """
+
+    split: str
+    plan: Plan | None = None
+    manifest: Json = None
+    samples: int = 0
+    broken_samples: set[int] = field(default_factory=set)
+    known: set[str] = field(default_factory=set)
+    findings: list[Finding] = field(default_factory=list)
+
+    def found(self, path: str, problem: Problem, detail: str = "") -> None:
+        """Notes a file that is not as it should be."""
+        self.findings.append(Finding(path=path, problem=problem, detail=detail))
+
+
+def splits_in(root: Path) -> list[str]:
+    """Names of the splits of a dataset, also of those whose plan is missing.
+
+    Raises:
+        DatasetError: there is none.
+    """
+    entries = [*root.glob(f"{GEAR}/*/plan.json"), *root.glob(f"{GEAR}/*/manifest.json")]
+    names = {path.parent.name for path in entries} | {path.parent.name for path in root.glob(f"{GEAR}/*/samples")}
+    if not names:
+        raise DatasetError(root, "is not a dataset of gear's (it has no gear/<split>/plan.json)")
+    return sorted(names)
+
+
+def check_split(root: Path, split: str, on_progress: Progress | None = None) -> SplitCheck:
+    """Checks all files of one split.
+
+    Args:
+        root: of the dataset.
+        split: its name.
+        on_progress: called with (samples checked, samples) after every sample.
+
+    Raises:
+        DatasetError: a file cannot be read, lies outside the root, or the split is a copy of another one.
+    """
+    check = SplitCheck(split=split)
+    _check_plan(root, check)
+    _check_manifest(root, check)
+    _check_samples(root, check, on_progress)
+    if isinstance(check.manifest, dict):
+        _check_listed(root, check, check.manifest.get("indexes"))
+        _check_listed(root, check, check.manifest.get("patches"))
+    label = check.plan.patch["label"] if check.plan is not None else ""
+    check.known |= {
+        _relative(root, path) for path in inside(root, patch_path(label or "none", "x")).parent.glob("*.png")
+    }
+    return check
+
+
+def unexpected_files(root: Path, checks: Iterable[SplitCheck]) -> list[Finding]:
+    """Files that belong to no split, in the folders that hold files of splits; hidden ones are left out.
+
+    Files in the root itself, and folders of which gear wrote nothing, are the user's own. Where a manifest is missing
+    or damaged, it is not known which index files belong to its split, and only leftovers are reported.
+    """
+    checks = list(checks)
+    known = {path for check in checks for path in check.known}
+    folders = {str(Path(path).parent) for path in known} | {split_folder(check.split) for check in checks}
+    found = []
+    is_known = all(check.manifest is not None for check in checks)
+    for folder in sorted(folders - {".", GEAR}) if is_known else ():
+        place = inside(root, folder)
+        for path in sorted(place.iterdir()) if place.is_dir() else ():
+            relative = _relative(root, path)
+            if relative not in known and not path.name.startswith(".") and not path.is_dir():
+                found.append(Finding(path=relative, problem="unexpected"))
+    leftovers = [path for check in checks for path in inside(root, f"{split_folder(check.split)}/begun").glob("*.json")]
+    leftovers += inside(root, SCRATCH).glob("*")
+    found += [
+        Finding(path=_relative(root, path), problem="unexpected", detail="left by a run that was stopped")
+        for path in sorted(leftovers)
+    ]
+    return found
+
+
+def _check_plan(root: Path, check: SplitCheck) -> None:
+    relative = plan_path(check.split)
+    check.known.add(relative)
+    if not inside(root, relative).exists():
+        check.found(relative, "missing")
+        return
+    try:
+        check.plan = read_plan(root, check.split)
+    except DatasetError as error:
+        check.found(relative, "damaged", error.problem.partition(";")[0])
+    else:
+        check.samples = check.plan.samples if check.plan is not None else 0
+
+
+def _check_manifest(root: Path, check: SplitCheck) -> None:
+    relative = manifest_path(check.split)
+    check.known.add(relative)
+    if not inside(root, relative).exists():
+        check.found(relative, "missing", "the split is not finished")
+        return
+    try:
+        manifest = load_sealed(inside(root, relative))
+        samples = [dict(one["files"]) for one in manifest["samples"]]
+        dict(manifest["indexes"])
+    except DatasetError as error:
+        check.found(relative, "damaged", error.problem.partition(";")[0])
+    except (KeyError, TypeError, ValueError):
+        check.found(relative, "damaged", "it lists no files")
+    else:
+        if check.plan is not None and manifest.get("content_key") != check.plan.content_key:
+            check.found(plan_path(check.split), "damaged", "it is not the plan that the manifest was written for")
+            check.plan, check.samples = None, 0
+        check.manifest, check.samples = manifest, max(check.samples, len(samples))
+
+
+def _check_samples(root: Path, check: SplitCheck, on_progress: Progress | None) -> None:
+    folder = inside(root, f"{split_folder(check.split)}/samples")
+    if not check.samples:  # neither the plan nor the manifest says how many
+        numbers = [int(path.stem) for path in folder.glob("*.json") if path.stem.isdecimal()]
+        check.samples = max(numbers, default=-1) + 1
+    manifest = check.manifest if isinstance(check.manifest, dict) else {}
+    listed, hashes = manifest.get("samples", []), manifest.get("sidecars", {})
+    if on_progress is not None:
+        on_progress(0, check.samples)
+
+    def findings(index: int) -> list[Finding]:
+        entry = listed[index]["files"] if index < len(listed) else {}
+        return list(_sample_findings(root, check, index, hashes, entry))
+
+    for index, found in enumerate(in_threads(findings, range(check.samples))):
+        check.findings += found
+        if found:
+            check.broken_samples.add(index)
+        if on_progress is not None:
+            on_progress(index + 1, check.samples)
+
+
+def _sample_findings(
+    root: Path, check: SplitCheck, index: int, hashes: dict[str, str], listed: dict[str, str]
+) -> Iterator[Finding]:
+    """The damaged and missing files of a sample, by its sidecar or, where that is damaged, by the manifest."""
+    relative = sidecar_path(check.split, index)
+    path = inside(root, relative)
+    files = dict(listed)
+    check.known.add(relative)
+    if not path.exists():
+        yield Finding(path=relative, problem="missing")
+    else:
+        try:
+            sidecar = read_sidecar(path)
+            if relative in hashes and file_hash(path) != hashes[relative]:
+                yield Finding(path=relative, problem="damaged", detail="it is not the sidecar that the manifest names")
+            else:
+                files = dict(sidecar.files)
+        except DatasetError as error:
+            yield Finding(path=relative, problem="damaged", detail=error.problem.partition(";")[0])
+    check.known |= files.keys()
+    for name, digest in files.items():
+        yield from _file_findings(root, name, digest)
+
+
+def _check_listed(root: Path, check: SplitCheck, hashes: Json) -> None:
+    """Checks files that the manifest names with their hashes."""
+    for relative, digest in hashes.items() if isinstance(hashes, dict) else ():
+        check.known.add(relative)
+        check.findings += _file_findings(root, relative, digest)
+
+
+def _file_findings(root: Path, relative: str, digest: str) -> Iterator[Finding]:
+    path = inside(root, relative)
+    if not path.exists():
+        yield Finding(path=relative, problem="missing")
+    elif not path.is_file() or file_hash(path) != digest:
+        yield Finding(path=relative, problem="damaged")
+
+
+def _relative(root: Path, path: Path) -> str:
+    return path.relative_to(root).as_posix()

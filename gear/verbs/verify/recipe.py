@@ -1,0 +1,144 @@
+"""The collection that a split came from, resolved again from what its files say."""
+
+from __future__ import annotations
+
+import dataclasses
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from gear.collecting.job import Job, resolve
+from gear.collecting.patch_sources import resolve_patch
+from gear.config.collection import CollectionConfig
+from gear.config.nodes import Place, in_one_place, parse_text
+from gear.config.reader import read_node
+from gear.contracts.tasks import NO_PATCH, RANDOM_PATCH
+from gear.dataset.files import inside
+from gear.dataset.guarded_paths import parts_of
+from gear.dataset.layout import patch_path
+from gear.dataset.plan import differences
+from gear.dataset.verification import SplitCheck
+from gear.networks.shipped import shipped_patches
+from gear.values.errors import BackendError, ConfigError, DatasetError, PatchError, UnknownNameError
+from gear.values.serial import Json
+
+HASH = 1 + 8
+"""Characters of the hash, and the hyphen before it, at the end of a patch's label."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sources:
+    """Files that a dataset does not name, because they lie on one machine.
+
+    Attributes:
+        patch: the patch, where the dataset's own copy is damaged; else None.
+        town: MJCF file of a town that is none of gear's own.
+        scenes: its scene library.
+    """
+
+    patch: str | Path | None = None
+    town: str | Path | None = None
+    scenes: str | Path | None = None
+
+
+def job_of(root: Path, check: SplitCheck, sources: Sources) -> Job:
+    """The collection that made a split.
+
+    Args:
+        root: of the dataset.
+        check: what is known of the split.
+        sources: files that the dataset does not name.
+
+    Raises:
+        DatasetError: plan and manifest do not say how the split was made, or the same cannot be made here.
+    """
+    known = _known(root, check)
+    with _patch_folder(root, check, known, sources) as patch:
+        config: dict[str, Any] = {
+            **known["recipe"],
+            "town": str(sources.town or known["town"]),
+            "seed": known["seed"],
+            "samples": known["samples"] // known["frames"],
+            "patch": patch,
+            "root": str(root),
+            **({"scenes": str(sources.scenes)} if sources.scenes else {}),
+        }
+        try:
+            name = f"{root} split {check.split}"
+            node = in_one_place(parse_text(yaml.safe_dump(config, sort_keys=False), name), Place(name))
+            job = resolve(read_node(CollectionConfig, node))
+        except (UnknownNameError, ConfigError, PatchError, BackendError) as error:
+            files = "" if sources.town else "; of a town of your own, name the files with --town and --scenes"
+            raise DatasetError(root, f"split {check.split!r} cannot be made again ({error}){files}") from error
+    plan = dataclasses.replace(job.plan, recipe=known["recipe"])
+    if plan.content_key != known["content_key"]:
+        what = ", ".join(differences(check.plan.as_json(), plan.as_json())[:2]) if check.plan is not None else ""
+        why = what or "other versions, renderer or files"
+        problem = f"split {check.split!r} would be made otherwise here ({why})"
+        raise DatasetError(root, f"{problem}; repair it on the machine and with the versions that made it")
+    return dataclasses.replace(job, plan=plan)
+
+
+def _known(root: Path, check: SplitCheck) -> dict[str, Json]:
+    """How a split was made: by its plan, or by its manifest where the plan is damaged.
+
+    Raises:
+        DatasetError: neither says.
+    """
+    plan, manifest = check.plan, check.manifest if isinstance(check.manifest, dict) else {}
+    recipe = (plan.recipe if plan is not None else None) or manifest.get("config")
+    try:
+        if not isinstance(recipe, dict):
+            raise KeyError("config")
+        if plan is not None:
+            return {
+                "recipe": recipe, "town": plan.content["town"], "seed": plan.content["seed"], "patch": plan.patch,
+                "samples": plan.samples, "frames": max(plan.content["frames"], 1), "content_key": plan.content_key,
+            }  # fmt: skip
+        frames = 1 + max((one["frame"] for one in manifest["samples"]), default=0)
+        return {
+            "recipe": recipe, "town": manifest["info"]["town"], "seed": manifest["seed"], "patch": manifest["patch"],
+            "samples": len(manifest["samples"]), "frames": frames, "content_key": manifest["content_key"],
+        }  # fmt: skip
+    except (KeyError, TypeError) as error:
+        problem = f"neither the plan nor the manifest of split {check.split!r} says how it was made"
+        raise DatasetError(root, f"{problem}; run its `gear collect` again") from error
+
+
+@contextmanager
+def _patch_folder(root: Path, check: SplitCheck, known: dict[str, Json], sources: Sources) -> Iterator[str]:
+    """What `--patch` is to be for a split: a word, or a temporary folder with the patch under its own name.
+
+    Raises:
+        DatasetError: the patch is damaged and was not given, or another one was.
+    """
+    label, digest = known["patch"]["label"], known["patch"]["sha256"]
+    if label in (NO_PATCH, RANDOM_PATCH):
+        yield label
+        return
+    parts_of(root, patch_path(label, "patch_0.png"))
+    copies = inside(root, patch_path(label, "patch_0.png")).parent
+    name = label[:-HASH]
+    count = max(len(check.manifest.get("patches", {})) if isinstance(check.manifest, dict) else 0, 1)
+    for source in (sources.patch, copies, shipped_patches().get(name)):
+        if source is None:
+            continue
+        try:
+            found = resolve_patch(str(source), surfaces=count, seed=0)
+        except PatchError:
+            continue
+        if found.digest == digest:
+            with tempfile.TemporaryDirectory(prefix="gear-") as scratch:
+                folder = Path(scratch) / name
+                folder.mkdir()
+                for file, data in found.files.items():
+                    (folder / file).write_bytes(data)
+                yield str(folder)
+            return
+    problem = f"the copy of patch {label} is damaged; name the patch with --patch"
+    raise DatasetError(root, f"split {check.split!r} cannot be made again: {problem}")

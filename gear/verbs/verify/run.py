@@ -1,0 +1,118 @@
+"""`gear.verify`: checks a dataset, and makes damaged samples again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from gear.collecting.run import executor_of, run_job
+from gear.dataset.guarded_paths import refuse_links, remove_files
+from gear.dataset.layout import sidecar_path, split_folder
+from gear.dataset.locks import is_at_work, turn
+from gear.dataset.plan import write_plan
+from gear.dataset.verification import Finding, SplitCheck, check_split, splits_in, unexpected_files
+from gear.reporting.display import displayed
+from gear.values.errors import DatasetError
+from gear.values.progress import Callbacks, Progress
+from gear.verbs.verify.recipe import Sources, job_of
+from gear.verbs.verify.report import VerifyReport
+
+
+def verify(
+    dataset: str | Path,
+    *,
+    split: str | None = None,
+    repair: bool = False,
+    patch: str | Path | None = None,
+    town: str | Path | None = None,
+    scenes: str | Path | None = None,
+    workers: int = 1,
+    progress: bool = False,
+    on_progress: Progress | None = None,
+) -> VerifyReport:
+    """Checks that every file of a dataset has the bytes that gear wrote, and that none is missing.
+
+    A repair makes again what is damaged or missing: whole samples, indexes, manifest, plan and copies of patches. The
+    dataset is then byte for byte what it was, as long as the same versions, renderer and device are used; where they
+    would make other bytes, nothing is changed. Files that do not belong to the dataset are reported and stay.
+
+    Args:
+        dataset: root of a dataset.
+        split: the split to check; all of them unless given.
+        repair: whether to make again what is damaged or missing.
+        patch: for a repair, the patch that the dataset shows, where its own copy is damaged.
+        town: for a repair, the MJCF file of a town that is none of gear's own.
+        scenes: for a repair, that town's scene library.
+        workers: processes that make samples again.
+        progress: whether to show the progress on stderr.
+        on_progress: called with (samples, samples of the split), while a split is checked and while it is repaired.
+
+    Raises:
+        DatasetError: it is no dataset, a file cannot be read, or one leads outside of the dataset.
+    """
+    sources = Sources(patch=patch, town=town, scenes=scenes)
+    with displayed(Callbacks.of(on_progress=on_progress), "verify", progress=progress) as callbacks:
+        return _verified(Path(dataset), split, sources if repair else None, workers, callbacks)
+
+
+def _verified(
+    root: Path, split: str | None, sources: Sources | None, workers: int, callbacks: Callbacks
+) -> VerifyReport:
+    """Checks a dataset, and repairs it where sources for that are given."""
+    names = splits_in(root)
+    if split is not None and split not in names:
+        raise DatasetError(root, f"has no split {split!r}; there are: {', '.join(names)}")
+    chosen = names if split is None else [split]
+    checks = {name: check_split(root, name, callbacks.on_progress if name in chosen else None) for name in names}
+    findings = _findings(root, checks, chosen)
+    if sources is None or not findings:
+        return VerifyReport(root=root, files=_count(checks, chosen), findings=tuple(findings))
+    refuse_links(root)
+    unrepaired: list[str] = []
+    leftovers = any(one.detail for one in findings if one.problem == "unexpected")
+    for name in chosen:
+        if checks[name].findings or leftovers:
+            try:
+                _repair(root, checks[name], sources, workers, callbacks)
+            except DatasetError as error:
+                unrepaired.append(str(error))
+    checks |= {name: check_split(root, name) for name in chosen}
+    left = _findings(root, checks, chosen)
+    paths = {one.path for one in left}
+    return VerifyReport(
+        root=root,
+        files=_count(checks, chosen),
+        findings=tuple(left),
+        repaired=tuple(one for one in findings if one.path not in paths),
+        unrepaired=tuple(unrepaired),
+    )
+
+
+def _findings(root: Path, checks: dict[str, SplitCheck], chosen: Sequence[str]) -> list[Finding]:
+    """Those of the chosen splits; what belongs to no split is known only when all are."""
+    found = [finding for name in chosen for finding in checks[name].findings]
+    unexpected = unexpected_files(root, checks.values())
+    if len(chosen) < len(checks):
+        folders = tuple({f"{Path(path).parent}/" for name in chosen for path in checks[name].known})
+        unexpected = [one for one in unexpected if one.path.startswith(folders)]
+    return list(dict.fromkeys([*found, *unexpected]))
+
+
+def _count(checks: dict[str, SplitCheck], chosen: Sequence[str]) -> int:
+    return len({path for name in chosen for path in checks[name].known})
+
+
+def _repair(root: Path, check: SplitCheck, sources: Sources, workers: int, callbacks: Callbacks) -> None:
+    """Makes a split whole again.
+
+    Raises:
+        DatasetError: it is not known how it was made, it would be made otherwise here, or a run is at work on it.
+    """
+    job = job_of(root, check, sources)
+    with turn(root):
+        if is_at_work(root / split_folder(check.split)):
+            raise DatasetError(root, f"a run is making split {check.split!r} just now; wait for its end")
+        if check.plan is None:
+            write_plan(root, job.plan)
+        remove_files(root, [sidecar_path(check.split, index) for index in sorted(check.broken_samples)])
+    run_job(job, executor=executor_of(job, workers, in_subprocess=False), callbacks=callbacks)

@@ -1,0 +1,213 @@
+"""`gear verify`: a byte of every file of every task is flipped; it is found, and repaired to the same bytes."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+import gear
+from gear.cli.main import main
+from gear.dataset.verification import Finding
+from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
+from gear.values.errors import DatasetError
+from gear.verbs.verify import run as module
+from gear.verbs.verify.recipe import Sources
+from gear.verbs.verify.report import VerifyReport
+from tests.dataset.splits import tree
+from tests.verbs.conftest import Collected, Copy
+
+TASKS = ["semseg", "detect2d", "stereo3d", "depth"]
+
+
+def flip(path: Path, place: float) -> None:
+    """Changes one bit of a file, at a share of its length."""
+    data = bytearray(path.read_bytes())
+    data[min(int(place * len(data)), len(data) - 1)] ^= 1
+    path.write_bytes(data)
+
+
+def repaired(root: Path, **more: Any) -> VerifyReport:
+    return gear.verify(root, repair=True, town=TINY_TOWN, scenes=TINY_SCENES, **more)
+
+
+@pytest.fixture(scope="module")
+def patch(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("patch") / "stripes.png"
+    cv2.imwrite(str(path), np.random.default_rng(1).integers(0, 256, (20, 40, 3), dtype=np.uint8))
+    return path
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_a_flipped_byte_of_any_file_is_found(task: str, tmp_path: Path, copy_small: Copy, patch: Path) -> None:
+    root = copy_small(task, tmp_path / "data", patch=patch, probes=True)
+    whole = gear.verify(root)
+    assert whole.is_whole and whole.files == len(tree(root)) and not whole.findings
+    for relative, data in tree(root).items():
+        for place in (0, 0.3, 0.77, 1):
+            flip(root / relative, place)
+            found = gear.verify(root).findings
+            assert [one.problem for one in found] == ["damaged"], (relative, place)
+            assert found[0].path == relative
+            (root / relative).write_bytes(data)
+        for text in (b"", None):
+            (root / relative).write_bytes(text) if text is not None else (root / relative).unlink()
+            found = gear.verify(root).findings
+            assert [(one.path, one.problem) for one in found] == [(relative, "missing" if text is None else "damaged")]
+            (root / relative).write_bytes(data)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_what_is_damaged_is_made_again_to_the_byte(task: str, tmp_path: Path, copy_small: Copy, patch: Path) -> None:
+    root = copy_small(task, tmp_path / "data", patch=patch, probes=True)
+    before, broken = tree(root), []
+    for relative in before:
+        if ("0001" in relative and "/samples/" not in relative) or (
+            relative.endswith(".txt") and "0000" not in relative
+        ):
+            flip(root / relative, 0.5)
+            broken.append(relative)
+    kept = {path: (root / path).stat().st_ino for path in before if path not in broken and "0000" in path}
+    report = repaired(root)
+    assert report.is_whole and not report.unrepaired, report.lines()
+    assert {one.path for one in report.repaired} == set(broken)
+    assert tree(root) == before
+    assert {path: (root / path).stat().st_ino for path in kept if "0001" not in path} == {
+        path: number for path, number in kept.items() if "0001" not in path
+    }, "whole samples were not made again"
+
+
+def test_everything_but_the_plan_is_damaged_at_once(tmp_path: Path, copy_small: Copy) -> None:
+    root = copy_small("depth", tmp_path / "data")
+    before = tree(root)
+    for relative in before:
+        if not relative.endswith("plan.json"):
+            flip(root / relative, 0.5)
+    assert repaired(root).is_whole
+    assert tree(root) == before
+
+
+@pytest.mark.parametrize("name", ["plan.json", "manifest.json"])
+@pytest.mark.parametrize("place", [0.2, 0.999, None])
+def test_plan_and_manifest_repair_each_other(name: str, place: float | None, tmp_path: Path, copy_small: Copy) -> None:
+    root = copy_small("depth", tmp_path / "data")
+    before = tree(root)
+    path = root / "gear/debug" / name
+    path.unlink() if place is None else flip(path, place)
+    assert not gear.verify(root).is_whole
+    assert repaired(root).is_whole
+    assert tree(root) == before
+
+
+def test_a_damaged_patch_is_taken_from_where_it_is_named(tmp_path: Path, copy_small: Copy, patch: Path) -> None:
+    root = copy_small("depth", tmp_path / "data", patch=patch)
+    before = tree(root)
+    (copy,) = root.glob("gear/patches/*/patch_0.png")
+    copy.write_bytes(b"")
+    report = repaired(root)
+    assert not report.is_whole and "name the patch with --patch" in report.lines()[1]
+    assert repaired(root, patch=patch).is_whole
+    assert tree(root) == before
+
+
+def test_what_does_not_belong_there_is_reported_and_stays(tmp_path: Path, copy_small: Copy) -> None:
+    root = copy_small("semseg", tmp_path / "data")
+    (root / "README.md").write_text("mine")
+    (root / "gear/scratch").mkdir()
+    (root / "gear/scratch/oldhost-77-1.part").write_bytes(b"half")
+    folder = next(path for path in root.rglob("*.png")).parent
+    (folder / "stray.png").write_bytes(b"stray")
+    (folder / ".hidden").write_bytes(b"")
+    report = repaired(root)
+    stray = (folder / "stray.png").relative_to(root).as_posix()
+    assert report.findings == (Finding(path=stray, problem="unexpected"),)
+    assert (folder / "stray.png").exists() and not (root / "gear/scratch").exists()
+
+
+def test_an_unfinished_split_is_finished(tmp_path: Path, copy_small: Copy) -> None:
+    root = copy_small("depth", tmp_path / "data")
+    before = tree(root)
+    (root / "gear/debug/manifest.json").unlink()
+    (root / "gear/debug/samples/000001.json").unlink()
+    assert [one.problem for one in gear.verify(root).findings] == ["missing", "missing"]
+    assert repaired(root).is_whole and tree(root) == before
+
+
+def test_what_would_be_made_otherwise_is_left_alone(
+    tmp_path: Path, copy_small: Copy, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root = copy_small("depth", tmp_path / "data")
+    flip(next(root.rglob("*.png")), 0.5)
+    damaged = tree(root)
+    monkeypatch.setattr("gear.collecting.job.versions", lambda: {"gear": "0.0.1"})
+    report = repaired(root)
+    assert "would be made otherwise here (content.versions" in report.unrepaired[0]
+    assert len(report.findings) == 1 and tree(root) == damaged
+
+
+def test_the_command_has_lines_and_json_and_an_exit_code(
+    tmp_path: Path, copy_small: Copy, capsys: pytest.CaptureFixture[str]
+) -> None:
+    root = copy_small("depth", tmp_path / "data")
+    assert main(["verify", str(root)]) == 0
+    assert capsys.readouterr().out.endswith("files, all as they were written\n")
+    picture = next(root.rglob("*.png"))
+    flip(picture, 0.5)
+    assert main(["verify", str(root)]) == 1
+    first, last = capsys.readouterr().out.splitlines()
+    assert first == f"damaged    {picture.relative_to(root)}" and last.startswith(f"{root}: 1 damaged of")
+    assert main(["verify", str(root), "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["findings"][0]["problem"] == "damaged"
+    town = ["--town", str(TINY_TOWN), "--scenes", str(TINY_SCENES)]
+    assert main(["verify", str(root), "--repair"]) == 1
+    assert "no town named 'tiny'" in capsys.readouterr().out
+    assert main(["verify", str(root), "--repair", *town]) == 0
+    assert capsys.readouterr().out.startswith(f"repaired   {picture.relative_to(root)}\n")
+    assert main(["verify", str(tmp_path)]) == 2
+    assert main(["verify", str(root), "--split", "nowhere"]) == 2
+
+
+def test_damage_is_not_passed_over_by_what_reads_it(
+    tmp_path: Path, collected: Collected, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole = collected("semseg")
+    for suffix in (".png", ".json"):
+        root = Path(shutil.copytree(whole, tmp_path / f"data{suffix}"))
+        victim = next(path for path in sorted(root.rglob(f"*{suffix}")) if "gear/" not in path.as_posix())
+        flip(victim, 0.5)
+        dataset = gear.open_dataset(root)
+        with pytest.raises(DatasetError, match=r"is damaged: .*; `gear verify DIR --repair` makes it again"):
+            list(dataset)
+        sheet, page = str(tmp_path / "sheet.png"), str(tmp_path / "view.html")
+        for command in (["sheet", str(root), "--out", sheet], ["view", str(root), "--out", page]):
+            capsys.readouterr()
+            assert main(command) in (1, 2), command
+            said = capsys.readouterr()
+            assert "is damaged" in said.out + said.err
+
+
+def test_a_collection_does_not_pass_over_damage(tmp_path: Path, copy_small: Copy, collect_small: object) -> None:
+    root = copy_small("depth", tmp_path / "data")
+    before = tree(root)
+    picture = next(root.rglob("*.png"))
+    flip(picture, 0.5)
+    with pytest.raises(DatasetError, match=r"is not as it was written; `gear verify DIR --repair` makes it again"):
+        collect_small("depth", root)  # type: ignore[operator]
+    picture.unlink()
+    collect_small("depth", root)  # type: ignore[operator]
+    assert tree(root) == before
+    flip(root / "gear/debug/plan.json", 0.5)
+    with pytest.raises(DatasetError, match=r"plan.json: is (damaged|not JSON)") as caught:
+        collect_small("depth", root)  # type: ignore[operator]
+    assert "--force" not in str(caught.value) and "gear verify DIR --repair" in str(caught.value)
+
+
+def test_sources_are_looked_at_only_for_a_repair(tmp_path: Path, copy_small: Copy) -> None:
+    root = copy_small("depth", tmp_path / "data")
+    assert module.verify(root, patch=tmp_path / "nowhere").is_whole
+    assert Sources() == Sources(patch=None, town=None, scenes=None)
