@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from gear.contracts.tasks import Auxiliary, Sidecar
-from gear.dataset.sealed_json import REPAIR, load_sealed, sealed_json
+from gear.dataset.sealed_json import load_sealed, sealed_json
 from gear.dataset.sidecar_validation import check_numbers, check_sidecar
 from gear.values.errors import DatasetError, FieldError
 from gear.values.ground_truth import SurfaceTruth
@@ -56,5 +56,5 @@ def read_sidecar(path: Path) -> Sidecar:
 def no_sidecar(path: Path, error: Exception) -> DatasetError:
     """The error of a sidecar that cannot be read."""
     said = f"{error} is missing" if isinstance(error, KeyError) else str(error)
-    remedy = f"{REPAIR}, or delete it and run the same collection again"
+    remedy = "delete it and run the same collection again"
     return DatasetError(path, f"is not a sidecar of this version of gear ({said}); {remedy}")

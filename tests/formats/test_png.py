@@ -62,10 +62,9 @@ def test_pictures_need_not_be_contiguous() -> None:
     "data", [b"", b"not a picture", b"\x89PNG\r\n\x1a\n", whole(60_000, 60_000, 8, 2, zlib.compress(b"\0"))]
 )
 def test_rubbish_is_refused(data: bytes) -> None:
-    with pytest.raises(ValueError, match="not a picture"):
-        decode_rgb(data)
-    with pytest.raises(ValueError, match="not a picture"):
-        decode_plain(data)
+    for decode in (decode_rgb, decode_plain):
+        with pytest.raises(ValueError, match=r"not a picture|is 60000 x 60000 px"):
+            decode(data)
 
 
 def test_wrong_arrays_are_refused() -> None:

@@ -22,6 +22,7 @@ import gear
 from gear.collecting.job import resolve
 from gear.collecting.run import CollectReport
 from gear.config.load import load_collection
+from gear.dataset.files import sha256
 from gear.formats import rle
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import (
@@ -285,11 +286,11 @@ def test_a_file_that_is_gone_or_damaged_is_named_with_its_remedy(
     dataset = gear.open_dataset(tmp_path)
     picture = next(iter(tmp_path.glob("leftImg8bit/*/*/*.png")))
     whole = picture.read_bytes()
-    for damage, what in ((whole[:90], "not a picture"), (None, "is gone")):
+    for damage, what in ((whole[:90], "is damaged: .*"), (None, "is gone")):
         picture.unlink()
         if damage is not None:
             picture.write_bytes(damage)
-        with pytest.raises(DatasetError, match=rf"{picture.name}: {what}; delete its sample's sidecar") as caught:
+        with pytest.raises(DatasetError, match=rf"{picture.name}: {what}; `gear verify DIR --repair`") as caught:
             list(dataset)
         assert "\n" not in str(caught.value)
     (tmp_path / "gear/debug/samples/000000.json").unlink()
@@ -306,6 +307,9 @@ def test_a_picture_of_another_size_or_kind_is_named_with_its_remedy(
     camera = dataset.sidecar(0).record.cameras[0]
     width, height = camera.width_px, camera.height_px
     files = [tmp_path / name for name in dataset.sidecar(0).files]
+    sidecar = tmp_path / "gear/debug/samples/000000.json"
+    written = sidecar.read_bytes()
+    content = json.loads(written)
     for path in (path for path in files if path.suffix in (".png", ".tiff")):
         if path.name.endswith("_color.png") or (path.suffix == ".png" and path.parent.parent.name == "gtFine"):
             continue  # written for other people's loaders alone
@@ -316,8 +320,13 @@ def test_a_picture_of_another_size_or_kind_is_named_with_its_remedy(
             damages += [np.full((height, width), 200, np.uint8), np.zeros((height, width, 3), np.uint8)]
         for damage in damages:
             path.write_bytes(cv2.imencode(path.suffix, damage)[1].tobytes())
-            with pytest.raises(DatasetError, match=rf"{path.name}: is .*; delete its sample's sidecar"):
+            with pytest.raises(DatasetError, match=rf"{path.name}: is damaged: .*; `gear verify DIR --repair`"):
                 dataset[0]
+            hashes = {**content["files"], path.relative_to(tmp_path).as_posix(): sha256(path.read_bytes())}
+            sidecar.write_text(json.dumps(content | {"files": hashes}))  # as somebody would who edits data
+            with pytest.raises(DatasetError, match=rf"{path.name}: is .* (px|pixel).*; `gear verify DIR --repair`"):
+                dataset[0]
+            sidecar.write_bytes(written)
         path.write_bytes(whole)
     assert len(list(dataset)) == 2
 
