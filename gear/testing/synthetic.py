@@ -98,6 +98,7 @@ def _moved(thing: Thing, world_from_ego: RigidTransform) -> Thing:
         yaw_rad=thing.yaw_rad + world_from_ego.yaw_rad,
         object_id=thing.object_id,
         role=thing.role,
+        key_points=thing.key_points,
     )
 
 
@@ -126,6 +127,7 @@ def _scene_object(thing: Thing) -> SceneObject:
             box_centre_m=(low + high) / 2,
             box_size_m=high - low,
         ),
+        key_points=dict(thing.key_points),
     )
 
 

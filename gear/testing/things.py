@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from gear.values.geometry import RigidTransform
 from gear.values.rng import derive_rng
@@ -35,6 +36,7 @@ class Thing:
         position_m, yaw_rad: pose of its frame in the world.
         object_id: as in `GeomTable.object_id`; -1 for what is not an instance.
         role: of the actor; None for a fixed part of the town.
+        key_points: named points in its frame, metres.
     """
 
     parts: tuple[Part, ...]
@@ -42,6 +44,7 @@ class Thing:
     yaw_rad: float = 0.0
     object_id: int = -1
     role: Role | None = None
+    key_points: Mapping[str, Vec3] = field(default_factory=dict)
 
     @property
     def world_from_thing(self) -> RigidTransform:

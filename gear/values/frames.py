@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from gear.values.geometry import RigidTransform
 from gear.values.labels import KittiType
-from gear.values.scene import CameraRecord
+from gear.values.scene import CameraRecord, Vec3
 
 UInt8Image = npt.NDArray[np.uint8]
 UInt16Image = npt.NDArray[np.uint16]
@@ -98,6 +98,8 @@ class SceneObject:
         is_ego: whether it carries the cameras (never labelled).
         world_from_object: pose.
         shape: its triangles.
+        key_points: named points in its own frame, metres, such as a person's `left_knee`; empty for assets that name
+            none. `key_points_m` has them in the world.
     """
 
     id: int
@@ -107,6 +109,15 @@ class SceneObject:
     is_ego: bool
     world_from_object: RigidTransform
     shape: Shape
+    key_points: Mapping[str, Vec3] = field(default_factory=dict)
+
+    @property
+    def key_points_m(self) -> dict[str, Vec3]:
+        """The key points in the world, by name, metres."""
+        if not self.key_points:
+            return {}
+        placed = self.world_from_object.apply(list(self.key_points.values()))
+        return {name: (float(x), float(y), float(z)) for name, (x, y, z) in zip(self.key_points, placed, strict=True)}
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -282,6 +282,7 @@ class World:
             is_ego=actor.role == "ego",
             world_from_object=actor.world_from_actor.transform("world", "object"),
             shape=actor_type.shape,
+            key_points=dict(actor_type.facts.key_points),
         )
 
     def _texture(self, face: Face, albedo: SurfaceAlbedo) -> UInt8Image:

@@ -11,6 +11,7 @@ import shapely
 
 from gear.formats.kitti_object import KittiLabel, dont_care, label_corners
 from gear.metrics.kitti_ap import KittiEvaluator
+from gear.metrics.kitti_match import DIFFICULTIES, choose, count, matched_scores, picture_boxes
 from gear.metrics.kitti_reference import NearCars
 
 LEVELS = {"easy": (40, 0, 0.15), "moderate": (25, 1, 0.3), "hard": (25, 2, 0.5)}
@@ -242,6 +243,29 @@ def test_a_van_counts_neither_way_and_a_truck_counts_against() -> None:
     good = [([CAR], found)] * 60
     assert evaluate([*good, *[([van], found)] * 60])["car_2d_moderate_r40"] == 1.0
     assert evaluate([*good, *[([truck], found)] * 60])["car_2d_moderate_r40"] == pytest.approx(0.5)
+
+
+def test_a_label_that_only_a_detection_below_the_least_height_finds_counts_neither_way() -> None:
+    """The label is 26 px high and looked for; a detection of 24.9 px is ignored, and so is its label: no hit, no miss,
+    no false alarm. A higher one beside it is the match, whatever their scores.
+    """
+    label = replace(CAR, box_px=(100.0, 100.0, 150.0, 126.0))
+    low = replace(label, box_px=(100.0, 100.0, 150.0, 124.9), score=0.9)
+    high = replace(label, score=0.4)
+    moderate = next(one for one in DIFFICULTIES if one.name == "moderate")
+
+    def counted(*found: KittiLabel) -> tuple[list[float], list[float]]:
+        chosen = choose(picture_boxes([label], found), "Car", moderate, "2d")
+        counts = count(chosen, np.array([0.1]))
+        return matched_scores(chosen), [float(part[0]) for part in (counts.tp, counts.fp, counts.fn)]
+
+    assert counted(low) == ([], [0.0, 0.0, 0.0])
+    assert counted(high) == ([0.4], [1.0, 0.0, 0.0])
+    assert counted() == ([], [0.0, 0.0, 1.0])
+    # The first pass takes the surest, which is too low; the second prefers the one that counts.
+    assert counted(low, high) == ([], [1.0, 0.0, 0.0])
+    good = [([CAR], [replace(CAR, score=1.0)])] * 60
+    assert evaluate([*good, *[([label], [low])] * 60])["car_2d_moderate_r40"] == pytest.approx(0.5, abs=0.026)
 
 
 def test_dont_care_excuses_in_the_picture_alone() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -25,6 +25,11 @@ PERSON = "person"
 
 MOST_WEIGHT = 1e6
 """Largest weight of an asset or a colour, so that sums and shares of weights are finite."""
+
+KEY_POINT = "key_point."
+"""Entries of an actor's `<custom>` section that name a point of it begin with this."""
+
+MOST_KEY_POINT_M = 100.0
 
 _NAN = re.compile(r"^([-+.\deE\s]*\s)?[-+]?nan(\s|$)", re.IGNORECASE)
 """Matches a list of numbers in which one is NaN."""
@@ -69,6 +74,7 @@ class ActorFacts:
         gait: `walk` or `stand` for people, "" for vehicles.
         weight: probability of the asset relative to the others of its folder.
         palette: colours of its paint as linear albedo 0..1, each with its weight.
+        key_points: named points in its frame, metres, such as a person's joints.
     """
 
     name: str
@@ -77,6 +83,7 @@ class ActorFacts:
     gait: Gait
     weight: float
     palette: tuple[tuple[Vec3, float], ...]
+    key_points: tuple[tuple[str, Vec3], ...] = ()
 
     @property
     def label(self) -> Label:
@@ -125,7 +132,26 @@ def read_actor_facts(path: Path) -> ActorFacts:
         gait=cast(Gait, gait),
         weight=weight[0] * (1.0 if vehicle is None else vehicle.weight),
         palette=colours,
+        key_points=_key_points(path, entries),
     )
+
+
+def _key_points(path: Path, entries: Mapping[str, str]) -> tuple[tuple[str, Vec3], ...]:
+    """The named points of an actor: `<numeric name="key_point.left_knee" data="0.02 0.09 0.48"/>`.
+
+    Raises:
+        TownError: a point is not three numbers within `MOST_KEY_POINT_M` of the origin.
+    """
+    points: list[tuple[str, Vec3]] = []
+    for entry, text in entries.items():
+        name = entry.removeprefix(KEY_POINT)
+        if name == entry:
+            continue
+        numbers = _numbers(path, entry, text)
+        if len(numbers) != 3 or not all(abs(value) <= MOST_KEY_POINT_M for value in numbers) or not name:
+            raise TownError(path, f"{entry} must be x y z in metres, within {MOST_KEY_POINT_M:g} m, got {text!r}")
+        points.append((name, (numbers[0], numbers[1], numbers[2])))
+    return tuple(points)
 
 
 def _with_included(path: Path) -> Iterator[ET.Element]:
