@@ -11,8 +11,8 @@ from gear.collecting.forecast import Forecast
 from gear.collecting.job import Job
 from gear.collecting.pipeline import collect_samples
 from gear.collecting.session import open_session
+from gear.dataset.executors.engines import DEFAULT, open_engine
 from gear.dataset.executors.executor import Done, Executor, InThisProcess
-from gear.dataset.executors.processes import Processes
 from gear.dataset.store import Store
 from gear.plugins.build import blamed, build, find
 from gear.values.counted import counted
@@ -43,13 +43,16 @@ class CollectReport:
         return f"{self.root}: {counted(self.samples, 'sample')} in split {self.split!r}{resumed}"
 
 
-def executor_of(job: Job, workers: int, *, in_subprocess: bool) -> Executor:
-    """The executor for a number of workers; a single worker is this process, unless a process of its own is
+def executor_of(job: Job, workers: int, *, engine: str = DEFAULT, in_subprocess: bool = False) -> Executor:
+    """The executor of an engine; a single worker of the default engine is this process, unless a process of its own is
     requested.
+
+    Raises:
+        UnknownNameError: there is no such engine.
     """
-    if workers == 1 and not in_subprocess:
+    if workers == 1 and engine == DEFAULT and not in_subprocess:
         return InThisProcess()
-    return Processes(workers=workers, backend=job.config.renderer)
+    return open_engine(engine, workers=workers, backend=job.config.renderer)
 
 
 def run_job(

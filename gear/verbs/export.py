@@ -13,8 +13,9 @@ from gear.dataset.reading import check_hash
 from gear.dataset.store import check_output, plan_of, splits_of
 from gear.formats.exports import SplitRecords, layouts
 from gear.plugins.datasets import open_dataset
+from gear.reporting.display import displayed
 from gear.values.errors import DatasetError, UnknownNameError
-from gear.values.progress import Progress
+from gear.values.progress import Callbacks, Progress
 
 UNFINISHED = ".gear-export"
 """Ends the name of the hidden folder, beside the new tree's place, in which the tree is written."""
@@ -25,6 +26,7 @@ def export(
     *,
     layout: str,
     out: str | Path,
+    progress: bool = False,
     on_progress: Progress | None = None,
 ) -> int:
     """Writes all splits of a dataset as another layout's tree.
@@ -36,6 +38,7 @@ def export(
         dataset: root of a dataset whose splits are finished.
         layout: one of `gear.formats.exports.layouts()`.
         out: folder of the new tree; must be empty or new.
+        progress: shows a progress bar.
         on_progress: called after every file with (files so far, 0): their number is not known before.
 
     Returns:
@@ -69,7 +72,8 @@ def export(
     check_output(unfinished, "delete it, or use another --out")
     with alone_at_work(unfinished):
         try:
-            _write_tree(unfinished, tree, on_progress)
+            with displayed(Callbacks.of(on_progress=on_progress), "export", progress=progress, unit="file") as shown:
+                _write_tree(unfinished, tree, shown.on_progress)
             with explained(target):
                 _check_target(target)  # another command may have written there
                 unfinished.replace(target)
@@ -95,7 +99,7 @@ def _check_target(target: Path) -> None:
         raise DatasetError(target, f"is {kind}; export into a new folder in it")
 
 
-def _write_tree(root: Path, tree: Iterable[tuple[str, bytes]], on_progress: Progress | None) -> None:
+def _write_tree(root: Path, tree: Iterable[tuple[str, bytes]], on_progress: Progress) -> None:
     """Writes what is missing of a tree, and deletes what an earlier export, that was killed, left of another one."""
     written: set[str] = set()
     for relative, data in tree:
@@ -103,8 +107,7 @@ def _write_tree(root: Path, tree: Iterable[tuple[str, bytes]], on_progress: Prog
         if not (path.is_file() and read_bytes(path) == data):
             write_whole(root, relative, data)
         written.add(relative)
-        if on_progress is not None:
-            on_progress(len(written), 0)
+        on_progress(len(written), 0)
     there = [path.relative_to(root).as_posix() for path in root.rglob("*") if not path.is_dir()]
     remove_files(root, [relative for relative in there if relative not in written])
     for folder in root.iterdir():

@@ -12,8 +12,9 @@ from urllib.parse import quote
 from gear.dataset.files import explained, refuse_folder, streamed_alone
 from gear.dataset.reading import Dataset
 from gear.plugins.datasets import open_dataset
+from gear.reporting.display import displayed
 from gear.values.counted import counted
-from gear.values.progress import Progress
+from gear.values.progress import Callbacks, Progress
 from gear.values.serial import Json
 from gear.view.build import Builder, fitting_scale
 from gear.view.document import document
@@ -60,6 +61,7 @@ def write_view(
     split: str | None = None,
     samples: int | None = None,
     max_mb: float = 48.0,
+    progress: bool = False,
     on_progress: Progress | None = None,
 ) -> ViewReport:
     """Writes one self-contained HTML page of a dataset; it opens from disk, without a server or a network.
@@ -73,13 +75,16 @@ def write_view(
         split: the split to show; may be left out where there is only one.
         samples: only the first so many.
         max_mb: about how large the page may get, in megabytes.
-        progress: told after every sample, with (done, total).
+        progress: shows a progress bar.
+        on_progress: called after every sample.
 
     Raises:
         DatasetError: there is no finished split to show, or `out` cannot be written.
         UnknownNameError: its task's plugin is not installed.
     """
-    return write_page(open_dataset(path, split), out, samples=samples, max_mb=max_mb, on_progress=on_progress)
+    with displayed(Callbacks.of(on_progress=on_progress), "view", progress=progress) as shown:
+        dataset = open_dataset(path, split)
+        return write_page(dataset, out, samples=samples, max_mb=max_mb, on_progress=shown.on_progress)
 
 
 def write_page(

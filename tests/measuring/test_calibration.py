@@ -119,6 +119,8 @@ def test_a_gap_stands_behind_what_has_learnt(small: Small, learner: list[Learner
     report = gear.gap(small(), calibration=small(split="val"), calibration_patched=small(split="val"), **asked)
     assert learner[0].fits == [(2, 2)] and report.defense == "learner"
     with pytest.raises(GearError, match="a defense guards a model"):
+        gear.gap(small(), twin=tmp_path / "gap/twin", defense="learner", calibration=small(split="val"))
+    with pytest.raises(GearError, match="there is no defense: name one with --defense"):
         gear.gap(small(), twin=tmp_path / "gap/twin", calibration=small(split="val"))
 
 

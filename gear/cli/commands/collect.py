@@ -51,6 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the command's flags to its parser."""
     parser.epilog = EXAMPLE
     add_collection_arguments(parser)
+    parser.add_argument("--engine", metavar="NAME", help="engine that makes the samples (processes)")
     parser.add_argument(
         "--workers", type=positive, default=1, metavar="N", help="processes; the result does not depend on them (1)"
     )

@@ -16,7 +16,7 @@ from multiprocessing.context import SpawnProcess
 from multiprocessing.queues import Queue
 from typing import Any
 
-from gear.dataset.executors.executor import Done, Work
+from gear.dataset.executors.executor import Done, Executor, Work
 from gear.values.errors import BackendError, GearError
 
 SILENCE_S = 600.0
@@ -64,6 +64,11 @@ class Processes:
                 process.terminate()
             for process in started:
                 process.join(timeout=10)
+
+
+def executor(*, workers: int, backend: str) -> Executor:
+    """The engine, as `open_engine` asks for it."""
+    return Processes(workers=workers, backend=backend)
 
 
 @contextlib.contextmanager

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from gear.config.collection import CollectionConfig
 from gear.config.load import load_collection
+from gear.dataset.executors.engines import DEFAULT
 from gear.values.errors import GearError
 
 
@@ -32,6 +33,7 @@ class CollectRequest:
     out: str | Path | None = None
     probes: bool | None = None
     settings: tuple[str, ...] = ()
+    engine: str = DEFAULT
     workers: int = 1
     in_subprocess: bool = False
     force: bool = False

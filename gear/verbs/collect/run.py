@@ -7,6 +7,7 @@ from pathlib import Path
 
 from gear.collecting.job import resolve
 from gear.collecting.run import CollectReport, executor_of, run_job
+from gear.dataset.executors.engines import DEFAULT
 from gear.reporting.display import displayed
 from gear.values.progress import Callbacks, Progress, Warn
 from gear.verbs.collect.request import CollectRequest
@@ -28,6 +29,7 @@ def collect(
     out: str | Path | None = None,
     probes: bool | None = None,
     settings: Iterable[str] = (),
+    engine: str = DEFAULT,
     workers: int = 1,
     in_subprocess: bool = False,
     force: bool = False,
@@ -44,7 +46,8 @@ def collect(
         out: root of the dataset.
         probes: also keep what compositors need; see `gear.dataset.probe_files`.
         settings: further `KEY=VALUE` texts for any key of the config.
-        workers: processes; they change nothing but time.
+        engine: name of the engine that makes the samples; `processes` are those of this machine.
+        workers: number of workers of the engine; they change nothing but time.
         in_subprocess: whether a single worker is a process of its own, too, which gives all its memory back.
         force: replaces a split that was made with another configuration.
         progress: shows a progress bar.
@@ -70,6 +73,7 @@ def collect(
         out=out,
         probes=probes,
         settings=tuple(settings),
+        engine=engine,
         workers=workers,
         in_subprocess=in_subprocess,
         force=force,
@@ -88,5 +92,5 @@ def run_collect(request: CollectRequest, callbacks: Callbacks) -> CollectReport:
     job = resolve(request.loaded())
     for note in job.notes:
         callbacks.on_warning(note)
-    executor = executor_of(job, request.workers, in_subprocess=request.in_subprocess)
+    executor = executor_of(job, request.workers, engine=request.engine, in_subprocess=request.in_subprocess)
     return run_job(job, executor=executor, force=request.force, callbacks=callbacks)

@@ -11,9 +11,10 @@ import cv2
 from gear.contracts.rendering import Quality
 from gear.dataset.files import explained, write_alone
 from gear.render.registry import describe
+from gear.reporting.display import displayed
 from gear.values.errors import GearError, TownError, UnknownNameError
 from gear.values.frames import UInt8Image
-from gear.values.progress import Progress
+from gear.values.progress import Callbacks, Progress
 from gear.verbs.towns.facts import Town, read_town
 from gear.verbs.towns.ground_layer import TownGeometry
 from gear.verbs.towns.sheet import SheetOptions, draw_sheet
@@ -56,6 +57,7 @@ def write_town(
     quality: str = "fast",
     weather: str = "ClearNoon",
     seed: int = 0,
+    progress: bool = False,
     on_progress: Progress | None = None,
 ) -> TownReport:
     """Writes `<town>_map.png`, and `<town>_scenes.png` with a thumbnail of every scene.
@@ -67,7 +69,8 @@ def write_town(
         renderer, quality: who renders the thumbnails, and how well.
         weather: a preset.
         seed: of the places from which the thumbnails look.
-        progress: is told how many pictures are finished.
+        progress: shows a progress bar.
+        on_progress: called after every picture.
 
     Raises:
         UnknownNameError: there is no such town, file, renderer or weather.
@@ -77,8 +80,6 @@ def write_town(
     """
     check_pictures(renderer=renderer, quality=quality, weather=weather, seed=seed)
     found = _drawable(read_town(town, scenes))
-    if on_progress is not None and found.scenes is not None:
-        on_progress(0, len(found.scenes.scenes))
     folder = Path(out)
     with explained(folder):  # before minutes are spent on drawing
         folder.mkdir(parents=True, exist_ok=True)
@@ -90,7 +91,9 @@ def write_town(
         options = SheetOptions(
             renderer=renderer, quality="film" if quality == "film" else "fast", weather=PRESETS[weather], seed=seed
         )
-        picture, problems = draw_sheet(found, options, on_progress)
+        with displayed(Callbacks.of(on_progress=on_progress), "towns", progress=progress, unit="scene") as shown:
+            shown.on_progress(0, len(found.scenes.scenes))
+            picture, problems = draw_sheet(found, options, shown.on_progress)
         sheet_path = _write(folder / f"{found.name}_scenes.png", picture)
     problems = [*found.faulty.values(), *problems]
     return TownReport(town=found, map=map_path, sheet=sheet_path, problems=tuple(problems))

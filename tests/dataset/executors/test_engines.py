@@ -1,0 +1,48 @@
+"""Engines are found by the name of their module."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from gear.dataset import executors
+from gear.dataset.executors.engines import engine_names, open_engine
+from gear.dataset.executors.executor import InThisProcess
+from gear.dataset.executors.processes import Processes
+from gear.values.errors import UnknownNameError
+
+ENGINE = """
+from gear.dataset.executors.executor import InThisProcess
+
+def executor(*, workers, backend):
+    made = InThisProcess()
+    made.asked = (workers, backend)
+    return made
+"""
+
+
+def test_the_engine_of_one_machine_is_there() -> None:
+    assert open_engine("processes", workers=3, backend="raster") == Processes(workers=3, backend="raster")
+    with pytest.raises(UnknownNameError, match=r"'procesess'.*processes"):
+        open_engine("procesess", workers=1, backend="raster")
+
+
+def test_a_new_engine_is_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "cluster_of_mine.py").write_text(ENGINE)
+    monkeypatch.setattr(executors, "__path__", [*executors.__path__, str(tmp_path)])
+    assert engine_names() == ["cluster_of_mine", "processes"]
+    opened = open_engine("cluster_of_mine", workers=8, backend="film")
+    assert isinstance(opened, InThisProcess) and vars(opened)["asked"] == (8, "film")
+
+
+def test_this_process_makes_each_item_once() -> None:
+    made: list[int] = []
+
+    def work(indices: object, done: object) -> None:
+        for index in indices:  # type: ignore[attr-defined]
+            done(index)  # type: ignore[operator]
+
+    InThisProcess().run(work, [4, 2], made.append)
+    assert made == [4, 2]
+    InThisProcess().run(lambda indices, done: pytest.fail("nothing is missing"), [], made.append)
