@@ -1,4 +1,4 @@
-"""The camera: from linear frames to pictures, by one response that no picture can influence."""
+"""The camera: turns linear frames into pictures, by weather, effects and a response that no picture influences."""
 
 from gear.camera.response import IDENTITY, Response, face_light, response_for
 

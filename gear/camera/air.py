@@ -1,12 +1,12 @@
-"""The air between the camera and what it sees: fog, haze and the veil of rain, laid over linear frames by depth.
+"""Fog, haze and the veil of rain between the camera and the scene, applied to linear frames by depth.
 
     L' = L T + A (1 - T)
 
-T, the share of light that comes through, follows from depth alone, and A, the light of the air itself, from the
-direction alone: frames stay linear in every albedo, and a patch changes no pixel that it does not reach.
+The transmittance T depends on depth, and the light of the air A on direction: frames stay linear in every albedo, and
+a patch changes only pixels that show it.
 
-Depth is sampled at pixel centres. In `film` a pixel on a silhouette has colour from both sides of it, and the air of
-the side that its centre sees: between something near and a thick fog the silhouette is as hard as in `fast`.
+Depth is sampled at pixel centres. In `film` quality a pixel on a silhouette mixes colours of both sides, but has the
+air of its centre: against thick fog, silhouettes of near objects are as hard as in `fast`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from gear.values.geometry import Array
 from gear.values.scene import CameraRecord
 
 SKY_DISTANCE_M = 2e4
-"""How far fog reaches below the sky, where it does not thin with height."""
+"""Length of rays to the sky in metres, for fog that does not thin with height."""
 
 _COARSE_PX = 16
 _STRIP_ROWS = 32
@@ -33,12 +33,12 @@ _STEEP = 80.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fog:
-    """Drops in the air: a fog, or the veil of rain.
+    """A fog, or the veil of rain: extinction that begins at a distance and decays exponentially with height.
 
     Attributes:
-        per_m: extinction at height 0.
-        from_m: where it begins, along a ray.
-        thinning_per_m: rate at which it thins with height; 0 for a fog without a top.
+        per_m: extinction at height 0, 1/m.
+        from_m: distance along a ray at which it begins, metres.
+        thinning_per_m: rate of decay with height, 1/m; 0 for none.
     """
 
     per_m: float
@@ -46,27 +46,29 @@ class Fog:
     thinning_per_m: float
 
     def thickness(self, length_m: FloatImage, rise: FloatImage, height_m: float) -> FloatImage:
-        """Optical thickness along rays: the integral of exp(-k height), solved.
+        """Optical thickness along rays: the closed integral of an exponentially decaying density.
 
-        Between two heights a density that falls exponentially adds up to (1 - exp(-x)) / x of what it is at the
-        lower end, x being the fall.
+        Over a height difference with decay x, the mean density is (1 - exp(-x)) / x times that at the lower end.
 
         Args:
-            length_m: (h, w) of the rays.
-            rise: (h, w) how they climb, a metre of ray.
-            height_m: of where they begin.
+            length_m: (h, w) lengths of the rays.
+            rise: (h, w) height gained per metre of ray.
+            height_m: height at which they begin.
+
+        Returns:
+            (h, w) float32.
         """
         inside_m = np.maximum(length_m - np.float32(self.from_m), 0)
         if self.thinning_per_m <= 0:
             return np.asarray(np.float32(self.per_m) * inside_m)
         rate = np.float32(self.thinning_per_m)
-        # Nothing is denser than the fog on the ground, also where a sky is seen below the horizon.
+        # Density is not extrapolated below the ground, where a ray to the sky points below the horizon.
         start = np.maximum(rate * (np.float32(height_m) + np.float32(self.from_m) * rise), 0)
         fall = np.maximum(rate * rise * inside_m, -start)
         np.copyto(fall, _LEAST_FALL, where=np.abs(fall) < _LEAST_FALL)
         density = np.exp(-start)
         if start.max(initial=0) > _STEEP:
-            # The same, where looking down from so high over the fog exp(-fall) is more than a float holds.
+            # The same formula for rays from far above the fog, where exp(-fall) would overflow.
             density = (density - np.exp(-(start + fall))) / fall
         else:
             density *= (1 - np.exp(-fall)) / fall
@@ -75,12 +77,12 @@ class Fog:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Air:
-    """What the air does to light.
+    """Extinction and in-scattered light of one weather's air.
 
     Attributes:
-        fogs: what floats in it; each thins, begins and takes its share by itself.
-        clear_per_m: (3,) extinction of the air itself, by channel, the same at every height. It dims no sky, which the
-            sky's picture has in it.
+        fogs: fog and the veil of rain; their optical thicknesses add up.
+        clear_per_m: (3,) extinction of clear air per channel, 1/m, at every height. It does not dim the sky, whose
+            picture includes it.
         ring: (N, 3) light of the air by azimuth, counter-clockwise from east; 1.0 is the frame's full scale.
     """
 
@@ -119,12 +121,18 @@ class Air:
         return np.asarray(cv2.merge(planes), dtype=np.uint16)
 
     def transmittance(self, depth_m: FloatImage, camera: CameraRecord) -> FloatImage:
-        """T of each pixel and channel, (H, W, 3) float32 in 0..1."""
+        """The transmittance T of each pixel and channel, (H, W, 3) float32 in 0..1."""
         rays, _ = self._directions(camera)
         return np.stack(self._through(depth_m, rays, float(camera.world_from_camera.position_m[2])), axis=-1)
 
     def _through(self, depth_m: FloatImage, rays: FloatImage, height_m: float) -> list[FloatImage]:
-        """(h, w) a channel for (h, w) depth and (2, h, w) rays: their length, and how they climb, a metre of depth."""
+        """Transmittance, (h, w) per channel.
+
+        Args:
+            depth_m: (h, w).
+            rays: (2, h, w) length of the ray, and height gained, per metre of depth.
+            height_m: height of the camera.
+        """
         seen = depth_m == depth_m
         rise = rays[1] / rays[0]
         length_m = np.where(seen, depth_m * rays[0], np.float32(SKY_DISTANCE_M))
@@ -135,9 +143,9 @@ class Air:
         return [np.exp(length_m * np.float32(-per_m) - tau) for per_m in self.clear_per_m]
 
     def _directions(self, camera: CameraRecord) -> tuple[FloatImage, list[FloatImage]]:
-        """(2, H, W) metres of ray and of climb a metre of depth, and (H, W) light of the air a channel.
+        """Rays as `_through` takes them, and the light of the air, (H, W) per channel.
 
-        The light changes slowly, so it is worked out on a coarse grid.
+        The light varies slowly, so it is computed on a coarse grid and interpolated.
         """
         width, height = camera.width_px, camera.height_px
         columns, rows = -(-width // _COARSE_PX), -(-height // _COARSE_PX)

@@ -1,14 +1,14 @@
-"""The sky's light that road users keep from the ground under and beside them, laid over linear frames.
+"""Contact shadows: the sky's light that road users block on the ground under and beside them.
 
     L' = L (1 - s o)
 
-o, the share of the sky that an actor hides from a place on the ground, weighted as level ground receives it, is the
-mean of the shadows that the actor's triangles throw from directions all over the sky. s is what the sky's light is
-worth there: all of it under a vehicle, where no sun comes; beside it, half way between shade, where it is all, and sun,
-since the frame does not say which. Neither depends on any albedo, so frames stay linear.
+o is the share of the sky that an actor hides from a point of level ground, weighted by the cosine: the mean of the
+shadows of the actor's triangles from directions all over the sky. s is the share of the sky in the ground's light: all
+of it under a vehicle, where no sun comes; beside it, the mean of shade and sun, since the frame does not tell them
+apart. Neither depends on any albedo, so frames stay linear.
 
-Renderers know no such light: their sky is at an infinite distance, and what `gear.render.occlusion` finds in depth
-reaches some decimetres. Under an overcast sky, and in the shade of houses, cars would seem to float.
+Renderers lack these shadows: their sky casts none, and `gear.render.occlusion` reaches some decimetres only. Under an
+overcast sky and in the shade of houses, cars would seem to float.
 """
 
 from __future__ import annotations
@@ -32,20 +32,20 @@ Mask = npt.NDArray[np.bool_]
 
 DIRECTIONS = 128
 MOST_HIDDEN = 0.94
-"""The rest comes by way of the ground around."""
+"""Largest share of light that is blocked; the rest is reflected by the ground around."""
 
 OUTLINE = np.float32(0.5)
-"""Of a pixel on an outline that shows what lies behind."""
+"""Share of a pixel on a silhouette that shows the background."""
 
 _FULL_FROM, _BESIDE_TO = 0.75, 0.4
-"""Shares of the sky: where more is hidden there is no sun, where less, there may be."""
+"""Hidden shares of the sky above which there is no sun, and below which there may be."""
 
 _CELLS_PER_M = {"large": 12.5, "small": 16.0}
 _LARGE_M = 2.5
 _REACH_HEIGHTS, _LEAST_REACH_M, _MOST_REACH_M = 1.6, 0.6, 3.0
 _RIM = 0.4
 _STEP_M, _FADE_M = 0.2, 0.15
-"""Ground may lie this much higher or lower than an actor's wheels, as kerbs do, and a little more."""
+"""Height difference between ground and wheels up to which shadows are full, as at kerbs, and the fade above it."""
 
 _NEAREST_M, _FARTHEST_M = 0.3, 200.0
 _MOST_POINTS = 400_000
@@ -56,11 +56,11 @@ _EDGES = np.array([(i, i | bit) for bit in (1, 2, 4) for i in range(8) if not i 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SkyOcclusion:
-    """How much of the sky one asset hides from the ground around it.
+    """Share of the sky that one asset hides from the level ground around it.
 
     Attributes:
-        share: (rows, columns) float32 in 0..1; rows go to the actor's left, columns ahead. 0 at the border.
-        cells_per_m: of both.
+        share: (rows, columns) float32 in 0..1; rows go to the actor's left, columns ahead; 0 at the border.
+        cells_per_m: resolution of both axes.
     """
 
     share: FloatImage
@@ -68,10 +68,10 @@ class SkyOcclusion:
 
     @staticmethod
     def of(shape: Shape) -> SkyOcclusion:
-        """Shadows of an asset from directions spread as level ground weighs them. It is solid from its underside up.
+        """Averages shadows from directions with a cosine distribution. The asset is solid from its underside up.
 
         Args:
-            shape: in the actor frame, standing on z = 0.
+            shape: its triangles in the actor frame, standing on z = 0.
         """
         rows, columns, cells_per_m = _grid(shape)
         layers = _layers(_points(shape, 1.5 * cells_per_m) * cells_per_m, rows, columns)
@@ -87,13 +87,13 @@ class SkyOcclusion:
 
 
 def _reach_m(shape: Shape) -> float:
-    """How far beside an asset ground is shaded."""
+    """Distance beside an asset up to which ground is shaded, metres."""
     top_m = float(shape.box_centre_m[2] + shape.box_size_m[2] / 2)
     return min(max(_REACH_HEIGHTS * top_m, _LEAST_REACH_M), _MOST_REACH_M)
 
 
 def _grid(shape: Shape) -> tuple[int, int, float]:
-    """Rows and columns of an asset's `SkyOcclusion`, and how many there are to a metre."""
+    """Rows, columns and cells per metre of an asset's `SkyOcclusion`."""
     cells_per_m = _CELLS_PER_M["large" if max(shape.box_size_m[:2]) > _LARGE_M else "small"]
     half_m = np.abs(shape.box_centre_m[:2]) + shape.box_size_m[:2] / 2 + _reach_m(shape)
     columns, rows = (2 * math.ceil(side * cells_per_m) + 1 for side in half_m)
@@ -101,7 +101,7 @@ def _grid(shape: Shape) -> tuple[int, int, float]:
 
 
 def _layers(points: Array, rows: int, columns: int) -> list[Mask]:
-    """(rows, columns) of what an asset fills at each height: cells as high as wide, the lowest on the ground."""
+    """(rows, columns) bool per layer of cubic cells, from the ground up: the cells that the asset fills."""
     cells = np.rint(points[:, 1]).astype(np.int64) + rows // 2, np.rint(points[:, 0]).astype(np.int64) + columns // 2
     low, high = np.full((rows, columns), np.inf), np.full((rows, columns), -np.inf)
     np.minimum.at(low, cells, points[:, 2])
@@ -111,7 +111,7 @@ def _layers(points: Array, rows: int, columns: int) -> list[Mask]:
 
 
 def _shadow(layers: list[Mask], to_east: float, to_north: float) -> Mask:
-    """What layers hide from the ground in a direction: each moves by so many cells for each cell of its height."""
+    """(rows, columns) shadow of all layers for one direction: each layer is shifted in proportion to its height."""
     shadow = np.zeros_like(layers[0])
     rows, columns = shadow.shape
     for level, layer in enumerate(layers):
@@ -124,7 +124,7 @@ def _shadow(layers: list[Mask], to_east: float, to_north: float) -> Mask:
 
 
 def _slopes() -> Iterator[tuple[float, float]]:
-    """Metres that shadows move for each metre of height: a spiral of directions, by the cosine to the zenith."""
+    """Shifts of shadows east and north per metre of height, for directions on a spiral with a cosine distribution."""
     for number in range(DIRECTIONS):
         square = (number + 0.5) / DIRECTIONS
         length, turn = math.sqrt(square / (1 - square)), number * math.pi * (3 - math.sqrt(5))
@@ -132,7 +132,7 @@ def _slopes() -> Iterator[tuple[float, float]]:
 
 
 def _points(shape: Shape, per_m: float) -> Array:
-    """(N, 3) points on all triangles, about so many to a metre along and across; the same every time."""
+    """(N, 3) points on all triangles, about `per_m` per metre along and across, without random draws."""
     corners = shape.vertices_m[shape.faces]
     steps = np.maximum(np.ceil(longest_edges(corners) * per_m).astype(np.int64), 1)
     found = [shape.vertices_m[np.unique(shape.faces)], *points_on(corners, steps)]
@@ -142,11 +142,11 @@ def _points(shape: Shape, per_m: float) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ContactShadows:
-    """What the actors of a world hide of one weather's sky.
+    """The contact shadows of a world's actors in one weather.
 
     Attributes:
-        shapes: of every asset that may take part, by name.
-        even_share: how much of the light on open level ground is not the sun's, 0..1.
+        shapes: triangles of every asset that may take part, by name.
+        even_share: share of the light on open level ground that is not the sun's, 0..1.
         is_display: whether frames hold display values instead of light.
     """
 
@@ -158,12 +158,12 @@ class ContactShadows:
     def apply(
         self, linear_rgb: UInt16Image, depth_m: FloatImage, is_ground: Mask, camera: CameraRecord, record: SceneRecord
     ) -> UInt16Image:
-        """The frame with shaded ground.
+        """The frame with contact shadows.
 
         Args:
             linear_rgb: (H, W, 3) uint16, gear's linear frame.
             depth_m: (H, W) float32 planar z, NaN where nothing is.
-            is_ground: (H, W) what is shaded.
+            is_ground: (H, W) bool, pixels of ground.
             camera: the camera that takes the picture.
             record: the scene.
 
@@ -183,7 +183,7 @@ class ContactShadows:
     def left(
         self, depth_m: FloatImage, is_ground: Mask, camera: CameraRecord, record: SceneRecord
     ) -> FloatImage | None:
-        """(H, W) float32 shares of the frame's values that are left; None where nothing is shaded."""
+        """(H, W) float32 factors for the frame's values; None where nothing is shaded. Arguments as for `apply`."""
         left: FloatImage | None = None
         for actor in record.actors:
             shape = self.shapes.get(actor.asset)
@@ -202,7 +202,7 @@ class ContactShadows:
                     left[band] *= np.where(where, self._beside(actor, sky, depth_m, band, camera), np.float32(1))
         if left is None:
             return None
-        # Pixels on the outline of what stands before the ground show some of it.
+        # Pixels on the silhouette of an object in front of the ground show some of the ground.
         darkest = cv2.erode(left, cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3)))
         left = np.where(is_ground, left, 1 - OUTLINE * (1 - darkest))
         return left ** np.float32(DISPLAY_POWER) if self.is_display else left
@@ -215,7 +215,7 @@ class ContactShadows:
     def _beside(
         self, actor: ActorRecord, sky: SkyOcclusion, depth_m: FloatImage, box: tuple[slice, slice], camera: CameraRecord
     ) -> FloatImage:
-        """(h, W) shares of light that one actor leaves to ground in a box of the picture."""
+        """(h, w) factors of one actor for the ground in a box of the picture."""
         actor_from_camera = (
             actor.world_from_actor.transform("world", "actor").inverse() @ camera.world_from_camera_transform
         )
@@ -231,13 +231,13 @@ class ContactShadows:
             sky.share, ahead * scale + columns // 2, left * scale + rows // 2, cv2.INTER_LINEAR, borderValue=0
         )
         level = 1 - smooth_step(np.abs(up), _STEP_M, _FADE_M)
-        beside = np.float32(worth_beside(self.even_share))
+        beside = np.float32(sky_share_beside(self.even_share))
         worth = beside + (1 - beside) * smooth_step(hidden, _BESIDE_TO, _FULL_FROM - _BESIDE_TO)
         return np.asarray(1 - np.float32(MOST_HIDDEN) * hidden * worth * level, dtype=np.float32)
 
 
-def worth_beside(even_share: float) -> float:
-    """What the sky's light is worth beside an actor: half way between sun and shade."""
+def sky_share_beside(even_share: float) -> float:
+    """The sky's share in the light beside an actor: the mean of shade (1) and sun (`even_share`)."""
     return (1 + even_share) / 2
 
 
@@ -247,7 +247,7 @@ def _slopes_of(part: slice, centre_px: float, focal_px: float) -> FloatImage:
 
 
 def _box_in_picture(actor: ActorRecord, shape: Shape, camera: CameraRecord) -> tuple[slice, slice] | None:
-    """Rows and columns that hold all ground near an actor; None where the camera sees none of it."""
+    """Rows and columns that contain all ground near an actor; None where it is out of view."""
     rows, columns, cells_per_m = _grid(shape)
     half_m = np.array((columns // 2, rows // 2)) / cells_per_m
     corners = _CUBE * (*half_m, _STEP_M + _FADE_M)
@@ -274,7 +274,7 @@ def _box_in_picture(actor: ActorRecord, shape: Shape, camera: CameraRecord) -> t
 
 
 def _before_camera(corners: Array) -> Array:
-    """(N, 3) corners of what is left of a box when all that is too near or behind is cut off, camera frame."""
+    """(N, 3) corners of a box in the camera frame, clipped at the near plane."""
     ends = corners[_EDGES]
     first, last = ends[:, 0, 2] - _NEAREST_M, ends[:, 1, 2] - _NEAREST_M
     cut = first * last < 0

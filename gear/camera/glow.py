@@ -1,4 +1,4 @@
-"""What glows by itself: windows with light behind them, and lamps that shine at the camera."""
+"""Lit windows, and the glare of lamps that shine towards the camera."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ _MOST = 4.0
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LitWindows:
-    """Panes with light behind them.
+    """N lit windows.
 
     Attributes:
-        corners_m: (N, 4, 3) in the world, in order around each pane.
+        corners_m: (N, 4, 3) in the world, in order around each window.
         normal: (N, 3) unit vectors out of the house.
-        geom_id: (N,) of the geom that each is part of.
-        gain: (N, 3) how often the frame's own light a pane shows: curtains and goods in lamplight.
-        light: (N, 3) that a pane shows besides, in shares of full scale.
-        reach_m: panes farther away are left dark.
+        geom_id: (N,) id of the geom that each is part of.
+        gain: (N, 3) factors on the frame's light, for curtains and goods in lamplight.
+        light: (N, 3) light that is added, in shares of full scale.
+        reach_m: distance beyond which windows are dark.
     """
 
     corners_m: Array
@@ -53,9 +53,10 @@ class LitWindows:
     reach_m: float = 1200.0
 
     def seen(self, geom_id: IdImage, depth_m: FloatImage, camera: CameraRecord) -> npt.NDArray[np.int32]:
-        """(H, W) number of the pane that each pixel shows, -1 for none: it is of the pane's geom, and in its plane.
+        """(H, W) index of the window that each pixel shows, -1 for none.
 
-        One geom may be many houses, of which one stands before another.
+        A pixel shows a window where it has the window's geom and lies in its plane: one geom may be many houses, of
+        which one hides another.
         """
         pose = camera.world_from_camera_transform
         found = np.full(geom_id.shape, -1, np.int32)
@@ -85,13 +86,13 @@ class LitWindows:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LampGlare:
-    """Lamps of one kind that shine at a camera.
+    """The visible lamps of one kind, as spots in the picture.
 
     Attributes:
         position_m: (N, 3) in the world.
-        places_px: (N, 2) column and row, in index pixels.
-        size_px: (N,) of the lamp's glass.
-        strength: (N,) light of a spot.
+        places_px: (N, 2) column and row, index pixels.
+        size_px: (N,) radius of the lamp's glass, pixels.
+        strength: (N,) light at the middle of a spot.
     """
 
     position_m: Array
@@ -101,13 +102,13 @@ class LampGlare:
 
     @staticmethod
     def of(lamps: Lamps, camera: CameraRecord, glare: float, depth_m: FloatImage) -> LampGlare:
-        """Those before the camera that nothing in the picture hides.
+        """The lamps in front of the camera that no surface hides.
 
         Args:
-            lamps: of one kind.
+            lamps: lamps of one kind.
             camera: the camera that takes the picture.
             glare: light of a spot per intensity towards the camera.
-            depth_m: (H, W) planar z, NaN where nothing is.
+            depth_m: (H, W) float32 planar z, NaN where nothing was hit.
         """
         pose = camera.world_from_camera_transform
         inside = (lamps.position_m - pose.translation_m) @ pose.rotation
@@ -129,19 +130,23 @@ class LampGlare:
         )
 
     def spots(self, size_px: tuple[int, ...]) -> FloatImage:
-        """(height, width) light, but for its colour: a spot a lamp, and a little glare about it."""
+        """(height, width) float32 light without colour: a Gaussian spot per lamp, and a wide faint one around it."""
         result = np.zeros(size_px, np.float32)
         for place, size, strength in zip(self.places_px, self.size_px, self.strength, strict=True):
             sigma = max(_LEAST_SIGMA_PX, size)
-            # A lamp smaller than the least spot is as much darker.
+            # A lamp smaller than the smallest spot has a darker spot.
             peak = strength * min(1.0, size / sigma)
             for width, height in ((1.0, peak), (_GLARE_WIDTH, _GLARE_SHARE * peak)):
                 _add_spot(result, place, (width * sigma, width * sigma), height)
         return result
 
     def streaks(self, camera: CameraRecord, ground_m: float) -> FloatImage:
-        """(H, W) light, but for its colour, on wet level ground at a height: its unevenness draws the images of lamps
-        out, towards who looks."""
+        """(H, W) float32 light without colour: reflections of lamps on wet level ground, stretched towards the camera.
+
+        Args:
+            camera: the camera that takes the picture.
+            ground_m: height of the ground in the world.
+        """
         pose = camera.world_from_camera_transform
         below_m = self.position_m * (1, 1, -1) + (0, 0, 2 * ground_m)
         places_px = _pixels((below_m - pose.translation_m) @ pose.rotation, camera)
@@ -154,7 +159,7 @@ class LampGlare:
 
 
 def _pixels(inside: Array, camera: CameraRecord) -> Array:
-    """(N, 2) index pixels of (N, 3) places in the camera's frame; the middle of the first pixel is (0, 0)."""
+    """(N, 2) index pixels of (N, 3) points in the camera's frame."""
     pinhole = camera.intrinsics
     return np.asarray(
         inside[..., :2] / inside[..., 2:] * (pinhole.fx_px, pinhole.fy_px) + (pinhole.cx_px, pinhole.cy_px)

@@ -1,7 +1,7 @@
-"""What throws shadows in the light of lamps: what stands in a town, and the road users of a scene.
+"""Shadows in the light of lamps, cast by static objects of a town and by the road users of a scene.
 
-What stands stops the light of lamps that stand, too, where it first meets it; maps of that are made once. Road users
-stop the light of all lamps. The ground stops none.
+Static objects cast shadows in the light of static lamps, from shadow maps that are computed once. Road users cast
+shadows in the light of all lamps. The ground casts none.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from gear.values.frames import FloatImage, Shape
 from gear.values.scene import ActorRecord, SceneRecord
 
 LEAST_LIGHT = 0.002
-"""Light fainter than this is not looked after: a fifteenth of what the night leaves on the ground."""
+"""Light below which shadows are not computed: a fifteenth of the night's light on the ground."""
 
 SHADOWED_WITHIN_M = 100.0
-"""Lamps farther from the camera throw no shadows."""
+"""Distance from the camera beyond which lamps cast no shadows."""
 
 WORTH = 0.85
-"""Share of a lamp's reach in which road users throw shadows; farther out little is left of its light."""
+"""Share of a lamp's reach in which road users cast shadows; its light is faint beyond."""
 
 STANDING = Layout(cells=384, zoom=1.0)
 DRIVING = Layout(cells=384, zoom=2.2)
-"""Headlamps throw shadows within 49 degrees of where they point; farther aside they only stray."""
+"""Layouts of shadow maps. Headlamps cast shadows within 49 degrees of their axis; beyond it they only scatter light."""
 
 _PIECE_M = 24.0
 _SPACING_M = {"large": 0.07, "small": 0.035}
@@ -39,12 +39,12 @@ _LARGE_M = 2.5
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Casters:
-    """What stands in a town, without the ground, in pieces that lie together.
+    """Triangles of a town's static objects, without the ground, in spatial pieces.
 
     Attributes:
         corners_m: (N, 3, 3) float32 triangles in the world.
-        ends: (M,) where each piece ends among them.
-        low_m, high_m: (M, 3) float32 corners of boxes that hold the pieces.
+        ends: (M,) index after the last triangle of each piece.
+        low_m, high_m: (M, 3) float32 corners of the pieces' bounding boxes.
     """
 
     corners_m: Floats
@@ -54,7 +54,7 @@ class Casters:
 
     @staticmethod
     def of(corners_m: Floats) -> Casters:
-        """Triangles, put in order once."""
+        """Sorts (N, 3, 3) triangles into pieces."""
         cells = np.floor(corners_m[:, 0, :2] / np.float32(_PIECE_M)).astype(np.int64)
         keys = cells[:, 0] * (1 << 32) + cells[:, 1]
         order = np.argsort(keys, kind="stable")
@@ -68,7 +68,7 @@ class Casters:
         return Casters(corners_m=corners_m, ends=ends, low_m=low_m, high_m=high_m)
 
     def near(self, place_m: Floats, reach_m: float) -> Floats:
-        """(K, 3, 3) of which something may be within reach of a place."""
+        """(K, 3, 3) triangles that may reach into a sphere around a position (3,)."""
         away = np.maximum(np.maximum(self.low_m - place_m, place_m - self.high_m), 0)
         chosen = np.flatnonzero(lengths(away.T) < reach_m).tolist()
         starts = np.append(0, self.ends)
@@ -80,12 +80,12 @@ class Casters:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class User:
-    """A road user as what stops light.
+    """A road user as a set of points that block light.
 
     Attributes:
-        points_m: (N, 3) float32 on it, in the world.
-        spacing_m: how far apart they are.
-        middle_m, radius_m: of a ball that holds them.
+        points_m: (N, 3) float32 points on its surface, in the world.
+        spacing_m: distance between neighbouring points.
+        middle_m, radius_m: bounding sphere.
     """
 
     points_m: Floats
@@ -94,7 +94,7 @@ class User:
     radius_m: float
 
     def is_before(self, outlook: LampFrame, reach_m: float) -> bool:
-        """Whether some of it may be in a lamp's map, near enough to matter."""
+        """Whether its bounding sphere is near a lamp and within the directions of the lamp's map."""
         away = self.middle_m - outlook.place_m
         away_m = float(np.linalg.norm(away))
         if away_m >= WORTH * reach_m + self.radius_m:
@@ -107,11 +107,11 @@ class User:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LampShadows:
-    """All that throws shadows in a town at night.
+    """Shadow casters of a town at night.
 
     Attributes:
-        casters: what stands.
-        shapes: of every asset that may take part, by name.
+        casters: static objects.
+        shapes: triangles of every asset that may take part, by name.
     """
 
     casters: Casters
@@ -121,7 +121,7 @@ class LampShadows:
     _scenes: list[SceneShadows] = field(default_factory=list, init=False, repr=False)
 
     def scene(self, record: SceneRecord) -> SceneShadows:
-        """With the road users of a scene. All views of one that come one after the other share what is made for it."""
+        """The casters with the road users of a scene; cached for consecutive views of one scene."""
         if not self._scenes or self._scenes[0].record is not record:
             users = [
                 self._user(actor, self.shapes[actor.asset]) for actor in record.actors if actor.asset in self.shapes
@@ -141,7 +141,7 @@ class LampShadows:
         return User(points_m=points_m, spacing_m=spacing_m, middle_m=middle_m, radius_m=radius_m)
 
     def standing(self, kind: str, index: int, outlook: LampFrame, reach_m: float) -> Floats:
-        """(cells, cells) how far the light of a lamp that stands comes among what stands."""
+        """(cells, cells) distances at which static objects stop the light of a static lamp; computed once."""
         if (kind, index) not in self._fixed:
             self._fixed[kind, index] = first_hits(self.casters.near(outlook.place_m, reach_m), outlook)
         return self._fixed[kind, index]
@@ -149,10 +149,10 @@ class LampShadows:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SceneShadows:
-    """All that throws shadows in one scene.
+    """Shadow casters of one scene.
 
     Attributes:
-        town: what stands.
+        town: static objects.
         record: the scene.
         users: its road users.
     """
@@ -180,13 +180,13 @@ class SceneShadows:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LampShadow:
-    """What is in the way of one lamp. Its map is made when the first place in its light is seen.
+    """The shadows of one lamp. Its map is computed when it is first needed.
 
     Attributes:
-        scene: what throws shadows.
-        kind, index: which lamp it is.
-        lamps: of its kind.
-        stands: whether it stands in the town.
+        scene: shadow casters.
+        kind, index: the lamp.
+        lamps: all lamps of its kind.
+        stands: whether the lamp is a static one of the town.
     """
 
     scene: SceneShadows
@@ -203,14 +203,14 @@ class LampShadow:
         facing: FloatImage,
         up: FloatImage,
     ) -> None:
-        """Takes from the lamp's light what does not come through, in place.
+        """Multiplies the lamp's light by the share that reaches each surface, in place.
 
         Args:
-            light: (h, W) of the lamp, without shadows.
-            towards: (h, W) each, east, north and up parts of the unit vectors from the lamp to places.
-            away_m: (h, W) how far they are from it.
-            facing: (h, W) cosines between their surfaces' normals and the way back to the lamp.
-            up: (h, W) upward parts of the normals.
+            light: (h, W) light of the lamp without shadows.
+            towards: east, north and up components, (h, W) each, of unit vectors from the lamp to the surfaces.
+            away_m: (h, W) distances from the lamp.
+            facing: (h, W) cosines between the surfaces' normals and the direction to the lamp.
+            up: (h, W) upward components of the normals.
         """
         shown = light.reshape(-1)
         where = np.flatnonzero(shown > LEAST_LIGHT)
@@ -222,7 +222,7 @@ class LampShadow:
 
 
 def _thinned(shape: Shape, spacing_m: float) -> Floats:
-    """(N, 3) points on all triangles, of those that lie together one."""
+    """(N, 3) points on all triangles, one per cell of `spacing_m`."""
     corners = shape.vertices_m[shape.faces].astype(np.float32)
     steps = np.maximum(np.ceil(longest_edges(corners) / spacing_m), 1).astype(np.int64)
     points_m = np.concatenate(list(points_on(corners, steps)))

@@ -1,4 +1,4 @@
-"""Lamps, and how their light is spread."""
+"""Lamps and their angular distribution of light."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ DRIVING = ("ego", "npc", "carrier")
 HEAD_REACH_M = 70.0
 HEAD_HEIGHT_M = 0.65
 HEAD_DIP = 0.012
-"""Tangent by which low beams point down."""
+"""Tangent of the angle by which low beams point down."""
 
 HEAD_COLOUR = (1.0, 0.93, 0.80)
 HEAD_INTENSITY = 130.0
@@ -27,17 +27,17 @@ _HEAD_WIDTH, _HEAD_CUT, _HEAD_DEPTH, _HEAD_STRAY = 0.38, 0.012, 0.16, 0.015
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Lamps:
-    """Some lamps of one kind.
+    """N lamps of one kind.
 
     Attributes:
         position_m: (N, 3) in the world.
         axis: (N, 3) unit vectors along which they shine.
-        intensity: (N,) light, times a square metre, that a white surface a metre before the lamp would show.
-        colour: (3,) by which it is multiplied.
-        beam: how light is spread: from the direction to what is lit, as (along the axis, level across, up) parts of
-            a unit vector, to shares of the intensity.
-        reach_m: beyond it nothing is lit.
-        up_m, down_m: how much higher and lower than a lamp things are lit.
+        intensity: (N,) light of a white surface one metre in front of the lamp; 1.0 is the frame's full scale.
+        colour: (3,) factors per channel.
+        beam: angular distribution: takes the components of unit vectors from the lamp (along the axis, horizontally
+            across it, up) to shares of the intensity.
+        reach_m: distance beyond which nothing is lit.
+        up_m, down_m: heights above and below a lamp up to which surfaces are lit.
     """
 
     position_m: Array
@@ -50,7 +50,7 @@ class Lamps:
     down_m: float
 
     def shares_towards(self, place_m: Array) -> Array:
-        """(N,) shares of their intensity that lamps send to a place."""
+        """(N,) shares of their intensity that lamps send towards a world position (3,)."""
         away = place_m - self.position_m
         away = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-6)
         across = np.einsum("nd,nd->n", away, sides_of(self.axis))
@@ -59,7 +59,7 @@ class Lamps:
 
 
 def sides_of(axis: Array) -> Array:
-    """(N, 3) level unit vectors to the left of axes; zero for upright ones."""
+    """(N, 3) horizontal unit vectors to the left of axes; zero for vertical axes."""
     side = np.stack([-axis[:, 1], axis[:, 0], np.zeros(len(axis))], axis=1)
     length = np.linalg.norm(side, axis=1, keepdims=True)
     return np.asarray(np.where(length > _UPRIGHT, side / np.maximum(length, _UPRIGHT), 0.0))
@@ -67,11 +67,11 @@ def sides_of(axis: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Headlamps:
-    """Where a vehicle bears them.
+    """Positions of a vehicle's headlamps.
 
     Attributes:
-        front_m: how far ahead of its origin.
-        half_gauge_m: from its middle to each of the two; 0 for a single one.
+        front_m: distance ahead of the vehicle's origin.
+        half_gauge_m: distance of each of two headlamps from the middle; 0 for a single one.
     """
 
     front_m: float
@@ -79,17 +79,17 @@ class Headlamps:
 
 
 def street_beam(along: FloatImage, across: FloatImage, up: FloatImage) -> FloatImage:
-    """A lantern that lights a long piece of its street: more to the sides than straight down, nothing above."""
+    """A street lamp: more light to the sides than straight down, none upwards. See `Lamps.beam`."""
     return np.asarray(np.clip(along * 3.5, 0, 1) * (1 + 1.6 * (1 - along * along)))
 
 
 def globe_beam(along: FloatImage, across: FloatImage, up: FloatImage) -> FloatImage:
-    """A glass that shines to all sides, under a lid."""
+    """A globe lamp: light to all sides, less upwards. See `Lamps.beam`."""
     return np.asarray(np.clip(1 - 0.9 * up, 0.1, 1), dtype=np.float32)
 
 
 def low_beam(along: FloatImage, across: FloatImage, up: FloatImage) -> FloatImage:
-    """A dipped headlamp: wide, bright just below a sharp edge at the height of the lamp."""
+    """A low beam: wide, with a sharp cut-off just above its brightest direction. See `Lamps.beam`."""
     ahead = np.maximum(along, 1e-3)
     side, rise = across / ahead, up / ahead + np.float32(HEAD_DIP)
     above = np.exp(-np.maximum(rise, 0) / np.float32(_HEAD_CUT))
@@ -99,16 +99,16 @@ def low_beam(along: FloatImage, across: FloatImage, up: FloatImage) -> FloatImag
 
 
 def drivers(record: SceneRecord, vehicles: Mapping[str, Headlamps]) -> list[ActorRecord]:
-    """Those of a scene that drive, and so with their lamps on."""
+    """The vehicles of a scene whose lamps are on: those that drive and have headlamps."""
     return [actor for actor in record.actors if actor.asset in vehicles and actor.role in DRIVING]
 
 
 def headlamps(record: SceneRecord, vehicles: Mapping[str, Headlamps]) -> Lamps:
-    """The headlamps of all that drive in a scene.
+    """The headlamps of all driving vehicles of a scene.
 
     Args:
         record: the scene.
-        vehicles: where each asset bears its own; what is not in it has none.
+        vehicles: headlamps by asset; other assets have none.
     """
     positions, axes = [np.zeros((0, 3))], [np.zeros((0, 3))]
     for actor in drivers(record, vehicles):

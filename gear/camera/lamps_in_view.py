@@ -1,4 +1,4 @@
-"""The lamps in a picture, and the light that they throw on what it shows."""
+"""The light of lamps on the surfaces of a view."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ _NEAREST_M = 0.5
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LampsInView:
-    """The lamps of one kind that light something in a picture.
+    """The lamps of one kind, with the part of a picture that each may light.
 
     Attributes:
-        lamps: all of the kind.
-        boxes: (N, 4) first and last column, first and last row of what each may light; empty boxes for none of it.
-        sides: (N, 3) level unit vectors to the left of their axes.
-        origin_m: (3,) the camera.
+        lamps: all N lamps of the kind.
+        boxes: (N, 4) first and last column, first and last row that each may light; empty where it lights none.
+        sides: (N, 3) horizontal unit vectors to the left of the lamps' axes.
+        origin_m: (3,) position of the camera.
     """
 
     lamps: Lamps
@@ -36,7 +36,7 @@ class LampsInView:
 
     @staticmethod
     def of(lamps: Lamps, camera: CameraRecord) -> LampsInView:
-        """Those within a camera's view."""
+        """The boxes of lamps for a camera."""
         pose = camera.world_from_camera_transform
         sides = np.array([(x, y) for x in (-1, 1) for y in (-1, 1)]) * lamps.reach_m
         corners = np.array([(*side, z) for side in sides for z in (-lamps.down_m, lamps.up_m)])
@@ -47,7 +47,7 @@ class LampsInView:
         middle = np.array([pinhole.cx_px, pinhole.cy_px]) + 0.5
         places = inside[..., :2] / np.maximum(z, _NEAREST_M) * (pinhole.fx_px, pinhole.fy_px) + middle
         low, high = np.floor(places.min(axis=1)), np.ceil(places.max(axis=1))
-        # What reaches behind the camera may be anywhere in the picture.
+        # A volume that reaches behind the camera may be anywhere in the picture.
         behind = z.min(axis=1) <= _NEAREST_M
         low, high = np.where(behind, 0, low), np.where(behind, size, high)
         high[z.max(axis=(1, 2)) <= 0] = 0
@@ -56,17 +56,17 @@ class LampsInView:
         return LampsInView(lamps=lamps, sides=sides_of(lamps.axis), boxes=boxes, origin_m=pose.translation_m)
 
     def near(self, within_m: float) -> list[int]:
-        """Those that may light something in the picture and are within a distance of the camera."""
+        """Indices of lamps with a box that are within a distance of the camera."""
         away_m = np.linalg.norm(self.lamps.position_m - self.origin_m, axis=1)
         first, last, above, below = self.boxes.T
         return np.flatnonzero((first < last) & (above < below) & (away_m < within_m)).tolist()
 
     def light(self, strip: Strip, shadows: Mapping[int, LampShadow] | None = None) -> FloatImage | None:
-        """(h, W) of what white surfaces would show of the lamps' light, but for its colour; None for darkness.
+        """(h, W) float32 light of the lamps on white surfaces, without colour; None where no lamp lights the strip.
 
         Args:
-            strip: of the picture.
-            shadows: what stops the light of some lamps, by their number.
+            strip: some rows of the view.
+            shadows: shadows of some lamps, by index.
         """
         top, bottom = strip.rows.start, strip.rows.stop
         first, last, above, below = self.boxes.T

@@ -1,4 +1,4 @@
-"""What has light of its own at night: signals, lamps of vehicles, the insides of buses, boards under their lamps."""
+"""Surfaces that emit light at night: lenses of vehicle lamps, interiors of buses, boards under their own lamps."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from gear.values.scene import CameraRecord, SceneRecord
 Where = tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]
 
 BOARD_LIGHT, BOARD_FALL = 0.33, 0.3
-"""What a white board shows at its upper edge in the light of its own lamps, and by what share less at its lower one."""
+"""Light of a white board at its upper edge, and the share by which it is darker at the lower edge."""
 
 INSIDE_LIGHT = (0.62, 0.60, 0.54)
-"""What a white thing in a bus shows in the light of the lamps there."""
+"""Light of a white surface inside a bus, per channel."""
 
 FRONT_LIGHT, BACK_LIGHT = (0.9, 0.85, 0.75), (0.30, 0.008, 0.004)
 BACK_GAIN = 0.35
 ENDS = 0.6
-"""Glass farther out than this share of the way to a vehicle's front or back is of lamps that are on; what is between,
-on the roof, is of blue lights that are off."""
+"""Glass beyond this share of the distance to a vehicle's front or back belongs to lamps that are on; glass between them
+belongs to blue lights on the roof, which are off."""
 
 
 def vehicle_lamp_light(
@@ -36,10 +36,10 @@ def vehicle_lamp_light(
     geoms: GeomTable,
     vehicles: Mapping[str, Headlamps],
 ) -> Iterator[tuple[Where, float, tuple[float, float, float]]]:
-    """The glass of the lamps of all that drives: rows and columns, gain of what is seen there, and light besides.
+    """The lenses of the lamps of driving vehicles.
 
     Args:
-        lenses: (ngeom + 1,) whether a geom is such glass; the last entry is what id -1 finds.
+        lenses: (ngeom + 1,) bool, whether a geom is a lens; the last entry is for id -1.
         geom_id, depth_m: (H, W) of a view.
         camera: the camera that takes the picture.
         record, geoms: the scene, and what each geom is.
@@ -66,10 +66,10 @@ def bus_interior_light(
     geoms: GeomTable,
     vehicles: Mapping[str, Headlamps],
 ) -> Where:
-    """Rows and columns of the panes of buses that drive; what is seen through them is lit from within.
+    """Rows and columns of the windows of driving buses, whose interior is lit.
 
     Args:
-        panes: (ngeom + 1,) whether a geom is a bus's panes; the last entry is what id -1 finds.
+        panes: (ngeom + 1,) bool, whether a geom is a bus window; the last entry is for id -1.
         geom_id: (H, W) of a view.
         record, geoms: the scene, and what each geom is.
         vehicles: assets that have lamps.
@@ -83,7 +83,7 @@ def bus_interior_light(
 def board_light(
     geom_id: IdImage, depth_m: FloatImage, camera: CameraRecord, record: SceneRecord, geoms: GeomTable
 ) -> Iterator[tuple[Where, FloatImage]]:
-    """Faces of standing boards: rows and columns, and (N,) what a white one shows there in the light from above."""
+    """Faces of standing boards: rows and columns, and (N,) light of a white face there under the board's lamps."""
     index = np.append(geoms.surface_index, -1)[geom_id]
     for number, surface in enumerate(record.surfaces):
         rows, columns = np.nonzero(index == number)
@@ -97,7 +97,7 @@ def board_light(
 def world_positions(
     rows: npt.NDArray[np.intp], columns: npt.NDArray[np.intp], depth_m: FloatImage, camera: CameraRecord
 ) -> Array:
-    """(N, 3) where pixels lie in the world."""
+    """(N, 3) positions in the world of the surfaces at (N,) rows and columns."""
     pose = camera.world_from_camera_transform
     z = depth_m[rows, columns].astype(np.float64)
     pinhole = camera.intrinsics

@@ -1,12 +1,12 @@
-"""Lamps at night, laid over linear frames: what they light, by depth, and what glows itself.
+"""Lamps at night in linear frames: light on surfaces, by depth, and surfaces that emit light.
 
     L' = L (k + E / A) + G
 
-L is the frame under the night's even light, in which every surface shows its albedo times A, the even light that a
-surface of its slant gets; k is what is left of that light, E what lamps add to it, G the light of what glows. None of
-these depends on any albedo: frames stay linear, and a patch changes no pixel that it does not reach.
+L is the frame under even light, in which every surface shows its albedo times A, the irradiance by its normal; k is the
+share of that light that is left at night, E the irradiance by lamps, G emitted light. None of these depends on any
+albedo: frames stay linear, and a patch changes only pixels that show it.
 
-Slants follow from depth, shadows from what stands in the town and from the scene's road users.
+Normals follow from depth. Static objects of the town and the scene's road users cast shadows.
 """
 
 from __future__ import annotations
@@ -35,23 +35,23 @@ from gear.values.scene import CameraRecord, SceneRecord
 HalfImage = npt.NDArray[np.float16]
 
 GLARE = {"street": 0.12, "globe": 0.6, "head": 0.03}
-"""Light of the spot that a lamp is seen as, per light that it throws."""
+"""Light of the spot of a visible lamp per intensity towards the camera, by kind of lamp."""
 
 SIGNAL_GAIN = 0.9
 STREAK_SHARE = 0.12
-"""Of a lamp's light that wet ground mirrors."""
+"""Share of a lamp's spot that wet ground reflects."""
 
 _GRAIN_PX = 128
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class NightLight:
-    """What one view of one scene gets of lamps; the same whatever its surfaces show.
+    """The light of lamps in one view of one scene; the same for all faces of its surfaces.
 
     Attributes:
         share: (H, W, 3) float16, k + E / A.
         glow: (H, W, 3) float16, G in frame units.
-        streaks: (H, W, 3) float16, what wet ground mirrors of lamps, in frame units; None for dry ground.
+        streaks: (H, W, 3) float16, reflections of lamps on wet ground, in frame units; None for dry ground.
     """
 
     share: HalfImage
@@ -59,7 +59,7 @@ class NightLight:
     streaks: HalfImage | None
 
     def apply(self, linear_rgb: UInt16Image) -> UInt16Image:
-        """(H, W, 3) uint16 frame at night, a new array. Steps between levels are hidden in a fixed grain."""
+        """The frame at night, (H, W, 3) uint16, a new array, rounded with a fixed dither pattern."""
         result = np.empty_like(linear_rgb)
         for rows in _bands(len(linear_rgb)):
             light = self.share[rows].astype(np.float32) * linear_rgb[rows] + self.glow[rows]
@@ -67,7 +67,7 @@ class NightLight:
         return result
 
     def apply_reflections(self, linear_rgb: UInt16Image) -> UInt16Image:
-        """The frame with lamps mirrored in wet ground."""
+        """The frame with reflections of lamps on wet ground; the frame itself where ground is dry."""
         if self.streaks is None:
             return linear_rgb
         result = np.empty_like(linear_rgb)
@@ -81,19 +81,19 @@ class Night:
     """A town's lamps in one weather.
 
     Attributes:
-        level, sky_level: share of the even light that is left on the ground and in the sky, 0..1.
-        lit: how far lamps outshine it, 0..1: at dusk they are on, and yet pale.
-        even: (3, 3) what a white surface shows in the even light that faces up, sideways and down, by channel; 1.0 is
-            the frame's full scale.
-        lamps: of the town, by kind: `street` and `globe`.
-        windows: panes with light behind them.
-        vehicles: where vehicles bear their headlamps, by asset.
-        wetness: of open ground, 0..1.
-        is_signal: (ngeom,) what glows by itself in the frame, the lenses of traffic lights.
-        is_lens: (ngeom,) the glass of vehicles' lamps.
-        is_pane: (ngeom,) the panes of buses.
+        level, sky_level: share of the even light that is left on surfaces and in the sky, 0..1.
+        lit: strength of lamps, 0..1; small at dusk, when they are on but pale.
+        even: (3, 3) even light of white surfaces that face up, sideways and down, per channel; 1.0 is the frame's full
+            scale.
+        lamps: lamps of the town, by kind: `street` and `globe`.
+        windows: lit windows.
+        vehicles: headlamps by asset.
+        wetness: wetness of open ground, 0..1.
+        is_signal: (ngeom,) bool, lenses of traffic lights, which emit light in the frame.
+        is_lens: (ngeom,) bool, lenses of vehicle lamps.
+        is_pane: (ngeom,) bool, windows of buses.
         is_display: whether frames hold display values instead of light.
-        shadows: what throws them; None for nothing.
+        shadows: shadows of lamps; None for none.
     """
 
     level: float
@@ -111,12 +111,12 @@ class Night:
     shadows: LampShadows | None = None
 
     def light(self, truth: RawView, camera: CameraRecord, record: SceneRecord, geoms: GeomTable) -> NightLight:
-        """What a view gets of lamps.
+        """The light of lamps in a view.
 
         Args:
-            truth: depth and ids of a renderer's view.
+            truth: depth and ids of the view.
             camera: the camera that takes the picture.
-            record: the scene, for who drives with lights.
+            record: the scene, for vehicles that drive.
             geoms: what each geom is.
         """
         kinds = {**self.lamps, "head": headlamps(record, self.vehicles)}
@@ -145,7 +145,7 @@ class Night:
     def _spots(
         self, kinds: Mapping[str, Lamps], camera: CameraRecord, record: SceneRecord
     ) -> list[tuple[LampsInView, dict[int, LampShadow]]]:
-        """The lamps in a view by kind, and what is in the way of those that are near, by number."""
+        """The lamps in a view by kind, each with the shadows of near lamps by index."""
         found = []
         scene = self.shadows.scene(record) if self.shadows is not None else None
         for kind, lamps in kinds.items():
@@ -165,7 +165,7 @@ class Night:
     def _add_lamps(
         self, strip: Strip, spots: Sequence[tuple[LampsInView, dict[int, LampShadow]]], share: FloatImage
     ) -> None:
-        """Adds k + E / A to some rows of shares."""
+        """Adds k + E / A to some rows of `share`."""
         share += np.where(strip.is_seen, np.float32(self.level), np.float32(self.sky_level))[..., None]
         lit = [(spot.lamps.colour, spot.light(strip, shadows)) for spot, shadows in spots]
         above, aside, below = self.even.astype(np.float32)
@@ -179,7 +179,7 @@ class Night:
     def _own(
         self, geom_id: IdImage, depth_m: FloatImage, camera: CameraRecord, record: SceneRecord, geoms: GeomTable
     ) -> tuple[HalfImage, HalfImage]:
-        """(H, W, 3) shares of what has light of its own, and the light that it shows besides."""
+        """(H, W, 3) factors and added light of surfaces that emit light; zero elsewhere."""
         share = np.zeros((*geom_id.shape, 3), np.float16)
         glow = np.zeros_like(share)
         panes = self.windows.seen(geom_id, depth_m, camera)
@@ -197,18 +197,18 @@ class Night:
 
 
 def _add_colour(total: HalfImage, light: FloatImage, colour: tuple[float, float, float]) -> None:
-    """Adds (H, W) light of a colour."""
+    """Adds (H, W) light of a colour to (H, W, 3), in place."""
     for rows in _bands(len(light)):
         total[rows] += light[rows, :, None] * np.array(colour, np.float32)
 
 
 def _bands(height: int) -> Iterator[slice]:
-    """Rows a few at a time: whole pictures of floats take more memory than all that a sample keeps."""
+    """Slices of a few rows each: float arrays of whole pictures would take much memory."""
     return (slice(top, min(top + STRIP_ROWS, height)) for top in range(0, height, STRIP_ROWS))
 
 
 def _rounded(light: FloatImage, rows: slice) -> UInt16Image:
-    """Some rows of light as levels, right on average: rounded down after a grain of 0..1, the same every time."""
+    """Some rows of light as uint16, dithered: a fixed pattern of 0..1 is added before rounding down."""
     grain = _grain()[np.arange(rows.start, rows.stop) % _GRAIN_PX]
     light += np.tile(grain, (1, -(-light.shape[1] // _GRAIN_PX)))[:, : light.shape[1], None]
     return np.minimum(light, LINEAR_FULL_SCALE, out=light).astype(np.uint16)

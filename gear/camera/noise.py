@@ -1,4 +1,4 @@
-"""Periodic fractal noise: one tile that meets itself at its borders."""
+"""Periodic fractal noise, reads of textures, and a smooth step."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ _FOLD = 4096
 
 
 def periodic_noise(rng: np.random.Generator, octaves: Sequence[int], slope: float) -> npt.NDArray[np.float32]:
-    """(`TILE_PX`, `TILE_PX`) noise whose values are spread evenly over 0..1.
+    """(`TILE_PX`, `TILE_PX`) float32 periodic noise whose values are uniformly distributed over 0..1.
 
     Args:
-        rng: draws the cells.
-        octaves: cells to a side, each a divisor of `TILE_PX`.
-        slope: an octave of n cells weighs n to the minus this power.
+        rng: generator of the random values.
+        octaves: grid cells per side of each octave, divisors of `TILE_PX`.
+        slope: an octave of n cells has the weight n ** -slope.
     """
     total = np.zeros((TILE_PX, TILE_PX), np.float32)
     for octave in octaves:
         grid = rng.random((octave, octave)).astype(np.float32)
-        # Two cells more on each side make the interpolation meet itself at the borders.
+        # Two more cells on each side make the interpolation periodic.
         cell = TILE_PX // octave
         padded = np.pad(grid, 2, mode="wrap")
         fine = cv2.resize(padded, None, fx=cell, fy=cell, interpolation=cv2.INTER_CUBIC)
@@ -37,8 +37,17 @@ def periodic_noise(rng: np.random.Generator, octaves: Sequence[int], slope: floa
 def sampled(
     picture: npt.NDArray[np.float32], x: npt.NDArray[Any], y: npt.NDArray[Any], *, is_periodic: bool = True
 ) -> npt.NDArray[np.float32]:
-    """A picture at (N,) places in its pixels, bilinear: (N,) or (N, channels); beyond its borders the border."""
-    # OpenCV's remap takes at most 32767 columns, and at least one: the list is folded into rows.
+    """Bilinear reads of a picture.
+
+    Args:
+        picture: (H, W) or (H, W, C) float32.
+        x, y: (N,) columns and rows, index pixels.
+        is_periodic: whether the picture repeats; otherwise the border is read beyond it.
+
+    Returns:
+        (N,) or (N, C) float32.
+    """
+    # OpenCV's remap takes 1 to 32767 columns, so the list is folded into rows.
     rows = max(1, -(-len(x) // _FOLD))
     height, width = picture.shape[:2]
     if is_periodic:
@@ -50,6 +59,6 @@ def sampled(
 
 
 def smooth_step(value: npt.NDArray[np.float32], edge: float, width: float) -> npt.NDArray[np.float32]:
-    """0 up to an edge, 1 from a width beyond it on, smooth in between."""
+    """0 up to `edge`, 1 from `edge + width` on, a cubic between them; elementwise."""
     t = np.clip((value - edge) / width, 0, 1)
     return np.asarray(t * t * (3 - 2 * t), dtype=np.float32)

@@ -1,4 +1,4 @@
-"""Where pixels lie and which way their surfaces face, from depth alone."""
+"""Positions and surface normals of pixels, from depth alone."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from gear.values.frames import FloatImage
 from gear.values.scene import CameraRecord
 
 STRIP_ROWS = 32
-"""Strips stay in the processor's cache."""
+"""Rows of a strip: its arrays stay in the processor's cache."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Strip:
-    """Some rows of a picture.
+    """Some rows of a view.
 
     Attributes:
-        rows: which.
-        is_seen: (h, W) whether there is anything.
-        position_m: (3, h, W) float32 east, north and up from the camera to what is seen; zero where nothing is.
-        normal: (3, h, W) float32 unit vectors out of what is seen, towards the camera; zero where nothing is.
+        rows: of the picture.
+        is_seen: (h, W) bool, whether a surface was hit.
+        position_m: (3, h, W) float32 vectors in the world from the camera to the surface; zero where nothing was hit.
+        normal: (3, h, W) float32 unit normals in the world, towards the camera; zero where nothing was hit.
     """
 
     rows: slice
@@ -33,11 +33,11 @@ class Strip:
 
 
 def strips_of(depth_m: FloatImage, camera: CameraRecord) -> Iterator[Strip]:
-    """A picture from its top to its bottom.
+    """Positions and normals of a view, in strips from top to bottom.
 
-    On a plane 1/z is linear over the picture: of the two neighbours along a row or column, a surface's slant is that
-    towards the one with which, and with the next one on that side, 1/z bends less. So neither silhouettes nor the edge
-    of paint, some millimetres above its road, tilt it.
+    Derivatives are one-sided. On a plane 1/z is linear over the picture, so that of the two neighbours along a row or
+    column the one is used on whose side the second difference of 1/z is smaller. Neither silhouettes nor the edges of
+    road paint, some millimetres above its road, then tilt a normal.
 
     Args:
         depth_m: (H, W) float32 planar z, NaN where nothing is.
@@ -66,14 +66,14 @@ def strips_of(depth_m: FloatImage, camera: CameraRecord) -> Iterator[Strip]:
 
 
 def _along(position: FloatImage, z: FloatImage, axis: int) -> FloatImage:
-    """(3, h, W) step to a neighbour along an axis of the picture."""
+    """(3, h, W) difference of positions to a neighbour along an axis of the picture."""
     step = np.diff(position, axis=axis + 1)
     bend = np.abs(np.diff(1 / z, n=2, axis=axis))
     bend[np.isnan(bend)] = np.inf
-    # The bend about a pixel belongs to its neighbours: to the one before it as what lies ahead, and the other way.
+    # The second difference around a pixel is the one ahead for the pixel before it, and the one behind for the next.
     ahead = np.pad(bend, _pads(axis, 0, 2), constant_values=np.inf)
     behind = np.pad(bend, _pads(axis, 2, 0), constant_values=np.inf)
-    # At the picture's border, and between two silhouettes, the shorter way in depth.
+    # At the picture's border, and between two silhouettes, the neighbour nearer in depth is used.
     fall = np.abs(np.diff(z, axis=axis))
     fall[np.isnan(fall)] = np.inf
     is_nearer = np.pad(fall, _pads(axis, 0, 1), constant_values=np.inf) < np.pad(

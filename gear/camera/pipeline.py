@@ -1,4 +1,4 @@
-"""From what a renderer returns to a view: air, water, the camera's effects and its response, each in its turn."""
+"""The camera pipeline: lamps, contact shadows, water, air, rain, camera effects and response, in this order."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ class CameraPipeline:
 
     Attributes:
         response: exposure and tone curve.
-        contact_shadows: what road users keep from the ground; None for nothing.
+        contact_shadows: shadows of the sky's light under and beside road users; None for none.
         night: the town's lamps; None by day.
-        air: fog and haze.
-        water: on the ground.
-        rain: falling water.
-        effects: of the camera.
+        air: fog, haze and the veil of rain.
+        water: puddles and wet ground.
+        rain: streaks of falling drops.
+        effects: parameters of the camera's effects.
     """
 
     response: Response
@@ -55,26 +55,33 @@ class CameraPipeline:
     def night_light(
         self, truth: RawView, camera: CameraRecord, record: SceneRecord, geoms: GeomTable
     ) -> NightLight | None:
-        """What a view gets of lamps, for `view`; None by day."""
+        """The light of lamps in a view, for the argument of `view`; None by day.
+
+        Args:
+            truth: depth and ids of the view.
+            camera: the camera of the view.
+            record: the scene.
+            geoms: what each geom is.
+        """
         return self.night.light(truth, camera, record, geoms) if self.night is not None else None
 
     def mirror_camera(self, camera: CameraRecord, record: SceneRecord) -> CameraRecord | None:
-        """Who has to look as well, since the ground mirrors what is seen from there; None where nothing is wet.
+        """The camera below the ground from which reflections on wet ground are rendered; None where nothing is wet.
 
-        At night lamps are mirrored by `NightLight`, and nothing else is bright enough.
+        At night there is none: `NightLight` has the reflections of lamps, and nothing else is bright enough.
         """
         if self.night is not None or (self.water.share <= 0 and self.water.film <= 0):
             return None
         return mirror_camera(camera, record.ego.world_from_actor.position_m[2])
 
     def reflection(self, below: MirrorView | None, record: SceneRecord) -> Reflection | None:
-        """What wet ground mirrors, from what `mirror_camera` saw without ground and with neutral surfaces."""
+        """The reflections on wet ground, from a render by `mirror_camera` without ground and with neutral surfaces."""
         if below is None:
             return None
         raw, camera = below
         assert raw.linear_rgb is not None
         height_m = record.ego.world_from_actor.position_m[2]
-        # The air on this side of the mirror is laid over the whole frame, later.
+        # The air between the camera and the ground is applied to the whole frame, later.
         veiled = replace(raw, linear_rgb=self.air.apply(raw.linear_rgb, *beyond_mirror(raw.depth_m, camera, height_m)))
         return Reflection.of(veiled, camera, height_m)
 
@@ -87,15 +94,15 @@ class CameraPipeline:
         night_light: NightLight | None = None,
         reflection: Reflection | None = None,
     ) -> View:
-        """One view: colour with everything that the weather and the camera add, and truth aligned with it.
+        """One view: colour with weather and camera effects, and depth and ids aligned with it.
 
         Args:
-            raw: colour and truth of a renderer.
+            raw: linear colour, depth and ids of a renderer.
             camera: the camera that takes the picture.
             record: the scene, for its seed and the ego car's motion.
             geoms: what each geom is.
-            night_light: what the same view, whatever its surfaces show, gets of lamps; found anew unless given.
-            reflection: what wet ground mirrors; without it puddles mirror the sky alone.
+            night_light: from `night_light` for the same view with any faces; computed if None.
+            reflection: reflections on wet ground; without them puddles reflect only the sky.
         """
         seen = replace(raw, linear_rgb=self._weathered(raw, camera, record, geoms, night_light, reflection))
         exposure = Exposure(camera=camera, scene=record, geoms=geoms)
@@ -128,7 +135,7 @@ class CameraPipeline:
             is_ground = np.append(np.isin(geoms.label_code, GROUND_CODES), False)
             linear_rgb = self.contact_shadows.apply(linear_rgb, raw.depth_m, is_ground[raw.geom_id], camera, record)
         if self.water.share > 0 or reflection is not None:
-            # The last entry is what id -1, nothing, finds.
+            # Index -1, nothing, finds the last entry.
             holds_water = np.append(np.isin(geoms.label_code, OPEN_GROUND_CODES), False)
             linear_rgb = self.water.apply(linear_rgb, raw.depth_m, holds_water[raw.geom_id], camera, reflection)
         if lamps is not None:

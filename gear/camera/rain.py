@@ -1,9 +1,9 @@
-"""Falling rain: streaks of drops in the air, before or behind what the depth says.
+"""Falling rain: streaks of drops, hidden by what is nearer.
 
     L' = L (1 - a) + D a
 
-a, what drops cover, comes from a generator of the sample's own and from depth; D is the light in a drop, the sky's.
-Neither knows of any albedo, so frames stay linear and twins see the same drops.
+The share a that drops cover comes from the sample's random generator and from depth; D is the light in a drop, that of
+the sky. Neither depends on any albedo, so frames stay linear, and twins have the same drops.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from gear.values.geometry import Array
 from gear.values.scene import CameraRecord, Vec3
 
 SHUTTER_S = 1 / 120
-"""How long a streak is drawn out."""
+"""Exposure time of streaks in seconds."""
 
 FALL_MPS = 7.5
 DROPS_PER_M3 = 16.0
-"""Drops that can be told apart, in the hardest rain."""
+"""Visible drops per cubic metre in the strongest rain."""
 
 DROP_M = 0.0022
 _LAYERS_M = (0.8, 2.0, 4.0, 8.0, 14.0)
@@ -39,9 +39,9 @@ class Rain:
     """The rain of one weather.
 
     Attributes:
-        intensity: 0..1.
-        wind_world_mps: drops drift so fast.
-        light: (3,) of the sky in a drop; 1.0 is the frame's full scale.
+        intensity: strength of the rain, 0..1.
+        wind_world_mps: horizontal velocity of drops in the world.
+        light: (3,) light of a drop; 1.0 is the frame's full scale.
     """
 
     intensity: float
@@ -50,7 +50,7 @@ class Rain:
 
     @staticmethod
     def of(precipitation: float, wind_intensity: float, light: Array) -> Rain:
-        """From CARLA's percent; the wind blows from the west."""
+        """The rain of CARLA's parameters, percent; the wind blows from the west."""
         wind = (_WIND_MPS * wind_intensity / 100, 0.25 * _WIND_MPS * wind_intensity / 100, 0.0)
         return Rain(intensity=precipitation / 100, wind_world_mps=wind, light=light)
 
@@ -62,14 +62,14 @@ class Rain:
         velocity_world_mps: Vec3,
         rng: np.random.Generator,
     ) -> UInt16Image:
-        """The frame with rain before it.
+        """The frame with streaks of rain.
 
         Args:
             linear_rgb: (H, W, 3) uint16, 0..`LINEAR_FULL_SCALE`.
             depth_m: (H, W) float32 planar z, NaN where nothing is.
             camera: the camera that takes the picture.
-            velocity_world_mps: of the camera.
-            rng: of this sample and camera.
+            velocity_world_mps: velocity of the camera in the world.
+            rng: generator of this sample and camera.
 
         Returns:
             (H, W, 3) uint16, a new array, rounded.
@@ -83,13 +83,13 @@ class Rain:
     def cover(
         self, depth_m: FloatImage, camera: CameraRecord, velocity_world_mps: Vec3, rng: np.random.Generator
     ) -> FloatImage:
-        """(H, W) float32 in 0..1, how much of each pixel drops cover."""
+        """(H, W) float32 in 0..1, the share of each pixel that drops cover; arguments as for `apply`."""
         falling = np.array([*self.wind_world_mps[:2], -FALL_MPS]) - np.asarray(velocity_world_mps)
         motion = camera.world_from_camera_transform.rotation.T @ falling * SHUTTER_S
         clear = np.ones(depth_m.shape, np.float32)
         for near_m, far_m in pairwise(_LAYERS_M):
             layer = self._layer(camera, near_m, far_m, motion, rng)
-            # What is nearer than the layer's middle hides it.
+            # Surfaces nearer than the middle of the layer hide it.
             hidden = depth_m < math.sqrt(near_m * far_m)
             layer[hidden] = 0
             clear *= 1 - layer.astype(np.float32) * np.float32(1 / 255)
@@ -98,7 +98,7 @@ class Rain:
     def _layer(
         self, camera: CameraRecord, near_m: float, far_m: float, motion: Array, rng: np.random.Generator
     ) -> npt.NDArray[np.uint8]:
-        """(H, W) uint8 cover of the drops between two depths."""
+        """(H, W) uint8 cover of the drops between two depths, 255 for all of a pixel."""
         pinhole = camera.intrinsics
         half_x, half_y = camera.width_px / (2 * pinhole.fx_px), camera.height_px / (2 * pinhole.fy_px)
         # Tangents of the view's middle: 0 unless the principal point lies elsewhere.
@@ -106,7 +106,7 @@ class Rain:
         down = ((camera.height_px - 1) / 2 - pinhole.cy_px) / pinhole.fy_px
         volume = 4 * half_x * half_y * (far_m**3 - near_m**3) / 3
         count = int(rng.poisson(min(volume * DROPS_PER_M3 * self.intensity, 6000)))
-        # Evenly in the volume of the pyramid between the two depths.
+        # Uniform in the volume of the view between the two depths.
         depth = np.cbrt(near_m**3 + rng.random(count) * (far_m**3 - near_m**3))
         start = np.column_stack(
             [
@@ -121,7 +121,7 @@ class Rain:
         ends = [self._pixels(points, camera) for points in (start, end)]
         width_px = camera.focal_px * DROP_M / depth
         length_px = np.linalg.norm(ends[1] - ends[0], axis=1)
-        # A drop is smeared over its streak: the longer, the fainter; thinner than a pixel, fainter again.
+        # Longer streaks are fainter, and so are streaks thinner than a pixel.
         smear = np.minimum(1.0, 6 * np.maximum(width_px, 0.5) / np.maximum(length_px, 1.0)) ** 0.5
         opacity = 255 * _OPACITY * strength * np.minimum(width_px, 1.0) * smear
         canvas = np.zeros((camera.height_px, camera.width_px), np.uint8)

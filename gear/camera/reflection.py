@@ -1,6 +1,6 @@
-"""What level wet ground mirrors: the street as a camera below the ground sees it.
+"""Planar reflections on level wet ground, rendered from a camera below the ground.
 
-A mirror shows what a camera sees that stands as far behind it as the real one before it.
+A plane mirror shows the view of the camera that is mirrored at its plane.
 """
 
 from __future__ import annotations
@@ -20,35 +20,35 @@ from gear.values.scene import CameraRecord, Pose
 _Floats = npt.NDArray[np.float32]
 
 MirrorView = tuple[RawView, CameraRecord]
-"""What a camera from `mirror_camera` saw."""
+"""A render from `mirror_camera`, and that camera."""
 
 SHARE_PX = 0.5
-"""Of the picture's pixels to a radian: water that rain stirs and rough ground show less than a mirror."""
+"""Resolution relative to the picture: ripples and rough ground show less detail than a mirror."""
 
 _RAYS = (33, 65)
-"""Columns and rows of rays that say what of the street the picture can mirror."""
+"""Columns and rows of rays that determine which part of the street the picture can reflect."""
 
 _STEP_PX, _MARGIN_PX = 32, 8
-"""Sizes go by steps, since renderers keep what they once needed for a size."""
+"""Sizes are multiples of a step, since renderers keep buffers for each size."""
 
 _STEEPEST = 0.2
-"""Cosine off the view's axis of the widest rays that are looked at."""
+"""Least cosine between the mirror camera's axis and a ray."""
 
 _UNDER_M = 0.05
 _BLUR_RAD = (0.008, 0.04)
-"""Standard deviations across and along the view of what damp ground mirrors: leaning facets draw it out to streaks."""
+"""Standard deviations of the blur across and along the view on damp ground, whose facets stretch reflections."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Reflection:
-    """The street from below.
+    """The reflected street.
 
     Attributes:
-        camera: who looked.
-        height_m: of the mirror in the world.
-        sharp: (h, w, 4) float32: how much of what the mirror shows is known (0..1, the last channel), and so much of
-            its light; 1.0 is the frame's full scale. What lies under the mirror hides what it shows.
-        soft: the same, as damp ground shows it.
+        camera: the mirror camera.
+        height_m: height of the mirror in the world.
+        sharp: (h, w, 4) float32: light times the known share, 1.0 being the frame's full scale, and the known share
+            0..1. Objects below the mirror hide the reflection, which is unknown there.
+        soft: the same, blurred as on damp ground.
     """
 
     camera: CameraRecord
@@ -58,12 +58,12 @@ class Reflection:
 
     @staticmethod
     def of(view: RawView, camera: CameraRecord, height_m: float) -> Reflection:
-        """From a rendered view of a world without its ground.
+        """The reflection from a render of the world without its ground.
 
         Args:
-            view: of `camera`.
+            view: the render of `camera`.
             camera: from `mirror_camera`.
-            height_m: of the mirror.
+            height_m: height of the mirror in the world.
         """
         assert view.linear_rgb is not None
         at_m = np.nan_to_num(view.depth_m, nan=np.inf) * _climb(camera) + camera.world_from_camera.position_m[2]
@@ -74,7 +74,7 @@ class Reflection:
         return Reflection(camera=camera, height_m=height_m, sharp=sharp, soft=np.asarray(soft, dtype=np.float32))
 
     def at(self, picture: _Floats, east: _Floats, north: _Floats, up: _Floats) -> _Floats:
-        """(N, 4) of `sharp` or `soft` in (N,) directions, of any length."""
+        """(N, 4) reads of `sharp` or `soft` in directions with components (N,), of any length."""
         x, y, z = (
             axis[0] * east + axis[1] * north + axis[2] * up
             for axis in self.camera.world_from_camera_transform.rotation.T.astype(np.float32)
@@ -87,11 +87,13 @@ class Reflection:
 
 
 def mirror_camera(camera: CameraRecord, height_m: float) -> CameraRecord | None:
-    """Who sees what a level mirror shows to a camera; None where the camera looks at no ground.
+    """The camera whose render a level mirror shows to a camera; None where the camera sees no ground.
+
+    It is symmetric, level, and as large as needed to cover all reflected rays.
 
     Args:
-        camera: above the mirror.
-        height_m: of the mirror in the world.
+        camera: the camera above the mirror.
+        height_m: height of the mirror in the world.
     """
     world_from_camera = camera.world_from_camera_transform
     pinhole = camera.intrinsics
@@ -103,7 +105,7 @@ def mirror_camera(camera: CameraRecord, height_m: float) -> CameraRecord | None:
         [columns.ravel(), rows.ravel() * (pinhole.fx_px / pinhole.fy_px), np.full(columns.size, pinhole.fx_px)]
     )
     rays = (world_from_camera.rotation @ (rays / np.linalg.norm(rays, axis=0))).T
-    # Up to the horizon itself, which lies between two rays.
+    # Including the horizon, which lies between two rays.
     step = max(camera.width_px / (_RAYS[0] - 1) / pinhole.fx_px, camera.height_px / (_RAYS[1] - 1) / pinhole.fy_px)
     seen = rays[rays[:, 2] < step]
     if not (rays[:, 2] < 0).any() or world_from_camera.translation_m[2] <= height_m:
@@ -128,7 +130,13 @@ def mirror_camera(camera: CameraRecord, height_m: float) -> CameraRecord | None:
 
 
 def beyond_mirror(depth_m: FloatImage, camera: CameraRecord, height_m: float) -> tuple[FloatImage, CameraRecord]:
-    """The way from a mirror to what a camera from `mirror_camera` sees in it, as depth from a camera at its height."""
+    """The part of each ray beyond the mirror, as depth from a camera at the height of the mirror.
+
+    Args:
+        depth_m: (h, w) of the mirror camera.
+        camera: the mirror camera.
+        height_m: height of the mirror in the world.
+    """
     x, y, z = camera.world_from_camera.position_m
     leg_m = np.float32(height_m - z) / np.maximum(_climb(camera), np.float32(1e-6))
     pose = replace(camera.world_from_camera, position_m=(x, y, height_m))
@@ -136,7 +144,7 @@ def beyond_mirror(depth_m: FloatImage, camera: CameraRecord, height_m: float) ->
 
 
 def _climb(camera: CameraRecord) -> _Floats:
-    """(h, w) by how much rays climb a metre of depth."""
+    """(h, w) height gained per metre of depth."""
     pinhole = camera.intrinsics
     x = (np.arange(camera.width_px, dtype=np.float32) - pinhole.cx_px) / pinhole.fx_px
     y = (np.arange(camera.height_px, dtype=np.float32)[:, None] - pinhole.cy_px) / pinhole.fy_px
@@ -145,7 +153,7 @@ def _climb(camera: CameraRecord) -> _Floats:
 
 
 def _facing(forward: Array, rotation: Array) -> Array:
-    """(3, 3) world from camera axes of who looks along `forward` and keeps level; turned as before where that is up."""
+    """(3, 3) world-from-camera rotation that looks along `forward` without roll; like `rotation` where it looks up."""
     forward = forward / np.linalg.norm(forward)
     level = np.cross(forward, (0, 0, 1))
     right = level if np.linalg.norm(level) > 0.1 else rotation[:, 0] - forward * (rotation[:, 0] @ forward)

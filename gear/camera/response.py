@@ -1,13 +1,13 @@
-"""The response of the camera: exposure and tone curve, the same for every pixel of every picture of a weather.
+"""The response of the camera: exposure and tone curve, equal for all pixels of all pictures of a weather.
 
 For light x in 0..1 (1 is the frame's full scale):
 
-    y = x g / (1 + (g - 1) x)       exposure: shadows are lifted g times, full scale stays where it is
-    z = y ^ c                       contrast: c > 1 draws blacks down
-    picture = sRGB(z)               the encoding that every reader of PNG files expects
+    y = x g / (1 + (g - 1) x)       exposure: the darkest values are multiplied by g, full scale is unchanged
+    z = y ^ c                       contrast: c > 1 darkens dark values
+    picture = sRGB(z)               the encoding that readers of PNG files expect
 
-The curve rises everywhere and meets 0 and 1, so nothing clips that the frame has not clipped, and it can be undone.
-Nothing in it depends on the picture: a patch cannot change how the rest of a scene is shown.
+The curve is strictly increasing from 0 to 1, so that it clips nothing and is invertible. It does not depend on the
+picture: a patch cannot change how the rest of a scene is shown.
 """
 
 from __future__ import annotations
@@ -26,17 +26,20 @@ Encoding = Literal["srgb", "none"]
 Floats = npt.NDArray[np.float64]
 
 DISPLAY_POWER = 1 / 2.2
-"""Display values grow with this power of light."""
+"""Exponent from light to display values, where frames hold display values."""
 
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """One camera setting.
+    """One setting of exposure and tone curve.
 
     Attributes:
-        exposure: gain in the shadows, more than 0; below 1 it darkens.
+        exposure: gain of the darkest values, more than 0; below 1 it darkens.
         contrast: exponent of the tone curve, 0.5 to 2.
-        encoding: `none` for frames that hold display values already.
+        encoding: `srgb`, or `none` for frames that hold display values.
+
+    Raises:
+        ValueError: a parameter is out of range.
     """
 
     exposure: float = 1.0
@@ -66,14 +69,14 @@ class Response:
         return np.asarray(self._table[linear_rgb])
 
     def curve(self, light: npt.ArrayLike) -> Floats:
-        """The same without steps: light 0..1 to picture values 0..1, elementwise."""
+        """The response without rounding: light 0..1 to picture values 0..1, elementwise, float64."""
         x = np.asarray(light, dtype=np.float64)
         y = x * self.exposure / (1 + (self.exposure - 1) * x)
         z = y**self.contrast
         return encode_srgb(z) if self.encoding == "srgb" else z
 
     def inverse(self, picture: npt.ArrayLike) -> Floats:
-        """Picture values 0..1 back to light 0..1, elementwise."""
+        """The inverse of `curve`: picture values 0..1 to light 0..1, elementwise, float64."""
         value = np.asarray(picture, dtype=np.float64)
         z = decode_srgb(value) if self.encoding == "srgb" else value
         y = z ** (1 / self.contrast)
@@ -81,14 +84,13 @@ class Response:
 
 
 IDENTITY = Response(encoding="none")
-"""For frames that hold display values: the picture is the frame."""
+"""The response for frames that hold display values: the picture equals the frame."""
 
 
 def response_for(renderer_name: str, weather: Weather) -> Response:
-    """The camera setting for a renderer's frames in a weather: fixed, as if set once by hand for that light.
+    """The response for a renderer's frames in a weather; it depends on nothing else.
 
-    A low sun leaves streets in shadow and needs more lift; under clouds contrast is low by itself and gets a little
-    more.
+    With a low sun, streets are in shadow and exposure is raised. Clouds lower contrast, and the curve adds some.
     """
     if renderer_name == "classic":
         return IDENTITY
@@ -99,12 +101,12 @@ def response_for(renderer_name: str, weather: Weather) -> Response:
 
 
 def face_light(renderer_name: str, face: UInt8Image) -> Floats:
-    """What a face's bytes weigh in a linear frame: I = B + w (W - B), with W and B seen with a white and a black face.
+    """Weights of a face's bytes in a linear frame: I = B + w (W - B), where W and B show a white and a black face.
 
-    Filament decodes a face from sRGB to albedo; classic lights its display values.
+    The classic renderer lights display values, the others decode sRGB to albedo.
 
     Args:
-        renderer_name: who renders.
+        renderer_name: name of the renderer.
         face: (...) uint8.
 
     Returns:

@@ -1,8 +1,7 @@
-"""How far the light of one lamp comes in every direction, and the shadows of what stops it.
+"""Shadow maps of lamps: the distance at which light is stopped, by direction.
 
-Directions lie as on a paraboloid about the lamp's axis (Heidrich and Seidel 1998): one division finds them. The
-distances in nine cells around a direction are compared with a place's, not mixed (Reeves, Salesin and Cook 1987), so
-that edges are soft by about two cells.
+Directions are mapped by a paraboloid about the lamp's axis (Heidrich and Seidel 1998). Shadows are filtered by
+percentage-closer filtering over nine cells (Reeves, Salesin and Cook 1987), so that edges are soft by about two cells.
 """
 
 from __future__ import annotations
@@ -22,10 +21,10 @@ Floats = npt.NDArray[np.float32]
 Indices = npt.NDArray[np.int64]
 
 OWN_GLASS_M = 0.8
-"""What is as near as this to a lamp is part of it."""
+"""Surfaces this near to a lamp are part of it and cast no shadows."""
 
 BORDER = 2
-"""Cells around a map in which nothing stops light."""
+"""Cells at the border of a map in which nothing stops light."""
 
 _LEVEL, _EDGE_ON = 0.9, 1e-6
 _SLACK_M, _MOST_TILT, _STEEP = 0.15, 6.0, 2.5
@@ -35,11 +34,11 @@ _LARGEST, _FRACTION_BITS = 0.3, 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Layout:
-    """How directions lie in a map.
+    """Size and field of view of a map.
 
     Attributes:
-        cells: along each side.
-        zoom: 1 for all that is before the lamp; with larger ones only what lies about its axis, in finer cells.
+        cells: cells along each side.
+        zoom: 1 for the half space in front of the lamp; larger values for a narrower field in finer cells.
     """
 
     cells: int
@@ -47,27 +46,27 @@ class Layout:
 
     @property
     def grain_rad(self) -> float:
-        """The finest angle between neighbouring cells."""
+        """The smallest angle between neighbouring cells, radians."""
         return 2 / (self.cells * self.zoom)
 
     @property
     def half_angle_rad(self) -> float:
-        """How far from the axis directions are in the map, at its corners."""
+        """The angle between the axis and the corners of the map, radians."""
         return 2 * math.atan(math.sqrt(2) / self.zoom)
 
     def empty(self) -> Floats:
-        """(cells, cells) of light that nothing stops."""
+        """(cells, cells) float32 map in which nothing stops light."""
         return np.full((self.cells, self.cells), np.inf, np.float32)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LampFrame:
-    """Where a lamp is, and how directions from it lie in its map.
+    """Position and axes of a lamp, and the projection of directions into its map.
 
     Attributes:
-        place_m: (3,) float32 in the world.
-        frame: (3, 3) float32 unit vectors in its rows: across, up and along the lamp's axis.
-        layout: of its map.
+        place_m: (3,) float32 position in the world.
+        frame: (3, 3) float32 rows: unit vectors across, up and along the lamp's axis.
+        layout: size and field of view of its map.
     """
 
     place_m: Floats
@@ -76,7 +75,7 @@ class LampFrame:
 
     @staticmethod
     def of(place_m: Array, axis: Array, layout: Layout) -> LampFrame:
-        """Of a lamp that shines along an axis."""
+        """The frame of a lamp at a position (3,) that shines along an axis (3,)."""
         along = axis / np.linalg.norm(axis)
         across = np.cross(along, (0.0, 0.0, 1.0) if abs(along[2]) < _LEVEL else (0.0, 1.0, 0.0))
         across /= np.linalg.norm(across)
@@ -84,14 +83,14 @@ class LampFrame:
         return LampFrame(place_m=place_m.astype(np.float32), frame=frame.astype(np.float32), layout=layout)
 
     def places(self, unit: Floats) -> tuple[Floats, Floats]:
-        """Columns and rows of (3, N) directions, whole numbers in the middle of cells; outside for what is behind."""
+        """Columns and rows (N,) of (3, N) unit vectors, integers at cell centres; outside the map for those behind."""
         across, up, along = self.frame @ unit
         scale = np.float32(self.layout.zoom * self.layout.cells / 2) / np.maximum(1 + along, np.float32(1e-3))
         middle = np.float32(self.layout.cells / 2 - 0.5)
         return across * scale + middle, up * scale + middle
 
     def directions(self, column: Indices, row: Indices) -> Floats:
-        """(N, 3) unit vectors in the world through the middles of cells."""
+        """(N, 3) unit vectors in the world through the centres of (N,) cells."""
         across, up = ((2 * (cell + 0.5) / self.layout.cells - 1) / self.layout.zoom for cell in (column, row))
         square = across * across + up * up
         unit = np.stack([2 * across, 2 * up, 1 - square], axis=1) / (1 + square)[:, None]
@@ -99,19 +98,19 @@ class LampFrame:
 
 
 def lengths(vectors: Floats) -> Floats:
-    """(N,) of (3, N) vectors."""
+    """(N,) lengths of (3, N) vectors."""
     x, y, z = vectors
     return np.asarray(np.sqrt(x * x + y * y + z * z))
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ShadowMap:
-    """A map (Williams 1978) of one lamp.
+    """The shadow map (Williams 1978) of one lamp.
 
     Attributes:
-        outlook: of the lamp.
-        comes_m: (cells, cells) float32, by direction the distance at which something stops its light; infinite where
-            nothing does, as in the border. It may not change any more.
+        outlook: position and axes of the lamp.
+        comes_m: (cells, cells) float32 distance at which light is stopped, by direction; infinite where nothing stops
+            it, and in the border. It must not be changed afterwards.
     """
 
     outlook: LampFrame
@@ -125,16 +124,16 @@ class ShadowMap:
         object.__setattr__(self, "_most_m", cv2.dilate(self.comes_m, nine))
 
     def through(self, unit: Floats, away_m: FloatImage, facing: FloatImage, up: FloatImage) -> Floats:
-        """(N,) how much of the light comes to places, 0..1.
+        """(N,) share of the light that reaches surfaces, 0..1.
 
         Args:
-            unit: (3, N) directions of the places from the lamp.
-            away_m: (N,) how far they are from it.
-            facing: (N,) cosines between their surfaces' normals and the way back to the lamp.
-            up: (N,) upward parts of the normals. Level ground stops no light, not from itself either.
+            unit: (3, N) unit vectors from the lamp to the surfaces.
+            away_m: (N,) distances from the lamp.
+            facing: (N,) cosines between the surfaces' normals and the direction to the lamp.
+            up: (N,) upward components of the normals; level ground does not shadow itself.
         """
         layout = self.outlook.layout
-        # What the map does not have lies at its border, where nothing stops light.
+        # Directions outside of the map are clamped to its border, where nothing stops light.
         across, along = (np.clip(place, 1, layout.cells - 1.001) for place in self.outlook.places(unit))
         column, row = across.astype(np.int32), along.astype(np.int32)
         cosine = np.clip(facing, np.float32(1e-3), 1)
@@ -149,7 +148,7 @@ class ShadowMap:
         return through
 
     def _at_edges(self, middle: npt.NDArray[np.int32], x: Floats, y: Floats, reach_m: Floats) -> Floats:
-        """Where light comes through some of nine cells."""
+        """Shares of light where some of the nine cells around a direction stop it."""
         cells, comes_m = self.outlook.layout.cells, self.comes_m.reshape(-1)
         through = np.zeros_like(reach_m)
         for down, high in zip((-cells, 0, cells), _weights(y), strict=True):
@@ -159,15 +158,15 @@ class ShadowMap:
 
 
 def _weights(share: Floats) -> tuple[Floats, Floats, Floats]:
-    """Of three cells in a box two cells wide; its middle is so far, 0..1, from that of the second one."""
+    """Weights of three cells for a box two cells wide whose middle is `share` (0..1) beyond the second cell's."""
     half = np.full_like(share, 0.5)
     return half - half * share, half, half * share
 
 
 def first_hits(corners_m: Floats, outlook: LampFrame) -> Floats:
-    """(cells, cells) float32, how far a lamp's light comes among (N, 3, 3) triangles that are seen from outside.
+    """(cells, cells) float32 distances at which (N, 3, 3) triangles stop a lamp's light.
 
-    Triangles of which the lamp sees the back belong to bodies whose front is nearer.
+    Back faces are skipped: the front of the same body is nearer.
     """
     layout = outlook.layout
     corners = _split(corners_m - outlook.place_m, outlook.frame[2])
@@ -178,7 +177,7 @@ def first_hits(corners_m: Floats, outlook: LampFrame) -> Floats:
     corner_m = corner_m.reshape(-1, 3)
     away_m = corner_m.mean(axis=1)
     shown = np.flatnonzero((np.abs(places) < 2 * layout.cells).all(axis=(1, 2)) & (away_m > OWN_GLASS_M))
-    # What is nearer is painted over what is farther away.
+    # Painter's algorithm: nearer triangles are drawn last.
     shown = shown[np.argsort(-away_m[shown], kind="stable")]
     outlines = np.rint(places[shown] * (1 << _FRACTION_BITS)).astype(np.int32)
     painted = np.full((layout.cells, layout.cells), -1, np.int32)
@@ -196,7 +195,7 @@ def first_hits(corners_m: Floats, outlook: LampFrame) -> Floats:
 
 
 def _split(corners: Floats, axis: Floats) -> Floats:
-    """What is before a lamp and faces it, in triangles so small, seen from there, that they do not bend in a map."""
+    """Front faces before a lamp, subdivided until the map's projection of each is nearly straight."""
     left = corners[np.einsum("nd,nd->n", _normals(corners), corners[:, 0]) < 0]
     small = [np.zeros((0, 3, 3), np.float32)]
     while len(left):
@@ -210,22 +209,22 @@ def _split(corners: Floats, axis: Floats) -> Floats:
 
 
 def _normals(corners: Floats) -> Floats:
-    """(N, 3) out of triangles, twice as long as they are large."""
+    """(N, 3) normals of triangles; their length is twice the area."""
     a, b, c = np.moveaxis(corners, 1, 0)
     return np.cross(b - a, c - a)
 
 
 def _quartered(corners: Floats) -> Floats:
-    """Each triangle as four."""
+    """(4 N, 3, 3) quarters of (N, 3, 3) triangles, cut at the middles of edges."""
     a, b, c = np.moveaxis(corners, 1, 0)
     ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
     return np.concatenate([np.stack(three, axis=1) for three in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
 
 
 def stop_behind(comes_m: Floats, points_m: Floats, spacing_m: float, outlook: LampFrame) -> None:
-    """Ends light in a map where a body ends that is given by (N, 3) points so far apart, in place.
+    """Adds a body, given by (N, 3) points with a spacing, to a map, in place.
 
-    What it would throw on itself is left to slants, and its shadow begins at its soles.
+    Light is stopped at the body's far side, so that it does not shadow itself; its shadow begins at its soles.
     """
     layout = outlook.layout
     away = np.ascontiguousarray(points_m.T) - outlook.place_m[:, None]

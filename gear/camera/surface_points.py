@@ -1,4 +1,4 @@
-"""Points spread over triangles, as dense as asked for; the same every time."""
+"""Points on triangles on regular grids, without random draws."""
 
 from __future__ import annotations
 
@@ -12,18 +12,21 @@ Real = TypeVar("Real", np.float32, np.float64)
 
 
 def longest_edges(corners: npt.NDArray[Real]) -> npt.NDArray[Real]:
-    """(N,) of (N, 3, 3) triangles."""
+    """(N,) lengths of the longest edges of (N, 3, 3) triangles."""
     along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     longest = np.maximum(np.linalg.norm(along, axis=1), np.linalg.norm(across, axis=1))
     return np.asarray(np.maximum(longest, np.linalg.norm(across - along, axis=1)), corners.dtype)
 
 
 def points_on(corners: npt.NDArray[Real], steps: npt.NDArray[np.int64]) -> Iterator[npt.NDArray[Real]]:
-    """(M, 3) points at a time, on triangles that take the same number of steps: few steps first.
+    """Points on triangles, on a regular grid of each.
 
     Args:
-        corners: (N, 3, 3) of triangles.
-        steps: (N,) into how many parts each edge is cut, at least 1.
+        corners: (N, 3, 3) triangles.
+        steps: (N,) int64 number of parts that each edge is cut into, at least 1.
+
+    Yields:
+        (M, 3) points of all triangles with one number of steps, in growing order of steps.
     """
     along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     for step in np.unique(steps).tolist():

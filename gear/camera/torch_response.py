@@ -38,12 +38,12 @@ def apply(response: Response, light: torch.Tensor) -> torch.Tensor:
 
 
 def face_light(renderer_name: str, face: torch.Tensor) -> torch.Tensor:
-    """`gear.camera.face_light` on picture values 0..1, differentiable."""
+    """The torch twin of `gear.camera.face_light`: picture values 0..1 to weights 0..1 of the same shape."""
     return face if renderer_name == "classic" else decode_srgb(face)
 
 
 def decode_srgb(values: torch.Tensor) -> torch.Tensor:
-    """sRGB values 0..1 to linear light 0..1; differentiable once."""
+    """sRGB values 0..1 to linear light 0..1, elementwise; differentiable once."""
     with torch.no_grad():
         base = (values.clamp_min(0.04045) + 0.055) / 1.055
         bent = base**2.4
@@ -68,7 +68,7 @@ def _curve(given: torch.Tensor, values: torch.Tensor, slope: torch.Tensor) -> to
 
 
 class _Curve(torch.autograd.Function):
-    """An elementwise curve whose slopes are known: an attack goes back through it twice a step, by one product each."""
+    """An elementwise function with known derivatives, so that its backward pass is one product."""
 
     @staticmethod
     def forward(ctx: Any, given: torch.Tensor, values: torch.Tensor, slope: torch.Tensor) -> torch.Tensor:

@@ -1,12 +1,12 @@
-"""Water on open ground, laid over linear frames by what each pixel shows and where that lies: puddles, and a film.
+"""Puddles and wet open ground in linear frames, by label and position of each pixel.
 
     L' = L + f (S - L)                        damp ground
     L'' = L' (1 - p) + p (L d (1 - F) + R F)    with puddles on it
 
-p, the share of still water, is noise fixed to the town; F is Fresnel's share of light that it mirrors at this angle; d
-darkens the bottom. f is what a film of water on rough ground mirrors. R and S are the street as still water and as
-damp ground show it (`gear.camera.reflection`), with neutral surfaces. None of these depends on any patch, so frames
-stay linear in every albedo, and a patch changes no pixel that it does not reach.
+p is the share of still water, noise that is fixed to the town; F is its Fresnel reflectance; d darkens the bottom. f is
+the reflectance of a film of water on rough ground. R and S are the street as still water and as damp ground reflect it
+(`gear.camera.reflection`), with neutral surfaces. None of these depends on any patch, so frames stay linear in every
+albedo, and a patch changes only pixels that show it.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ _Floats = npt.NDArray[np.float32]
 _Mask = npt.NDArray[np.bool_]
 
 TILE_M = 96.0
-"""The pattern of a town's puddles comes back after so many metres."""
+"""Period of the pattern of puddles in metres."""
 
 WATER_F0 = 0.02
 BOTTOM = 0.6
 FILM_F0, FILM_F90 = 0.03, 0.55
-"""What damp ground mirrors from above and at a grazing angle: rough ground lets less of it be seen than a mirror."""
+"""Reflectance of damp ground from above and at a grazing angle; below that of a mirror, since ground is rough."""
 
 LEVEL_M = (0.2, 0.5)
-"""So near its height ground mirrors what a mirror at that height does, and from so far on nothing of it."""
+"""Height differences up to which ground has the reflection in full, and from which on none of it."""
 
 _ALL = 0.999
 
@@ -49,16 +49,16 @@ _RIPPLE_SLOPE = 0.12
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Water:
-    """What one weather leaves on the ground of one town.
+    """The water of one weather on the ground of one town.
 
     Attributes:
-        town: whose pattern of puddles it is.
-        share: of open ground that lies under water, 0..1.
-        ripples: how much falling rain stirs it, 0..1.
-        film: how wet the ground between puddles is, 0..1.
-        mirrored: (rows, columns, 3) float32, light by the sine of its height (row 0 is level, the last one
-            overhead) and azimuth (column 0 is east, counter-clockwise); 1.0 is the frame's full scale. What water
-            shows where there is no reflection.
+        town: name of the town, which determines the pattern of puddles.
+        share: share of open ground under water, 0..1.
+        ripples: strength of ripples by falling rain, 0..1.
+        film: wetness of the ground between puddles, 0..1.
+        mirrored: (rows, columns, 3) float32 light of sky and houses, by the sine of elevation (row 0 is level, the
+            last one overhead) and azimuth (column 0 is east, counter-clockwise); 1.0 is the frame's full scale. It is
+            reflected where the street's reflection is unknown.
     """
 
     town: str
@@ -80,10 +80,10 @@ class Water:
         Args:
             linear_rgb: (H, W, 3) uint16, 0..`LINEAR_FULL_SCALE`.
             depth_m: (H, W) float32 planar z, NaN where nothing is.
-            open_ground: (H, W) where water may be.
+            open_ground: (H, W) bool, where water may be.
             camera: the camera that takes the picture.
-            reflection: the street, as ground at its height mirrors it; ground at another height, and what is not known
-                of the street, mirrors `mirrored`. Without it puddles do, and there is no film.
+            reflection: the reflected street, for ground at its height. Other ground, and unknown parts of the street,
+                reflect `mirrored`. Without it puddles reflect `mirrored`, and there is no film.
 
         Returns:
             (H, W, 3) uint16, a new array, rounded.
@@ -130,13 +130,13 @@ class Water:
         up: _Floats,
         level: _Floats,
     ) -> _Floats:
-        """(N, 3) what comes from directions, in steps of the frame: of the street where it is known, else of the sky.
+        """(N, 3) reflected light in units of the frame: of the street where it is known, else of `mirrored`.
 
         Args:
-            reflection: the street; None where nothing of it is known.
-            picture: of it, sharp or soft.
-            east, north, up: (N,) directions of any length.
-            level: (N,) how far what mirrors lies at the street's height, 0..1.
+            reflection: the reflected street, or None.
+            picture: its sharp or soft picture.
+            east, north, up: (N,) components of directions of any length.
+            level: (N,) share of the street's reflection by the ground's height, 0..1.
         """
         full = np.float32(LINEAR_FULL_SCALE)
         if reflection is None or picture is None:
@@ -148,29 +148,29 @@ class Water:
         return np.asarray(light * full, dtype=np.float32)
 
     def _sky(self, east: _Floats, north: _Floats, up: _Floats) -> _Floats:
-        """(N, 3) of `mirrored`."""
+        """(N, 3) light of `mirrored` in directions of any length."""
         if not len(east):
             return np.zeros((0, 3), np.float32)
         rows, columns = self.mirrored.shape[:2]
         sine = up / np.sqrt(east * east + north * north + up * up)
-        # A little below the last row, so that the zenith does not wrap around to the horizon.
+        # Slightly below the last row, so that the zenith does not wrap around to the horizon.
         row = np.minimum(sine * (rows - 1), np.float32(rows - 1.001))
         azimuth_rad = cv2.phase(east, north).reshape(-1)
         return sampled(self.mirrored, azimuth_rad * np.float32(columns / (2 * np.pi)), row)
 
     def _stirred(self, sine: _Floats, distance_m: _Floats, at_px: list[_Floats]) -> _Floats:
-        """(N,) sines of the heights that rays see in the water, moved by ripples."""
+        """(N,) sines of the elevations that are reflected, perturbed by ripples."""
         if self.ripples <= 0:
             return sine
         scale = TILE_M / _RIPPLE_TILE_M
-        # Ripples that are smaller than a pixel cancel out.
+        # Ripples smaller than a pixel average out.
         slope = _RIPPLE_SLOPE * self.ripples / (1 + distance_m / 6)
         ripple = sampled(_pattern("ripples"), at_px[0] * scale, at_px[1] * scale) - np.float32(0.5)
         return np.asarray(np.minimum(np.abs(sine + 2 * slope * ripple), 1), dtype=np.float32)
 
 
 def _fresnel(sine: _Floats, above: float, grazing: float) -> _Floats:
-    """(N,) share of light that is mirrored, by the sine of its height: Schlick's approximation."""
+    """(N,) reflectance by the sine of elevation: Schlick's approximation (1994) of Fresnel's formula."""
     flat = (1 - sine) ** 2
     return np.asarray(above + (grazing - above) * flat * flat * (1 - sine), dtype=np.float32)
 
@@ -178,7 +178,7 @@ def _fresnel(sine: _Floats, above: float, grazing: float) -> _Floats:
 def _towards(
     rows: npt.NDArray[np.intp], columns: npt.NDArray[np.intp], depth_m: _Floats, camera: CameraRecord
 ) -> list[_Floats]:
-    """East, north and up, (N,) each in metres, from the camera to what pixels show."""
+    """Vectors from the camera to the surfaces of pixels: east, north and up, (N,) each, metres."""
     pinhole = camera.intrinsics
     x = (columns.astype(np.float32) - np.float32(pinhole.cx_px)) * depth_m * np.float32(1 / pinhole.fx_px)
     y = (rows.astype(np.float32) - np.float32(pinhole.cy_px)) * depth_m * np.float32(1 / pinhole.fy_px)
@@ -188,5 +188,5 @@ def _towards(
 
 @cache
 def _pattern(town: str) -> npt.NDArray[np.float32]:
-    """(`TILE_PX`, `TILE_PX`) noise that belongs to a town."""
+    """(`TILE_PX`, `TILE_PX`) noise of a town, equal in every process."""
     return periodic_noise(derive_rng(0, "puddles", town), _OCTAVES, _SLOPE)

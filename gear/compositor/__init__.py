@@ -1,1 +1,1 @@
-"""Patches into pictures, differentiably. Never imported by what collects."""
+"""Compositors put patches into stored pictures, differentiably. Collecting never imports this package."""

@@ -1,4 +1,4 @@
-"""What compositors share: which sample, which view, which patches; pictures out of stored ones and composed pixels."""
+"""The base of compositors: they replace some pixels of stored pictures by pixels that depend on patches."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from gear.values.frames import UInt8Image
 from gear.values.ground_truth import SurfaceTruth
 
 Sizes = tuple[tuple[int, int], ...]
-"""Height and width of each patch."""
+"""Height and width of each patch, pixels."""
 
 CACHE_BYTES = 4 << 30
-"""What a compositor keeps of samples that it has seen: at 512x256 some 2 MB each, at 2048x1024 some 20."""
+"""Default memory for prepared samples: each takes about 2 MB at 512 x 256 and 20 MB at 2048 x 1024."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prepared:
-    """One view of one sample, ready for any patches of given sizes.
+    """One view of one sample, prepared for patches of given sizes.
 
     Attributes:
         picture: (3, H, W) uint8, as stored.
-        where: (N,) int64, pixels that are composed, row-major.
-        inner: whatever the compositor needs to compose them.
-        inner_bytes: memory that `inner` takes.
+        where: (N,) int64 row-major indices of the pixels that are composed.
+        inner: data of the compositor for these pixels.
+        inner_bytes: memory of `inner` in bytes.
     """
 
     picture: Tensor
@@ -45,19 +45,19 @@ class Prepared:
 
     @property
     def nbytes(self) -> int:
-        """Memory in all."""
+        """Memory of the whole in bytes."""
         return self.picture.nbytes + self.where.nbytes + self.inner_bytes
 
 
 class BaseCompositor:
-    """A compositor that replaces some pixels of stored pictures. Subclasses say which and by what.
+    """Implements `gear.contracts.attacks.Compositor`; subclasses choose the pixels and compute their values.
 
     Args:
         dataset: the split whose samples are composed; its pictures are the background.
-        device: where to compute.
+        device: torch device to compute on.
         rounding: whether patches and pictures are rounded to bytes, as files are; gradients pass straight through.
-        cache_bytes: memory for what is worked out once a sample.
-        cache: that several compositors have in common, in place of one of `cache_bytes`.
+        cache_bytes: memory for prepared samples.
+        cache: a cache that several compositors share, instead of a new one of `cache_bytes`.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class BaseCompositor:
 
     @property
     def surfaces(self) -> int:
-        """How many patches it takes."""
+        """Number of patches that the scene takes."""
         return len(self.dataset.sidecar(0).record.surfaces)
 
     def compose(self, patches: Sequence[Tensor], samples: Sequence[int], view: str) -> Tensor:
@@ -85,7 +85,7 @@ class BaseCompositor:
         Differentiable to the patches. Pixels that no surface reaches are the dataset's own, bit for bit.
 
         Args:
-            patches: one a surface, sRGB in 0..1: (3, h, w) for all samples, or (B, 3, h, w) with one each.
+            patches: one per surface, sRGB in 0..1: (3, h, w) for all samples, or (B, 3, h, w), one per sample.
             samples: indices in the dataset.
             view: name of the camera.
 
@@ -108,10 +108,10 @@ class BaseCompositor:
         return pasted
 
     def _truth(self, sample: Any, name: str, view: str) -> SurfaceTruth:
-        """What was measured of a surface in a view.
+        """The stored ground truth of a surface in a view.
 
         Raises:
-            DatasetError: nothing.
+            DatasetError: the sample has none for this view.
         """
         for truth in sample.surfaces:
             if truth.name == name and truth.camera == view:
@@ -122,7 +122,7 @@ class BaseCompositor:
 
     @abstractmethod
     def _load(self, index: int, view: str, sizes: Sizes) -> Prepared:
-        """Works out what one view of one sample needs."""
+        """Prepares one view of one sample for patches of these sizes."""
 
     @abstractmethod
     def _columns(self, patches: Sequence[Tensor]) -> list[Tensor]:
@@ -130,7 +130,12 @@ class BaseCompositor:
 
     @abstractmethod
     def _composed(self, inner: Sequence[Any], columns: Sequence[Tensor]) -> Tensor:
-        """(N, 3) values in 0..1 of the pixels that are composed, of one view after the other."""
+        """(N, 3) values in 0..1 of the composed pixels, view after view.
+
+        Args:
+            inner: `Prepared.inner` of each view.
+            columns: from `_columns`, one per surface.
+        """
 
     def _checked(self, patch: Tensor, batch: int) -> Tensor:
         is_one = patch.ndim == 3
@@ -149,7 +154,7 @@ class BaseCompositor:
 
 
 class _Paste(torch.autograd.Function):
-    """Puts values into pictures; the gradient is read where they went, and nothing else is touched."""
+    """Writes values into pictures in place; the gradient is read back at the same pixels."""
 
     @staticmethod
     def forward(ctx: Any, values: Tensor, where: Tensor, pictures: Tensor) -> Tensor:
@@ -165,11 +170,14 @@ class _Paste(torch.autograd.Function):
 
 
 def products(matrices: Sequence[SparseMatrix], columns: Tensor) -> Tensor:
-    """What one surface's pixels show, of one view after the other.
+    """Light of one surface's pixels, view after view.
 
     Args:
-        matrices: one a view.
-        columns: (columns, 3), or (B, columns, 3) with one a view.
+        matrices: one per view, (N_i, columns).
+        columns: (columns, 3) for all views, or (B, columns, 3), one per view.
+
+    Returns:
+        (sum of N_i, 3).
     """
     if columns.ndim == 2:
         return stacked_product(matrices, columns)
@@ -177,13 +185,13 @@ def products(matrices: Sequence[SparseMatrix], columns: Tensor) -> Tensor:
 
 
 def rounded(values: Tensor) -> Tensor:
-    """Values in 0..1 as bytes hold them; gradients pass as if nothing had happened."""
+    """Values in 0..1 rounded to multiples of 1/255; gradients pass unchanged (straight-through estimator)."""
     stepped = torch.floor(values.detach() * 255 + 0.5) / 255
     return values + (stepped - values.detach())
 
 
 def picture_of(sample: Any, view: str, dataset: Dataset[Any]) -> UInt8Image:
-    """A sample's stored picture.
+    """A sample's stored picture of one view, (H, W, 3) uint8.
 
     Raises:
         DatasetError: there is no such view.

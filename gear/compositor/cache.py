@@ -1,4 +1,4 @@
-"""What was computed last is kept, up to so many bytes."""
+"""A least-recently-used cache with a limit in bytes."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Generic, Protocol, TypeVar
 
 
 class Sized(Protocol):
-    """Something that knows its memory."""
+    """An object that reports its memory."""
 
     @property
     def nbytes(self) -> int:
-        """Bytes that it takes."""
+        """Memory in bytes."""
         ...
 
 
@@ -20,7 +20,7 @@ ThingT = TypeVar("ThingT", bound=Sized)
 
 
 class Cache(Generic[ThingT]):
-    """Things by key; the one that was not used for the longest time goes first. Not for several threads."""
+    """Objects by key; the least recently used one is dropped first. Not safe for several threads."""
 
     def __init__(self, max_bytes: int) -> None:
         self._max_bytes = max_bytes
@@ -31,7 +31,7 @@ class Cache(Generic[ThingT]):
         return len(self._things)
 
     def get(self, key: Hashable, make: Callable[[], ThingT]) -> ThingT:
-        """The thing of that key, made if it is not there; what is larger than the cache is not kept."""
+        """The object of a key; `make` creates it if it is missing. An object larger than the cache is not kept."""
         if key in self._things:
             self._things.move_to_end(key)
             return self._things[key]

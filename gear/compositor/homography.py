@@ -1,9 +1,8 @@
-"""The paper's compositor: a patch pasted by homography, as it is, over whatever the picture shows there.
+"""The paper's compositor: a patch is pasted by homography, with its own colours.
 
-It knows nothing of light, air or what stands before a board; that is the gap that `transport` closes. What was broken
-in the reference code is mended: the mask is that of the surface's outline, not of pixels that happen not to be black;
-all patches stay; and a patch that is small in the picture is averaged, not skipped over (2 x 2 samples a pixel,
-trilinear).
+It ignores light, air and occluders; the `transport` compositor has them. It differs from the reference code in three
+points: the mask is the surface's outline instead of the pixels that are not black; all patches are kept; and a patch
+that is small in the picture is filtered (2 x 2 samples per pixel, trilinear) instead of subsampled.
 
 Source: CARLA-GeAR (Nesti et al., 2022), section on patch generation; Nesti et al., WACV 2022.
 """
@@ -33,17 +32,17 @@ _FOUR_SAMPLES = SampleScheme(supersampled=True, extrapolates=False, smooths=Fals
 _NOWHERE = np.zeros((1, 1), np.bool_)
 
 PIXELS_AT_ONCE = 1 << 17
-"""That are looked at together for whether a surface covers them; samples of a whole picture take a gigabyte."""
+"""Pixels that are tested for coverage at a time; samples of a whole picture would take a gigabyte."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Outline:
-    """Surfaces as the pinhole projects them, and its lens bends them where it has one.
+    """The N pixels that surfaces cover, as the pinhole and its lens project them.
 
     Attributes:
-        background: (N, 3) float32 of the stored picture, 0..1.
-        matrices: one a surface, (N, columns).
-        covers: one a surface, (N, 1) float32 share of each pixel that it covers and no nearer surface does.
+        background: (N, 3) float32 values of the stored picture, 0..1, times the uncovered share.
+        matrices: one per surface, (N, columns).
+        covers: one per surface, (N, 1) float32 share of each pixel that it covers and no nearer surface does.
     """
 
     background: Tensor

@@ -1,8 +1,8 @@
-"""A face's texture and its mip levels as linear functions of the patch.
+"""The texture of a face and its mip levels as linear functions of the patch.
 
-A patch becomes a face by area averages, and a face its mip levels by halving. Both work on rows and columns apart:
-level = rows @ patch @ columns.T. Levels that are finer than the patch are not made at all: what would read their
-texels reads the patch's pixels.
+A patch is resized to the face by area averages, and each mip level is half as large as the last. Both are separable:
+level = rows @ patch @ columns.T. Levels that are finer than the patch are not computed: reads of their texels are
+replaced by reads of the patch's pixels.
 """
 
 from __future__ import annotations
@@ -24,14 +24,17 @@ Ints = npt.NDArray[np.int64]
 
 
 Halving = Literal["middles", "areas"]
-"""How an axis of an odd number of texels becomes half as long: `middles` reads it bilinearly at the middles of the
-larger texels, as blits do; `areas` takes the mean of what each of them covers. Even ones are averaged in pairs."""
+"""How an axis with an odd number of texels is halved.
+
+`middles` reads it bilinearly at the centres of the larger texels, as blits do; `areas` averages the area that each of
+them covers. Even numbers of texels are averaged in pairs.
+"""
 
 
 def halving_of(renderer: str, driver: str) -> Halving:
-    """What a renderer does with a driver.
+    """The halving of mip levels that a renderer uses with a driver.
 
-    Filament halves with blits of its own, everywhere the same. OpenGL leaves it to the driver: Mesa's blit, NVIDIA's
+    Filament halves with its own blits on every driver. OpenGL leaves it to the driver: Mesa's blit, NVIDIA's
     averages areas (measured on an H100: composed pictures are 7 levels off with the other rule, 0.4 with this one).
     """
     return "areas" if renderer != "filament" and "nvidia" in driver.casefold() else "middles"
@@ -39,7 +42,7 @@ def halving_of(renderer: str, driver: str) -> Halving:
 
 @cache
 def halving_matrix(size: int, halving: Halving = "middles") -> Array:
-    """(max(1, size // 2), size): a renderer's next mip level along one axis."""
+    """(max(1, size // 2), size) matrix from one mip level to the next along one axis, read-only."""
     target = max(1, size // 2)
     if halving == "areas":
         return box_matrix(size, target)
@@ -54,7 +57,7 @@ def halving_matrix(size: int, halving: Halving = "middles") -> Array:
 
 @lru_cache(maxsize=16)
 def axis_matrices(patch_px: int, face_px: int, halving: Halving = "middles") -> tuple[Array, ...]:
-    """From a patch's pixels to each mip level's texels along one axis, the face itself first, down to one texel."""
+    """Matrices from a patch's pixels to the texels of each mip level along one axis, from the finest to one texel."""
     matrices = [box_matrix(patch_px, face_px)]
     while matrices[-1].shape[0] > 1:
         matrices.append(frozen(halving_matrix(matrices[-1].shape[0], halving) @ matrices[-1]))
@@ -63,7 +66,7 @@ def axis_matrices(patch_px: int, face_px: int, halving: Halving = "middles") -> 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reads:
-    """What stands for the texels of one axis of a level: a few columns each, with weights.
+    """How the texels along one axis of a level are read: from k columns each, with weights.
 
     Attributes:
         index: (texels, k) int64.
@@ -76,14 +79,14 @@ class Reads:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pyramid:
-    """Where each mip level of a face lies in one list of columns, for patches of one size.
+    """All texels of a face's mip levels as one list of columns, for patches of one size.
 
     Attributes:
-        height_px, width_px: of the patch.
-        halving: how one level becomes the next.
-        rows, columns: matrices of each level.
-        folded: so many levels, the finest, are read from the patch itself.
-        starts: where each level's texels begin; 0, the patch, for folded ones.
+        height_px, width_px: size of the patch.
+        halving: how one level is made from the last.
+        rows, columns: per level, the matrices of both axes.
+        folded: number of the finest levels that are read from the patch instead.
+        starts: per level, the first of its columns; 0, the patch, for folded levels.
         size: number of columns.
     """
 
@@ -98,7 +101,7 @@ class Pyramid:
 
     @property
     def levels(self) -> int:
-        """How many there are."""
+        """Number of mip levels."""
         return len(self.starts)
 
     def shape(self, level: int) -> tuple[int, int]:
@@ -106,14 +109,14 @@ class Pyramid:
         return self.rows[level].shape[0], self.columns[level].shape[0]
 
     def reads(self, level: int) -> tuple[Reads, Reads, int]:
-        """For rows and columns of a level: what is read; and how many columns lie between two rows."""
+        """How a level is read: along its rows, along its columns, and the number of columns from row to row."""
         if level < self.folded:
             return _nonzero(self.rows[level]), _nonzero(self.columns[level]), self.width_px
         height, width = self.shape(level)
         return _identity(height), _identity(width), width
 
     def spread(self, patch: Tensor) -> Tensor:
-        """The columns of a patch: (..., 3, h, w) light to (..., size, 3)."""
+        """The columns of a patch, differentiable: (..., 3, h, w) linear light to (..., size, 3)."""
         import torch
 
         levels = [patch]
@@ -122,14 +125,14 @@ class Pyramid:
         return torch.cat([texels.flatten(-2) for texels in levels], dim=-1).transpose(-1, -2).contiguous()
 
     def _is_patch(self, level: int) -> bool:
-        """Whether a folded level's texels are the patch's pixels. As many of them is not enough: 37 rows that were
-        stretched to 600 and halved to 37 again are mixed by it."""
+        """Whether a folded level's texels equal the patch's pixels. An equal size is not enough: 37 rows that are
+        stretched to 600 and halved to 37 again are mixed."""
         return self.shape(level) == (self.height_px, self.width_px) and all(
             bool((matrix.diagonal() == 1).all()) for matrix in (self.rows[level], self.columns[level])
         )
 
     def _next(self, last: Tensor, patch: Tensor, level: int) -> Tensor:
-        """A level from the one before it, or from the patch where there is none before it."""
+        """A level from the last one, or from the patch where there is no last one."""
         import torch
 
         size = tuple(last.shape[-2:])
@@ -149,7 +152,7 @@ def pyramid_of(height_px: int, width_px: int, halving: Halving = "middles") -> P
     """The pyramid for patches of a size."""
     rows = list(axis_matrices(height_px, FACE_SIZE_PX[1], halving))
     columns = list(axis_matrices(width_px, FACE_SIZE_PX[0], halving))
-    # The shorter axis stays at one texel while the longer one goes on.
+    # The shorter axis keeps one texel while the longer one is halved further.
     while len(rows) < len(columns):
         rows.append(rows[-1])
     while len(columns) < len(rows):
@@ -173,7 +176,7 @@ def pyramid_of(height_px: int, width_px: int, halving: Halving = "middles") -> P
 
 
 def _nonzero(matrix: Array) -> Reads:
-    """The few columns of each row that are not zero; padded with weights of zero."""
+    """The nonzero columns of each row, padded with weights of zero."""
     most = int((matrix > 0).sum(axis=1).max())
     index = np.argsort(-matrix, axis=1, kind="stable")[:, :most]
     return Reads(index=index, weight=np.take_along_axis(matrix, index, axis=1))

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from gear.dataset.reading import Dataset
 
 COMPOSITORS = ("transport", "homography")
-"""Names that `open_compositor` answers to, the default first."""
+"""Names of compositors, the default first."""
 
 
 def open_compositor(
@@ -27,15 +27,15 @@ def open_compositor(
     cache_bytes: int = CACHE_BYTES,
     cache: Cache[Prepared] | None = None,
 ) -> BaseCompositor:
-    """A compositor for the samples of a dataset.
+    """A compositor for the samples of one dataset.
 
     Args:
         name: one of `COMPOSITORS`.
         dataset: with probes, for `transport`.
-        device: where to compute.
+        device: torch device to compute on.
         rounding: whether patches and pictures are rounded to bytes, as files are.
-        cache_bytes: memory for what is worked out once a sample.
-        cache: that several compositors have in common, in place of one of `cache_bytes`.
+        cache_bytes: memory for prepared samples.
+        cache: a cache that several compositors share, instead of a new one of `cache_bytes`.
 
     Raises:
         UnknownNameError: there is no such compositor.

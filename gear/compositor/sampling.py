@@ -1,8 +1,7 @@
-"""Where the pixels of a picture read a surface's texture.
+"""Texture samples of the pixels that show a surface.
 
-Every pixel has a few samples. A sample is a place on the face, a mip level and a weight; a pixel shows the weighted
-mean. Samples that miss the face have no weight: probes hold how much of a pixel the face covers, and what is sampled
-is the face's share alone.
+Every pixel has a few samples: a position on the face, a mip level and a weight; its colour is their weighted mean.
+Samples beside the face have weight 0: probes already hold which share of a pixel the face covers.
 """
 
 from __future__ import annotations
@@ -29,10 +28,10 @@ class Samples:
     """Samples of N pixels, S each.
 
     Attributes:
-        u, v: (N, S) places on the face, 0..1 to the right and down.
-        level: (N, S) mip level, a real number; 0 is the face itself.
+        u, v: (N, S) positions on the face, 0..1 to the right and down.
+        level: (N, S) mip level, not rounded; 0 is the finest.
         weight: (N, S) float64; rows sum to 1.
-        coverage: (N,) share of the weight that hit the face before rows were scaled to 1.
+        coverage: (N,) share of the weight that is on the face, before rows are scaled to 1.
     """
 
     u: Array
@@ -61,7 +60,7 @@ class SampleScheme:
 
     @staticmethod
     def of(renderer_name: str, quality: Quality, effects: tuple[Effect, ...]) -> SampleScheme:
-        """For a renderer in a quality."""
+        """The scheme of a renderer and quality, with the camera's active effects."""
         is_film = quality == "film"
         return SampleScheme(
             supersampled=is_film and renderer_name != "classic",
@@ -72,9 +71,10 @@ class SampleScheme:
 
 
 def unit_from_image(truth: SurfaceTruth, surface: SurfaceRecord, camera: CameraRecord) -> Array:
-    """(3, 3) homography from index pixels of the pinhole to patch coordinates 0..1; the third row is positive in front.
+    """(3, 3) homography from index pixels of the pinhole to patch coordinates 0..1.
 
-    It exists for surfaces, too, that reach behind the camera.
+    Its third row gives the inverse of depth, positive in front of the camera. It also exists for surfaces that reach
+    behind the camera.
     """
     camera_from_surface = RigidTransform("camera", "surface", np.array(truth.camera_from_surface).reshape(4, 4))
     right_m = camera_from_surface.rotation[:, 0] * surface.width_m
@@ -87,13 +87,13 @@ def unit_from_image(truth: SurfaceTruth, surface: SurfaceRecord, camera: CameraR
 def take_samples(
     scheme: SampleScheme, unit: Array, pixels: tuple[Array, Array], mask: Mask, exposure: Exposure
 ) -> Samples:
-    """The samples of some pixels.
+    """The texture samples of some pixels.
 
     Args:
         scheme: how samples are taken.
-        unit: of `unit_from_image`.
+        unit: (3, 3) homography from `unit_from_image`.
         pixels: (N,) columns and (N,) rows, index pixels.
-        mask: (H, W) where the face is seen, by ids at pixel centres.
+        mask: (H, W) bool, pixels whose id is the face.
         exposure: camera and scene.
     """
     x, y = (np.asarray(axis, dtype=np.float64)[:, None] for axis in pixels)
@@ -119,7 +119,7 @@ def take_samples(
     counted = weight if scheme.extrapolates else weight * hits
     coverage = np.asarray((weight * hits).sum(axis=1))
     total = counted.sum(axis=1, keepdims=True)
-    # A pixel that the face only grazes, between all samples, shows the border nearest to it.
+    # Where the face lies between all samples of a pixel, the nearest position on its border is read.
     counted = np.where(total > 1e-9, counted / np.maximum(total, 1e-9), weight / weight.sum(axis=1, keepdims=True))
     if not scheme.extrapolates:
         u, v = np.clip(u, 0, 1), np.clip(v, 0, 1)
@@ -128,7 +128,7 @@ def take_samples(
 
 
 def _on_face(unit: Array, x: Array, y: Array) -> tuple[Array, Array, Mask]:
-    """Places on the face, and whether they lie before the camera."""
+    """Positions on the face, and whether they are in front of the camera."""
     u, v, depth = (row[0] * x + row[1] * y + row[2] for row in unit)
     in_front = depth > 1e-12
     safe = np.where(in_front, depth, 1.0)
@@ -136,7 +136,7 @@ def _on_face(unit: Array, x: Array, y: Array) -> tuple[Array, Array, Mask]:
 
 
 def _level(unit: Array, x: Array, y: Array, step_px: float) -> Array:
-    """log2 of the longer of a sample's two edges in texels: the level is isotropic."""
+    """Mip levels: log2 of the longer of a sample's two edges in texels, as isotropic filtering has it."""
     width, height = FACE_SIZE_PX
     u, v, _ = _on_face(unit, x, y)
     edges = []
@@ -147,7 +147,7 @@ def _level(unit: Array, x: Array, y: Array, step_px: float) -> Array:
 
 
 def _smoothed(x: Array, y: Array, mask: Mask) -> tuple[Array, Array, Array]:
-    """The 3 x 3 tent of `fast` where the face's visible mask ends, on those neighbours that show the face."""
+    """The 3 x 3 edge filter of `fast`: at the border of the visible mask, over the neighbours that show the face."""
     padded = np.pad(mask, 1)
     inner = np.pad(mask, 1, mode="edge")  # the picture's border is no edge
     column, row = x[:, 0].astype(int), y[:, 0].astype(int)

@@ -1,4 +1,4 @@
-"""A constant sparse matrix that gradients pass through."""
+"""Products with constant sparse matrices, differentiable to the dense factor."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from torch import Tensor
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SparseMatrix:
-    """A matrix and its transpose, both by rows, so that both directions are one quick product.
+    """A sparse matrix and its transpose, both in CSR form: the product forward and the product for gradients.
 
     Attributes:
         forward: (N, M) sparse CSR.
@@ -26,12 +26,12 @@ class SparseMatrix:
 
     @staticmethod
     def of(matrix: Any, device: torch.device) -> SparseMatrix:
-        """From a scipy CSR matrix of float32."""
+        """From a SciPy CSR matrix of float32, on a device."""
         return SparseMatrix(_csr(matrix, device), _csr(matrix.T.tocsr(), device))
 
     @property
     def nbytes(self) -> int:
-        """Memory that both take."""
+        """Memory of both matrices in bytes."""
         parts = [m for csr in (self.forward, self.backward) for m in (csr.crow_indices(), csr.col_indices())]
         return sum(p.nbytes for p in parts) + 2 * int(self.forward.values().nbytes)
 
@@ -61,7 +61,7 @@ class _Product(torch.autograd.Function):
 def _csr(matrix: Any, device: torch.device) -> Tensor:
     matrix.sort_indices()
     with warnings.catch_warnings():
-        # torch says once a process that such tensors are young, and that it does not check them.
+        # torch warns once per process that sparse CSR tensors are in beta.
         warnings.filterwarnings("ignore", "Sparse", UserWarning)
         return torch.sparse_csr_tensor(
             torch.from_numpy(matrix.indptr.astype(np.int32)),

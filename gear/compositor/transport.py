@@ -1,9 +1,10 @@
-"""The exact compositor: light is linear, so two probes of a surface say how any patch on it looks.
+"""The exact compositor: light is linear, so two probe renders of a surface determine how any patch on it looks.
 
     picture = response(B + sum over i of (M_i p_i) (W_i - B))
 
 B and W_i are the probes (`gear.dataset.probe_files`); p_i is patch i as light, with its coarser levels; M_i is a sparse
-matrix that samples it as the renderer samples its texture. Noise, if the dataset has any, is the sample's own.
+matrix that samples it as the renderer samples its texture. Noise, if the dataset has any, is that of the stored
+sample.
 """
 
 from __future__ import annotations
@@ -79,7 +80,7 @@ class TransportCompositor(BaseCompositor):
         return torch.cat([view.shown(part) for view, part in zip(inner, parts, strict=True)])
 
     def _pyramid(self, size: tuple[int, int]) -> Pyramid:
-        """Of patches of (height, width), as the dataset's renderer made it."""
+        """The pyramid for patches of (height, width), as the dataset's renderer filters them."""
         renderer = self._renderer
         driver = str(self.dataset.manifest["renderer"].get("driver"))
         return pyramid_of(*size, halving_of(renderer, driver))
@@ -125,7 +126,7 @@ class TransportCompositor(BaseCompositor):
     def _matrix(
         self, sample: Any, number: int, view: str, pixels: tuple[Any, Any], gain: Any, size: tuple[int, int]
     ) -> SparseMatrix:
-        """One surface's; rows are empty where it gives no light."""
+        """The sampling matrix of one surface; rows of pixels that it gives no light are empty."""
         record, pyramid = sample.record, self._pyramid(size)
         surface, camera = record.surfaces[number], record.camera(view)
         lit = np.flatnonzero(gain.any(axis=1))

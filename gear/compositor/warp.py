@@ -1,4 +1,4 @@
-"""From samples to one sparse matrix: pixels times a pyramid's columns."""
+"""Samples of a surface's texture as one sparse matrix: pixels by columns of a patch's pyramid."""
 
 from __future__ import annotations
 
@@ -13,9 +13,14 @@ from gear.values.geometry import Array
 
 
 def warp_matrix(samples: Samples, pyramid: Pyramid) -> Any:
-    """(N, columns) scipy CSR float32, rows sum to 1: what each pixel reads of a patch and of its coarser levels.
+    """The weights with which each pixel reads the columns of a pyramid: trilinear, with a texture that repeats.
 
-    Levels are mixed linearly and texels bilinearly, over borders that repeat.
+    Args:
+        samples: of N pixels.
+        pyramid: for patches of one size.
+
+    Returns:
+        (N, columns) SciPy CSR matrix of float32 whose rows sum to 1.
     """
     count, each = samples.weight.shape
     pixel = np.repeat(np.arange(count), each)

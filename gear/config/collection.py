@@ -1,4 +1,4 @@
-"""The collection config: what to collect, where, and with which patch. And the simulation config: how much of it."""
+"""The collection config (what to collect, where, with which patch) and the simulation config (seeds and counts)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gear.values.serial import PLACES
 from gear.values.vehicle_mix import check_mix
 
 SPLIT_NAME = re.compile(r"(?!(gear|patches|scratch)$)[a-z][a-z0-9]*(_[a-z0-9]+)*")
-"""Folders of gear's own are no splits."""
+"""Names of splits. Folders that gear writes in a dataset (`gear`, `patches`, `scratch`) are excluded."""
 
 
 _WEATHER_FIELDS = [DerivedField(name=name, kind=float | None, field=field(default=None)) for name in WEATHER_PARAMETERS]
@@ -51,13 +51,13 @@ class WeatherConfig:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SplitConfig:
-    """How much of one split, drawn from which seed.
+    """Seed and size of one split.
 
     Attributes:
-        seed: the one seed that enters.
-        samples: sequences; each is one picture long unless `frames` says otherwise.
-        frames: frames of one driving sequence.
-        interval_s: time between two frames of a sequence.
+        seed: all random draws of the split derive from it.
+        samples: number of sequences; with `frames` 1 each is a single picture.
+        frames: frames per driving sequence.
+        interval_s: seconds between two frames of a sequence, 0.001 to 10.
     """
 
     seed: int
@@ -78,7 +78,7 @@ class SplitConfig:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulationConfig:
-    """Seeds and counts of every split, and the most that a scene may hold.
+    """Seeds and sizes of all splits, and upper limits on road users.
 
     Attributes:
         splits: by name; `test_night` takes the entry of `test` unless it has its own.
@@ -120,14 +120,14 @@ class CollectionConfig:
         renderer: `raster` (physically based), `filament` (the same look, slower) or `classic`.
         quality: `film` (2x2 supersampled) or `fast`.
         camera: optional effects: `shot_noise`, `read_noise` (percent), `vignette`, `shutter_s`, `lens` (`k1`, `k2`).
-        seed, samples: instead of the simulation config's.
-        crowd: how many times the scene's numbers of other vehicles and people there are, their upper limits included.
-        mix: how often kinds of vehicles come, times their share in the scene: `{bus: 3}`.
-        patch_seed: of random patches; not the split's, so that all splits show the same one.
-        probes: also keep each surface's reach rendered black and white, from which compositors put patches in.
+        seed, samples: replace those of the simulation config.
+        crowd: factor on the scene's numbers of other vehicles and people, and on their upper limits; 0 to 10.
+        mix: factors on the frequency of kinds of vehicles, such as `{bus: 3}`.
+        patch_seed: seed of random patches, separate from the split's, so that all splits show the same patch.
+        probes: whether to store renders with each surface black and white, which the exact compositor needs.
         simulation: name or path of the simulation config.
         options: the task's own options (`gear plugins show TASK`).
-        places: where a file or a flag gives what, by key.
+        places: file, line and column of each given value, by key.
     """
 
     task: str

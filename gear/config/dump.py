@@ -12,11 +12,11 @@ from gear.config.nodes import Items, Mapping, Node, Scalar
 from gear.values.serial import Json, is_places_field
 
 MAX_NODES = 100_000
-"""No options hold more: aliases of aliases, which cost nothing to read, would be written out one by one."""
+"""Most values that a config may have once its YAML aliases are written out: aliases of aliases grow exponentially."""
 
 
 def to_yaml(config: Any) -> str:
-    """YAML text that reads back as the same config."""
+    """YAML text from which the same config is read."""
     return str(yaml.safe_dump(to_plain(config), sort_keys=False, allow_unicode=True, default_flow_style=None))
 
 

@@ -13,7 +13,7 @@ from gear.values.regular_file import read_regular
 MAX_BYTES = 4 << 20
 
 MARKS = "'\"[{&*!|>"
-"""What a value of YAML begins with that is no bare word."""
+"""First characters of YAML values that are not bare words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +87,11 @@ def text_of(path: Path) -> str:
 
 
 def parse_text(text: str, name: str) -> Node:
-    """Reads YAML text; `name` stands for the file in errors.
+    """Reads YAML text.
+
+    Args:
+        text: the YAML.
+        name: stands for the file in errors.
 
     Raises:
         ConfigError: it is not YAML, repeats a key, or is nested too deeply.

@@ -41,7 +41,7 @@ TOWNS = {"Town10HD": "town10", "Town10HD_Opt": "town10"}
 
 
 def is_original(node: Node) -> bool:
-    """Whether this is a config of the original tool."""
+    """Whether a node is a config of the original tool."""
     return isinstance(node, Mapping) and bool(ORIGINAL_ONLY & node.entries.keys())
 
 

@@ -35,7 +35,13 @@ def with_overrides(node: Node, settings: Iterable[str], kind: Any = None, *, fla
 
 
 def with_value(node: Node, path: tuple[str, ...], value: Node, above: str = "") -> Node:
-    """The tree with one value replaced or added; `above` is the key of the tree itself.
+    """The tree with one value replaced or added.
+
+    Args:
+        node: the tree.
+        path: keys from the root to the value.
+        value: the new value.
+        above: key of the tree itself, for errors.
 
     Raises:
         ConfigError: the path leads through a list or a scalar.

@@ -21,7 +21,7 @@ TRUE_WORDS = ("true", "yes", "on")
 FALSE_WORDS = ("false", "no", "off")
 
 WHOLE = {"whole": True}
-"""Metadata of a field whose default is one thing: who gives some of its keys does not mean the default's others."""
+"""Metadata of a field whose default counts as a whole: if some keys are given, the others have the class's defaults."""
 
 
 def read_node(kind: type[T], node: Node, key: str = "") -> T:

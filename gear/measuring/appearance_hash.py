@@ -16,7 +16,7 @@ from typing import Any
 
 import mujoco
 
-from gear.camera.contact_shadows import MOST_HIDDEN, worth_beside
+from gear.camera.contact_shadows import MOST_HIDDEN, sky_share_beside
 from gear.camera.response import response_for
 from gear.camera.water import FILM_F90
 from gear.dataset.plan import Plan
@@ -131,7 +131,7 @@ def light_digest() -> str:
         numbers = [*light.towards_sun, *light.sun, *light.ambient]
         levels = [int(level) for level in light.sky_faces.mean(axis=(0, 1)).round()]
         ramp = [round(float(value), 2) for value in response_for("filament", weather).curve(RAMP)]
-        hidden = round(MOST_HIDDEN * worth_beside(even_share(weather, light)), 2)
+        hidden = round(MOST_HIDDEN * sky_share_beside(even_share(weather, light)), 2)
         film = round(FILM_F90 * wetness(weather), 2)
         presets[name] = [to_json(weather), [f"{number:.3g}" for number in numbers], levels, ramp, hidden, film]
     return _digest(presets)

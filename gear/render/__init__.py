@@ -1,4 +1,4 @@
-"""Renderers: linear colour, metric depth and geom ids of one camera at once. The only room that knows a GPU exists."""
+"""Renderers: linear colour, metric depth and geom ids for one camera. No other package touches graphics drivers."""
 
 from gear.render.probing import ProbeResult, probe
 from gear.render.registry import RENDERERS, describe, open_renderer

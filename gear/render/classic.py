@@ -1,11 +1,10 @@
 """MuJoCo's own OpenGL renderer, through EGL or OSMesa.
 
-It lights with display values: no tone curve, no gamma. So that the same MJCF looks right, the renderer's own copy of
-the model holds colours as they are to be displayed: textures marked sRGB are not decoded, linear albedos of materials
-and geoms are encoded. Its frames are linear in a face's 8-bit values (Filament's are linear in the albedo that these
-encode).
+It computes light with display values, without tone curve and gamma. So that the same MJCF looks right, the renderer's
+copy of the model holds display colours: textures marked sRGB are not decoded, linear albedos of materials and geoms are
+encoded. Its frames are linear in a face's 8-bit values; Filament's are linear in the albedo that these encode.
 
-How a face's texture reaches the screen: as in `gear.render.filament`, but filtered as bytes, without decoding.
+A face's texture is filtered as in `gear.render.filament`, but as bytes, without decoding.
 """
 
 from __future__ import annotations
@@ -52,7 +51,7 @@ class ClassicRenderer:
         self._quality = quality
         self._model = displayed_model(model)
         self._model.vis.quality.offsamples = _SAMPLES[quality]
-        self._worn: dict[int, npt.NDArray[np.uint8]] = {}
+        self._replaced: dict[int, npt.NDArray[np.uint8]] = {}
         self._size = (0, 0)
         backend = choose_backend("classic")
         self._gl = open_context(backend, "classic")
@@ -84,7 +83,7 @@ class ClassicRenderer:
         colour: bool = True,
         shapes: Sequence[RawView] | None = None,
     ) -> tuple[RawView, ...]:
-        """One raw view a camera; see `gear.contracts.rendering.Renderer`.
+        """One raw view per camera; see `gear.contracts.rendering.Renderer`.
 
         Raises:
             ValueError: the stage belongs to another model, or a face does not fit its texture.
@@ -92,7 +91,7 @@ class ClassicRenderer:
         if stage.model is not self._shared_model:
             raise ValueError("the stage was compiled as another model than the renderer was opened for")
         self._gl.make_current()
-        self._wear(dict(checked_faces(self._shared_model, stage.faces).values()))
+        self._set_faces(dict(checked_faces(self._shared_model, stage.faces).values()))
         known = [None] * len(cameras) if shapes is None else shapes
         return tuple(
             self._view(stage, camera, shape, colour=colour) for camera, shape in zip(cameras, known, strict=True)
@@ -107,22 +106,22 @@ class ClassicRenderer:
         self._context.free()
         self._gl.free()
 
-    def _wear(self, faces: dict[int, UInt8Image]) -> None:
-        """Puts faces on by texture, and takes off those that the last stage left."""
-        for texture in sorted(self._worn.keys() | faces.keys()):
+    def _set_faces(self, faces: dict[int, UInt8Image]) -> None:
+        """Uploads faces by texture id, and restores the textures of faces that only the last stage had."""
+        for texture in sorted(self._replaced.keys() | faces.keys()):
             self._upload(texture, faces.get(texture))
 
     def _upload(self, texture: int, srgb: UInt8Image | None) -> None:
-        """Gives a texture of the model's copy new texels, or its own ones back where there are none."""
+        """Uploads new texels of a texture of the model's copy, or its original ones for None."""
         model = self._model
         begin = int(model.tex_adr[texture])
         texels = model.tex_data[begin : begin + 3 * int(model.tex_height[texture]) * int(model.tex_width[texture])]
-        own = self._worn.pop(texture, None)
+        own = self._replaced.pop(texture, None)
         if own is None:
             own = texels.copy()
         content = own if srgb is None else srgb.reshape(-1)
         if srgb is not None:
-            self._worn[texture] = own
+            self._replaced[texture] = own
         if not np.array_equal(texels, content):
             texels[:] = content
             mujoco.mjr_uploadTexture(model, self._context, texture)
@@ -137,21 +136,21 @@ class ClassicRenderer:
         seen = in_frustum(frustum, *spheres)
         if shape is None:
             self._fill_scene(stage, frustum, seen)
-            geom_id, depth_m = self._truth(camera)
+            geom_id, depth_m = self._ids_and_depth(camera)
         else:
             geom_id, depth_m = shape.geom_id, shape.depth_m
         linear_rgb = None
         if colour:
-            casts = self._casters(stage, frustum, *spheres)
+            casts = self._shadow_casters(stage, frustum, *spheres)
             self._fill_scene(stage, frustum, seen | casts)
-            self._dress(stage, casts)
+            self._set_paint(stage, casts)
             linear_rgb = shade(four_times(self._colour(camera)), openness(depth_m, camera.focal_px))
             if self._quality == "fast":
                 linear_rgb = smooth_edges(linear_rgb, geom_id, depth_m)
         return RawView(linear_rgb=linear_rgb, depth_m=depth_m, geom_id=geom_id)
 
     def _fill_scene(self, stage: Stage, frustum: Frustum, needed: Mask) -> None:
-        """The scene anew, with the geoms that are needed, seen through the frustum."""
+        """Fills the MuJoCo scene with the needed geoms, for a view volume."""
         self._model.geom_group[:] = np.where(needed, self._shared_model.geom_group, _HIDDEN_GROUP)
         mujoco.mjv_updateScene(
             self._model, stage.data, self._option, None, mujoco.MjvCamera(), mujoco.mjtCatBit.mjCAT_ALL, self._scene
@@ -168,11 +167,11 @@ class ClassicRenderer:
             gl_camera.frustum_far = FAR_M
         for light in self._scene.lights[: self._scene.nlight]:
             if light.type == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL:
-                # OpenGL's sun casts shadows on a square about the line through this point.
+                # The sun casts shadows on a square around the line through this point.
                 light.pos[:] = _shadow_centre(frustum) - _SHADOW_HEIGHT_M * light.dir
 
-    def _casters(self, stage: Stage, frustum: Frustum, centres_m: Array, radii_m: Array) -> Mask:
-        """Geoms that may cast a shadow on the squares of the suns; all of them where another light casts shadows."""
+    def _shadow_casters(self, stage: Stage, frustum: Frustum, centres_m: Array, radii_m: Array) -> Mask:
+        """(ngeom,) bool, geoms in the beams of the suns' squares; all geoms where another light casts shadows."""
         casts = np.zeros(len(radii_m), np.bool_)
         model = self._model
         for light in np.flatnonzero(model.light_castshadow & model.light_active):
@@ -182,8 +181,8 @@ class ClassicRenderer:
             casts |= in_beam(_shadow_centre(frustum), direction, SHADOW_REACH_M, centres_m, radii_m)
         return casts
 
-    def _dress(self, stage: Stage, casts: Mask) -> None:
-        """Paint, and a mark on what is too far for its shadow to be seen. Scenes are filled anew: nothing to undo."""
+    def _set_paint(self, stage: Stage, casts: Mask) -> None:
+        """Sets paint, and switches shadows off for geoms that need none. The scene is filled again for each view."""
         for geom in self._scene.geoms[: self._scene.ngeom]:
             if geom.objtype != mujoco.mjtObj.mjOBJ_GEOM:
                 continue
@@ -200,13 +199,13 @@ class ClassicRenderer:
         self._render_and_read(camera, pixels, None, seen=(_FLAGS.mjRND_SHADOW, _FLAGS.mjRND_SKYBOX))
         return pixels[::-1]
 
-    def _truth(self, camera: CameraRecord) -> tuple[IdImage, FloatImage]:
-        """Ids and depth from one pass."""
+    def _ids_and_depth(self, camera: CameraRecord) -> tuple[IdImage, FloatImage]:
+        """Geom ids and depth in metres from one pass."""
         pixels = np.empty((camera.height_px, camera.width_px, 3), np.uint8)
         depth = np.empty((camera.height_px, camera.width_px), np.float32)
         self._render_and_read(camera, pixels, depth, seen=(_FLAGS.mjRND_SEGMENT, _FLAGS.mjRND_IDCOLOR))
         geoms = self._scene.geoms[: self._scene.ngeom]
-        # Pixels count the place in the scene, plus one; the last entry is what index -1, nothing, finds.
+        # Pixels hold the geom's position in the scene plus one; index -1, nothing, finds the last entry.
         geom_of_place = np.full(self._scene.ngeom + 1, -1, np.int32)
         for geom in geoms:
             if geom.objtype == mujoco.mjtObj.mjOBJ_GEOM:
@@ -222,7 +221,7 @@ class ClassicRenderer:
         *,
         seen: tuple[mujoco.mjtRndFlag, ...],
     ) -> None:
-        """One pass with the flags that are named set and all others cleared."""
+        """One pass with only these flags set; pixels and depth are written into the given arrays."""
         self._scene.flags[:] = 0
         for flag in (*seen, _FLAGS.mjRND_CULL_FACE):
             self._scene.flags[flag] = 1
@@ -232,5 +231,5 @@ class ClassicRenderer:
 
 
 def _shadow_centre(frustum: Frustum) -> Array:
-    """(3,) in the middle of where shadows can be told apart."""
+    """(3,) world position around which the shadow map is centred."""
     return np.asarray(frustum.position_world_m + _SHADOW_AHEAD_M * frustum.forward_world)

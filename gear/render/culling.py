@@ -1,4 +1,4 @@
-"""Which geoms a view needs. OpenGL is handed whatever the scene holds, three times over where there are shadows."""
+"""Which geoms a view needs: OpenGL draws all that a scene holds, up to three times where there are shadows."""
 
 from __future__ import annotations
 
@@ -13,17 +13,23 @@ Mask = npt.NDArray[np.bool_]
 
 
 def bounding_spheres(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Array, Array]:
-    """Centres (ngeom, 3) and radii (ngeom,) in metres, world frame; what has no bounds is everywhere."""
+    """Bounding spheres of geoms: (ngeom, 3) centres in the world and (ngeom,) radii, metres; infinite for planes."""
     return data.geom_xpos, bounding_radii(model)
 
 
 def bounding_radii(model: mujoco.MjModel) -> Array:
-    """(ngeom,) in metres; what has no bounds is endless."""
+    """(ngeom,) radii of bounding spheres in metres; infinite for geoms without bounds, such as planes."""
     return np.asarray(np.where(model.geom_rbound > 0, model.geom_rbound, np.inf))
 
 
 def in_frustum(frustum: Frustum, centres_m: Array, radii_m: Array) -> Mask:
-    """(ngeom,) whether a sphere reaches into the view; never False for one that does."""
+    """(ngeom,) bool, whether a sphere may reach into the view volume: never False for one that does.
+
+    Args:
+        frustum: the camera's view volume.
+        centres_m: (ngeom, 3) in the world.
+        radii_m: (ngeom,).
+    """
     right = np.cross(frustum.forward_world, frustum.up_world)
     towards = centres_m - frustum.position_world_m
     ahead = towards @ frustum.forward_world
@@ -40,9 +46,16 @@ def in_frustum(frustum: Frustum, centres_m: Array, radii_m: Array) -> Mask:
 
 
 def in_beam(centre_m: Array, direction: Array, half_side_m: float, centres_m: Array, radii_m: Array) -> Mask:
-    """(ngeom,) whether a sphere reaches into the beam of light about a line, `half_side_m` wide to each side.
+    """(ngeom,) bool, whether a sphere may reach into a square beam of light around a line.
 
-    The square may be turned about the line, so the beam is taken as round and as wide as the square's diagonal.
+    The square may be rotated about the line, so a round beam around it is tested.
+
+    Args:
+        centre_m: (3,) a point of the line.
+        direction: (3,) of the light, of any length.
+        half_side_m: half the side of the square.
+        centres_m: (ngeom, 3) in the world.
+        radii_m: (ngeom,).
     """
     unit = direction / np.linalg.norm(direction)
     towards = centres_m - centre_m
@@ -51,6 +64,11 @@ def in_beam(centre_m: Array, direction: Array, half_side_m: float, centres_m: Ar
 
 
 def near_to_far(chosen: Mask, depth_m: Array) -> npt.NDArray[np.intp]:
-    """Indices of what is chosen by growing depth, equal ones in their own order."""
+    """Indices of the chosen geoms by growing depth; equal depths keep their order.
+
+    Args:
+        chosen: (ngeom,) bool.
+        depth_m: (ngeom,).
+    """
     selection = np.flatnonzero(chosen)
     return np.asarray(selection[np.argsort(depth_m[selection], kind="stable")])

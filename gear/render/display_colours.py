@@ -1,4 +1,4 @@
-"""A model's colours as OpenGL must be given them so that what it shows looks right."""
+"""Display colours for the classic renderer, which knows neither sRGB nor a tone curve."""
 
 from __future__ import annotations
 
@@ -12,21 +12,20 @@ from gear.camera.response import encode_srgb
 from gear.contracts.rendering import has_own_colour
 
 SHADOW_REACH_M = 50.0
-"""Half the side of the square on which classic's sun casts shadows; the renderer lays it before the camera."""
+"""Half the side in metres of the square in front of the camera on which the sun casts shadows."""
 
 SHADOW_MAP_PX = 2048
-"""Side of its shadow map: five centimetres a texel. Twice as many cost a tenth of a frame."""
+"""Side of the shadow map: five centimetres per texel. Twice as many take a tenth of a frame's time more."""
 
 LIFT = 2.4
-"""How much the darkest colours are lifted: what a road camera's tone curve does to Filament's frames.
+"""Factor by which the darkest colours are lifted, as the tone curve does with Filament's frames.
 
-Display values cannot be brightened by more light: white, such as that of a patch, would clip. Colours of the town are
-lifted instead; what a face shows is left as it is.
+More light would clip white, such as that of a patch, so colours of the town are lifted instead; faces are not.
 """
 
 
 def has_linear_colours(model: mujoco.MjModel) -> bool:
-    """Whether the model says that its colours (`rgba`) are linear albedo; MuJoCo's habit is sRGB."""
+    """Whether the model declares its colours (`rgba`) as linear albedo; MuJoCo's default is sRGB."""
     index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, "filament.material.base_color_type")
     if index < 0:
         return False
@@ -35,11 +34,11 @@ def has_linear_colours(model: mujoco.MjModel) -> bool:
 
 
 def displayed_model(model: mujoco.MjModel) -> mujoco.MjModel:
-    """A copy whose colours are display values.
+    """A copy of a model whose colours are display values.
 
-    OpenGL would decode a texture that is marked sRGB, light it, and show the linear result as it is: far too dark. In
-    the copy such textures are not marked, linear colours of geoms and materials are encoded, and both are lifted.
-    Lights of the kind `image`, which OpenGL does not have, are off, and of the headlight only its ambient light stays.
+    OpenGL would decode a texture that is marked sRGB and show the linear result unencoded, far too dark. In the copy
+    such textures are not marked, linear colours of geoms and materials are encoded, and both are lifted. Lights of type
+    `image`, which MuJoCo's OpenGL lacks, are off; of the headlight only the ambient light stays.
     """
     shown = copy.copy(model)
     shown.tex_colorspace[:] = mujoco.mjtColorSpace.mjCOLORSPACE_LINEAR
@@ -62,7 +61,7 @@ def displayed_model(model: mujoco.MjModel) -> mujoco.MjModel:
 
 
 def displayed_colour(albedo: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Linear albedo 0..1 as classic is to show it in full light, elementwise."""
+    """Display values 0..1 of linear albedo 0..1 in full light, elementwise."""
     return _lifted(encode_srgb(albedo))
 
 

@@ -1,4 +1,4 @@
-"""Which texture a surface's face wears."""
+"""The textures through which surfaces' faces show patches."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from gear.values.frames import UInt8Image
 
 
 def texture_of_face(model: mujoco.MjModel, geom_id: int) -> int:
-    """Index of the colour texture of a geom's material.
+    """Id of the colour texture of a geom's material.
 
     Raises:
-        ValueError: the geom has none, so it cannot be a face.
+        ValueError: the geom has no such texture, so it cannot be a face.
     """
     material = int(model.geom_matid[geom_id])
     texture = int(model.mat_texid[material, mujoco.mjtTextureRole.mjTEXROLE_RGB]) if material >= 0 else -1
@@ -24,7 +24,14 @@ def texture_of_face(model: mujoco.MjModel, geom_id: int) -> int:
 
 
 def checked_faces(model: mujoco.MjModel, faces: Mapping[int, UInt8Image]) -> dict[int, tuple[int, UInt8Image]]:
-    """Faces by geom id with the model's texture that each one replaces.
+    """Checks the faces of a stage.
+
+    Args:
+        model: the compiled world.
+        faces: (H, W, 3) uint8 sRGB by geom id.
+
+    Returns:
+        By geom id: the id of the texture that the face replaces, and the face.
 
     Raises:
         ValueError: a face is not uint8 or not of its texture's size.

@@ -1,13 +1,13 @@
 """The physically based renderer: Filament on Vulkan, through MuJoCo's `mjrf`.
 
-Pictures are taken without Filament's post-processing: it dithers by frame number and finds edges by contrast, so a
-frame would depend on what was rendered before it and a patch could change pixels that it does not reach. Without it
-every frame is linear and the same each time; supersampling and gear's own camera take its place.
+Filament's post-processing is off: it dithers by frame number and detects edges by contrast, so a frame would depend on
+earlier frames, and a patch could change pixels that do not show it. Without it frames are linear and repeatable;
+supersampling and gear's camera pipeline replace it.
 
-How a face's texture reaches the screen (measured): texels are decoded from sRGB, then filtered trilinearly over a
-chain of 2 x 2 averaged mip levels, in linear light, with borders that repeat. The level is isotropic, log2 of the
-longer of a pixel's two edges in texels, so a slanted face is softer than its shorter direction needs. Classic does
-the same on raw bytes.
+Filtering of a face's texture (measured): texels are decoded from sRGB, then filtered trilinearly over mip levels of
+2 x 2 averages, in linear light; the texture repeats. The level is isotropic, log2 of the longer of a pixel's two edges
+in texels, so a slanted face is blurred more than its longer direction needs. The classic renderer does the same with
+undecoded bytes.
 """
 
 from __future__ import annotations
@@ -44,17 +44,17 @@ _FACE_TEXTURES_KEPT = 16
 _M_ARENA_MAX = -8
 _WHITE = np.ones(4, np.float32)
 _FRAMES_TO_SETTLE = 24
-"""After so many frames Filament lets go of what it uploaded the model through: a quarter of what it takes of a town."""
+"""Frames after which Filament frees its upload buffers: a quarter of the memory that a town takes."""
 
 _FIRST_LOOK = CameraRecord(
     name="first", width_px=16, height_px=16, focal_px=8.0, world_from_camera=Pose(position_m=(0.0, 0.0, -1e5))
 )
-"""From so far away that no town is drawn: a look at one takes two cores 0.15 s, even at this size."""
+"""A camera so far away that nothing is drawn: even at this size, drawing a town takes two cores 0.15 s."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Target:
-    """A render target with the buffer that its pixels are read into."""
+    """A render target and the buffer into which its pixels are read."""
 
     handle: Any
     read: Any
@@ -90,7 +90,7 @@ class FilamentRenderer:
         self._face_textures: OrderedDict[bytes, Any] = OrderedDict()
         self._retired_textures: list[Any] = []
         self._closed = False
-        with native_output():  # the driver's thread says what it has to say of the model before the first frame is done
+        with native_output():  # the driver's thread writes its messages before the first frame is done
             for _ in range(_FRAMES_TO_SETTLE):
                 self._geom_id(_FIRST_LOOK)
 
@@ -107,7 +107,7 @@ class FilamentRenderer:
         colour: bool = True,
         shapes: Sequence[RawView] | None = None,
     ) -> tuple[RawView, ...]:
-        """One raw view a camera; see `gear.contracts.rendering.Renderer`.
+        """One raw view per camera; see `gear.contracts.rendering.Renderer`.
 
         Raises:
             ValueError: the stage belongs to another model, or a face does not fit its texture.
@@ -116,7 +116,7 @@ class FilamentRenderer:
             raise ValueError("the stage was compiled as another model than the renderer was opened for")
         self._lights.update(stage.data)
         self._renderables.update(stage.data)
-        self._dress(stage)
+        self._set_paint_and_faces(stage)
         known = [None] * len(cameras) if shapes is None else shapes
         return tuple(self._view(camera, shape, colour=colour) for camera, shape in zip(cameras, known, strict=True))
 
@@ -125,15 +125,15 @@ class FilamentRenderer:
         if self._closed:
             return
         self._closed = True
-        # What lives inside the context must go before it, users before what they use.
+        # Objects of the context are freed before it, and users before what they use.
         del self._renderables, self._lights, self._scene
         self._targets.clear()
         self._face_textures.clear()
         self._retired_textures.clear()
         del self._resources, self._context
 
-    def _dress(self, stage: Stage) -> None:
-        """Puts on paint and faces. `ModelRenderables.update` has just taken off what the last stage wore."""
+    def _set_paint_and_faces(self, stage: Stage) -> None:
+        """Sets paint and faces. `ModelRenderables.update` has just reset those of the last stage."""
         for geom_id, rgb in stage.paint_rgb.items():
             renderable = self._renderable(geom_id)
             material = renderable.get_material()
@@ -171,7 +171,7 @@ class FilamentRenderer:
         texture.upload(data)
         self._face_textures[key] = texture
         if len(self._face_textures) > _FACE_TEXTURES_KEPT:
-            # The material that wears it is only let go by the next frame.
+            # The material that uses the texture is freed by the next frame.
             self._retired_textures.append(self._face_textures.popitem(last=False)[1])
         return texture
 
@@ -197,7 +197,7 @@ class FilamentRenderer:
         return ids_from_rgb(self._pixels(camera, "SEGMENTATION_BY_ID", "RGB8"))
 
     def _pixels(self, camera: CameraRecord, mode: str, pixel_format: str, *, scale: int = 1) -> npt.NDArray[Any]:
-        """One pass; the buffer that it returns is overwritten by the next pass of that size and format."""
+        """One pass. The returned buffer is overwritten by the next pass of its size and format."""
         width, height = camera.width_px * scale, camera.height_px * scale
         target = self._target(width, height, pixel_format)
         request = self._mjrf.RenderRequest()
@@ -248,7 +248,7 @@ class FilamentRenderer:
 
 
 def _start() -> tuple[Any, list[str], dict[str, bool]]:
-    """`mjrf`, chatter so far, and which devices are software.
+    """MuJoCo's Filament module, messages so far, and whether each device is software, by name.
 
     Raises:
         BackendError: Filament cannot start here.
@@ -270,9 +270,9 @@ def _start() -> tuple[Any, list[str], dict[str, bool]]:
 
 
 def _share_one_heap() -> None:
-    """Lets the driver's threads allocate where everybody does: heaps of their own each keep what they once needed.
+    """Makes the driver's threads share one heap: separate heaps would each keep the most that they ever needed.
 
-    Only glibc has such heaps; elsewhere there is nothing to do.
+    Only glibc has separate heaps.
     """
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
     if mallopt is not None:
@@ -280,7 +280,7 @@ def _share_one_heap() -> None:
 
 
 def _info(chatter: list[str], software_by_device: dict[str, bool]) -> RendererInfo:
-    """From what Filament says of the device that it chose; where it is silent, from the first device."""
+    """Driver and device from Filament's messages; without messages, the first device."""
     text = "\n".join(chatter)
     driver = re.search(r"Vulkan device driver: (.+)", text)
     chosen = re.search(r"Selected physical device '(.+)' from", text)

@@ -1,4 +1,4 @@
-"""From a renderer's 8-bit samples to linear frames that count 0..`LINEAR_FULL_SCALE`."""
+"""Linear frames, 0..`LINEAR_FULL_SCALE`, from a renderer's 8-bit samples."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from gear.values.frames import FloatImage, IdImage, UInt8Image, UInt16Image
 _BAND_ROWS = 64
 
 EDGE_DEPTH_STEP = 0.02
-"""A pixel lies on an edge where the inverse depth of its neighbours bends by more than this share of its own."""
+"""A pixel is on an edge where the second difference of inverse depth exceeds this share of its inverse depth."""
 
 
 def sum_2x2(samples: UInt8Image) -> UInt16Image:
     """(2H, 2W, 3) uint8 samples to (H, W, 3) uint16: the sum of each block of four."""
     height, width = samples.shape[0] // 2, samples.shape[1] // 2
     sums = np.empty((height, width, 3), np.uint16)
-    # In bands: between the two sums lies a frame as large as the samples.
+    # In bands: the intermediate array of a whole frame would be as large as the samples.
     for top in range(0, height, _BAND_ROWS):
         pairs = samples[2 * top : 2 * (top + _BAND_ROWS)].reshape(-1, 2, 2 * width * 3)
         columns = np.add(pairs[:, 0], pairs[:, 1], dtype=np.uint16).reshape(-1, width, 2, 3)
@@ -34,8 +34,8 @@ def four_times(samples: UInt8Image) -> UInt16Image:
 def smooth_edges(linear_rgb: UInt16Image, geom_id: IdImage, depth_m: FloatImage) -> UInt16Image:
     """The edge filter of `fast`: a 3 x 3 tent (1 2 1) where ids change or depth bends, nothing elsewhere.
 
-    Where it smooths comes from ids and depth alone, and a tent is linear, so frames stay linear in every albedo: unlike
-    filters that look for contrast, it cannot be steered by a patch.
+    Edges come from ids and depth alone and the filter is linear, so frames stay linear in every albedo: unlike a filter
+    that detects contrast, it cannot be influenced by a patch.
 
     Args:
         linear_rgb: (H, W, 3) uint16.
@@ -53,7 +53,7 @@ def smooth_edges(linear_rgb: UInt16Image, geom_id: IdImage, depth_m: FloatImage)
 def edge_mask(geom_id: IdImage, depth_m: FloatImage) -> npt.NDArray[np.uint8]:
     """(H, W) uint8, 255 where the 4-neighbourhood holds another geom, or a silhouette or crease of the same one.
 
-    On a plane 1/z is linear over the picture, whatever the plane's slant: its second difference finds what is no plane.
+    On every plane 1/z is linear over the picture: a second difference that is not zero is no plane.
     """
     edges = np.zeros(geom_id.shape, np.bool_)
     across, down = geom_id[:, 1:] != geom_id[:, :-1], geom_id[1:] != geom_id[:-1]
@@ -69,7 +69,7 @@ def edge_mask(geom_id: IdImage, depth_m: FloatImage) -> npt.NDArray[np.uint8]:
 
 
 def ids_from_rgb(pixels: UInt8Image) -> IdImage:
-    """Ids out of their colours.
+    """Decodes ids from colours.
 
     Args:
         pixels: (H, W, 3) uint8 that count r + 256 g + 65536 b = id + 1.

@@ -1,4 +1,4 @@
-"""Keeps a native library's chatter off the user's terminal, and nothing else."""
+"""Removes known informational messages of native libraries from stdout and stderr."""
 
 from __future__ import annotations
 

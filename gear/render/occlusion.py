@@ -1,8 +1,7 @@
 """Ambient occlusion from depth: corners, kerbs and the ground under cars are darker than open surfaces.
 
-Filament has an effect of this name too. It is off in gear's worlds: with Mesa's software Vulkan (22.3) it loses about
-a megabyte a frame, for good. This one serves both renderers; it looks at depth alone, so frames stay linear in every
-albedo.
+Filament's ambient occlusion is off in gear's worlds: with Mesa's software Vulkan (22.3) it leaks about a megabyte per
+frame. This one serves all renderers. It depends on depth alone, so frames stay linear in every albedo.
 """
 
 from __future__ import annotations
@@ -25,15 +24,18 @@ _MAX_REACH = 0.06
 
 
 def openness(depth_m: FloatImage, focal_px: float) -> FloatImage:
-    """How much of its sky each pixel sees, (H, W) float32 in 1 - `STRENGTH`..1.
+    """Ambient visibility of each pixel.
 
     Around a pixel, pairs of opposite neighbours are compared with it. On a plane 1/z is linear over the picture, so
-    the mean of a pair lies on the plane, however slanted; where it lies nearer, the surface is hollow. Pairs that
-    reach to something more than a radius away say nothing: an object before a distant wall does not darken it.
+    the mean of a pair lies on the plane, whatever its slant; where the mean is nearer, the surface is concave. Pairs
+    that reach something more than a radius away are ignored: an object does not darken a distant wall behind it.
 
     Args:
         depth_m: (H, W) float32 planar z, NaN where nothing is.
-        focal_px: of the camera.
+        focal_px: horizontal focal length.
+
+    Returns:
+        (H, W) float32 in 1 - `STRENGTH`..1, by which light is multiplied.
     """
     height, width = depth_m.shape
     step = max(1, math.ceil(width / _COARSE_WIDTH_PX))
@@ -43,7 +45,7 @@ def openness(depth_m: FloatImage, focal_px: float) -> FloatImage:
     hollow = np.zeros_like(inverse)
     for radius_m in RADII_M:
         reach = np.minimum(focal_px / step * radius_m * inverse, _MAX_REACH * inverse.shape[1]).astype(np.float32)
-        # Closer than a pixel and a half the samples would see their own pixel.
+        # Neighbours closer than a pixel and a half would be interpolated from the pixel itself.
         counts = (reach > 1.5) & (inverse > 0)
         limit = radius_m * inverse
         for turn in range(_DIRECTIONS):
@@ -58,7 +60,7 @@ def openness(depth_m: FloatImage, focal_px: float) -> FloatImage:
 def _pair(
     inverse: FloatImage, columns: FloatImage, rows: FloatImage, across: FloatImage, down: FloatImage, limit: FloatImage
 ) -> FloatImage:
-    """(h, w) 0..1: how far the mean of two opposite neighbours lies before the pixel, in halves of a radius."""
+    """(h, w) 0..1: how far the mean of two opposite neighbours is in front of the pixel, in halves of a radius."""
     one, other = (
         cv2.remap(inverse, columns + s * across, rows + s * down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         for s in (np.float32(1), np.float32(-1))
@@ -71,7 +73,7 @@ def _pair(
 
 
 def shade(linear_rgb: UInt16Image, share: npt.NDArray[np.float32]) -> UInt16Image:
-    """(H, W, 3) uint16 light times (H, W) shares, rounded."""
+    """(H, W, 3) uint16 light times (H, W) float32 shares, rounded; a new array."""
     shaded = np.empty_like(linear_rgb)
     # In bands, since the shares of a whole picture, once for each colour, take more memory than the picture.
     for top in range(0, len(share), _BAND_ROWS):

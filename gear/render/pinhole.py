@@ -1,4 +1,4 @@
-"""The pinhole as renderers want it, and their depth buffers as metres."""
+"""View volumes of pinhole cameras, and depth buffers in metres."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gear.values.scene import CameraRecord
 
 NEAR_M = 0.1
 FAR_M = 2000.0
-"""What lies nearer or farther is not seen. Depth is kept reversed in 32-bit floats: the range costs no precision."""
+"""Limits of what is rendered, in metres. Reversed depth in 32-bit floats keeps its precision over this range."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

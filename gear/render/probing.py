@@ -1,4 +1,4 @@
-"""Whether a renderer works here: one small reference frame."""
+"""Tests whether a renderer works on this machine, by one small reference frame."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ _REFERENCE_MJCF = """
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProbeResult:
-    """What a renderer did with the reference frame.
+    """The outcome of rendering the reference frame.
 
     Attributes:
-        info: who rendered.
-        sha256: of the linear picture, the depth and the ids, little-endian, in this order.
-        start_s: time to start the context.
-        frame_s: time of the second frame; the first one compiles shaders.
+        info: name, driver and device of the renderer.
+        sha256: hash of the linear picture, the depth and the ids, little-endian, in this order.
+        start_s: seconds to start the context.
+        frame_s: seconds for the second frame; the first one compiles shaders.
     """
 
     info: RendererInfo
@@ -56,17 +56,17 @@ class ProbeResult:
 
 
 def probe(name: str, *, quality: Quality = "film") -> ProbeResult:
-    """Renders the reference frame.
+    """Renders the reference frame twice.
 
     Raises:
         UnknownNameError: there is no such renderer.
-        BackendError: it does not start here; says what to install.
+        BackendError: it cannot start here; says what to install.
     """
     model = mujoco.MjModel.from_xml_string(_REFERENCE_MJCF)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     stage = Stage(model=model, data=data)
-    with native_output():  # on a busy machine the driver's thread speaks of small frames after they are done
+    with native_output():  # on a busy machine the driver's thread writes messages after frames are done
         started = time.perf_counter()
         renderer = open_renderer(name, model, quality=quality)
         try:
@@ -101,11 +101,11 @@ _CAMERA = CameraRecord(
 
 @cache
 def renderer_info(name: str) -> RendererInfo:
-    """Who would render, without a frame; asked once in a process, since one has to be started to say it.
+    """Name, driver and device of a renderer, without a frame; cached, since a renderer has to be started for it.
 
     Raises:
         UnknownNameError: there is no such renderer.
-        BackendError: it does not start here; says what to install.
+        BackendError: it cannot start here; says what to install.
     """
     renderer = open_renderer(name, mujoco.MjModel.from_xml_string(_REFERENCE_MJCF))
     try:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     import mujoco
 
 RENDERERS = ("raster", "filament", "classic")
-"""Names that `open_renderer` answers to, the default first."""
+"""Names of renderers, the default first."""
 
 _SUMMARIES = {
     "filament": "physically based, MuJoCo's, through Vulkan: a GPU, or the CPU with Mesa's llvmpipe",
@@ -25,12 +25,12 @@ def open_renderer(name: str, model: mujoco.MjModel, *, quality: Quality = "film"
 
     Args:
         name: one of `RENDERERS`.
-        model: what every stage given to the renderer was compiled as; it is never changed.
-        quality: `film` takes several samples a pixel, `fast` takes one and smooths edges.
+        model: the compiled world; every stage must be of this model, which is never changed.
+        quality: `film` takes several samples per pixel, `fast` takes one and smooths edges.
 
     Raises:
         UnknownNameError: there is no such renderer.
-        BackendError: its driver is missing; says what to install.
+        BackendError: it cannot start here; says what to install.
     """
     if name == "filament":
         from gear.render.filament import FilamentRenderer
@@ -48,7 +48,7 @@ def open_renderer(name: str, model: mujoco.MjModel, *, quality: Quality = "film"
 
 
 def describe(name: str) -> str:
-    """One line about a renderer.
+    """A description of a renderer in one line.
 
     Raises:
         UnknownNameError: there is no such renderer.

@@ -1,4 +1,4 @@
-"""What of a model may be seen."""
+"""The geom groups that are rendered."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import mujoco
 
 
 def geoms_only() -> mujoco.MjvOption:
-    """Geoms of groups 0 to 2; no collision geoms, sites, skins or helpers."""
+    """Visualisation options that show geoms of groups 0 to 2, and no collision geoms, sites, skins or helpers."""
     option = mujoco.MjvOption()
     mujoco.mjv_defaultOption(option)
     option.geomgroup[:] = (1, 1, 1, 0, 0, 0)

@@ -1,4 +1,4 @@
-"""Asks the Vulkan loader for devices, before Filament does: Filament ends the process where there is none."""
+"""Lists Vulkan devices. Filament ends the process where there is none, so gear checks first."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 _CPU_DEVICE = 4
 _SUCCESS = 0
 _PROPERTIES_BYTES = 4096
-"""More than sizeof(VkPhysicalDeviceProperties), of which only the head is read."""
+"""More than sizeof(VkPhysicalDeviceProperties); only its first fields are read."""
 
 
 class _InstanceCreateInfo(ctypes.Structure):
@@ -40,8 +40,8 @@ class VulkanDevice:
     """One physical device.
 
     Attributes:
-        name: what the driver calls it.
-        is_software: whether it is the CPU.
+        name: name that the driver reports.
+        is_software: whether it is a CPU.
     """
 
     name: str
@@ -49,14 +49,14 @@ class VulkanDevice:
 
 
 class VulkanUnavailableError(Exception):
-    """No loader, no driver or no device; says which."""
+    """The Vulkan loader, a driver or a device is missing; the message says which."""
 
 
 def vulkan_devices() -> tuple[VulkanDevice, ...]:
-    """All devices that the installed drivers offer, at least one.
+    """All devices of the installed drivers, at least one.
 
     Raises:
-        VulkanUnavailableError: there is none.
+        VulkanUnavailableError: there is no device.
     """
     try:
         library = ctypes.CDLL("libvulkan.so.1")

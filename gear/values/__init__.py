@@ -1,1 +1,1 @@
-"""Values: what every other room speaks in. NumPy only; frozen, typed, with units and frames in their names."""
+"""Values that all other packages exchange: frozen, typed, with units and frames in their names. NumPy only."""

@@ -1,4 +1,4 @@
-"""Errors that a user can mend. A `GearError` is shown as one line; anything else is a bug and keeps its traceback."""
+"""Errors that a user can correct. A `GearError` is shown as one line; any other exception is a bug with a traceback."""
 
 from __future__ import annotations
 
@@ -8,11 +8,16 @@ from pathlib import Path
 
 
 class GearError(Exception):
-    """Something that the user can put right. Its text says what, where and what to do next, in one line."""
+    """An error that the user can correct. Its text says in one line what is wrong, where, and what to do."""
 
 
 class FieldError(ValueError):
-    """A value that a config class refuses; the reader turns it into a `ConfigError` with its place."""
+    """A value that a config class refuses. The reader turns it into a `ConfigError` with file, line and column.
+
+    Attributes:
+        field: name of the refused field; nested ones with dots.
+        problem: what is wrong with its value.
+    """
 
     def __init__(self, field: str, problem: str) -> None:
         super().__init__(field, problem)
@@ -24,7 +29,7 @@ class FieldError(ValueError):
 
 
 class ConfigError(GearError):
-    """A config that cannot be read. `path:line:column: key: problem`."""
+    """A config that cannot be read; its text is `path:line:column: key: problem`."""
 
     def __init__(self, path: Path | str, line: int, column: int, key: str, problem: str) -> None:
         super().__init__(str(path), line, column, key, problem)
@@ -36,7 +41,7 @@ class ConfigError(GearError):
 
 
 class UnknownNameError(GearError):
-    """A name that nothing answers to, with what was meant, if that can be guessed."""
+    """A name that is not known. The text suggests the known name that is spelled most alike."""
 
     def __init__(self, kind: str, name: str, known: Iterable[str] = (), hint: str = "") -> None:
         names = tuple(sorted(known))
@@ -55,7 +60,7 @@ class UnknownNameError(GearError):
 
 
 class DuplicateNameError(GearError):
-    """Two plugins claim one name and the name was asked for without its package."""
+    """A name that several plugins share, given without the package."""
 
     def __init__(self, kind: str, name: str, choices: Iterable[str]) -> None:
         listed = tuple(choices)
@@ -67,7 +72,7 @@ class DuplicateNameError(GearError):
 
 
 class PluginError(GearError):
-    """A plugin that broke, with whose it is."""
+    """A plugin that failed: which one, at which stage, and how."""
 
     def __init__(self, plugin: str, stage: str, problem: str) -> None:
         super().__init__(plugin, stage, problem)
@@ -78,7 +83,7 @@ class PluginError(GearError):
 
 
 class BackendError(GearError):
-    """A renderer that cannot start here, with what to install or which other one to use."""
+    """A renderer that cannot start on this machine. The text says what to install or which renderer to use instead."""
 
     def __init__(self, backend: str, problem: str, remedy: str) -> None:
         super().__init__(backend, problem, remedy)
@@ -89,7 +94,7 @@ class BackendError(GearError):
 
 
 class PatchError(GearError):
-    """A patch that cannot be used."""
+    """A patch file or folder that cannot be read or does not fit."""
 
     def __init__(self, path: Path | str, problem: str) -> None:
         super().__init__(str(path), problem)
@@ -111,7 +116,7 @@ class DatasetError(GearError):
 
 
 class ReplaceableError(DatasetError):
-    """What lies there is in the way: it was made with other settings, or is broken. A `--force` replaces it."""
+    """Existing output that was made with other settings, or is damaged; `--force` replaces it."""
 
     def __init__(self, path: Path | str, problem: str, *, split: str = "") -> None:
         super().__init__(path, problem)
@@ -123,11 +128,11 @@ class ReplaceableError(DatasetError):
 
 
 class OutdatedError(ReplaceableError):
-    """What lies there was made as is wanted now, but from something else: other pictures, or another patch."""
+    """Existing output of the same settings that was made from other input: other pictures, or another patch."""
 
 
 class TownError(GearError):
-    """A town, actor or surface whose MJCF does not keep gear's conventions."""
+    """A town, actor or surface whose MJCF does not follow gear's conventions."""
 
     def __init__(self, path: Path | str, problem: str) -> None:
         super().__init__(str(path), problem)
@@ -138,7 +143,7 @@ class TownError(GearError):
 
 
 class PlacementError(GearError):
-    """A scene into which its actors cannot be placed."""
+    """A scene whose actors or cameras cannot be placed."""
 
     def __init__(self, scene: str, problem: str) -> None:
         super().__init__(scene, problem)

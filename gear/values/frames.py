@@ -1,4 +1,4 @@
-"""What the renderer saw: frames of aligned RGB, depth and geom ids, and what each geom is."""
+"""Frames: pixel-aligned colour, depth and geom ids of the cameras of one sample, and tables of geoms and objects."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ FloatImage = npt.NDArray[np.float32]
 IdImage = npt.NDArray[np.int32]
 
 LINEAR_FULL_SCALE = 1020
-"""Linear frames count 0..1020: four 8-bit samples added, so that 2x2 supersampling keeps ten bits."""
+"""Largest value of linear frames: the sum of four 8-bit samples, so that 2 x 2 supersampling keeps ten bits."""
 
 STATIC_OBJECT_BASE = 1000
-"""Countable things of the town (traffic lights, benches…) have object ids from here on; actors have smaller ones."""
+"""First object id of countable objects of the town, such as traffic lights; actors have smaller ids."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class View:
-    """One camera's picture and its exact truth, pixel-aligned.
+    """One camera's picture with pixel-aligned depth and ids. Arrays are read-only.
 
     Attributes:
-        camera: pinhole and pose.
+        camera: size, pinhole, lens and pose.
         linear_rgb: (H, W, 3) uint16, linear in scene light, 0..`LINEAR_FULL_SCALE`.
         rgb: (H, W, 3) uint8, sRGB after gear's camera, row 0 at the top.
         depth_m: (H, W) float32, planar z, NaN where nothing was hit; sampled at pixel centres, no anti-aliasing.
@@ -53,7 +53,7 @@ class View:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class GeomTable:
-    """What each geom of the render model is in this sample; arrays are indexed by geom id.
+    """Label, object and surface of each geom of the render model; arrays are indexed by geom id.
 
     Attributes:
         label_code: (ngeom,) uint8, codes of `gear.values.labels`; 255 for geoms that are never seen.
@@ -69,13 +69,13 @@ class GeomTable:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Shape:
-    """The visible triangles of an asset, in its own frame.
+    """The visible triangles of an asset, in the asset's frame.
 
     Attributes:
         vertices_m: (N, 3) float64.
         faces: (M, 3) int32.
         face_label_code: (M,) uint8.
-        box_centre_m: (3,) middle of the tight box along the frame's axes.
+        box_centre_m: (3,) centre of the tight box along the frame's axes.
         box_size_m: (3,) its length (x), width (y), height (z).
     """
 
@@ -88,12 +88,12 @@ class Shape:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SceneObject:
-    """A countable thing: an actor, or a traffic light, bench… of the town.
+    """A countable object: an actor, or an object of the town such as a traffic light or a bench.
 
     Attributes:
         id: as in `GeomTable.object_id`.
-        asset: MJCF it comes from, or the body's name for things of the town.
-        label_code: what it mainly is (a cyclist is a bicycle, with rider geoms on it).
+        asset: name of its MJCF; for objects of the town the body's name.
+        label_code: label of its main part: a cyclist is a bicycle that has geoms of a rider.
         kitti_type: KITTI's type of the whole, or None.
         is_ego: whether it carries the cameras (never labelled).
         world_from_object: pose.
@@ -122,12 +122,12 @@ class SceneObject:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Frame:
-    """All views of one sample with the tables to read them.
+    """All views of one sample, with the tables that explain their ids.
 
     Attributes:
         views: by camera name.
         geoms: what each geom id is.
-        objects: countable things by object id (all that the scene holds, seen or not).
+        objects: countable objects by object id, visible or not.
     """
 
     views: Mapping[str, View]

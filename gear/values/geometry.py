@@ -1,9 +1,9 @@
-"""Rigid transforms that know their frames, and the pinhole.
+"""Rigid transforms between named frames, and the pinhole camera.
 
-Frames: world is x east, y north, z up. Cameras are x right, y down, z forward. Actors are x forward, y left, z up,
-origin on the
-ground in the middle of the footprint. Surfaces are x right, y down as their viewer sees them, z into the board.
-Pixels: index pixels, the centre of the first pixel is (0, 0), so a symmetric pinhole has cx = (W - 1) / 2.
+Frames: the world is x east, y north, z up. Cameras are x right, y down, z forward. Actors are x forward, y left, z up,
+with the origin on the ground in the middle of the footprint. Surfaces are x right and y down for a viewer in front of
+them, z into the board. Pixels: in index pixels the centre of the first pixel is (0, 0), so that a symmetric pinhole has
+cx = (W - 1) / 2.
 """
 
 from __future__ import annotations
@@ -18,14 +18,18 @@ Array = npt.NDArray[np.float64]
 
 
 class FrameMismatchError(ValueError):
-    """Two transforms that do not meet in one frame."""
+    """Two transforms were chained whose inner frames differ."""
 
 
 def frozen(array: npt.ArrayLike, shape: tuple[int, ...] | None = None) -> Array:
-    """A read-only float64 copy; `shape` is demanded where given.
+    """A read-only float64 copy of an array.
+
+    Args:
+        array: anything that NumPy takes for an array.
+        shape: the shape that it must have; None for any.
 
     Raises:
-        ValueError: the shape is another.
+        ValueError: the shape differs.
     """
     copy = np.array(array, dtype=np.float64)
     if shape is not None and copy.shape != shape:
@@ -35,13 +39,13 @@ def frozen(array: npt.ArrayLike, shape: tuple[int, ...] | None = None) -> Array:
 
 
 def wrap_angle_rad(angle_rad: float) -> float:
-    """The same angle in [-pi, pi)."""
+    """The equivalent angle in [-pi, pi)."""
     return (angle_rad + math.pi) % (2 * math.pi) - math.pi
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RigidTransform:
-    """`dst_from_src`: takes coordinates in frame `src` to coordinates in frame `dst`.
+    """The transform `dst_from_src`: it takes coordinates in frame `src` to coordinates in frame `dst`.
 
     Attributes:
         dst, src: frame names, checked whenever transforms are chained.
@@ -71,21 +75,21 @@ class RigidTransform:
 
     @property
     def rotation(self) -> Array:
-        """(3, 3)."""
+        """(3, 3) rotation matrix."""
         return self.matrix[:3, :3]
 
     @property
     def translation_m(self) -> Array:
-        """(3,): where the origin of `src` lies in `dst`."""
+        """(3,) position of the origin of `src` in `dst`, metres."""
         return self.matrix[:3, 3]
 
     @property
     def yaw_rad(self) -> float:
-        """Heading of the x axis about z, counter-clockwise."""
+        """Angle of the x axis of `src` about the z axis of `dst`, counter-clockwise, in radians."""
         return math.atan2(self.matrix[1, 0], self.matrix[0, 0])
 
     def inverse(self) -> RigidTransform:
-        """`src_from_dst`."""
+        """The inverse transform, `src_from_dst`."""
         rotation = self.rotation.T
         return RigidTransform.from_parts(self.src, self.dst, rotation, -rotation @ self.translation_m)
 
@@ -172,7 +176,7 @@ class Intrinsics:
 
     @property
     def matrix(self) -> Array:
-        """(3, 3) K in index pixels."""
+        """(3, 3) calibration matrix K in index pixels, read-only."""
         return frozen([[self.fx_px, 0.0, self.cx_px], [0.0, self.fy_px, self.cy_px], [0.0, 0.0, 1.0]])
 
     def project(self, points_camera_m: npt.ArrayLike) -> Array:

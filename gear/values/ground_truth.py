@@ -48,8 +48,10 @@ class ObjectTruth:
 
     @property
     def uncovered_fraction(self) -> float:
-        """Share of the silhouette inside the picture that nothing else covers, 0..1; exact where a limit is such a
-        share: 3 of 30 pixels are 0.1, of which 1 - 0.9 falls short."""
+        """Share of the silhouette inside the picture that nothing else covers, 0..1.
+
+        It is a quotient of pixel counts, so that it equals limits exactly: 3 of 30 pixels are 0.1, and 1 - 0.9 is less.
+        """
         return min(1.0, self.visible_px / self.amodal_in_image_px) if self.amodal_in_image_px else 1.0
 
     @property
@@ -71,12 +73,10 @@ class SurfaceTruth:
         name: as in `SurfaceRecord.name`.
         camera: name of the view.
         camera_from_surface: (4, 4) row-major, as 16 numbers.
-        corners_px: index pixels of the corners (top left, top right, bottom right, bottom left of the patch) or None
-            where one lies
-            behind the camera.
+        corners_px: index pixels of the corners (top left, top right, bottom right, bottom left of the patch); None
+            where one lies behind the camera.
         image_from_unit: homography as 9 row-major numbers from patch coordinates (u right, v down, 0..1 over the
-            face) to index
-            pixels; None as above.
+            face) to index pixels; None where a corner lies behind the camera.
         visible_px: pixels of the face in the id buffer.
         visible_fraction: of the face's silhouette, inside and outside the picture.
         distance_m: camera to the middle of the face.

@@ -1,4 +1,4 @@
-"""What the machine offers."""
+"""The number of usable processor cores."""
 
 from __future__ import annotations
 
@@ -6,5 +6,5 @@ import os
 
 
 def cores() -> int:
-    """Cores that this process may use; containers and batch systems give fewer than there are."""
+    """Number of cores that this process may use; containers and batch systems may allow fewer than the machine has."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

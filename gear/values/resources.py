@@ -1,4 +1,4 @@
-"""Where gear's own data lies: inside the package once installed, beside it in a checkout."""
+"""Folders of gear's data: inside the package when it is installed, next to the package in a checkout."""
 
 from __future__ import annotations
 
@@ -8,7 +8,10 @@ from pathlib import Path
 
 @cache
 def data_dir(name: str) -> Path:
-    """The folder `name` (`mjcf`, `configs`) of gear's data.
+    """The path of one of gear's data folders.
+
+    Args:
+        name: `mjcf` or `configs`.
 
     An installed wheel carries it as `gear/data/<name>`; in a checkout it is `<name>` at the top.
 

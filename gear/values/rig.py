@@ -1,4 +1,4 @@
-"""Sensor rigs: named cameras on the ego car."""
+"""Camera rigs: named cameras on the ego car."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class CameraMount:
 
     @property
     def intrinsics(self) -> Intrinsics:
-        """The pinhole."""
+        """The pinhole that the options describe, in index pixels."""
         focal_px = self.focal_px
         if focal_px is None:
             focal_px = Intrinsics.from_hfov(self.width_px, self.height_px, math.radians(self.hfov_deg)).focal_px
@@ -70,7 +70,7 @@ class CameraMount:
 
     @property
     def ego_from_camera(self) -> RigidTransform:
-        """Pose on the car: yaw, then pitch, then roll, in the car's axes."""
+        """The camera's pose in the car's frame: yaw, then pitch, then roll."""
         cy, sy = math.cos(math.radians(self.yaw_deg)), math.sin(math.radians(self.yaw_deg))
         cp, sp = math.cos(math.radians(self.pitch_deg)), math.sin(math.radians(self.pitch_deg))
         cr, sr = math.cos(math.radians(self.roll_deg)), math.sin(math.radians(self.roll_deg))
@@ -83,10 +83,10 @@ class CameraMount:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rig:
-    """The cameras of a task.
+    """The cameras of a task, on one car.
 
     Attributes:
-        cameras: the first one is the reference: the board must be in its view.
+        cameras: the first one is the reference camera, which must have the boards in view.
         follows_road: False keeps the rig level (yaw only), as the CARLA-GeAR loaders demand; True takes the car's
             pitch and roll.
     """
@@ -102,7 +102,7 @@ class Rig:
             raise FieldError("cameras", f"two cameras share a name: {', '.join(names)}")
 
     def place(self, world_from_ego: RigidTransform) -> tuple[CameraRecord, ...]:
-        """The cameras of a car that stands at `world_from_ego`."""
+        """The records of the cameras for a pose of the car."""
         base = world_from_ego
         if not self.follows_road:
             base = RigidTransform.from_yaw("world", "ego", world_from_ego.translation_m, world_from_ego.yaw_rad)

@@ -1,4 +1,4 @@
-"""Randomness: one seed enters, every purpose derives its own generator by name."""
+"""Random numbers: every purpose derives its own generator from the one seed, by name."""
 
 from __future__ import annotations
 
@@ -11,19 +11,23 @@ from gear.values.errors import GearError
 
 
 def check_seed(seed: int) -> None:
-    """Seeds count from 0, in configs and wherever else one is given.
+    """Refuses negative seeds.
 
     Raises:
-        GearError: this one is below.
+        GearError: the seed is negative.
     """
     if seed < 0:
         raise GearError(f"seed must not be negative, got {seed}")
 
 
 def derive_rng(seed: int, *path: str | int) -> np.random.Generator:
-    """An independent generator for one named purpose, e.g. `derive_rng(7, "scene", 12)`.
+    """An independent generator for one named purpose, such as `derive_rng(7, "scene", 12)`.
 
-    Sample 12 draws the same numbers alone, resumed, or on eight workers, because nothing is shared.
+    A sample draws the same numbers alone, after resuming, or with any number of workers, since no generator is shared.
+
+    Args:
+        seed: the seed of the split.
+        *path: names and numbers of the purpose.
     """
     digest = hashlib.blake2b(json.dumps([seed, *path]).encode(), digest_size=16).digest()
     return np.random.default_rng(int.from_bytes(digest, "little"))

@@ -1,5 +1,8 @@
-"""Run lengths as COCO's compressed strings say them: five bits a character, lowest first, the sixth says that more
-follow; from the third run on, the difference to the run before the last is stored."""
+"""COCO's compressed run-length strings.
+
+Each character holds five bits of a number, lowest first; its sixth bit says that more characters follow. From the third
+run on, the difference to the run before the last one is stored.
+"""
 
 from __future__ import annotations
 
@@ -7,14 +10,20 @@ import numpy as np
 import numpy.typing as npt
 
 MOST_CHARACTERS = 7
-"""Of one run: 35 bits, more than any picture has pixels."""
+"""Characters of one run: 35 bits, more than any picture has pixels."""
 
 
 def run_lengths(counts: str) -> npt.NDArray[np.int64]:
-    """Lengths of the runs of a compressed string, in order; the first is of zeros.
+    """Decodes a compressed string.
+
+    Args:
+        counts: the string, as in COCO's `counts`.
+
+    Returns:
+        (N,) int64 lengths of the runs in order; the first run is of zeros.
 
     Raises:
-        ValueError: it is no such string.
+        ValueError: the string is malformed.
     """
     bits = np.frombuffer(counts.encode("ascii"), np.uint8).astype(np.int64) - ord("0")
     if not bits.size:

@@ -1,4 +1,4 @@
-"""The scene is data: a `SceneRecord` says everything about one sample, and is saved beside it.
+"""Scenes as data: a `SceneRecord` describes one sample completely, and is stored with the sample.
 
 A record is a pure function of (config, seed, index). Nothing in it depends on the patch.
 """
@@ -19,15 +19,15 @@ Quat = tuple[float, float, float, float]
 Role = Literal["ego", "npc", "parked", "carrier", "pedestrian"]
 
 POSE_DIGITS = 6
-"""Poses are rounded to micrometres (and 1e-9 in quaternions) so that records are equal across machines."""
+"""Decimals of positions in metres. Quaternions have nine; records are then equal across machines."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pose:
-    """Where a frame stands in another one: the field's name says which, `dst_from_src`.
+    """The pose of a frame `src` in a frame `dst`; the field that holds it is named `dst_from_src`.
 
     Attributes:
-        position_m: origin of `src` in `dst`.
+        position_m: origin of `src` in `dst`, metres.
         quat_wxyz: unit quaternion of the rotation.
     """
 
@@ -36,13 +36,13 @@ class Pose:
 
     @staticmethod
     def from_transform(transform: RigidTransform) -> Pose:
-        """Rounded as records are."""
+        """The pose of a transform, rounded to the precision of records."""
         position = tuple(round(float(v), POSE_DIGITS) + 0.0 for v in transform.translation_m)
         quat = tuple(round(float(v), 9) + 0.0 for v in _quat_from_rotation(transform.rotation))
         return Pose(position_m=(position[0], position[1], position[2]), quat_wxyz=(quat[0], quat[1], quat[2], quat[3]))
 
     def transform(self, dst: str, src: str) -> RigidTransform:
-        """`dst_from_src`."""
+        """The transform `dst_from_src` between frames of these names."""
         w, x, y, z = np.asarray(self.quat_wxyz) / np.linalg.norm(self.quat_wxyz)
         rotation = [
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -175,15 +175,15 @@ def check_weather(name: str, value: float) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ActorRecord:
-    """One vehicle or person.
+    """One vehicle or pedestrian.
 
     Attributes:
         id: stable within a sequence, >= 1.
         asset: name of its MJCF.
-        role: why it is there; `carrier` bears a surface, `ego` carries the cameras.
+        role: `ego` carries the cameras, `carrier` carries a surface; `npc` drives, `parked` stands, `pedestrian` walks.
         world_from_actor: its frame is x forward, y left, z up, origin on the ground in the middle of the footprint.
-        velocity_world_mps: linear velocity.
-        paint_rgb: linear albedo of its `.paint` geoms, or None for the asset's own.
+        velocity_world_mps: linear velocity in the world, m/s.
+        paint_rgb: linear albedo, 0..1, of its `.paint` geoms; None for the asset's colours.
     """
 
     id: int
@@ -196,11 +196,11 @@ class ActorRecord:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SurfaceRecord:
-    """One rectangle that takes a patch.
+    """One rectangle that a patch is shown on.
 
     Attributes:
         name: `surface_0`, `surface_1`, …: takes `patch_0`, `patch_1`, ….
-        asset: MJCF of the board that bears it, or of the actor.
+        asset: name of the MJCF of its board, or of its actor.
         actor_id: the actor whose body is its parent, or None for the world.
         parent_from_surface: frame x right, y down as its viewer sees it, z into the board, origin in the middle of
             the face.
@@ -255,28 +255,29 @@ class CameraRecord:
 
     @property
     def intrinsics(self) -> Intrinsics:
-        """The pinhole in index pixels."""
+        """The pinhole, in index pixels."""
         return Intrinsics(self.width_px, self.height_px, self.focal_px, self.focal_y_px, self.principal_px)
 
     @property
     def world_from_camera_transform(self) -> RigidTransform:
-        """`world_from_camera`."""
+        """The camera's pose as a transform."""
         return self.world_from_camera.transform("world", "camera")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SceneRecord:
-    """Everything about one sample but its patch.
+    """The complete description of one sample, without its patch.
 
     Attributes:
         version: of this data model.
-        town, scene, split: where it belongs.
-        seed, index: what it was drawn from; `index` counts all frames of a split.
-        sequence, frame, time_s: its place in time; a sequence is one frame long unless the split drives.
-        weather: light and air.
+        town, scene, split: names.
+        seed, index: the draw; `index` counts all frames of a split.
+        sequence, frame, time_s: the frame's number in its driving sequence, and its time in seconds; a sequence of
+            single pictures has one frame.
+        weather: parameters of light and air.
         actors: the ego car first; ids are unique.
-        surfaces: what takes patches, in patch order.
-        cameras: the rig, placed.
+        surfaces: rectangles that patches are shown on, in patch order.
+        cameras: the rig's cameras with their poses in the world.
     """
 
     version: int = 1
@@ -295,14 +296,14 @@ class SceneRecord:
 
     @property
     def ego(self) -> ActorRecord:
-        """The car that carries the cameras."""
+        """The record of the ego car."""
         return next(actor for actor in self.actors if actor.role == "ego")
 
     def actor(self, actor_id: int) -> ActorRecord:
-        """By id.
+        """The actor with an id.
 
         Raises:
-            KeyError: there is none.
+            KeyError: no actor has it.
         """
         for actor in self.actors:
             if actor.id == actor_id:
@@ -310,10 +311,10 @@ class SceneRecord:
         raise KeyError(actor_id)
 
     def camera(self, name: str) -> CameraRecord:
-        """By name.
+        """The camera with a name.
 
         Raises:
-            KeyError: there is none.
+            KeyError: no camera has it.
         """
         for camera in self.cameras:
             if camera.name == name:
@@ -321,7 +322,7 @@ class SceneRecord:
         raise KeyError(name)
 
     def world_from_surface(self, surface: SurfaceRecord) -> RigidTransform:
-        """The surface's frame in the world, on its board or on its moving actor."""
+        """The pose of a surface in the world, on its board or on its actor."""
         if surface.actor_id is None:
             return surface.parent_from_surface.transform("world", surface.name)
         world_from_actor = self.actor(surface.actor_id).world_from_actor.transform("world", "actor")

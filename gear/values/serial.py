@@ -1,4 +1,4 @@
-"""Frozen dataclasses to JSON and back, by their declared types. No pickles, no guessing."""
+"""Frozen dataclasses to JSON and back, by the declared types of their fields."""
 
 from __future__ import annotations
 
@@ -15,15 +15,19 @@ Json = Any
 T = TypeVar("T")
 
 PLACES = {"places": True}
-"""Metadata of a field that is no key: a config's reader puts the places of the given values there, by their keys, and
-nobody writes it."""
+"""Metadata of a field that holds file, line and column of the given values, by key. The config reader fills it; it is
+no key of the config and is not written."""
 
 SHOWN = 60
-"""Characters of a wrong value that a message shows."""
+"""Characters of a wrong value that an error message quotes."""
 
 
 def to_json(value: Any) -> Json:
-    """Dataclasses become dicts, tuples become lists, everything else must be JSON already."""
+    """A value as JSON: dataclasses become dicts, tuples become lists.
+
+    Raises:
+        TypeError: a value has no JSON form.
+    """
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         said = [field.name for field in dataclasses.fields(value) if not is_places_field(field)]
         return {name: to_json(getattr(value, name)) for name in said}
@@ -37,21 +41,26 @@ def to_json(value: Any) -> Json:
 
 
 def is_places_field(field: dataclasses.Field[Any]) -> bool:
-    """Whether a field says where the others were given, and is nothing that one can say."""
+    """Whether a field holds the places of the others, and is no key of the config; see `PLACES`."""
     return PLACES.items() <= field.metadata.items()
 
 
 @cache
 def type_hints(cls: Any) -> dict[str, Any]:
-    """Resolved annotations of a class, computed once."""
+    """The resolved annotations of a class, by field."""
     return get_type_hints(cls)
 
 
 def from_json(kind: type[T], value: Json, where: str = "") -> T:
-    """Reads `value` into the declared type.
+    """Reads JSON into a declared type.
+
+    Args:
+        kind: a dataclass, or any type that its fields may have.
+        value: the JSON.
+        where: the key of `value`, for errors.
 
     Raises:
-        FieldError: a key is unknown or missing, or a value has another type; says where.
+        FieldError: a key is unknown or missing, or a value has another type; names the key.
     """
     return cast(T, _read(kind, value, where))
 
@@ -127,6 +136,6 @@ def _read_scalar(kind: Any, value: Json, where: str) -> Any:
 
 
 def _shown(value: Json) -> str:
-    """For a message of one line, however much there is."""
+    """A value for a message of one line, cut at `SHOWN` characters."""
     text = repr(value)
     return text if len(text) <= SHOWN else f"{text[: SHOWN - 3]}..."
