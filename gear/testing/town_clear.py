@@ -1,4 +1,4 @@
-"""What stands in the way on the lanes and walks of a town, felt or only seen: a line for each that is blocked."""
+"""Finds obstacles on the lanes and walks of a town, collision and visible geoms; one line for each lane or walk."""
 
 from __future__ import annotations
 
@@ -13,28 +13,29 @@ from gear.values.geometry import Array
 from gear.world.roads.polyline import Polyline
 
 CAR_HEIGHTS_M = (0.3, 0.7, 1.3, 1.9)
-"""Above the road: over a kerb that a bend cuts, at a bumper, at a windscreen, at a van's."""
+"""Heights of the rays above the road: over a kerb, at a bumper, at a windscreen, at the windscreen of a van."""
 
 CAR_SIDE_M = 1.3
-"""Half the width of a bus, the widest that drives; lanes that are narrower are looked at up to `LANE_EDGE_M`."""
+"""Half the width of a bus. In narrower lanes the rays end `LANE_EDGE_M` before the edge of the lane."""
 
 LANE_EDGE_M = 0.2
 COLLISION_GAP_M, VISIBLE_GAP_M = 0.2, 0.4
-"""Between the rays across a lane. What is seen alone is more and costs more; posts are felt too."""
+"""Distances between the rays across a lane. Rays to visible geoms cost more, and posts have collision geoms too."""
 
 PERSON_HEIGHTS_M = (0.4, 0.8, 1.3, 1.7)
 PERSON_RAYS = 3
-"""So many neighbouring rays must be free for a person to pass: half a metre."""
+"""Number of neighbouring rays that must be free for a person to pass: half a metre."""
 
 PERSON_GAP_M = 0.25
 WALK_PIECE_M = 0.5
 
 DETOUR_M, STEP_UP_M = 1.0, 0.1
-"""So far beyond a walk's edge people go round something, where the ground goes on at the same height."""
+"""Distance beyond the edge of a walk to which people go around an obstacle, on ground that differs by at most
+`STEP_UP_M`."""
 
 
 def blocked_lanes(town: TownUnderTest) -> list[str]:
-    """Lanes on which something stands or hangs, anywhere on the way of whatever drives there."""
+    """Lanes with an obstacle on or above them, in the width and height of the vehicles that use them."""
     problems = []
     for lane in town.graph.lanes.values():
         side_m = max(0.0, min(CAR_SIDE_M, lane.width_m / 2 - LANE_EDGE_M))
@@ -48,7 +49,7 @@ def blocked_lanes(town: TownUnderTest) -> list[str]:
 
 
 def blocked_walks(town: TownUnderTest) -> list[str]:
-    """Walks with a place that a person can neither pass nor go round."""
+    """Walks with an obstacle that a person can neither pass nor go around."""
     problems = []
     for walk in town.graph.walks.values():
         for start_m, end_m in pairwise(walk.line.points_m):
@@ -59,7 +60,7 @@ def blocked_walks(town: TownUnderTest) -> list[str]:
 
 
 def _stopped(town: TownUnderTest, start_m: Array, end_m: Array, edge_m: float) -> str:
-    """What blocks a straight piece of a walk, and where; empty if people can pass."""
+    """Name and place of the obstacle that blocks a straight piece of a walk; empty if people can pass."""
     side_m = max(PERSON_GAP_M, edge_m - PERSON_GAP_M)
     is_short = float(np.linalg.norm(end_m - start_m)) <= WALK_PIECE_M
     if is_short:
@@ -81,13 +82,13 @@ def _stopped(town: TownUnderTest, start_m: Array, end_m: Array, edge_m: float) -
         return ""
     if is_short:
         return named
-    # No straight way leads along all of it; one may wind.
+    # No straight path leads along the whole piece; a winding one may.
     middle_m = (start_m + end_m) / 2
     return _stopped(town, start_m, middle_m, edge_m) or _stopped(town, middle_m, end_m, edge_m)
 
 
 def _hits(rays: Rays, line: Polyline, across_m: Array, heights_m: tuple[float, ...]) -> Iterator[tuple[Array, int]]:
-    """Places along a line where rays hit something, and what."""
+    """Yields the points along a line at which rays hit a geom, and the geom's id."""
     for start_m, end_m in pairwise(line.points_m):
         for lateral_m in across_m:
             hit = _first(rays, start_m, end_m, float(lateral_m), heights_m)
@@ -98,7 +99,7 @@ def _hits(rays: Rays, line: Polyline, across_m: Array, heights_m: tuple[float, .
 def _first(
     rays: Rays, start_m: Array, end_m: Array, lateral_m: float, heights_m: tuple[float, ...]
 ) -> tuple[Array, int] | None:
-    """Where a ray along a straight piece, so far to its left and so high above it, hits what."""
+    """First hit of the rays along a straight piece, at a distance to its left and at several heights, or None."""
     along = end_m - start_m
     left = _left(along)
     for height_m in heights_m:

@@ -1,14 +1,14 @@
-"""What every town promises. Subclass it in your own tests, and say where the town and its scenes are:
+"""The contract of a town, as tests. Subclass it in your own tests, and give it the town and its scenes:
 
     class TestMyTown(TownContract):
         town = "my/towns/port.xml"
         scenes = "my/scenes/port.yml"
 
-The town's own file is held against `docs/reference/mjcf.md`: labels, what is seen and felt, materials, lanes, walks,
-bays, bounds and depth. Then gear composes the town, plans samples of every scene with the boards in view, and rendered
-ids and depth must be those of rays. Boards, vehicles and people are read as far as the first scene is composed of them,
-which tells what gear cannot use, and their materials are looked at; how well collision geoms fit, how many triangles
-there are and how meshes are rounded is not. Messages name the geom, the lane or the scene.
+The town's own file is checked against `docs/reference/mjcf.md`: labels, visible and collision geoms, materials, lanes,
+walks, parking bays, bounds and clipping planes. Then gear composes the town and plans samples of every scene; the
+boards must be in view, and rendered ids and depth must be those of rays. Boards, vehicles and people are checked as far
+as the first scene uses them: whether gear can compose them, and their materials. The fit of collision geoms and the
+number of triangles are not checked. Messages name the geom, the lane or the scene.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ MESSAGES_SHOWN = 12
 STREET = frozenset(
     {"road", "road_marking", "sidewalk", "terrain", "building", "pole", "traffic_light", "traffic_sign", "vegetation"}
 )
-"""Labels without which a street is none; another label of the same Cityscapes class will do."""
+"""Labels that a street must have; another label of the same Cityscapes class counts as well."""
 
 PRIMITIVES = ("mjGEOM_PLANE", "mjGEOM_SPHERE", "mjGEOM_CAPSULE", "mjGEOM_CYLINDER", "mjGEOM_BOX")
 
@@ -37,18 +37,18 @@ class TownContract:
     """Attributes:
     town: name of a town, or path of its MJCF.
     scenes: path of its scene library; empty for gear's own of that town.
-    expected: labels that must be there.
-    open_ends: lanes that may end, such as where a road leaves the town.
-    planned_scenes: scenes that are planned and rendered; None for all.
-    samples: planned of each scene.
-    join_m, max_turn_deg: how far and how sharply a lane may be from the one that continues it.
-    lane_width_m, speed_mps: least and most.
-    ground_m: how far lanes and walks may be from the height of their ground.
-    wheel_m: half the track of a car, which must stand on the road as well.
-    near_m, far_m: least and most distance of the near clipping plane, least of the far one.
-    min_visible: share of each board that must be seen in each sample.
-    albedo: most that a visible geom gives back, of any colour.
-    min_agreement: share of pixels away from edges whose id and depth must be those of rays.
+    expected: labels that the town must have.
+    open_ends: names of lanes that may end, as where a road leaves the town.
+    planned_scenes: names of the scenes that are planned and rendered; None for all.
+    samples: number of samples that are planned of each scene.
+    join_m, max_turn_deg: largest gap and largest turn between a lane and the lane that continues it.
+    lane_width_m, speed_mps: least and largest width and speed of a lane.
+    ground_m: largest difference between the height of a lane or walk and its ground.
+    wheel_m: half the track of a car; there the ground is checked as well.
+    near_m, far_m: least and largest distance of the near clipping plane, and least distance of the far one.
+    min_visible: share of each board that must be visible in each sample.
+    albedo: largest albedo of a visible geom in any colour channel.
+    min_agreement: share of pixels, away from edges, whose id and depth must be those of rays.
     """
 
     town: ClassVar[str | Path]
@@ -74,18 +74,18 @@ class TownContract:
         return town_under_test(str(self.town), str(self.scenes))
 
     def test_stock_mujoco_compiles_it(self, record_property: Callable[[str, object], None]) -> None:
-        """It is plain MJCF; how long it takes is put into the report."""
+        """Stock MuJoCo compiles the town's file; the report has the seconds that it takes."""
         _, model, seconds = self.under_test().compiled
         record_property("compile_s", round(seconds, 2))
         record_property("triangles", int(model.nmeshface))
 
     def test_gear_composes_it(self, record_property: Callable[[str, object], None]) -> None:
-        """The first scene becomes a world; how long it takes is put into the report."""
+        """Gear composes the world of the first scene; the report has the seconds that it takes."""
         world, seconds = self.under_test().first_world
         record_property("compose_s", round(seconds, 2))
         assert world.model.ngeom > 0 and world.lanes.lanes
 
-    def test_what_is_seen_is_labelled(self) -> None:
+    def test_visible_geoms_are_labelled(self) -> None:
         """The first part of every visible geom's class is a label."""
         fail_if("visible geoms have no label: their class must start with one, such as `building.brick`", [
             f"geom {geom.name!r} of body {geom.parent.name!r} has class {unprefixed_class(geom.classname.name)!r}"
@@ -94,37 +94,37 @@ class TownContract:
             and _label(geom.classname.name) not in (LABEL_BY_NAME.keys() - {"sky"})
         ])  # fmt: skip
 
-    def test_what_is_seen_is_not_felt(self) -> None:
-        """Visible geoms touch nothing; collision geoms are primitives of group 3, and nothing else is hidden."""
+    def test_visible_geoms_do_not_collide(self) -> None:
+        """Visible geoms do not collide; collision geoms are primitives of group 3, and no other geom is hidden."""
         problems = []
         for geom in self.under_test().compiled[0].geoms:
             is_collision = _label(geom.classname.name) == COLLISION_CLASS
             if is_collision and geom.group < FIRST_HIDDEN_GROUP:
-                problems.append(f"geom {geom.name!r} of class collision is in group {geom.group}, so it is seen")
+                problems.append(f"geom {geom.name!r} of class collision is in group {geom.group}, so it is visible")
             elif is_collision and geom.group != FIRST_HIDDEN_GROUP:
                 problems.append(f"geom {geom.name!r} of class collision is in group {geom.group}, not 3")
             elif not is_collision and geom.group >= FIRST_HIDDEN_GROUP:
                 problems.append(
-                    f"geom {geom.name!r} is in group {geom.group} and not of class collision: neither seen nor felt"
+                    f"geom {geom.name!r} is in group {geom.group} and not of class collision: neither visible nor a"
+                    " collision geom"
                 )
             elif is_collision and geom.type.name not in PRIMITIVES:
                 problems.append(
                     f"geom {geom.name!r} of class collision is a {geom.type.name[7:].lower()}, no primitive"
                 )
             elif not is_collision and geom.group < FIRST_HIDDEN_GROUP and (geom.contype or geom.conaffinity):
-                problems.append(f"geom {geom.name!r} is seen and has contype or conaffinity, so it is felt")
-        fail_if("geoms are seen and felt", problems)
+                problems.append(f"geom {geom.name!r} is visible and has contype or conaffinity, so it collides")
+        fail_if("visible and collision geoms are mixed up", problems)
 
     def test_nothing_is_transparent(self) -> None:
-        """Ids and depth know every pixel, so nothing shines through."""
+        """No visible geom is transparent, since ids and depth hold one geom for each pixel."""
         town = self.under_test()
-        # What the town's own file holds is told by the names that it has there.
+        # Geoms of the town's own file are named as they are in that file.
         problems = town_materials.transparent(town.compiled[1])
         fail_if("visible geoms are transparent", problems or town_materials.transparent(town.first_world[0].model))
 
     def test_materials_are_physical(self) -> None:
-        """Renderers can show every texture, colours are marked as such, and nothing gives back more light than it
-        gets."""
+        """Renderers can show every texture, colours are marked as sRGB, and no surface reflects too much light."""
         town = self.under_test()
         problems = town_materials.unphysical(town.compiled[1], self.albedo)
         if not problems:
@@ -133,7 +133,7 @@ class TownContract:
         fail_if("materials are not physical", problems)
 
     def test_every_class_of_a_street_is_there(self) -> None:
-        """No class that networks know from streets is missing."""
+        """No class that networks know from streets is missing in the town."""
         there = {
             LABEL_BY_NAME[label].cityscapes_id
             for geom in self.under_test().compiled[0].geoms
@@ -143,31 +143,31 @@ class TownContract:
         missing = sorted(name for name in self.expected if LABEL_BY_NAME[name].cityscapes_id not in there)
         fail_if("labels are missing from the town (if it needs none, take them out of `expected`)", missing)
 
-    def test_one_can_drive_for_ever(self) -> None:
-        """Every lane is continued, without a gap."""
+    def test_lanes_are_continued(self) -> None:
+        """Every lane is continued by another one, without a gap."""
         fail_if("lanes end or tear", town_streets.dead_ends(self.under_test().graph, self.open_ends, self.join_m))
 
     def test_headings_are_continuous(self) -> None:
-        """No lane turns on the spot."""
+        """No lane turns sharply at one point, or into the lane that continues it."""
         fail_if("lanes have kinks", town_streets.kinks(self.under_test().graph, self.max_turn_deg))
 
     def test_widths_and_speeds_are_sane(self) -> None:
-        """As wide and as fast as roads are."""
+        """Widths and speeds of lanes and walks are those of real roads."""
         graph = self.under_test().graph
         fail_if("lanes have odd sizes", town_streets.odd_sizes(graph, self.lane_width_m, self.speed_mps))
 
     def test_neighbours_run_side_by_side(self) -> None:
-        """`left` is left, `right` is right, and both go the same way."""
+        """The neighbours of a lane are on the side that is stated, in the same direction."""
         fail_if("neighbours are elsewhere", town_streets.lost_neighbours(self.under_test().graph))
 
     def test_lanes_lie_on_the_road(self) -> None:
-        """Felt and seen, at the lane's height, all along and as wide as a car."""
+        """Ground and visible road are at the height of each lane, along its whole length and the width of a car."""
         fail_if(
             "lanes are off the road", town_streets.lanes_off_the_road(self.under_test(), self.ground_m, self.wheel_m)
         )
 
     def test_lanes_are_clear(self) -> None:
-        """Nothing stands or hangs on a lane, felt or only seen, as wide and as high as what drives there."""
+        """No collision or visible geom is on a lane, in the width and height of the vehicles that use it."""
         fail_if("lanes are blocked", town_clear.blocked_lanes(self.under_test()))
 
     def test_people_can_walk(self) -> None:
@@ -177,11 +177,11 @@ class TownContract:
         fail_if("crosswalks lead nowhere", town_streets.idle_crosswalks(self.under_test().graph))
 
     def test_cars_can_park(self) -> None:
-        """Bays are on the ground, empty and beside the lanes."""
+        """Parking bays are on the ground, empty, and outside of the lanes."""
         fail_if("parking bays cannot be used", town_streets.bad_bays(self.under_test(), self.ground_m))
 
     def test_bounds_hold_everything(self) -> None:
-        """Nothing that road users keep to leaves `town.bounds`."""
+        """No lane, walk or parking bay leaves `town.bounds`."""
         fail_if("things are out of bounds", town_streets.out_of_bounds(self.under_test().graph))
 
     def test_depth_has_a_range(self) -> None:
@@ -208,7 +208,7 @@ class TownContract:
         fail_if("scenes cannot be used", town_scenes.unusable(town, names, self.samples, self.min_visible))
 
     def test_the_ground_is_closed(self) -> None:
-        """Meshes that meet in a T leave cracks of a pixel: a slab below the town keeps the sky out of them."""
+        """No pixel shows the sky through a crack between meshes; a slab below the town closes them."""
         fail_if("there are cracks in the ground", town_scenes.cracks(self.under_test(), self.samples))
 
     def test_ids_and_depth_are_those_of_rays(self) -> None:
@@ -217,7 +217,7 @@ class TownContract:
 
 
 def fail_if(what: str, problems: Sequence[str]) -> None:
-    """Fails with what was found, if anything was.
+    """Fails with a list of problems, if there are any.
 
     Raises:
         AssertionError: there are problems.

@@ -1,4 +1,4 @@
-"""A town under test: compiled by stock MuJoCo, compiled by gear, and felt with rays."""
+"""A town under test: compiled by stock MuJoCo, composed by gear, and probed with rays."""
 
 from __future__ import annotations
 
@@ -27,32 +27,32 @@ DOWN = np.array([0.0, 0.0, -1.0])
 VISIBLE_GROUPS = (0, 1, 2)
 
 RAY_START_M = 0.6
-"""Ground is looked for from so far above where it should be: higher than kerbs, lower than whatever hangs above."""
+"""Height above the expected ground at which rays to the ground start: above kerbs, below anything that hangs."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rays:
-    """Casts rays at some geom groups of a posed model."""
+    """Casts rays at the geoms of some groups of a model."""
 
     model: mujoco.MjModel
     data: mujoco.MjData
     groups: tuple[int, ...]
 
     def first_hit(self, start_m: Array, along: Array) -> tuple[float, int]:
-        """Distance in lengths of `along` to the first geom that is hit, and its id; infinity and -1 for nothing."""
+        """Distance to the first geom that a ray hits, in lengths of `along`, and its id; infinity and -1 for no hit."""
         groups, hit = np.zeros(6, np.uint8), np.full(1, -1, np.int32)
         groups[list(self.groups)] = 1
         distance = mujoco.mj_ray(self.model, self.data, start_m, along, groups, 1, -1, hit)
         return (float(distance), int(hit[0])) if distance >= 0 else (np.inf, -1)
 
     def height_m(self, point_m: npt.ArrayLike, above_m: float) -> float:
-        """Height of what is hit first below a place, looking down from so far above it; NaN for nothing."""
+        """Height of the first geom below a point, with a ray that starts `above_m` above it; NaN for no hit."""
         start_m = np.asarray(point_m, dtype=np.float64) - above_m * DOWN
         distance_m, geom = self.first_hit(start_m, DOWN)
         return float(start_m[2] - distance_m) if geom >= 0 else float("nan")
 
     def name(self, geom: int) -> str:
-        """As messages name a geom."""
+        """The geom's name in messages."""
         return (
             self.model.geom(geom).name or f"number {geom} of body {self.model.body(self.model.geom_bodyid[geom]).name}"
         )
@@ -60,22 +60,22 @@ class Rays:
 
 @dataclass(frozen=True, eq=False)
 class TownUnderTest:
-    """Everything that the contract looks at; what is costly is made when first asked for."""
+    """Everything that the contract checks. What takes time is computed at the first use."""
 
     library: AssetLibrary
     scenes: SceneLibrary
 
     @property
     def path(self) -> Path:
-        """The town's MJCF."""
+        """Path of the town's MJCF file."""
         return self.library.town
 
     @cached_property
     def compiled(self) -> tuple[mujoco.MjSpec, mujoco.MjModel, float]:
-        """By stock MuJoCo, and the seconds it took.
+        """Spec and model by stock MuJoCo, and the seconds that compiling took.
 
         Raises:
-            TownError: MuJoCo refuses it.
+            TownError: MuJoCo cannot compile it.
         """
         began_s = time.perf_counter()
         try:
@@ -87,7 +87,7 @@ class TownUnderTest:
 
     @cached_property
     def graph(self) -> LaneGraph:
-        """Its lanes, walks and bays.
+        """Its lanes, walks and parking bays.
 
         Raises:
             TownError: one is malformed, or there are no bounds.
@@ -96,7 +96,7 @@ class TownUnderTest:
 
     @cached_property
     def visible(self) -> Rays:
-        """Rays that hit what can be seen of the town alone."""
+        """Rays that hit the visible geoms of the town alone."""
         model = self.compiled[1]
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
@@ -104,23 +104,23 @@ class TownUnderTest:
 
     @cached_property
     def first_world(self) -> tuple[World, float]:
-        """Gear's world of the first scene, and the seconds it took."""
+        """The world of the first scene, and the seconds that composing and compiling took."""
         began_s = time.perf_counter()
         world = self.world(next(iter(self.scenes.scenes)))
         return world, time.perf_counter() - began_s
 
     @cached_property
     def ground(self) -> Rays:
-        """Rays that hit what one stands on."""
+        """Rays that hit the ground's collision geoms."""
         return self._placement_rays(GROUND_GROUP)
 
     @cached_property
     def obstacles(self) -> Rays:
-        """Rays that hit what stands in the way, the first scene's boards too."""
+        """Rays that hit all other collision geoms, the first scene's boards included."""
         return self._placement_rays(OBSTACLE_GROUP)
 
     def world(self, scene: str) -> World:
-        """Gear's world of a scene, freshly composed.
+        """Composes and compiles the world of a scene.
 
         Raises:
             UnknownNameError: there is no such scene.
@@ -139,7 +139,11 @@ class TownUnderTest:
 
 @lru_cache(maxsize=2)
 def town_under_test(town: str, scenes: str) -> TownUnderTest:
-    """A town by name or path with its scenes by path, or gear's own for that town if empty; shared by all checks.
+    """A town with its scenes, shared by all checks.
+
+    Args:
+        town: name of the town, or path of its MJCF.
+        scenes: path of the scene library; empty for gear's own of that town.
 
     Raises:
         UnknownNameError: there is no such town or scene library.

@@ -1,4 +1,4 @@
-"""What can be wrong with the materials of a town: each function returns what it finds, a line each."""
+"""Checks of a town's materials. Each function returns its findings, one line each."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ COLOUR_ROLES = (
 )
 
 LARGEST_PX = 8192
-"""Vulkan drivers take textures of at least half of this a side, those that run on processors of twice as much."""
+"""Largest side of a texture. Every Vulkan driver accepts half of it; software drivers accept twice of it."""
 
 
 def transparent(model: mujoco.MjModel) -> list[str]:
@@ -33,12 +33,12 @@ def transparent(model: mujoco.MjModel) -> list[str]:
 
 
 def unphysical(model: mujoco.MjModel, most_albedo: float, faces: Mask | None = None) -> list[str]:
-    """Textures that renderers cannot show or show wrongly, and surfaces that give back more light than they get.
+    """Textures that renderers cannot show or show wrongly, and surfaces that reflect too much light.
 
     Args:
         model: compiled.
-        most_albedo: that a geom may have.
-        faces: (ngeom,) bool, what takes patches and is not looked at: gear makes its texture.
+        most_albedo: largest allowed albedo of a geom.
+        faces: (ngeom,) bool, the faces that take patches; they are not checked, since gear makes their textures.
     """
     looked_at = (model.geom_group < FIRST_HIDDEN_GROUP) & ~(np.zeros(model.ngeom, bool) if faces is None else faces)
     problems = []
@@ -56,7 +56,7 @@ def _odd_numbers(model: mujoco.MjModel, material: int) -> list[str]:
     found = []
     for name in ("emission", "metallic", "roughness"):
         value = float(getattr(model, f"mat_{name}")[material])
-        # -1 says that a material has no such number.
+        # -1 means that the material does not set the number.
         if not 0 <= value <= 1 and (name == "emission" or value != -1):
             found.append(f"has {name} {value:g}, not 0 to 1")
     return found
@@ -103,7 +103,7 @@ def _too_bright(model: mujoco.MjModel, most_albedo: float, looked_at: Mask) -> l
 
 
 def _mean(model: mujoco.MjModel, texture: int) -> Array:
-    """(3,) linear mean of a texture's colours; of its first channel, thrice, where it has fewer than three."""
+    """(3,) mean of a texture's colours in linear light; a texture of one or two channels is grey by its first."""
     channels, start = int(model.tex_nchannel[texture]), int(model.tex_adr[texture])
     count = int(model.tex_width[texture]) * int(model.tex_height[texture]) * channels
     pixels = model.tex_data[start : start + count].reshape(-1, channels)

@@ -1,4 +1,4 @@
-"""What can be wrong with the scenes of a town: each function returns what it finds, a line each."""
+"""Checks of a town's scenes. Each function returns its findings, one line each."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ RIG = Rig(cameras=(CameraMount(name="rgb", width_px=640, height_px=320),))
 FACE_GRID = (9, 5)
 PIXELS = 400
 DEPTH_TOLERANCE = 1e-3
-"""Relative; a depth buffer of classic is a float in front of a far plane."""
+"""Largest relative error of a depth of the classic renderer, whose depth buffer is a float up to a far plane."""
 
 
 BOARD_GROUND_M = 0.4
-"""How far the foot of a board may be from the ground: footings reach a little into it, or stand out."""
+"""Largest distance of a board's foot from the ground: footings are partly in the ground, or stand out of it."""
 
 BOARD_LOOK_M = 1.2
-"""The ground below a board is looked for from so far above its foot, as placement does."""
+"""Height above a board's foot at which rays to the ground start, as in placement."""
 
 
 def misplaced(town: TownUnderTest) -> list[str]:
-    """A library of another town, and boards outside of the bounds, in the air or in the ground."""
+    """A scene library of another town, and boards outside of the bounds, in the air or in the ground."""
     problems = []
     if town.scenes.town != town.library.town_name:
         problems.append(f"the scene library is for {town.scenes.town!r}, the town is {town.library.town_name!r}")
@@ -56,7 +56,7 @@ def misplaced(town: TownUnderTest) -> list[str]:
 
 
 def unusable(town: TownUnderTest, names: Sequence[str], samples: int, min_visible: float) -> list[str]:
-    """Scenes of which no sample can be planned, or whose boards are not in view of the planned ones."""
+    """Scenes that cannot be composed or planned, and boards that are not visible in a planned sample."""
     problems = []
     for name in names:
         try:
@@ -71,7 +71,7 @@ def unusable(town: TownUnderTest, names: Sequence[str], samples: int, min_visibl
 
 
 def cracks(town: TownUnderTest, samples: int) -> list[str]:
-    """Pixels below the horizon that show nothing though all around them is ground."""
+    """Pixels below the horizon that show the sky while all pixels around them show ground."""
     world, _ = town.first_world
     planner = _planner(world, samples)
     problems = []
@@ -94,7 +94,7 @@ def cracks(town: TownUnderTest, samples: int) -> list[str]:
 
 
 def disagreement(town: TownUnderTest, min_agreement: float) -> list[str]:
-    """Too many pixels, away from edges, whose id or depth is not that of a ray through their centre."""
+    """Pixels, away from edges, with another id or depth than a ray through their centre, if there are too many."""
     world, _ = town.first_world
     record = _planner(world, 1).plan(0)
     placed = world.place(record)
@@ -128,14 +128,14 @@ def disagreement(town: TownUnderTest, min_agreement: float) -> list[str]:
 
 @dataclass(frozen=True, slots=True)
 class _Truth:
-    """Ids and depth of one view."""
+    """Geom ids and depth of one view, as the classic renderer gives them."""
 
     geom_id: IdImage
     depth_m: FloatImage
 
 
 def _truth(world: World, placed: PlacedStage, record: SceneRecord) -> _Truth:
-    """As classic renders them."""
+    """Renders ids and depth of a sample with the classic renderer."""
     renderer = open_renderer("classic", world.model, quality="fast")
     try:
         (view,) = renderer.render(placed.stage, record.cameras, colour=False)

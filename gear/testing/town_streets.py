@@ -1,4 +1,4 @@
-"""What can be wrong with the lanes, walks and bays of a town: each function returns what it finds, a line each."""
+"""Checks of a town's lanes, walks and parking bays. Each function returns its findings, one line each."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from gear.world.roads.polyline import Polyline
 
 STEP_M = 2.0
 BUMPER_M = 0.6
-"""Obstacles in parking bays are looked for at this height."""
+"""Height of the rays to obstacles in parking bays."""
 
 KERB_M = 0.2
-"""In a tight turn a wheel may go over the kerb; it may not elsewhere."""
+"""Height of a kerb that a wheel may climb in the tight turn of a junction."""
 
 DRIVABLE = frozenset({"road", "road_marking", "parking", "ground", "bridge", "static"})
-"""What may be seen under a car; `static` for manholes and rails."""
+"""Labels of the surfaces below a car; `static` for manholes and rails."""
 
 CROSSWALK_REACH_M = 3.0
-"""A crosswalk ends at most so far from the border of a sidewalk."""
+"""Largest distance of a crosswalk's end from the edge of a sidewalk."""
 
 
 def dead_ends(graph: LaneGraph, open_ends: frozenset[str], join_m: float) -> list[str]:
-    """Lanes that nothing continues, and lanes whose followers start elsewhere."""
+    """Lanes that no lane continues, and lanes that end away from the start of the lane that continues them."""
     problems = [
         f"{lane.name} is a dead end at {_place(lane.line.points_m[-1])}: nothing in its next="
         for lane in graph.lanes.values()
@@ -45,7 +45,7 @@ def dead_ends(graph: LaneGraph, open_ends: frozenset[str], join_m: float) -> lis
 
 
 def kinks(graph: LaneGraph, most_deg: float) -> list[str]:
-    """Places where the heading of a lane, or from a lane to its follower, jumps."""
+    """Points at which the heading jumps, inside of a lane or between a lane and the next one."""
     problems = []
     for lane in graph.lanes.values():
         turns_deg = np.degrees(np.abs([wrap_angle_rad(float(t)) for t in np.diff(_headings(lane.line))]))
@@ -61,7 +61,7 @@ def kinks(graph: LaneGraph, most_deg: float) -> list[str]:
 
 
 def odd_sizes(graph: LaneGraph, width_m: tuple[float, float], speed_mps: tuple[float, float]) -> list[str]:
-    """Lanes and walks too narrow or wide, lanes too slow or fast, lanes without length."""
+    """Lanes and walks that are too narrow or too wide, and lanes that are too slow or too fast."""
     problems = []
     for lane in graph.lanes.values():
         if not width_m[0] <= lane.width_m <= width_m[1]:
@@ -75,7 +75,7 @@ def odd_sizes(graph: LaneGraph, width_m: tuple[float, float], speed_mps: tuple[f
 
 
 def lost_neighbours(graph: LaneGraph) -> list[str]:
-    """Lanes whose `left` or `right` does not run beside them, on that side and the same way."""
+    """Lanes whose `left` or `right` neighbour is not on that side, in the same direction."""
     problems = []
     for lane in graph.lanes.values():
         middle_m, heading_rad = lane.line.at(lane.line.length_m / 2)
@@ -93,7 +93,7 @@ def lost_neighbours(graph: LaneGraph) -> list[str]:
 
 
 def lanes_off_the_road(town: TownUnderTest, tolerance_m: float, wheel_m: float) -> list[str]:
-    """Lanes without ground at their height, or over something that is no road."""
+    """Lanes without ground at their height, or over a surface that is no road."""
     label = {geom.id: unprefixed_class(geom.classname.name).partition(".")[0] for geom in town.compiled[0].geoms}
     problems = []
     for lane in town.graph.lanes.values():
@@ -150,7 +150,7 @@ def idle_crosswalks(graph: LaneGraph) -> list[str]:
 
 
 def bad_bays(town: TownUnderTest, tolerance_m: float) -> list[str]:
-    """Parking bays without ground, with something in them, or on a lane."""
+    """Parking bays without ground, with an obstacle in them, or on a lane."""
     lanes = np.concatenate([np.array([p for p, _ in _along(lane.line)]) for lane in town.graph.lanes.values()])
     problems = []
     for bay in town.graph.bays:
@@ -174,7 +174,7 @@ def bad_bays(town: TownUnderTest, tolerance_m: float) -> list[str]:
 
 
 def out_of_bounds(graph: LaneGraph) -> list[str]:
-    """Lanes, walks and bays that leave what the town says it covers."""
+    """Lanes, walks and parking bays that leave `town.bounds`."""
     xmin, ymin, xmax, ymax = graph.bounds_m
     lines = [(lane.name, lane.line.points_m) for lane in graph.lanes.values()]
     lines += [(walk.name, walk.line.points_m) for walk in graph.walks.values()]
@@ -197,7 +197,7 @@ def _off_ground(ground: Rays, point_m: Array, tolerance_m: float) -> str:
 
 
 def _along(line: Polyline, lateral_m: float = 0.0, step_m: float = STEP_M) -> Iterator[tuple[Array, str]]:
-    """Places spread evenly over a line, its ends left out by a little so that they lie on it, and as messages say."""
+    """Yields points spread evenly over a line, just inside of its ends, each with its name in messages."""
     count = max(2, math.ceil(line.length_m / step_m) + 1)
     for s_m in np.linspace(min(0.05, line.length_m / 4), line.length_m - min(0.05, line.length_m / 4), count):
         point = line.at(float(s_m), lateral_m)[0]
@@ -205,7 +205,7 @@ def _along(line: Polyline, lateral_m: float = 0.0, step_m: float = STEP_M) -> It
 
 
 def _bay_corners(bay: ParkingBay) -> Array:
-    """A little inside, as the wheels of a parked car are."""
+    """(4, 3) points a little inside of a bay's corners, where the wheels of a parked car are."""
     along = np.array([math.cos(bay.yaw_rad), math.sin(bay.yaw_rad), 0.0]) * bay.length_m * 0.4
     left = np.array([-math.sin(bay.yaw_rad), math.cos(bay.yaw_rad), 0.0]) * bay.width_m * 0.4
     return np.asarray(np.array([along + left, along - left, -along - left, -along + left]) + bay.position_m)

@@ -160,7 +160,7 @@ class World:
 
     @property
     def town_name(self) -> str:
-        """Name of the town."""
+        """Name of the town, as in records."""
         return self.library.town_name
 
     def surface_records(self, carrier_id: int | None = None) -> tuple[SurfaceRecord, ...]:

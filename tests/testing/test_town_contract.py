@@ -75,22 +75,23 @@ FLAT = '<texture name="flat" type="2d" builtin="flat" rgb1="0.8 0.8 0.8" width="
 
 BREAKS: dict[str, tuple[tuple[tuple[str, str], ...], str, str]] = {
     "a geom without a label": (
-        ((LAMP, '<geom name="lamp_post" class="seen"'),), "test_what_is_seen_is_labelled", "geom 'lamp_post'.*'seen'"
+        ((LAMP, '<geom name="lamp_post" class="seen"'),), "test_visible_geoms_are_labelled", "geom 'lamp_post'.*'seen'"
     ),
-    "a geom seen and felt": (
-        ((LAMP, LAMP + ' contype="1"'),), "test_what_is_seen_is_not_felt", "geom 'lamp_post' is seen and has contype"
+    "a visible geom that collides": (
+        ((LAMP, LAMP + ' contype="1"'),),
+        "test_visible_geoms_do_not_collide", "geom 'lamp_post' is visible and has contype"
     ),
-    "a collision geom that is seen": (
+    "a visible collision geom": (
         (('<geom name="post.lamp" class="collision"', '<geom name="post.lamp" class="collision" group="1"'),),
-        "test_what_is_seen_is_not_felt", "geom 'post.lamp' of class collision is in group 1",
+        "test_visible_geoms_do_not_collide", "geom 'post.lamp' of class collision is in group 1",
     ),
     "a collision geom in another group": (
         (('<geom name="post.lamp" class="collision"', '<geom name="post.lamp" class="collision" group="4"'),),
-        "test_what_is_seen_is_not_felt", "geom 'post.lamp' of class collision is in group 4, not 3",
+        "test_visible_geoms_do_not_collide", "geom 'post.lamp' of class collision is in group 4, not 3",
     ),
-    "a geom neither seen nor felt": (
+    "a geom neither visible nor a collision geom": (
         ((LAMP, LAMP + ' group="3"'),),
-        "test_what_is_seen_is_not_felt", "geom 'lamp_post' is in group 3 and not of class collision",
+        "test_visible_geoms_do_not_collide", "geom 'lamp_post' is in group 3 and not of class collision",
     ),
     "a pane of glass": (
         ((LAMP + ' material="steel"', LAMP + ' rgba="1 1 1 0.5"'),),
@@ -139,16 +140,16 @@ BREAKS: dict[str, tuple[tuple[tuple[str, str], ...], str, str]] = {
     ),
     "a dead end": (
         (('<text name="lane.main_west_a" data="next=lane.x_west"/>', ""),),
-        "test_one_can_drive_for_ever", "lane.main_west_a is a dead end at",
+        "test_lanes_are_continued", "lane.main_west_a is a dead end at",
     ),
     "a torn lane": (
         (('data="3.5 11  26.5 -1.75 0  33.5 -1.75 0"', 'data="3.5 11  26.8 -1.75 0  33.5 -1.75 0"'),),
-        "test_one_can_drive_for_ever", "lane.main_east_a ends 0.30 m from where its follower lane.x_east starts",
+        "test_lanes_are_continued", "lane.main_east_a ends 0.30 m from where its follower lane.x_east starts",
     ),
     "an end that is none": (
         (("33.5 -1.75 0  78 -1.75 0", "33.5 -1.75 0  78 -1.75 0  78 -2 0  33.5 -2 0  33.4 -1.75 0"),
          custom('<text name="lane.main_east_b" data="next=lane.main_east_b"/>')),
-        "test_one_can_drive_for_ever", "lane.main_east_b is in open_ends",
+        "test_lanes_are_continued", "lane.main_east_b is in open_ends",
     ),
     "a kink inside a lane": (
         ((EAST_TO_SOUTH, 'data="3.5 5  26.5 -1.75 0  28.25 -1.75 0  28.25 -3.5 0"'),),
@@ -178,11 +179,11 @@ BREAKS: dict[str, tuple[tuple[tuple[str, str], ...], str, str]] = {
         (('31.75 20 0  31.75 58 3.8"', '31.75 20 0  31.75 58 5"'),),
         "test_lanes_lie_on_the_road", r"lane.cross_north_n is \+0.\d+ m above its ground",
     ),
-    "a road that cannot be felt": (
+    "a road without collision geom": (
         (('name="ground.hill"', 'name="hill"'), ('name="ground.terrain"', 'name="lawn"')),
         "test_lanes_lie_on_the_road", "lane.cross_north_n has no collision geom named ground",
     ),
-    "a road that cannot be seen": (
+    "an invisible road": (
         ((ROAD + ' pos="0 0 -0.25"', ROAD + ' pos="0 0 -3"'), (GRASS + ' pos="0 0 -0.55"', GRASS + ' pos="0 0 -5"')),
         "test_lanes_lie_on_the_road", "lane.main_east_a: no surface is seen at its height",
     ),
@@ -246,7 +247,7 @@ BREAKS: dict[str, tuple[tuple[tuple[str, str], ...], str, str]] = {
     ),
     "no such lane": (
         (('data="next=lane.x_west"', 'data="next=lane.x_wset"'),),
-        "test_one_can_drive_for_ever", "lane.main_west_a: next names lane.x_wset",
+        "test_lanes_are_continued", "lane.main_west_a: next names lane.x_wset",
     ),
     "a near plane behind the bonnet": (
         (('znear="0.001"', 'znear="0.02"'),), "test_depth_has_a_range", "nearest is 2 m"
@@ -312,7 +313,7 @@ def test_broken_scenes_fail_their_check(
 
 
 def test_a_board_behind_a_wall_that_nobody_feels_is_noticed(broken: Callable[..., TownContract]) -> None:
-    """Placement feels only collision geoms; the contract looks at what is seen."""
+    """Placement knows collision geoms alone; the contract checks visible geoms as well."""
     wall = '<geom name="sheet" class="building.plaster" material="plaster" pos="53 -8.5 3" size="0.1 6 3"/>'
     contract = broken(add_geom(wall))
     type(contract).planned_scenes = ("board",)

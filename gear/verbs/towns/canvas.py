@@ -1,4 +1,4 @@
-"""Drawing in metres: a picture with north at the top, drawn larger and averaged down, so that every edge is smooth."""
+"""A canvas for maps: drawing in metres, north at the top. It is drawn at twice its size for smooth edges."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ Points = npt.NDArray[np.float64]
 
 OVERSAMPLING = 2
 SHIFT = 4
-"""cv2 takes positions in sixteenths of a pixel."""
+"""Fractional bits of positions in OpenCV: sixteenths of a pixel."""
 
 FONT = cv2.FONT_HERSHEY_SIMPLEX
 FONT_HEIGHT_PX = 22.0
-"""Of a capital letter at scale 1."""
+"""Height of a capital letter at scale 1."""
 
 HAS_STROKES = int(cv2.__version__.partition(".")[0]) < 5
-"""OpenCV 4 writes with a pen whose width must grow with the letters; 5 fills them, and thickness is their weight."""
+"""OpenCV 4 draws letters as strokes, whose width must grow with their size; in OpenCV 5 thickness is their weight."""
 
 
 class Canvas:
-    """A sheet of paper with a part of the world on it.
+    """A picture that shows a part of the world.
 
-    Positions are (N, 2): in metres in the world for what ends in `_m`, in pixels of the finished picture, x to the
-    right and y down, for what ends in `_px`.
+    Positions are (N, 2). Names that end in `_m` are metres in the world; names that end in `_px` are pixels of the
+    finished picture, x to the right and y down.
     """
 
     def __init__(
@@ -45,14 +45,14 @@ class Canvas:
         origin_px: tuple[float, float] = (0.0, 0.0),
         box_px: tuple[float, float, float, float] | None = None,
     ) -> None:
-        """An empty sheet.
+        """Makes an empty picture.
 
         Args:
             size_px: width and height of the finished picture.
-            paper: its colour.
-            px_per_m: scale.
-            origin_px: where the world's (0, 0) lies.
-            box_px: left, top, right, bottom of the part that shows the world; all of it if left out.
+            paper: colour of the background.
+            px_per_m: scale of the map.
+            origin_px: position of the world's (0, 0) in the picture.
+            box_px: left, top, right and bottom of the part that shows the world; the whole picture if None.
         """
         self.size_px = size_px
         self.box_px = box_px or (0.0, 0.0, float(size_px[0]), float(size_px[1]))
@@ -61,16 +61,16 @@ class Canvas:
         self._pixels = np.full((size_px[1] * OVERSAMPLING, size_px[0] * OVERSAMPLING, 3), paper, np.uint8)
 
     def picture(self) -> UInt8Image:
-        """(H, W, 3) uint8 RGB."""
+        """The finished picture, (H, W, 3) uint8 RGB."""
         return np.asarray(cv2.resize(self._pixels, self.size_px, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
     def to_px(self, points_m: npt.ArrayLike) -> Points:
-        """World positions to pixels; further columns are ignored."""
+        """Converts (N, 2 or more) positions in the world to (N, 2) pixels; further columns are ignored."""
         points = np.atleast_2d(np.asarray(points_m, dtype=np.float64))[:, :2]
         return np.asarray(self._origin_px + points * (self.px_per_m, -self.px_per_m))
 
     def fill(self, outline_px: npt.ArrayLike, colour: Colour, opacity: float = 1.0) -> None:
-        """Fills a polygon."""
+        """Fills the polygon with an outline of (N, 2) points."""
         fixed = _fixed(outline_px)
         if opacity >= 1.0:
             cv2.fillPoly(self._pixels, [fixed], colour, cv2.LINE_AA, SHIFT)
@@ -82,7 +82,7 @@ class Canvas:
     def line(
         self, points_px: npt.ArrayLike, colour: Colour, width_px: float, *, closed: bool = False, opacity: float = 1.0
     ) -> None:
-        """Draws through points."""
+        """Draws a line through (N, 2) points."""
         width = max(1, round(width_px * OVERSAMPLING))
         if opacity >= 1.0:
             cv2.polylines(self._pixels, [_fixed(points_px)], closed, colour, width, cv2.LINE_AA, SHIFT)
@@ -95,7 +95,7 @@ class Canvas:
         self, points_px: npt.ArrayLike, colour: Colour, width_px: float, *, dash_px: float, gap_px: float,
         closed: bool = False,
     ) -> None:  # fmt: skip
-        """Draws through points in dashes."""
+        """Draws a dashed line through (N, 2) points."""
         points = np.asarray(points_px, dtype=np.float64)
         if closed:
             points = np.concatenate([points, points[:1]])
@@ -107,21 +107,21 @@ class Canvas:
             self.line(piece, colour, width_px)
 
     def dot(self, centre_px: npt.ArrayLike, radius_px: float, colour: Colour) -> None:
-        """Draws a filled disc."""
+        """Draws a filled disc around a point."""
         (x, y), one = _fixed(np.atleast_2d(centre_px))[0, 0], OVERSAMPLING << SHIFT
         cv2.circle(self._pixels, (int(x), int(y)), round(radius_px * one), colour, -1, cv2.LINE_AA, SHIFT)
 
     def mask(self) -> Mask:
-        """An empty one, to be filled by `fill_triangles` and spent by `blend`."""
+        """An empty mask, which `fill_triangles` fills and `blend` draws."""
         return np.zeros(self._pixels.shape[:2], np.uint8)
 
     def fill_triangles(self, mask: Mask, triangles_m: Points) -> None:
-        """Adds (N, 3, 2) triangles to a mask."""
+        """Adds (N, 3, 2) triangles in the world to a mask, in place."""
         for triangle in _fixed_many(self.to_px(triangles_m.reshape(-1, 2))).reshape(-1, 3, 2):
             cv2.fillConvexPoly(mask, triangle, 255, cv2.LINE_8, SHIFT)
 
     def blend(self, mask: Mask, colour: Colour, opacity: float = 1.0) -> None:
-        """Lays a colour over what a mask holds."""
+        """Draws a colour over the pixels of a mask, by its values 0..255 and the opacity 0..1."""
         x, y, width, height = cv2.boundingRect(mask)
         if not width:
             return
@@ -131,18 +131,18 @@ class Canvas:
         part[:] = mixed >> 8
 
     def outline(self, mask: Mask, colour: Colour, width_px: float) -> None:
-        """Draws around what a mask holds."""
+        """Draws the outlines of a mask."""
         rings, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
         cv2.drawContours(self._pixels, rings, -1, colour, max(1, round(width_px * OVERSAMPLING)), cv2.LINE_AA)
 
     def shift_down_right(self, mask: Mask, length_px: float) -> Mask:
-        """A mask moved to the south-east, as a shadow is."""
+        """A mask moved down and to the right, as a shadow."""
         step = length_px * OVERSAMPLING
         moved = cv2.warpAffine(mask, np.array([[1.0, 0.0, step], [0.0, 1.0, step]]), mask.shape[::-1])
         return np.asarray(moved, dtype=np.uint8)
 
     def clip(self, paper: Colour) -> None:
-        """Wipes everything outside of the part that shows the world."""
+        """Erases everything outside of the part that shows the world."""
         left, top, right, bottom = (round(value * OVERSAMPLING) for value in self.box_px)
         inside = self._pixels[top:bottom, left:right].copy()
         self._pixels[:] = paper
@@ -152,7 +152,17 @@ class Canvas:
         self, at_px: tuple[float, float], words: str, height_px: float, colour: Colour, *, anchor: Anchor = "left",
         bold: bool = False, halo: Colour | None = None,
     ) -> None:  # fmt: skip
-        """Writes one line; `at_px` is where its baseline starts, has its middle, or ends; `height_px` of a capital."""
+        """Writes one line of text.
+
+        Args:
+            at_px: point of the baseline at which the text starts, has its middle, or ends, by `anchor`.
+            words: the text.
+            height_px: height of a capital letter.
+            colour: of the letters.
+            anchor: which point of the text is at `at_px`.
+            bold: whether the letters are bold.
+            halo: colour of an edge around the letters; None for no edge.
+        """
         width_px = self.text_width_px(words, height_px, bold=bold)
         left_px = at_px[0] - width_px * {"left": 0.0, "middle": 0.5, "right": 1.0}[anchor]
         origin = (round(left_px * OVERSAMPLING), round(at_px[1] * OVERSAMPLING))
@@ -162,19 +172,19 @@ class Canvas:
         cv2.putText(self._pixels, words, origin, FONT, scale, colour, thickness, cv2.LINE_AA)
 
     def text_width_px(self, words: str, height_px: float, *, bold: bool = False) -> float:
-        """How wide a line of text is."""
+        """Width of a line of text in pixels."""
         scale, thickness = _font(height_px, bold)
         return float(cv2.getTextSize(words, FONT, scale, thickness)[0][0]) / OVERSAMPLING
 
 
 def round_step_m(span_m: float, most: int) -> float:
-    """The smallest of 1, 2, 5, 10, … that cuts a length into no more than so many parts."""
+    """The smallest step of 1, 2 or 5 times a power of ten that divides a length into at most `most` parts."""
     power = 10.0 ** math.floor(math.log10(span_m / most))
     return next(power * factor for factor in (1, 2, 5, 10) if span_m / (power * factor) <= most)
 
 
 def rectangle(x_px: float, y_px: float, width_px: float, height_px: float) -> Points:
-    """(4, 2) corners of an upright rectangle from its left upper one."""
+    """(4, 2) corners of an upright rectangle, given by its upper left corner and its size."""
     return np.array([x_px, y_px]) + np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * (width_px, height_px)
 
 
@@ -186,7 +196,7 @@ def _font(height_px: float, bold: bool) -> tuple[float, int]:
 
 
 def _fixed_many(points_px: Points) -> npt.NDArray[np.int32]:
-    """cv2's pixel centres are whole numbers, ours are halves."""
+    """Converts pixels to OpenCV's fixed-point positions, whose pixel centres are integers instead of halves."""
     return np.asarray(np.round((points_px * OVERSAMPLING - 0.5) * (1 << SHIFT)), dtype=np.int32)
 
 

@@ -1,4 +1,4 @@
-"""What a town and its scenes say of themselves, read without compiling a mesh."""
+"""The facts of a town and its scenes, read without compiling a mesh."""
 
 from __future__ import annotations
 
@@ -37,22 +37,22 @@ class Town:
 
     @property
     def name(self) -> str:
-        """Its file's stem."""
+        """Name of the town: the stem of its file."""
         return self.library.town_name
 
     @property
     def size_m(self) -> tuple[float, float]:
-        """West to east and south to north of what it says it covers."""
+        """Size of its bounds in metres, west to east and south to north."""
         xmin, ymin, xmax, ymax = self.lanes.bounds_m
         return xmax - xmin, ymax - ymin
 
     @property
     def lane_km(self) -> float:
-        """Length of all lanes together, those in junctions too."""
+        """Length of all lanes together in kilometres, junctions included."""
         return sum(lane.line.length_m for lane in self.lanes.lanes.values()) / 1000
 
     def to_json(self) -> Json:
-        """Everything that a list shows, and the scenes in full."""
+        """The facts as JSON, with the scenes in full."""
         scenes = {} if self.scenes is None else self.scenes.scenes
         return {
             "name": self.name,
@@ -82,8 +82,8 @@ def read_town(town: str | Path, scenes: str | Path | None = None) -> Town:
     """Reads a town's lanes and its scenes.
 
     Args:
-        town: its name, or the path of its MJCF.
-        scenes: its scene library, as collections name it; gear's own for that town if left out.
+        town: name of the town, or path of its MJCF.
+        scenes: path or name of its scene library; gear's own for that town if None.
 
     Raises:
         UnknownNameError: there is no such town or file.
@@ -96,7 +96,7 @@ def read_town(town: str | Path, scenes: str | Path | None = None) -> Town:
 
 
 def read_lanes(path: Path) -> LaneGraph:
-    """The lane graph of a town's file. Its custom fields are compiled by themselves: meshes would take seconds.
+    """Reads the lane graph of a town's file. Only its custom fields are compiled, since meshes would take seconds.
 
     Raises:
         TownError: it is no XML, MuJoCo cannot read it, or a lane is malformed.

@@ -1,4 +1,4 @@
-"""The ground of a map: what the town's geoms cover, seen from above."""
+"""The ground of a map: the surfaces, plants and buildings of a town, seen from above."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ COVERS: tuple[tuple[str, tuple[str, ...], Colour], ...] = (
     ("sidewalk", ("sidewalk",), (240, 234, 226)),
     ("road marking", ("road_marking",), (250, 250, 250)),
 )
-"""What the legend calls it, its labels, its colour; the later ones lie above the earlier."""
+"""Name in the legend, labels, and colour of each kind of ground; later ones are drawn over earlier ones."""
 
 VEGETATION: Colour = (122, 164, 104)
 BUILDING: Colour = (176, 160, 148)
@@ -41,21 +41,21 @@ FENCE: Colour = (132, 122, 114)
 SHADOW: Colour = (70, 66, 74)
 
 LEAST_BUILDING_M = 2.5
-"""Obstacles at least so high and so wide both ways are drawn as buildings."""
+"""Least height, length and width of an obstacle that is drawn as a building."""
 
 LEAST_FENCE_M = 3.0
-"""Obstacles at least so long that are no buildings are drawn as fences."""
+"""Least length of an obstacle, other than a building, that is drawn as a fence."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class TownGeometry:
-    """A compiled town, as far as a map needs it.
+    """The geometry of a town, compiled from its file alone.
 
     Attributes:
-        path: its file.
-        model: compiled from its file alone.
-        data: with its geoms in place.
-        classes: labels of what is seen.
+        path: the town's file.
+        model: the compiled model.
+        data: with kinematics up to date.
+        classes: labels of the visible geoms.
     """
 
     path: Path
@@ -68,7 +68,7 @@ class TownGeometry:
         """Compiles a town.
 
         Raises:
-            TownError: MuJoCo refuses it, or a visible geom has no label.
+            TownError: MuJoCo cannot compile it, or a visible geom has no label.
         """
         try:
             spec = read_spec(path)
@@ -80,7 +80,7 @@ class TownGeometry:
         return TownGeometry(path=path, model=model, data=data, classes=classify(spec, path))
 
     def corners_m(self, geom: int) -> Array:
-        """(N, 3, 3) triangles of a geom in the world; a plane reaches as far as it is rendered.
+        """(N, 3, 3) corners of a geom's triangles in the world, in metres; an infinite plane ends after 10 km.
 
         Raises:
             TownError: it is a height field, or something else without triangles.
@@ -100,12 +100,12 @@ class TownGeometry:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Obstacle:
-    """What stands in the way, from above.
+    """A collision geom of the town, seen from above.
 
     Attributes:
-        outline_m: (N, 2) convex outline.
-        height_m: of its top above its foot.
-        size_m: longer and shorter side.
+        outline_m: (N, 2) convex outline in the world.
+        height_m: height of its top above its foot.
+        size_m: longer and shorter side of its outline.
     """
 
     outline_m: Array
@@ -114,17 +114,17 @@ class Obstacle:
 
     @property
     def is_building(self) -> bool:
-        """Whether it is large and high."""
+        """Whether it is large and high enough for a building."""
         return min(self.height_m, *self.size_m) >= LEAST_BUILDING_M
 
     @property
     def is_fence(self) -> bool:
-        """Whether it is long and no building: a fence, a wall, a hedge, a fountain."""
+        """Whether it is long and no building, such as a fence, a wall or a hedge."""
         return not self.is_building and self.size_m[0] >= LEAST_FENCE_M
 
 
 def obstacles(geometry: TownGeometry) -> list[Obstacle]:
-    """Every collision geom on which nobody stands."""
+    """The collision geoms of a town that are not ground."""
     found = []
     for geom in np.flatnonzero(geometry.model.geom_group >= FIRST_HIDDEN_GROUP):
         is_plane = geometry.model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE
@@ -139,7 +139,7 @@ def obstacles(geometry: TownGeometry) -> list[Obstacle]:
 
 
 def draw_ground(canvas: Canvas, geometry: TownGeometry, bounds_m: Bounds) -> None:
-    """Draws ground covers, plants, fences and buildings of a town with those bounds."""
+    """Draws the ground, plants, fences and buildings of a town with given bounds."""
     corners_m = {geom: geometry.corners_m(geom) for _, labels, _ in COVERS for geom in _labelled(geometry, labels)}
     hidden = _underground(corners_m, _labelled(geometry, ("ground",)), bounds_m)
     for _, labels, colour in COVERS:
@@ -165,7 +165,7 @@ def draw_ground(canvas: Canvas, geometry: TownGeometry, bounds_m: Bounds) -> Non
 
 
 def _underground(corners_m: Mapping[int, Array], ground: Sequence[int], bounds_m: Bounds) -> int | None:
-    """What closes cracks from below: the ground that lies deeper than every other cover, under all of the town."""
+    """The geom that closes cracks from below: ground below every other cover and under the whole town, or None."""
     if len(corners_m) < 2:
         return None
     tops_m = {geom: float(corners[..., 2].max()) for geom, corners in corners_m.items()}
@@ -182,7 +182,7 @@ def _labelled(geometry: TownGeometry, names: tuple[str, ...]) -> list[int]:
 
 
 def _from_above(corners_m: Array) -> Array:
-    """The triangles that have an area from above, without their heights."""
+    """(M, 3, 2) those of (N, 3, 3) triangles that have an area in the ground plan."""
     flat = corners_m[:, :, :2]
     first, second = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
     return flat[np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) > 1e-3]

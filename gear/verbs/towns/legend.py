@@ -1,4 +1,4 @@
-"""What stands beside a map: title, what the signs mean, the scenes, scale and north."""
+"""The panel to the right of a map: title, legend, scenes, scale and north arrow."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ def draw_legend(canvas: Canvas, town: Town, colours: Mapping[str, Colour]) -> No
 
 
 def legend_height_px(scenes: int) -> int:
-    """Room enough for the legend of a town with so many scenes."""
+    """Height in pixels of the panel of a town with `scenes` scenes."""
     return 760 + 68 * scenes
 
 
 def scene_note(scene: SceneSpec) -> str:
-    """One line about what is in a scene."""
+    """One line about a scene: boards or truck, vehicles and people."""
     if scene.truck is not None:
         what = f"{scene.truck.asset} in the ego car's lane, {_span(scene.truck.gap_m)} m ahead, on any road"
     elif scene.boards:
@@ -112,7 +112,7 @@ def _ground_signs(canvas: Canvas, x: float, y: float) -> float:
 
 
 def _mixed(colour: Colour) -> Colour:
-    """As it looks where it covers terrain by half."""
+    """The colour as it looks on the map, where it covers terrain with half opacity."""
     base = ground_layer.COVERS[0][2]
     return tuple((a + b) // 2 for a, b in zip(colour, base, strict=True))  # type: ignore[return-value]
 

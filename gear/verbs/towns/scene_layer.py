@@ -29,11 +29,11 @@ BEHIND_NUMBER_PX = 12.0
 CLEAR_M = 3.0
 
 Box = tuple[float, float, float, float]
-"""Middle, half width and half height, in pixels."""
+"""x and y of the middle, half width and half height, in pixels."""
 
 
 def scene_colours(scenes: Mapping[str, SceneSpec]) -> dict[str, Colour]:
-    """A colour for every scene with boards, in their order."""
+    """Colours of the scenes with boards, by the scene's name."""
     with_boards = [name for name, scene in scenes.items() if scene.boards]
     return {name: PALETTE[number % len(PALETTE)] for number, name in enumerate(with_boards)}
 
@@ -54,7 +54,11 @@ def draw_limits(canvas: Canvas, scene: SceneSpec, colour: Colour) -> None:
 
 
 def draw_boards(canvas: Canvas, library: AssetLibrary, scene: SceneSpec, colour: Colour) -> None:
-    """Draws each board of a scene with a wedge to where it faces, numbered where there are several."""
+    """Draws each board of a scene and a wedge in the direction that it faces; several boards are numbered.
+
+    Raises:
+        TownError: the file of a board cannot be compiled or has no face.
+    """
     for number, board in enumerate(scene.boards):
         centre = canvas.to_px(board.position_m)[0]
         facing = math.radians(board.facing_deg)
@@ -71,7 +75,7 @@ def draw_boards(canvas: Canvas, library: AssetLibrary, scene: SceneSpec, colour:
 
 
 def draw_names(canvas: Canvas, scenes: Mapping[str, SceneSpec], colours: Mapping[str, Colour]) -> None:
-    """Writes each scene's name near its first board, clear of boards and of other names."""
+    """Writes the name of each scene near its first board, away from boards and other names."""
     clear_px = max(12.0, CLEAR_M * canvas.px_per_m)
     boards = [board for name in colours for board in scenes[name].boards]
     taken: list[Box] = [(*canvas.to_px(board.position_m)[0], clear_px, clear_px) for board in boards]
@@ -88,7 +92,7 @@ def draw_names(canvas: Canvas, scenes: Mapping[str, SceneSpec], colours: Mapping
 
 
 def _spots(canvas: Canvas, board: BoardSpec, half_px: tuple[float, float]) -> list[Box]:
-    """Places for a name inside of the map, best first: behind its board, then around it, then further away."""
+    """Candidate places of a name inside of the map, the best first: behind its board, around it, further away."""
     x, y = canvas.to_px(board.position_m)[0]
     left, top, right, bottom = canvas.box_px
     spots = []
@@ -112,7 +116,7 @@ def _overlap_px2(first: Box, second: Box) -> float:
 
 
 def limits_outline_m(board: BoardSpec, limits: NpcLimits) -> Array | None:
-    """Corners of limits in a board's frame; None where they only speak of a distance from the ego car."""
+    """(4, 2) corners in the world of limits in a board's frame; None for limits around the ego car alone."""
     if not limits.needs_board:
         return None
     return board_rectangle_m(board, limits.ahead_m or (-1e4, 1e4), limits.lateral_m or (-1e4, 1e4))

@@ -31,13 +31,13 @@ PAPER, INK, MUTED = (255, 255, 255), (30, 30, 36), (110, 110, 118)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SheetOptions:
-    """How thumbnails are made.
+    """Settings of the thumbnails.
 
     Attributes:
-        renderer, quality: who renders, and how well.
+        renderer, quality: name of the renderer, and its quality.
         weather: light and air.
-        seed: of the sampled places.
-        width_px, height_px: of one thumbnail.
+        seed: seed of the sampled views.
+        width_px, height_px: size of one thumbnail.
     """
 
     renderer: str
@@ -51,10 +51,15 @@ class SheetOptions:
 def draw_sheet(
     town: Town, options: SheetOptions, on_progress: Progress | None = None
 ) -> tuple[UInt8Image, list[GearError]]:
-    """Renders one sample of every scene and puts them side by side.
+    """Renders one sample of every scene into a sheet.
+
+    Args:
+        town: with a scene library.
+        options: settings of the thumbnails.
+        on_progress: called with the numbers of finished and of all scenes.
 
     Returns:
-        (H, W, 3) uint8 RGB, and what is wrong with scenes that cannot be planned; those show it instead of a picture.
+        (H, W, 3) uint8 RGB, and the errors of scenes that cannot be composed or planned; their cells show the error.
 
     Raises:
         BackendError: the renderer cannot start.
@@ -77,7 +82,7 @@ def draw_sheet(
 
 
 def thumbnail(town: Town, name: str, scene: SceneSpec, options: SheetOptions) -> tuple[UInt8Image, str]:
-    """One sample of a scene: its picture, and how its faces are seen in it."""
+    """Renders one sample of a scene: (H, W, 3) uint8 RGB, and a line on its faces and road users."""
     world = World.build(town=town.library.town, scene_name=name, scene=scene, weather=options.weather)
     rig = Rig(cameras=(CameraMount(name="rgb", width_px=options.width_px, height_px=options.height_px),))
     record = ScenePlanner(world, rig, SplitConfig(seed=options.seed, samples=1), split_name="debug").plan(0)

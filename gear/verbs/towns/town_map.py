@@ -26,8 +26,8 @@ def draw_map(town: Town, geometry: ground_layer.TownGeometry) -> UInt8Image:
     """Draws a town with all of its scenes.
 
     Args:
-        town: its lanes and scenes.
-        geometry: the town, compiled.
+        town: its lanes and its scenes.
+        geometry: its compiled geometry.
 
     Returns:
         (H, W, 3) uint8 RGB.

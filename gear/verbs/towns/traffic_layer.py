@@ -23,7 +23,7 @@ STRIPE_EVERY_M = 1.1
 
 
 def draw_traffic(canvas: Canvas, graph: LaneGraph) -> None:
-    """Draws all that road users keep to."""
+    """Draws the lanes, walks and parking bays of a town."""
     for bay in graph.bays:
         _bay(canvas, bay)
     for walk in graph.walks.values():
@@ -36,7 +36,7 @@ def draw_traffic(canvas: Canvas, graph: LaneGraph) -> None:
 
 
 def lane_arrow(canvas: Canvas, tip_px: Array, heading_rad: float, length_px: float, colour: Colour) -> None:
-    """An arrowhead whose middle is at a place."""
+    """Draws an arrowhead with its middle at a pixel, in a heading counter-clockwise from east."""
     along = np.array([np.cos(heading_rad), -np.sin(heading_rad)]) * length_px
     across = np.array([-along[1], along[0]]) * 0.42
     back = tip_px - along * 0.5

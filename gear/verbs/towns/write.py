@@ -1,4 +1,4 @@
-"""Writes what `gear towns NAME` writes."""
+"""Writes the map and the thumbnails of `gear towns NAME --out DIR`."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ QUALITIES: tuple[Quality, ...] = ("film", "fast")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TownReport:
-    """What was written.
+    """The files that were written for a town.
 
     Attributes:
-        town: of which town.
+        town: the town.
         map: path of the map.
         sheet: path of the thumbnails; None where the town has no scenes.
         problems: errors of the scenes that cannot be read, composed or planned.
@@ -42,7 +42,7 @@ class TownReport:
     problems: tuple[GearError, ...] = ()
 
     def summary(self) -> str:
-        """One line."""
+        """One line with the paths and the number of scenes."""
         files = [str(path) for path in (self.map, self.sheet) if path is not None]
         count = 0 if self.town.scenes is None else len(self.town.scenes.scenes)
         return f"{' and '.join(files)}: {self.town.name} with {count} scene{'' if count == 1 else 's'}"
@@ -63,14 +63,14 @@ def write_town(
     """Writes `<town>_map.png`, and `<town>_scenes.png` with a thumbnail of every scene.
 
     Args:
-        town: a town's name, or the path of its MJCF.
-        out: folder; made if it is not there.
-        scenes: path of a scene library, instead of gear's own for that town.
-        renderer, quality: who renders the thumbnails, and how well.
-        weather: a preset.
-        seed: of the places from which the thumbnails look.
+        town: name of a town, or path of its MJCF.
+        out: folder of the files; it is made if it does not exist.
+        scenes: path of a scene library; gear's own for that town if None.
+        renderer, quality: renderer of the thumbnails, and its quality.
+        weather: name of a weather preset.
+        seed: seed of the views of the thumbnails.
         progress: shows a progress bar.
-        on_progress: called after every picture.
+        on_progress: called after every picture with the numbers of finished and of all pictures.
 
     Raises:
         UnknownNameError: there is no such town, file, renderer or weather.
@@ -119,7 +119,7 @@ def _drawable(town: Town) -> Town:
 
 
 def check_pictures(*, renderer: str, quality: str, weather: str, seed: int) -> None:
-    """Whether thumbnails can be asked for in that way; see `write_town`.
+    """Checks the settings of thumbnails, which are those of `write_town`.
 
     Raises:
         UnknownNameError: there is no such renderer, quality or weather.

@@ -1,4 +1,4 @@
-"""Triangles of compiled geoms."""
+"""The triangles of compiled geoms, in the frame of the geom, of a body or of the world."""
 
 from __future__ import annotations
 

@@ -72,11 +72,11 @@ def camera_pipeline(
 
     Args:
         weather: light and air.
-        renderer_name: who renders.
-        town: its puddles lie where they always lie.
-        effects: of the camera; none unless given.
-        night: the town's lamps; none by day.
-        shapes: of the assets that may take part, which shade the ground about them; without them nothing does.
+        renderer_name: name of the renderer.
+        town: name of the town, which decides where its puddles are.
+        effects: camera effects; None for none.
+        night: lamps of the town at night; None by day.
+        shapes: shapes of the assets, which shade the ground around them; None for no such shade.
     """
     left = night.sky_level if night else 1.0
     mirrored = left * mirrored_radiance(weather, _MIRROR_ROWS, _MIRROR_COLUMNS)

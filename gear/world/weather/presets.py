@@ -52,8 +52,8 @@ def apply_weather(
     """Replaces the light of a composed world by that of a weather, and makes its ground wet.
 
     The world gets a light `sun`, a skybox texture `sky`, and a cube texture as an image light for Filament. Materials
-    of open ground are darker and smoother the wetter the weather is. Renderers are told that the colours of materials
-    and geoms are linear albedo.
+    of open ground are darker and smoother the wetter the weather is. A custom field makes Filament read the colours of
+    materials and geoms as linear albedo.
 
     Args:
         root: the MJCF of the world, changed in place.

@@ -1,0 +1,54 @@
+"""Regions are limits in the frame of a board and around the ego car; places are drawn evenly from pieces of lines."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gear.world.roads.polyline import Polyline
+from gear.world.roads.regions import LineTable, Region
+from gear.world.scene_spec import BoardSpec
+
+NORTH = BoardSpec(position_m=(10.0, 20.0, 0.0), facing_deg=90.0)
+
+
+def test_limits_are_in_the_frame_of_the_board() -> None:
+    region = Region(board=NORTH, ahead_m=(5.0, 10.0), lateral_m=(0.0, 3.0))
+    places = [(9.0, 26.0), (11.0, 26.0), (9.0, 24.0), (9.0, 31.0), (6.0, 26.0)]
+    assert region.holds(places).tolist() == [True, False, False, False, False]
+
+
+def test_all_limits_hold_together() -> None:
+    region = Region(board=NORTH, ahead_m=(0.0, 100.0), radius_m=(2.0, 5.0), centre_m=(10.0, 30.0))
+    assert region.holds([(10.0, 33.0), (10.0, 31.0), (10.0, 36.0), (10.0, 19.0)]).tolist() == [
+        True,
+        False,
+        False,
+        False,
+    ]
+    assert Region().holds([(1e6, -1e6)]).all()
+
+
+def line(length_m: float, y_m: float) -> Polyline:
+    return Polyline.through(np.array([[0.0, y_m, 0.0], [length_m, y_m, 0.0]]))
+
+
+def test_places_are_drawn_by_length_and_weight() -> None:
+    table = LineTable.of(
+        [("short", line(10.0, 0.0), 1.0), ("long", line(40.0, 5.0), 1.0), ("rare", line(50.0, 9.0), 0.2)]
+    )
+    assert len(table.names) == 100
+    np.testing.assert_allclose(table.length_m, 1.0)
+    rng = np.random.default_rng(0)
+    drawn = [table.draw(np.arange(100), rng) for _ in range(6000)]
+    shares = {name: sum(one == name for one, _ in drawn) / 6000 for name in ("short", "long", "rare")}
+    assert shares == pytest.approx({"short": 10 / 60, "long": 40 / 60, "rare": 10 / 60}, abs=0.03)
+    along = np.array([s_m for name, s_m in drawn if name == "long"])
+    assert np.histogram(along, 4, (0.0, 40.0))[0] / len(along) == pytest.approx(0.25, abs=0.04)
+
+
+def test_only_pieces_inside_are_found() -> None:
+    table = LineTable.of([("lane", line(40.0, 0.0), 1.0)])
+    inside = table.inside(Region(radius_m=(0.0, 5.0), centre_m=(20.0, 0.0)))
+    assert table.s_m[inside].min() == pytest.approx(15.5) and table.s_m[inside].max() == pytest.approx(24.5)
+    assert not len(LineTable.of([]).inside(Region()))
