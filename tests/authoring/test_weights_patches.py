@@ -98,9 +98,9 @@ def test_every_command_is_one_that_gear_understands(task: str) -> None:
         args = parser.parse_args(step.arguments[1:])
         if step.name == "evaluate":
             folders = [f"{Path(args.out).parent}/{kind}" for kind in ("none", "random", "patched")]
-            assert args.data == folders and args.model_set == ["weights=none"]
+            assert args.data == folders and args.model_settings == ["weights=none"]
         if step.name == "attack":
-            assert (args.settings, args.model_set, args.every) == (["batch=1"], ["weights=none"], 25)
+            assert (args.settings, args.model_settings, args.every) == (["batch=1"], ["weights=none"], 25)
         if step.name == "gap":
             twins = [f"{Path(args.out).parent}/{kind}" for kind in ("none", "patched")]
             assert [args.dataset, args.twin] == twins and args.compositors == ["transport"]

@@ -167,8 +167,11 @@ def test_damaged_samples_and_bad_previews_are_said_and_not_fatal(
 
 def test_what_cannot_be_shown_or_written_is_one_line(write_dataset: Any, tmp_path: Path) -> None:
     root = write_dataset("depth", 1)
-    with pytest.raises(DatasetError, match="not a dataset"):
+    with pytest.raises(DatasetError, match="is a folder of 1 dataset; give one of them"):
         write_view(tmp_path, tmp_path / "page.html")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(DatasetError, match="not a dataset"):
+        write_view(tmp_path / "empty", tmp_path / "page.html")
     with pytest.raises(DatasetError, match="no split 'val'"):
         write_view(root, tmp_path / "page.html", split="val")
     (tmp_path / "file").write_text("")
@@ -208,7 +211,7 @@ def test_the_command_writes_a_page_and_says_where(
     root = write_dataset("depth", 2)
     out = tmp_path / "x.html"
     assert main(["view", str(root), "--out", str(out), "--samples", "1"]) == 0
-    assert capsys.readouterr().out.startswith(f"{out}: 1 samples, ")
+    assert capsys.readouterr().out.startswith(f"{out}: 1 sample, ")
     assert out.is_file()
     assert main(["view", str(tmp_path / "nothing")]) == 2
     with pytest.raises(SystemExit):
