@@ -68,7 +68,7 @@ class Compositor(Protocol):
 
 
 State = Mapping[str, npt.NDArray[Any]]
-"""What an attack needs to go on where it was cut off: arrays by name."""
+"""Arrays by name from which an interrupted attack resumes."""
 
 
 class Watch(Protocol):

@@ -16,10 +16,10 @@ from gear.contracts.tasks import Encoded, Evaluator, SplitInfo
 from gear.values.serial import Json
 
 Masks = Mapping[str, npt.NDArray[np.bool_]]
-"""(H, W) by camera name."""
+"""(H, W) bool by camera name."""
 
 Draws = npt.NDArray[np.int64]
-"""(R, N) numbers of gathered samples: each row chooses N of them, possibly some of them several times."""
+"""(R, N) indices of gathered samples: each row chooses N of them, possibly with repetition."""
 
 Spread = Mapping[str, npt.NDArray[np.float64]]
 """(R,) values by metric."""

@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     import mujoco
 
 Quality = Literal["film", "fast"]
-"""`film`: 2x2 supersampled, averaged in linear light. `fast`: one sample a pixel, gear's own edge filter."""
+"""`film`: 2x2 supersampling, averaged in linear light. `fast`: one sample per pixel with gear's own edge filter."""
 
 FULL_SCALE_LUX = 38400.0
-"""A radiance of so many cd/m² is full scale: Filament's fixed exposure (f/16, 1/125 s, ISO 100)."""
+"""Radiance, in cd/m², that is full scale at Filament's fixed exposure (f/16, 1/125 s, ISO 100)."""
 
 NO_OWN_RGBA = (0.5, 0.5, 0.5, 1.0)
-"""MuJoCo's default: a geom of this colour wears its material's."""
+"""MuJoCo's default colour; a geom with it has the colour of its material."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -15,10 +15,10 @@ ConfigT = TypeVar("ConfigT")
 ProductT = TypeVar("ProductT", covariant=True)
 
 PROTOCOL_VERSION = 1
-"""Raised when a protocol changes so that old plugins no longer fit."""
+"""Increased when a protocol changes so that older plugins no longer fit."""
 
 Gradient = Literal["differentiable", "surrogate", "none"]
-"""How gradients pass a defense: exactly, through a declared stand-in, or not at all."""
+"""How gradients pass a defense: exactly, through a declared substitute, or not at all."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -36,7 +36,7 @@ PredictionT_contra = TypeVar("PredictionT_contra", contravariant=True)
 
 NO_PATCH, RANDOM_PATCH = "none", "random"
 CONTROLS = (NO_PATCH, RANDOM_PATCH)
-"""Labels of patches that others are compared with."""
+"""Labels of the controls with which patches are compared."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

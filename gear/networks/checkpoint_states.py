@@ -22,13 +22,13 @@ STATES = ("model", "state_dict", "model_state_dict", "model_state", "net", "netw
 """Names under which checkpoints hold the network, the likelier ones first."""
 
 AVERAGED = ("ema", "avg", "average", "swa", "teacher")
-"""Words in the names of entries and prefixes that hold another state than the one that was trained."""
+"""Words in names of entries and prefixes whose state is an average or a teacher, not the trained network."""
 
 DEPTH = 4
-"""How deep in a checkpoint, and behind how many components of a prefix, the network may lie."""
+"""Nesting depth of entries, and number of components of a prefix, that are searched."""
 
 LEAST_SHARE = 0.2
-"""Of an entry's tensors, to be behind a prefix that is tried."""
+"""A prefix is tried if at least this share of an entry's tensors has it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

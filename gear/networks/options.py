@@ -11,7 +11,7 @@ SHIPPED = "shipped"
 NONE = "none"
 
 CIRCUMSTANCES = ("weights", "device", "precision", "seed")
-"""Options that say nothing of how weights are to be used."""
+"""Options that do not affect how weights are used, such as the device."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

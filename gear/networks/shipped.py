@@ -22,7 +22,7 @@ GROUP = "gear.weights"
 CHECKOUT = Path(__file__).resolve().parents[2] / "weights" / "gear_weights"
 
 JSON_KEYS = ("metrics", "intervals", "options", "data", "look", "averaged")
-"""Metadata whose texts are JSON."""
+"""Metadata keys whose texts are JSON."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -27,7 +27,7 @@ SCHEMAS = (
     "roi_align(Tensor input, Tensor rois, float spatial_scale, SymInt pooled_height, SymInt pooled_width, "
     "int sampling_ratio, bool aligned) -> Tensor",
 )
-"""As torchvision declares them; qnms, for quantised boxes, only has to exist."""
+"""Operators as torchvision declares them; qnms, for quantised boxes, only has to exist."""
 
 _libraries: list[torch.library.Library] = []
 
@@ -74,7 +74,7 @@ def _define_operators() -> None:
         library.define(schema)
     library.impl("nms", torchvision_ops.nms, "CompositeExplicitAutograd")
     library.impl("roi_align", torchvision_ops.roi_align, "CompositeImplicitAutograd")
-    _libraries.append(library)  # the operators live as long as their library
+    _libraries.append(library)  # operators exist as long as their library object
 
 
 def _import_again() -> None:

@@ -19,18 +19,20 @@ from gear.networks.shipped import check_file, not_safetensors, resolve
 from gear.values.errors import GearError
 
 OPTIONAL = "num_batches_tracked"
-"""Files older than this counter lack it; nothing uses it."""
+"""Counter that older files lack and that nothing uses."""
 
 SHORT = (torch.float16, torch.bfloat16, torch.float8_e4m3fn, torch.float8_e5m2)
-"""Numbers that are stored in fewer bits than gear's networks have."""
+"""Number formats with fewer bits than gear's networks use."""
 
 SHOWN_KEYS = 3
 
 HEADER_AT = 8
-"""A safetensors file is the length of its header in eight bytes, the header as JSON, the tensors."""
+"""Bytes before the header: a safetensors file is the header's length, the header as JSON, and the tensors."""
 
 LEAST_SHARED = 0.25
-"""Of a network's numbers, for a file to be its trunk: heads are small, and a few layers alone are an accident."""
+"""Share of a network's numbers that a file must have to count as its trunk: heads are small, and a few equal layers are
+a coincidence.
+"""
 
 GraphT = TypeVar("GraphT", bound=nn.Module)
 
@@ -163,7 +165,7 @@ def _in_order(data: bytes) -> bytes:
     header = json.loads(data[HEADER_AT : HEADER_AT + length])
     header["__metadata__"] = dict(sorted(header.get("__metadata__", {}).items()))
     text = json.dumps(header, separators=(",", ":")).encode()
-    text += b" " * (-len(text) % HEADER_AT)  # tensors begin at multiples of eight
+    text += b" " * (-len(text) % HEADER_AT)  # tensors start at multiples of eight bytes
     return len(text).to_bytes(HEADER_AT, "little") + text + data[HEADER_AT + length :]
 
 

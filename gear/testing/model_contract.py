@@ -108,7 +108,7 @@ class ModelContract:
         for one, prediction in zip(views, alone, strict=True):
             (found,) = many([one])
             assert share_apart(found, prediction, self.tolerance) <= 0.01, "a sample has another prediction than alone"
-        first, second = many(views)  # batches may round otherwise, and a detector's boxes then change places
+        first, second = many(views)  # batches may round differently, which may reorder a detector's boxes
         for found, own, other in ((first, *alone), (second, *reversed(alone))):
             apart, swapped = (share_apart(found, one, self.tolerance) for one in (own, other))
             assert apart <= swapped, "predictions are not in the samples' order"

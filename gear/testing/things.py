@@ -79,7 +79,7 @@ SLOTS = (
     (CAR, 37.0, -1.0),
     (PERSON, 42.0, 7.5),
 )
-"""What stands in `street`: what, how far ahead and how far to the left in metres; far enough apart never to overlap."""
+"""Objects of `street`: kind, distance ahead and to the left in metres; far enough apart never to overlap."""
 
 
 def board(distance_m: float, left_m: float = 0.0, *, surface: int = 0, bottom_m: float = 0.15) -> Thing:

@@ -21,7 +21,7 @@ from gear.world.world import World
 DATA = Path(__file__).parent / "data"
 
 TINY_TOWN = DATA / "mjcf" / "towns" / "tiny.xml"
-"""The town's MJCF: `--town` takes this path."""
+"""Path of the town's MJCF, which `--town` takes."""
 
 TINY_SCENES = DATA / "scenes" / "tiny.yml"
 """Its scene library: `board`, `double`, `truck`, `no_billboard`."""
@@ -29,7 +29,7 @@ TINY_SCENES = DATA / "scenes" / "tiny.yml"
 CLEAR = Weather(name="ClearNoon", cloudiness=5.0, sun_altitude_deg=60.0)
 
 SMALL_RIG = Rig(cameras=(CameraMount(name="rgb", width_px=320, height_px=160),))
-"""One small camera where the paper's stands."""
+"""One small camera in the place of the paper's."""
 
 
 def tiny_scenes() -> SceneLibrary:

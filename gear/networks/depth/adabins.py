@@ -21,7 +21,7 @@ from gear.networks.network import Normalise
 
 BINS = "bin_centres_m"
 CHAMFER_WEIGHT = 0.1
-"""The paper's beta."""
+"""Weight beta of the bins' loss (equation 6 of the paper)."""
 
 OLD_NAMES = (
     ("adaptive_bins_layer.embedding_conv.", "adaptive_bins_layer.conv3x3."),
@@ -30,7 +30,7 @@ OLD_NAMES = (
         "adaptive_bins_layer.patch_transformer.embedding_convPxP.",
     ),
 )
-"""Two layers are called otherwise in the published files than in the code that reads them."""
+"""Two layers have other names in the published files than in the authors' current code."""
 
 
 class AdaBins(DepthNetwork):

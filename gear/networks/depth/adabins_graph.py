@@ -22,11 +22,11 @@ PATCH_PX = 16
 """Side of a token's patch in the feature map, which has half the picture's sides."""
 
 MOST_PATCHES = 500
-"""As many have a position encoding."""
+"""Number of position encodings."""
 
 HIDDEN = 256
 LEAST_WIDTH = 0.1
-"""Added to every bin's width before the widths are normalised: no bin is empty."""
+"""Added to every bin's width before normalisation, so that no bin is empty."""
 
 
 class AdaBinsGraph(nn.Module):
@@ -96,7 +96,7 @@ class Decoder(nn.Module):
     def __init__(self, widths: Sequence[int], features: int) -> None:
         super().__init__()
         half, quarter, eighth, sixteenth, deepest = widths
-        # The padding around a 1x1 convolution makes its map two pixels larger. The published weights were trained so.
+        # The padding of this 1x1 convolution enlarges its map by two pixels. The published weights were trained so.
         self.conv2 = nn.Conv2d(deepest, features, 1, padding=1)
         self.up1 = Up(features + sixteenth, features // 2)
         self.up2 = Up(features // 2 + eighth, features // 4)

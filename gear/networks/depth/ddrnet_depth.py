@@ -15,15 +15,15 @@ from gear.networks.network import Normalise
 from gear.networks.segmentation.ddrnet import DDRNet23Slim
 
 MIDDLE_M = 10.0
-"""What a channel of 0 means; so that training begins near the depths of streets."""
+"""Depth for an output of 0, so that training starts near typical depths of streets."""
 
 RANGE_M = (0.05, 1000.0)
-"""Answers are kept in it, for the sake of finite numbers."""
+"""Predictions are clamped to this range, so that all numbers are finite."""
 
 LAST_STD = 0.05
 
 RMS_UNIT_M = 20.0
-"""An error of this size in metres weighs like one of the logarithm by a factor of e."""
+"""A root mean square error of this size counts as much as a logarithmic error of 1."""
 
 
 def ddrnet_depth_graph() -> DDRNet23Slim:

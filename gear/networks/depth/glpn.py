@@ -23,7 +23,7 @@ from gear.networks.depth.packages import need_transformers
 MULTIPLE_PX = 32
 
 LEAST_PX = MULTIPLE_PX // 2 + 1
-"""Of a picture's sides: of fewer pixels there is not enough to mirror."""
+"""Smallest side of a picture; smaller ones are too small for reflection."""
 
 
 class Glpn(DepthNetwork):

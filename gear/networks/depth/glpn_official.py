@@ -28,10 +28,10 @@ NUMBERED: tuple[tuple[str, str], ...] = (
     (r"^glpn\.encoder\.block(\d)\.", "glpn.encoder.block.{}."),
     (r"^glpn\.encoder\.norm(\d)\.", "glpn.encoder.layer_norm.{}."),
 )
-"""Stages, which the published files count from 1."""
+"""Stages, which published files count from 1."""
 
 JOINT = ".attn.kv."
-"""Keys and values come from one layer there: its first half of outputs are the keys."""
+"""In published files keys and values are outputs of one layer, of which the first half are the keys."""
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:

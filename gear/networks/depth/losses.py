@@ -11,13 +11,13 @@ from torch import Tensor
 from torch.nn import functional
 
 LEAST_M = 1e-3
-"""Nearer than this nothing is, and logarithms are taken of no less."""
+"""Lower limit of depths in logarithms; no object is nearer."""
 
 LEAST_SQUARE = 1e-12
-"""Keeps the gradient of a root finite where the error vanishes."""
+"""Keeps the gradient of a square root finite where the error is 0."""
 
 CAP_M = 80.0
-"""As far as KITTI's depth is customarily learnt and judged."""
+"""Depth up to which KITTI's benchmark is usually trained and evaluated."""
 
 
 def known(depth_m: Tensor, cap_m: float | None = CAP_M) -> Tensor:

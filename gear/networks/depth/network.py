@@ -80,5 +80,6 @@ def resized(maps: Tensor, height: int, width: int) -> Tensor:
     """
     if tuple(maps.shape[2:]) == (height, width):
         return maps
-    is_less = height < maps.shape[2] or width < maps.shape[3]  # elsewhere there is nothing to average, only more to do
+    # When enlarging, anti-aliasing changes nothing and costs time.
+    is_less = height < maps.shape[2] or width < maps.shape[3]
     return functional.interpolate(maps, (height, width), mode="bilinear", align_corners=False, antialias=is_less)

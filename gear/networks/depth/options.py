@@ -9,10 +9,10 @@ from gear.networks.options import LARGEST_SCALE, NetworkOptions
 from gear.values.errors import FieldError
 
 STAGES = 4
-"""Stages of a mix transformer."""
+"""Number of stages of a mix transformer."""
 
 HEADS = (1, 2, 5, 8)
-"""Attention heads of a mix transformer's stages, whatever its size."""
+"""Attention heads of the stages of a mix transformer of any size."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -28,10 +28,10 @@ OBJECTNESS, RPN_DELTAS, ANCHORS_PX = "objectness", "rpn_bbox_regression", "ancho
 PROPOSALS, LOGITS, DELTAS = "proposals_px", "class_logits", "box_regression"
 
 MAPS = ("0", "1", "2", "3", "pool")
-"""Feature maps at 1/4 to 1/64 of what the graph sees, as torchvision names them."""
+"""Feature maps at 1/4 to 1/64 of the graph's input, by torchvision's names."""
 
 SURE_BACKGROUND = 20.0
-"""The background's logit where there is no proposal."""
+"""Background logit of padded proposals."""
 
 
 class FasterRcnnDetector(Detector):
@@ -60,7 +60,7 @@ class FasterRcnnDetector(Detector):
         (proposals,) = self._proposals(trunk)
         logits, deltas = self._box_heads(trunk, [proposals])
         missing = graph.rpn.post_nms_top_n() - len(proposals)
-        nothing = logits.new_zeros(1, logits.shape[1])  # there may be no proposal at all
+        nothing = logits.new_zeros(1, logits.shape[1])  # a picture may have no proposals
         nothing[:, 0] = SURE_BACKGROUND
         shrinkage = self.shrinkage(size_of(picture))
         return {
@@ -159,7 +159,7 @@ class FasterRcnnDetector(Detector):
         proposals = heads.add_gt_proposals(proposals, boxes)
         matched, labels = heads.assign_targets_to_proposals(proposals, boxes, [target.labels for target in wanted])
         chosen = heads.subsample(_without_ignored(labels, proposals, wanted))
-        # A picture without objects matches its background to one empty box, which no loss looks at.
+        # In a picture without objects the background is matched to one empty box, which no loss uses.
         some = [each if len(each) else each.new_zeros(1, 4) for each in boxes]
         truth = [each[match[keep]] for each, match, keep in zip(some, matched, chosen, strict=True)]
         kept = [each[keep] for each, keep in zip(proposals, chosen, strict=True)]

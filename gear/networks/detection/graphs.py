@@ -16,26 +16,26 @@ from gear.networks.efficientnet_lite0 import CHANNELS as LITE0_CHANNELS
 from gear.networks.efficientnet_lite0 import OnLite0, features_of_lite0
 
 TRAINABLE_STAGES = 3
-"""Of the published detectors; the stem and the first stage stay as ImageNet left them."""
+"""Trainable stages of the published detectors; the stem and the first stage keep their ImageNet weights."""
 
 CHANNELS = 128
-"""Of the reference detectors' pyramid and heads."""
+"""Channels of the reference detectors' pyramid and heads."""
 
 GROUPS = 32
 
 STRIDES_PX = (8, 16, 32, 64, 128)
 ANCHOR_STRIDES = 1.5
-"""Side of the smallest anchor of a feature map in its strides; the published networks have 4."""
+"""Side of the smallest anchor of a feature map, in strides of the map; the published networks have 4."""
 
 OCTAVES = (1.0, 2 ** (1 / 3), 2 ** (2 / 3))
 ASPECT_RATIOS = (0.5, 1.0, 2.0)
 """Height over width."""
 
 LITE0_LEVELS = (2, 3, 4)
-"""Of `gear.networks.efficientnet_lite0.LEVELS`, those at 1/8, 1/16 and 1/32."""
+"""Indices into `gear.networks.efficientnet_lite0.LEVELS` of the maps at 1/8, 1/16 and 1/32."""
 
 LITE0_HEAD_DEPTH = 2
-"""Convolutions in each of its heads; RetinaNet has four, in which CPUs would spend half of every step."""
+"""Convolutions in each of its heads; RetinaNet has four, which would take half of each step on a CPU."""
 
 
 def fasterrcnn_r50_fpn(least_score: float) -> nn.Module:

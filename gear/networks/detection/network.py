@@ -21,13 +21,13 @@ from gear.networks.network import IMAGENET_MEAN, IMAGENET_STD, Network, Normalis
 
 VIEW = "left"
 DIVISOR_PX = 32
-"""Sides of what the graph sees are multiples of this, as torchvision pads them."""
+"""Sides of the graph's input are padded to multiples of this, as in torchvision."""
 
 ANCHORS, PICTURE = "anchors", "picture_px"
-"""What losses are given beside the heads' outputs: (B, N, 4) in the graph's pixels; (B, 2) height and width."""
+"""Further inputs of the losses: (B, N, 4) in the graph's pixels; (B, 2) height and width."""
 
 MOSTLY = 0.5
-"""Background of which this share lies in ignored objects is not learnt."""
+"""Background is not trained on if this share of it lies in ignored objects."""
 
 Size = tuple[int, int]
 """Height and width."""
@@ -74,7 +74,7 @@ class Detector(Network):
     options: DetectorOptions
     has_quick_copy = True
     generator: ClassVar[str] = "anchor_generator"
-    """Where the graph keeps what makes its anchors."""
+    """Name under which the graph keeps its anchor generator."""
 
     def __init__(
         self, graph: nn.Module, options: DetectorOptions, *, sizing: Sizing, categories: Sequence[int | None]
@@ -164,7 +164,7 @@ class Detector(Network):
 
 OFFICIAL_CLASSES = 91
 OFFICIAL_CATEGORIES = tuple(number if number in CATEGORY_NAMES else None for number in range(OFFICIAL_CLASSES))
-"""Classes of the published detectors are COCO's ids, with gaps; 0 is the background."""
+"""Classes of the published detectors are COCO's category ids, with gaps; 0 is the background."""
 
 
 def size_of(pictures: Tensor) -> Size:

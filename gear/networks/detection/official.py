@@ -15,7 +15,7 @@ OLD_NAMES = (
     (r"(head\.\w+_head\.conv)\.4\.(weight|bias)", r"\1.2.0.\2"),
     (r"(head\.\w+_head\.conv)\.6\.(weight|bias)", r"\1.3.0.\2"),
 )
-"""How the files of 2019 and 2020 say it: no block around a convolution, activations counted."""
+"""Key names in files of 2019 and 2020, which lack the block around a convolution and count activations."""
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:

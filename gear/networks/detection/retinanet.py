@@ -27,7 +27,7 @@ LITE_TAPS = (1, 2, 4, 6)
 
 FIRST_STRIDE_PX = 8
 LEVELS = 5
-"""Feature maps at 1/8 to 1/128 of what the graph sees."""
+"""Feature maps at 1/8 to 1/128 of the graph's input."""
 
 
 class RetinaNetDetector(Detector):

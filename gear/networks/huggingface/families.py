@@ -16,7 +16,7 @@ HALF = (0.5, 0.5, 0.5)
 STEPS = ("do_resize", "do_rescale", "do_normalize", "do_pad", "do_center_crop")
 
 FOR_LABELS_OR_OTHER_FILES = ("do_reduce_labels", "do_convert_annotations", "do_convert_rgb")
-"""Steps that leave gear's pictures as they are: those are RGB, and its labels are its own."""
+"""Steps that do not change gear's pictures: these are RGB, and labels are not processed."""
 
 EVERYWHERE: Mapping[str, Any] = MappingProxyType(
     {"do_resize": True, "do_rescale": True, "rescale_factor": 1 / 255, "do_normalize": True, "do_pad": False,
@@ -27,11 +27,12 @@ EVERYWHERE: Mapping[str, Any] = MappingProxyType(
 NEEDED_PX: Mapping[str, int] = MappingProxyType(
     {"glpn": 32, "rt_detr": 32, "rt_detr_v2": 32, "d_fine": 32, "deimv2": 32}
 )
-"""By `model_type`: what sides must be multiples of, or a network's maps of several scales do not fit one another."""
+"""By `model_type`: divisor of the sides, without which a network's feature maps of several scales do not match."""
 
 IN_PATCHES = ("beit", "data2vec-vision", "depth_anything", "dpt", "yolos", "zoedepth")
-"""By `model_type`: networks that look at whole patches only. What is left of a picture on the right and below they do
-not see, and what they say is of the rest alone."""
+"""By `model_type`: networks that process whole patches alone; a remainder on the right and at the bottom is not seen,
+and the output covers the rest of the picture.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -22,13 +22,13 @@ from gear.values.errors import GearError
 ADAPTER = "write an adapter (docs/how-to/write-a-model.md)"
 
 SHOWN = 240
-"""Characters of what transformers says."""
+"""Characters of transformers' messages that an error quotes."""
 
 OF_TIMM = {"in_chans": "num_channels", "out_indices": "out_indices", "output_stride": "output_stride"}
-"""What transformers before 5 says of a backbone of timm's in `backbone_kwargs`, and what it says since."""
+"""Keys of `backbone_kwargs` for a backbone of timm before transformers 5, and their current names."""
 
 DILATED_STRIDE_PX = 16
-"""Of the last map of such a backbone that is dilated, where nothing else is said."""
+"""Stride of the last map of a dilated backbone, where the config states none."""
 
 
 def open_folder(options: FolderOptions, auto: str) -> nn.Module:
@@ -51,7 +51,7 @@ def open_folder(options: FolderOptions, auto: str) -> nn.Module:
     try:
         with _quietly(), _offline():
             graph, found = _opened(options, auto)
-    except Exception as error:  # transformers lets out whatever a broken file happens to raise
+    except Exception as error:  # transformers passes on any exception that a damaged file causes
         raise _refused(folder, auto, error) from error
     _check(graph, found, folder)
     if options.weights not in (FOLDER, NONE):
@@ -78,7 +78,7 @@ def _opened(options: FolderOptions, auto: str) -> tuple[nn.Module, Mapping[str, 
     import transformers
 
     kind: Any = getattr(transformers, auto)
-    # Left open, transformers asks, and runs the folder's code at a "y".
+    # If left open, transformers asks the user, and runs the folder's code after a "y".
     common: dict[str, Any] = {"local_files_only": True, "trust_remote_code": False}
     said = read_mapping(Path(options.folder) / "config.json")
     described = _with_backbone(said)
@@ -88,14 +88,14 @@ def _opened(options: FolderOptions, auto: str) -> tuple[nn.Module, Mapping[str, 
         else transformers.AutoConfig.for_model(**described)
     )
     if options.weights == FOLDER:
-        # In the precision of the file, as transformers would have it, the network does not take gear's pictures.
+        # In the file's own precision, the default of transformers, the network does not accept gear's pictures.
         loaded: tuple[nn.Module, Mapping[str, Any]] = kind.from_pretrained(
             options.folder,
             config=config,
             use_safetensors=True,
             dtype=torch.float32,
             output_loading_info=True,
-            ignore_mismatched_sizes=True,  # `_check` says which they are, transformers refers to its own table
+            ignore_mismatched_sizes=True,  # `_check` names them; transformers refers to a table of its own
             **common,
         )
         return loaded

@@ -12,7 +12,7 @@ SYNONYMS = {
     "pottedplant": "potted plant", "route": "road", "signboard": "traffic sign", "sofa": "couch", "tree": "vegetation",
     "tvmonitor": "tv", "van": "car",
 }  # fmt: skip
-"""Of Pascal VOC, ADE20K and their kin. Used where the name itself is unknown."""
+"""Synonyms from Pascal VOC, ADE20K and similar data sets, used where the name itself is unknown."""
 
 
 def match(names: Mapping[int, str], known: Mapping[str, int]) -> tuple[dict[int, int], tuple[str, ...]]:

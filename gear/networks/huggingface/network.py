@@ -33,12 +33,12 @@ VIEW = "left"
 LOGITS, DEPTH, BOXES, PICTURE = "logits", "depth_m", "pred_boxes", "picture"
 
 UNKNOWN_LOGIT = -50.0
-"""Of classes that the network does not have."""
+"""Logit of classes that the network does not have."""
 
 NEAREST_M = 1e-3
 
 METRIC_TYPES = ("glpn", "zoedepth")
-"""Families whose every network says metres; others say so in `depth_estimation_type`."""
+"""Families all of whose networks predict metres; others state it in `depth_estimation_type`."""
 
 logger = logging.getLogger(__name__)
 
@@ -167,7 +167,7 @@ class FolderDepth(FolderNetwork):
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """`depth_m` (B, H, W) in metres at the picture's size."""
         said = self.said(self.seen(pictures)).predicted_depth.float()
-        said = self.restored(said[:, None], pictures, "bicubic")[:, 0]  # as transformers does
+        said = self.restored(said[:, None], pictures, "bicubic")[:, 0]  # as in transformers
         if self.options.inverse_scale:
             inverse = self.options.inverse_scale * said + self.options.inverse_shift
             said = 1 / inverse.clamp(min=1e-3)
@@ -227,7 +227,7 @@ class FolderDetector(FolderNetwork):
             scores = self._scores(logits)
             edges = torch.cat([boxes[:, :2] - boxes[:, 2:] / 2, boxes[:, :2] + boxes[:, 2:] / 2], dim=1) * scale
             edges = edges.clamp(min=0).minimum(scale)
-            surest, places = scores.flatten().topk(len(scores))  # as many as there are queries, whatever their class
+            surest, places = scores.flatten().topk(len(scores))  # as many as queries, of any class
             found = [
                 Detection(category_id=self._categories[index], box_px=(box[0], box[1], box[2], box[3]), score=score)
                 for score, index, box in zip(

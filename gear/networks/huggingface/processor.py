@@ -89,7 +89,7 @@ class Processor:
             return functional.interpolate(pictures, target, mode=self.mode)
         if self.aligns_corners:
             return functional.interpolate(pictures, target, mode=self.mode, align_corners=True)
-        # Theirs are whole levels, which cannot overshoot as a bicubic does.
+        # Pillow returns whole levels, which cannot overshoot as bicubic interpolation does.
         return functional.interpolate(pictures, target, mode=self.mode, antialias=True).clamp(0, 1)
 
     def _multiple(self, side_px: float) -> int:
@@ -126,6 +126,6 @@ def _with_edges(picture_px: Size, edge_px: int, most_px: int | None) -> Size:
     rounded = round(exact)
     if rounded == short:
         return picture_px
-    # Theirs rounds the shorter side only: the longer one follows from what it was before.
+    # transformers rounds the shorter side alone; the longer one follows from its unrounded value.
     height, width = (rounded if side == short else int(exact * side / short) for side in picture_px)
     return height, width

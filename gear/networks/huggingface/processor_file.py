@@ -16,15 +16,15 @@ from gear.values.regular_file import read_regular
 FILE = "preprocessor_config.json"
 
 RESAMPLING = {0: "nearest-exact", 2: "bilinear", 3: "bicubic"}
-"""By Pillow's numbers."""
+"""torch's interpolation modes by Pillow's numbers."""
 
 MOST_PX = 1 << 15
-"""No picture that a network sees is larger: it would not fit into memory."""
+"""Upper limit of sizes in the file; larger pictures would not fit into memory."""
 
 YOLOS_PATCH_PX = 16
 
 DETR_LONGEST_PX = 1333
-"""Of files from before `longest_edge`, which say `max_size` or nothing."""
+"""For files without `longest_edge`, which state `max_size` or nothing."""
 
 
 def read_processor(folder: Path, *, resizes: bool = True, config: object = None) -> Processor:
@@ -152,12 +152,12 @@ _EDGES = {"shortest_edge", "longest_edge"}
 def _processor(name: str, facts: _Facts, needed_px: int, *, resizes: bool) -> Processor:
     does_resize = facts.flag("do_resize")
     if resizes and facts.flag("do_center_crop"):
-        # What lies outside would have no answer, and answers are held against labels of the whole picture.
+        # The part outside would have no prediction, but predictions are compared with labels of the whole picture.
         raise facts.refuse("do_center_crop", "false (or set input_size to picture), for gear scores whole pictures")
     size = facts.size() if does_resize and name != "GLPN" else None
     scale = 255 * facts.number("rescale_factor") if facts.flag("do_rescale") else 255.0
     mean, std = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
-    if facts.flag("do_normalize") and name != "MobileViT":  # whose class never does
+    if facts.flag("do_normalize") and name != "MobileViT":  # whose class never pads
         mean, std = facts.channels("image_mean", is_positive=False), facts.channels("image_std", is_positive=True)
     multiple_px = _multiple_px(name, facts, size) if does_resize else 1
     pads_to_px = facts.pixels("size_divisor") if name == "DPT" and facts.flag("do_pad") else 0

@@ -18,23 +18,23 @@ PAIRS = (
     ("enc_topk_logits", "enc_topk_bboxes"),
     ("enc_outputs_class", "enc_outputs_coord"),
 )
-"""What the losses are given of queries, by name: of the last layer, of all layers, of the encoder."""
+"""Arguments of the losses with classes and boxes of queries: of the last layer, of all layers, of the encoder."""
 
 BATCH_FIRST = "enc_topk_logits"
-"""Losses that are given this have all layers' queries as (B, layers, …), others as (layers, B, …)."""
+"""Losses with this argument take the queries of all layers as (B, layers, …), others as (layers, B, …)."""
 
 DENOISING, NOTHING_NOISED = "denoising_meta_values", {"dn_num_split": (0,)}
 NOISED = ("logits", "outputs_class")
-"""In training, begin with queries that are noised boxes of the objects; those always take part."""
+"""In training these begin with queries that are noised boxes of the objects, which always take part."""
 
 IGNORED = "ignored"
-"""Beside the labels' `boxes`: those of what is neither to be found nor background."""
+"""Key of the labels for boxes that are neither targets nor background, in addition to `boxes`."""
 
 NEAR = 0.4
-"""A query whose box overlaps (IoU) that of an object to be found by more is about that one, as RetinaNet's anchors."""
+"""A query whose IoU with a target's box exceeds this belongs to that target, as with RetinaNet's anchors."""
 
 SURE, FAR = 50.0, 10.0
-"""Logit of the background, and middle of the box in sides of the picture, of queries that take no part."""
+"""Background logit and box centre (in sides of the picture) of queries that take no part."""
 
 
 def set_loss(loss: Callable[..., Any], device_type: str, *said: Any, **more: Any) -> Any:

@@ -14,7 +14,7 @@ BRANCH_PLANES = 128
 HEAD_PLANES = 64
 
 WRAPPER = "model."
-"""The authors save the wrapper that they train with; its criterion has weights of its own."""
+"""Prefix of the training wrapper that the authors save; its criterion has weights too."""
 
 
 class DDRNet23Slim(nn.Module):

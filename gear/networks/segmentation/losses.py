@@ -36,7 +36,9 @@ def train_ids(samples: Sequence[SegmentedSample], device: torch.device) -> Tenso
 
 
 STEP_PX = 2
-"""Training compares every second pixel of every second row: maps at 1/8 know little more, in a quarter of the time."""
+"""Training compares every second pixel of every second row: maps at 1/8 hold little more, and it takes a quarter of the
+time.
+"""
 
 
 def offsets_px(index: int) -> tuple[int, int]:
@@ -114,11 +116,12 @@ SHARES = (
     0.278, 0.101, 0.199, 0.0050, 0.0045, 0.0071, 0.0003, 0.0023, 0.054, 0.046, 0.250, 0.0031, 0.0004, 0.0083, 0.0035,
     0.0021, 0.0, 0.0003, 0.0002,
 )  # fmt: skip
-"""Of the pixels of 1005 pictures of gear's towns, by train id."""
+"""Share of each train id among the pixels of 1005 pictures of gear's towns."""
 
 BALANCED: tuple[float, ...] = tuple(math.log(1.02 + share) ** -0.5 for share in SHARES)
-"""Weights by class, from 2 (road) to 7: the root of those in Paszke et al., "ENet", arXiv 1606.02147, §5.2, because
-leaving out easy pixels already takes most of the common classes away."""
+"""Weights by class, from 2 (road) to 7: square roots of those in Paszke et al., "ENet", arXiv 1606.02147, section 5.2,
+because hard example mining already leaves out most pixels of frequent classes.
+"""
 
 
 class SegmentationLosses:

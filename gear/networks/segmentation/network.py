@@ -19,10 +19,10 @@ VIEW = "left"
 LOGITS = "logits"
 MAPS = "maps"
 AUXILIARY = "auxiliary"
-"""Outputs of further heads, which only losses see, are `auxiliary_0`, `auxiliary_1`, ..."""
+"""Outputs of training heads are `auxiliary_0`, `auxiliary_1` and so on."""
 
 STRIDE_PX = 8
-"""Networks give their maps at 1/8 of what they look at, so its sides are multiples of this."""
+"""Output maps are at 1/8 of the network's input, whose sides are multiples of this."""
 
 LABEL_ID_OF_TRAIN_ID = tuple(
     label.id for label in sorted(LABELS, key=lambda label: label.train_id) if label.train_id != IGNORED_TRAIN_ID
@@ -31,7 +31,7 @@ LABEL_IDS = np.array(LABEL_ID_OF_TRAIN_ID, dtype=np.uint8)
 CLASSES = len(LABEL_IDS)
 
 Losses = Callable[[Mapping[str, Tensor], Sequence[Any]], Mapping[str, Tensor]]
-"""Named numbers from outputs and the batch's samples."""
+"""Function from outputs and the batch's samples to scalar losses by name."""
 
 
 class SemsegNetwork(Network):

@@ -22,7 +22,7 @@ from gear.values.geometry import Array
 
 UPSAMPLED = 2
 MOST_SAMPLES = 56
-"""Rows, and columns, of a box that are looked at; the box is sampled more sparsely where it has more."""
+"""Largest number of rows, and of columns, of a box that are compared; larger boxes are subsampled."""
 
 COARSE_STEPS, COARSE_M = 50, 0.5
 FINE_STEPS, FINE_M = 20, 0.05

@@ -20,7 +20,7 @@ from gear.values.geometry import Array, wrap_angle_rad
 from gear.values.ground_truth import BoxPx
 
 BORDER_PX = (20.0, 10.0)
-"""A side of the box this near to the picture's edge, in x and in y, may be the picture's and not the car's."""
+"""A side of a box within this distance, in x and y, of the picture's edge may be cut by the picture."""
 
 LEAST_BOX_PX, LEAST_SEEN_PX = 10.0, 3.0
 CORNER_WEIGHT = 2.0
@@ -29,7 +29,7 @@ NEAREST_M = 0.5
 ROUNDS = 5
 
 SIGNS = np.array([(-1, -1), (-1, 1), (1, 1), (1, -1)]) / 2
-"""Corners on the ground in widths to the right and lengths to the front, in the order of the keypoint's four types."""
+"""Ground corners in widths to the right and lengths to the front, in the order of the keypoint's four types."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -148,7 +148,7 @@ class _Problem:
             rows=(np.array([top, bottom]) - lens.cy_px) / lens.fy_px,
             right_sides=(np.array(measured.right_sides_px) - lens.cx_px) / focal,
             corner=(measured.corner_px - lens.cx_px) / focal,
-            # A car that the picture cuts shows no share to be trusted.
+            # For a car that the picture cuts, the share is not reliable.
             alpha_rad=measured.alpha_of_corner_rad if is_whole else measured.alpha_rad,
             weights=np.array(weights, dtype=np.float64),
         )
@@ -181,7 +181,7 @@ class _Problem:
         c, s = math.cos(rotation_y), math.sin(rotation_y)
         across, along = self.measured.width_m * SIGNS[:, :1], self.measured.length_m * SIGNS[:, 1:]
         places = np.array([x, z]) + across * (-s, -c) + along * (c, -s)
-        # A step of the solver may take the box through the camera; what is seen must stay finite there.
+        # A step of the solver may move the box through the camera; projections must stay finite.
         places[:, 1] = np.maximum(places[:, 1], NEAREST_M)
         return places, y
 

@@ -30,10 +30,10 @@ MULTIPLE = 32
 MATCHING_STRIDE = 2
 PRIOR_SIZE_M = (1.6, 1.8, 3.9)
 HEADINGS = 24
-"""Directions, evenly round the circle from 0 on, of which an observation angle is a distribution."""
+"""Number of directions, spaced evenly from 0, over which an observation angle is a distribution."""
 
 PRIOR_HEAT = -4.6
-"""A hundredth: what a cell says at first."""
+"""Probability of a centre in every cell before training."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,7 +85,7 @@ def _band(left: Tensor, right: Tensor, disparities: int) -> Tensor:
     batch, channels, height, width = left.shape
     one = functional.normalize(left, dim=1).permute(0, 2, 3, 1).reshape(batch * height, width, channels)
     two = functional.normalize(right, dim=1).permute(0, 2, 1, 3).reshape(batch * height, channels, width)
-    # All columns against all columns of a row is one product of matrices, of which a band is kept: faster than a
+    # All pairs of columns in a row are one matrix product, of which a band is kept: faster than one
     # product for each shift. With one more column a row, the band's rows lie one apart in memory.
     all_pairs = functional.pad(torch.bmm(one, two), (disparities - 1, 1))
     rows, _, step = all_pairs.stride()
@@ -122,7 +122,8 @@ class CentreGraph(nn.Module, ABC):
     log_bins: Tensor
 
     corrects_surface: ClassVar[bool] = False
-    """Whether the disparity of an object's middle is said as a change to what the volume says of the surface there."""
+    """Whether the disparity of an object's centre is predicted as a correction of the surface disparity of the volume.
+    """
 
     def __init__(self, shape: StereoCentreShape, channels: Sequence[int], pyramid: int) -> None:
         """Builds everything after the trunk.

@@ -17,11 +17,12 @@ from gear.metrics.boxes import iou_2d
 from gear.values.geometry import Array, Intrinsics, wrap_angle_rad
 
 TRUSTED_M = 1.0
-"""A detection's score is the geometric mean of the chances that it is one, that its depth is this right, and that its
-line is, where that matters."""
+"""A detection's score is the geometric mean of the probabilities that it is an object, that its depth is correct within
+this distance, and, where it matters, that its axis is correct.
+"""
 
 LONG = ("Car", "Van", "Truck", "Cyclist")
-"""Kinds whose boxes lie elsewhere when they are turned."""
+"""Kinds whose 3D boxes change much when they are turned."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,7 +15,8 @@ from gear.networks.efficientnet_lite0 import CHANNELS, LEVELS, OnLite0, features
 from gear.networks.stereo.centre import CentreGraph, StereoCentreShape
 
 FUSE_STD = 0.01
-"""What it adds is under a hundredth of a map that ImageNet taught the trunk to give."""
+"""Initial standard deviation of the fusing layer's weights, so that it adds under a hundredth of the trunk's own map.
+"""
 
 
 class StereoCentreLite0(CentreGraph, OnLite0):

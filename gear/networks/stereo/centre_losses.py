@@ -22,13 +22,13 @@ from gear.values.ground_truth import BoxPx
 Whole = npt.NDArray[np.int64]
 
 PEAK_SHARE = 0.54 / 6
-"""Standard deviation of a centre's bump over the box's side (TTFNet, Liu et al., AAAI 2020)."""
+"""Standard deviation of a centre's Gaussian as a share of the box's side (TTFNet, Liu et al., AAAI 2020)."""
 
 LEAST_SIGMA = 0.7
-"""In cells: the bump of a small object still reaches the cells beside its own."""
+"""Smallest standard deviation in cells, so that a small object's Gaussian reaches the neighbouring cells."""
 
 COUNTED_FROM = 0.1
-"""Height of the bump from which a cell learns what the object is."""
+"""Value of the Gaussian from which on a cell is trained on the object."""
 
 FOCAL_POWER, BUMP_POWER = 2.0, 4.0
 ALMOST_ZERO = 1e-6

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 MOST_GROWTH = 4.135
-"""Logarithm of how many times an anchor can grow: 1000 / 16, as later networks have it."""
+"""Largest logarithm of the size ratio of box and anchor: of 1000 / 16, as in later networks."""
 
 
 def sides(boxes: Tensor) -> Tensor:

@@ -13,7 +13,7 @@ SOLID = ("Car", "Van", "Truck")
 """Kinds that fill the lower half of their box."""
 
 FOOT_SHARE = 0.1
-"""Of a box's height, at the bottom: there is the road between the wheels."""
+"""Share of a box's height, at the bottom, where the road is visible between the wheels."""
 
 MOST_OCCLUDED = 0.3
 

@@ -13,7 +13,7 @@ from gear.values.geometry import Intrinsics
 LEFT, RIGHT = "left", "right"
 
 INPUT_SCALE = 0.5
-"""Of the network of centres, where neither the user nor the weights say."""
+"""Of the centre-based network, where neither the user nor the weights state one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

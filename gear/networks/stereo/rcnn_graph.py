@@ -24,7 +24,7 @@ ANCHOR_SIDES = (32, 64, 128, 256, 512)
 STRIDES = (4, 8, 16, 32, 64)
 POOLED = 7
 KEYPOINT_CELLS = 28
-"""Columns of a box that a keypoint can fall into."""
+"""Number of columns in a box over which a keypoint is classified."""
 
 CORNERS = 4
 LEVEL_AT_SIDE = 224.0

@@ -19,14 +19,14 @@ from gear.values.geometry import Array
 
 CAR = "Car"
 BOX_DEVIATION = (0.1, 0.1, 0.2, 0.2, 0.1, 0.2)
-"""By which box codes are divided: x, y, width, height of the left box, x and width of the right one."""
+"""Divisors of box codes: x, y, width, height of the left box, x and width of the right box."""
 
 SIZE_MEAN = (1.6, 1.5, 4.0, 0.0, 0.0)
 SIZE_DEVIATION = 0.5
-"""Width, height, length in metres, sine and cosine of the observation angle."""
+"""Width, height, length in metres, sine and cosine of the observation angle are coded by this mean and scale."""
 
 SIDE_MARGIN_PX = 3.0
-"""A corner this near to a side of the box says nothing more than the side."""
+"""A corner within this distance of a side of the box holds no more information than the side."""
 
 LEAST_HEIGHT_PX, LEAST_SEEN_PX = 10.0, 3.0
 RPN_SAMPLES, RPN_HIGH, RPN_LOW = 256, 0.7, 0.3
@@ -76,7 +76,7 @@ def car_targets(sample: LabelledPair, scale: float) -> CarTargets:
         left, right = pair
         union = np.concatenate([np.minimum(left[:2], right[:2]), np.maximum(left[2:], right[2:])])
         if thing.is_ignored or thing.kitti_type != CAR:
-            # Other vehicles are background, as for the authors; ignored objects are neither.
+            # Other vehicles are background, as in the authors' training; ignored objects are not.
             ignored += [union] if thing.is_ignored else []
             continue
         nearer = [

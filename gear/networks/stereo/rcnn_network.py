@@ -147,7 +147,8 @@ class StereoRcnnNetwork(Network):
 
     def _draws(self, count: int) -> list[torch.Generator]:
         """A generator for each picture of a batch."""
-        if self.training:  # `gear train` seeds torch's own generator by the step, so a training taken up again agrees
+        # `gear train` seeds torch's generator at every step, so that a resumed training draws the same.
+        if self.training:
             step = int(torch.randint(2**62, ()))
             seeds = [derive_rng(step, NAME, "samples", number) for number in range(count)]
         else:

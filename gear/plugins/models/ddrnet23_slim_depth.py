@@ -10,7 +10,7 @@ from gear.networks.depth.options import DepthOptions
 NAME = "ddrnet23_slim_depth"
 
 HABIT = 0.5
-"""It sees pictures at half their sides, which is what makes it fast on CPUs; depth is smooth nearly everywhere."""
+"""Default factor of the input: half the sides make it fast on CPUs, and depth is smooth nearly everywhere."""
 
 
 def build(options: DepthOptions) -> Model:

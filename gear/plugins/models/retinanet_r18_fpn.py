@@ -15,8 +15,9 @@ if TYPE_CHECKING:
 R18, LITE0 = "retinanet_r18_fpn", "retinanet_lite0_fpn"
 
 CATEGORIES = (1, 2, 3, 4, 6, 8, 10, 11, 13, 14, 15)
-"""COCO's ids of what there is in gear's towns: person, bicycle, car, motorcycle, bus, truck, traffic light, fire
-hydrant, stop sign, parking meter, bench."""
+"""COCO category ids of the classes in gear's towns: person, bicycle, car, motorcycle, bus, truck, traffic light, fire
+hydrant, stop sign, parking meter, bench.
+"""
 
 INPUT_SCALE = 0.5
 

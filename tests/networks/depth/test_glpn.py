@@ -23,7 +23,7 @@ def small_state(seed: int = 1) -> dict[str, torch.Tensor]:
 
 
 def test_every_published_key_has_its_place() -> None:
-    stored = json.loads((Path(__file__).parent / "keys" / "glpdepth.json").read_text())
+    stored = json.loads((Path(__file__).parents[1] / "keys" / "glpdepth.json").read_text())
     with torch.device("meta"):
         graph = glpn_graph(GlpnOptions())
         published = {key: torch.empty(shape) for key, shape in stored.items()}

@@ -43,7 +43,7 @@ MIN_PX, MAX_PX = 128, 190
 
 @pytest.mark.parametrize("name", OFFICIAL)
 def test_keys_and_shapes_are_the_published_ones(name: str) -> None:
-    stored = json.loads((Path(__file__).parent / "keys" / f"{name}.json").read_text())
+    stored = json.loads((Path(__file__).parents[1] / "keys" / f"{name}.json").read_text())
     with torch.device("meta"):
         graph = OFFICIAL[name][1](0.05)
     state = graph.state_dict()
@@ -67,7 +67,7 @@ def old_names(state: dict[str, Tensor]) -> dict[str, Tensor]:
 
 @pytest.mark.parametrize("name", OFFICIAL)
 def test_files_of_2019_are_read_as_torchvision_reads_them(name: str) -> None:
-    stored = json.loads((Path(__file__).parent / "keys" / f"{name}.json").read_text())
+    stored = json.loads((Path(__file__).parents[1] / "keys" / f"{name}.json").read_text())
     state = {key: torch.full(shape, float(number)) for number, (key, shape) in enumerate(stored.items())}
     old = old_names(state)
     assert len(old.keys() - state.keys()) >= 18
