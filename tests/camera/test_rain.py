@@ -1,19 +1,21 @@
-"""Rain and puddles: seeded, behind what is near, linear, and where they belong."""
+"""Rain: seeded, in front of what is far, and linear."""
 
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from gear.camera.rain import Rain
-from gear.camera.water import Water
 from gear.values.frames import LINEAR_FULL_SCALE
 from gear.values.geometry import CAMERA_FROM_ACTOR_AXES, RigidTransform
 from gear.values.rng import derive_rng
 from gear.values.scene import CameraRecord, Pose
 
 SIZE = (96, 160)
+
+
 RAIN = Rain.of(80, 40, np.array([0.6, 0.7, 0.8]))
+
+
 STILL = (0.0, 0.0, 0.0)
 
 
@@ -83,56 +85,11 @@ def test_more_rain_covers_more_and_none_nothing() -> None:
     assert np.array_equal(dry, picture)
 
 
-def puddles(share: float = 0.4, ripples: float = 0.0) -> Water:
-    mirrored = np.zeros((16, 64, 3), np.float32)
-    mirrored[..., 2] = np.linspace(1, 0, 16)[:, None]
-    return Water(town="x", share=share, ripples=ripples, mirrored=mirrored)
-
-
-@pytest.mark.parametrize("effect", ["rain", "puddles"])
-def test_linear_in_the_picture(effect: str) -> None:
+def test_linear_in_the_picture() -> None:
     depth = ground_depth()
-
-    def shown(picture: np.ndarray) -> np.ndarray:
-        if effect == "rain":
-            return RAIN.apply(picture, depth, camera(), STILL, derive_rng(7, "rain", 0)).astype(float)
-        return puddles(ripples=0.5).apply(picture, depth, ~np.isnan(depth), camera()).astype(float)
-
-    black, white, patch = (shown(picture) for picture in frames())
+    black, white, patch = (
+        RAIN.apply(picture, depth, camera(), STILL, derive_rng(7, "rain", 0)).astype(float) for picture in frames()
+    )
     expected = black + frames()[2] / LINEAR_FULL_SCALE * (white - black)
     assert np.abs(patch - expected).max() <= 1.5
     assert np.abs(patch - frames()[2]).max() > 50
-
-
-def test_puddles_lie_on_open_ground_where_the_town_has_them() -> None:
-    depth = ground_depth()
-    _, white, _ = frames()
-    ground = ~np.isnan(depth)
-    seen = puddles().apply(white, depth, ground, camera())
-    wet = (seen != white).any(axis=-1)
-    assert 0.1 < wet[ground].mean() < 0.8 and not wet[~ground].any()
-    assert np.array_equal(puddles(0.0).apply(white, depth, ground, camera()), white)
-
-
-@pytest.mark.parametrize(("moved_m", "least_alike"), [(2.0, 0.9), (0.0, 1.0)])
-def test_a_camera_that_has_moved_sees_the_same_water_elsewhere(moved_m: float, least_alike: float) -> None:
-    depth, (_, white, _) = ground_depth(), frames()
-    x_m, y_m = (grid.reshape(-1) for grid in np.meshgrid(np.linspace(6, 9, 30), np.linspace(-2, 2, 9)))
-    seen = []
-    for at_m in (0.0, moved_m):
-        wet = (puddles().apply(white, depth, ~np.isnan(depth), camera(at_m)) != white).any(axis=-1)
-        row = np.rint(90 * 1.6 / (x_m - at_m) + (SIZE[0] - 1) / 2).astype(int)
-        column = np.rint(-90 * y_m / (x_m - at_m) + (SIZE[1] - 1) / 2).astype(int)
-        seen.append(wet[row, column])
-    assert 0.15 < seen[0].mean() < 0.85
-    assert (seen[0] == seen[1]).mean() >= least_alike
-
-
-def test_water_mirrors_more_at_a_flat_angle() -> None:
-    depth = ground_depth()
-    black, _, _ = frames()
-    seen = puddles(share=1.1).apply(black, depth, ~np.isnan(depth), camera())
-    blue = seen[..., 2].mean(axis=1)
-    horizon = int(np.argmax(~np.isnan(depth[:, 0])))
-    assert blue[horizon] > 5 * blue[-1] > 0
-    assert (np.diff(blue[horizon:]) <= 0.5).all()

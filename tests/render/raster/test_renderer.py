@@ -1,4 +1,4 @@
-"""What is particular to the raster renderer: its shapes, its light, and that it shows what Filament shows."""
+"""The raster renderer: light on surfaces, shadows, and the same pictures as Filament's."""
 
 from __future__ import annotations
 
@@ -15,123 +15,11 @@ import pytest
 from gear.camera import response_for
 from gear.contracts.rendering import Quality, Renderer, Stage
 from gear.render import open_renderer
-from gear.render.pinhole import Frustum
-from gear.render.raster.environment import mip_chain
-from gear.render.raster.lights import irradiance_over_pi, lights_of
-from gear.render.raster.primitives import Triangles, height_field, primitive
-from gear.render.raster.shadow_cascades import CASCADE_ENDS_M, town_cascade, view_cascades
-from gear.render.raster.split_sum import split_sum_table
 from gear.values.geometry import RigidTransform
 from gear.values.scene import CameraRecord, Pose
 from gear.world.compilation.quiet_mjcf import mjcf
 from gear.world.weather.presets import PRESETS, apply_weather
 from tests.render.conftest import STREET, camera, posed
-
-GEOM = mujoco.mjtGeom
-VOLUMES = {
-    (GEOM.mjGEOM_BOX, (1.0, 2.0, 3.0)): 48.0,
-    (GEOM.mjGEOM_SPHERE, (1.5, 0.0, 0.0)): 4 / 3 * math.pi * 1.5**3,
-    (GEOM.mjGEOM_ELLIPSOID, (1.0, 2.0, 0.5)): 4 / 3 * math.pi,
-    (GEOM.mjGEOM_CYLINDER, (0.5, 2.0, 0.0)): math.pi,
-    (GEOM.mjGEOM_CAPSULE, (0.5, 2.0, 0.0)): math.pi + 4 / 3 * math.pi * 0.125,
-}
-
-
-def outwards(shape: Triangles) -> np.ndarray:
-    """(T, 3) normals of triangles by the order of their corners, as long as twice their areas."""
-    corners = shape.positions_m[shape.corners]
-    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-
-
-@pytest.mark.parametrize(("kind", "size"), VOLUMES)
-def test_a_solid_is_closed_and_looks_outwards(kind: mujoco.mjtGeom, size: tuple[float, ...]) -> None:
-    shape = primitive(int(kind), np.array(size))
-    across = outwards(shape)
-    volume = np.einsum("ij,ij->", shape.positions_m[shape.corners[:, 0]], across) / 6
-    assert volume == pytest.approx(VOLUMES[kind, size], rel=0.03)
-    assert np.abs(across.sum(axis=0)).max() < 1e-9, "a hole"
-    lean = np.einsum("ij,ij->i", across, shape.normals[shape.corners].mean(axis=1))
-    assert (lean[np.linalg.norm(across, axis=1) > 1e-9] > 0).all()
-    assert np.allclose(np.linalg.norm(shape.normals, axis=1), 1)
-    assert (shape.texcoords >= 0).all() and (shape.texcoords <= 1).all()
-
-
-def test_a_height_field_lies_where_rays_find_it() -> None:
-    xml = (
-        '<mujoco><asset><hfield name="h" nrow="5" ncol="7" size="3 2 1 0.1" '
-        f'elevation="{" ".join(str((3 * k) % 11) for k in range(35))}"/></asset>'
-        '<worldbody><geom type="hfield" hfield="h"/></worldbody></mujoco>'
-    )
-    model = mujoco.MjModel.from_xml_string(xml)
-    shape = height_field(model, 0)
-    assert (outwards(shape)[:, 2] > 0).all() and (shape.normals[:, 2] > 0).all()
-    stage = Stage(model=model, data=posed(model))
-    for middle in shape.positions_m[shape.corners].mean(axis=1)[::5]:
-        hit = np.zeros(1, np.int32)
-        down = np.array([0.0, 0.0, -1.0])
-        distance = mujoco.mj_ray(model, stage.data, middle - 5 * down, down, None, 1, -1, hit)
-        assert distance == pytest.approx(5, abs=0.35), "cells may be cut along either diagonal"
-
-
-def test_what_is_no_solid_is_refused() -> None:
-    with pytest.raises(ValueError, match="mjGEOM_MESH"):
-        primitive(int(GEOM.mjGEOM_MESH), np.ones(3))
-
-
-def test_an_even_light_comes_from_everywhere_alike() -> None:
-    light = irradiance_over_pi(np.full((6, 32, 32, 3), 0.3))
-    assert np.allclose(light[0], 0.3) and np.allclose(light[1:], 0)
-    bright_top = np.zeros((6, 32, 32, 3))
-    bright_top[2] = 1.0
-    light = irradiance_over_pi(bright_top)
-    assert np.allclose(light[[1, 2]], 0) and (light[3] > 0.1).all()
-    north = np.zeros((6, 32, 32, 3))
-    north[5] = 1.0
-    assert (irradiance_over_pi(north)[2] > 0.1).all(), "the cube's back is north"
-
-
-def test_mirrored_light_gets_coarser_and_keeps_its_mean() -> None:
-    radiance = np.random.default_rng(0).random((6, 16, 16, 3))
-    levels = mip_chain(radiance)
-    assert [level.shape[1] for level in levels] == [16, 8, 4, 2, 1]
-    assert np.allclose(levels[-1][:, 0, 0], radiance.mean(axis=(1, 2)))
-
-
-def test_a_smooth_metal_mirrors_all_and_a_smooth_dielectric_its_reflectance() -> None:
-    shares = split_sum_table()
-    smooth = shares[0, 3:]
-    assert np.allclose(smooth.sum(axis=-1), 1, atol=0.03)
-    assert 0.04 * shares[0, -1, 0] + shares[0, -1, 1] == pytest.approx(0.04, abs=1e-3)
-    grazing, straight = (0.04 * shares[8, k, 0] + shares[8, k, 1] for k in (2, -1))
-    assert grazing > 4 * straight
-    rough = shares[-1].sum(axis=-1)
-    assert (rough < 0.95).all(), "what meets several facets is lost, and added again by the shader"
-
-
-def test_shadows_are_looked_for_wherever_the_camera_looks() -> None:
-    record = camera(320, 192)
-    sun = np.array([0.3, -0.5, 0.8]) / np.linalg.norm([0.3, -0.5, 0.8])
-    cascades = view_cascades(Frustum.of(record), sun)
-    columns, rows = np.meshgrid([-0.5, 319.5], [-0.5, 191.5])
-    corners = np.stack([columns, rows], axis=-1).reshape(-1, 2)
-    begin_m = 0.1
-    for cascade, end_m in zip(cascades, CASCADE_ENDS_M, strict=True):
-        for depth_m in (begin_m, end_m):
-            points = record.world_from_camera_transform.apply(record.intrinsics.unproject(corners, np.full(4, depth_m)))
-            placed = np.concatenate([points, np.ones((4, 1))], axis=1) @ cascade.matrix(np.zeros(3)).T
-            assert (np.abs(placed[:, :2]) <= 1 + 1e-9).all() and ((placed[:, 2] >= 0) & (placed[:, 2] <= 1)).all()
-        begin_m = end_m
-    nearer, farther = (cascades[0].matrix(np.zeros(3)) @ [*point, 1.0] for point in (2 * sun, 0 * sun))
-    assert nearer[2] < farther[2], "depth grows away from the sun"
-    assert np.allclose(nearer[:2], farther[:2])
-
-
-def test_a_town_is_in_one_square_but_for_what_lies_far_outside() -> None:
-    points = np.random.default_rng(0).uniform(-100, 100, (1000, 3)) * [1, 1, 0.1]
-    points[0] = (1e5, 0, 0)
-    cascade = town_cascade(points, np.array([0.0, 0.6, 0.8]))
-    assert 90 < cascade.half_side_m < 110
-
 
 LAMBERT = """
 <mujoco>
@@ -158,19 +46,6 @@ def test_a_matte_wall_shows_what_lambert_says(sun: tuple[float, float, float], q
     matte = 0.5 / math.pi * 60000 / 38400 * sun[0] * 1020
     # Straight ahead a dielectric of this roughness adds some per cent of gloss.
     assert matte * 0.99 <= view.linear_rgb[14:18, 14:18].mean() <= matte * 1.04
-
-
-def test_lights_are_taken_as_their_kinds_mean() -> None:
-    xml = """<mujoco><worldbody>
-      <light type="point" pos="0 0 3" diffuse="1 0 0" intensity="3840"/>
-      <light type="directional" dir="0 0 -2" diffuse="0 1 0" castshadow="false"/>
-      <light type="directional" dir="1 0 0" diffuse="0.5 0.5 0.5" intensity="38400"/>
-      <geom size="1"/></worldbody></mujoco>"""
-    model = mujoco.MjModel.from_xml_string(xml)
-    lights = lights_of(model, posed(model))
-    assert lights.casts_shadows and np.allclose(lights.towards[0], (-1, 0, 0, 0)), "what throws shadows comes first"
-    assert np.allclose(lights.light, [[0.5, 0.5, 0.5], [0.1, 0, 0], [0, math.pi, 0]])
-    assert np.allclose(lights.towards[1:], [(0, 0, 3, 1), (0, 0, 1, 0)])
 
 
 def street(weather: str) -> mujoco.MjModel:
