@@ -170,7 +170,7 @@ class ContactShadows:
         Returns:
             (H, W, 3) uint16; the frame itself where nothing is shaded.
         """
-        left = self.left(depth_m, is_ground, camera, record)
+        left = self.factors(depth_m, is_ground, camera, record)
         if left is None:
             return linear_rgb
         shaded = linear_rgb.copy()
@@ -180,7 +180,7 @@ class ContactShadows:
                 cv2.multiply(linear_rgb[band], cv2.merge([left[band]] * 3), dst=shaded[band], dtype=cv2.CV_16U)
         return shaded
 
-    def left(
+    def factors(
         self, depth_m: FloatImage, is_ground: Mask, camera: CameraRecord, record: SceneRecord
     ) -> FloatImage | None:
         """(H, W) float32 factors for the frame's values; None where nothing is shaded. Arguments as for `apply`."""

@@ -93,16 +93,16 @@ class User:
     middle_m: Floats
     radius_m: float
 
-    def is_before(self, outlook: LampFrame, reach_m: float) -> bool:
+    def is_before(self, lamp_frame: LampFrame, reach_m: float) -> bool:
         """Whether its bounding sphere is near a lamp and within the directions of the lamp's map."""
-        away = self.middle_m - outlook.place_m
+        away = self.middle_m - lamp_frame.place_m
         away_m = float(np.linalg.norm(away))
         if away_m >= WORTH * reach_m + self.radius_m:
             return False
         if away_m <= self.radius_m:
             return True
-        aside_rad = math.acos(min(max(float(away @ outlook.frame[2]) / away_m, -1.0), 1.0))
-        return aside_rad < outlook.layout.half_angle_rad + math.asin(self.radius_m / away_m)
+        aside_rad = math.acos(min(max(float(away @ lamp_frame.frame[2]) / away_m, -1.0), 1.0))
+        return aside_rad < lamp_frame.layout.half_angle_rad + math.asin(self.radius_m / away_m)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -140,10 +140,10 @@ class LampShadows:
         radius_m = float(lengths((points_m - middle_m).T).max())
         return User(points_m=points_m, spacing_m=spacing_m, middle_m=middle_m, radius_m=radius_m)
 
-    def standing(self, kind: str, index: int, outlook: LampFrame, reach_m: float) -> Floats:
+    def standing(self, kind: str, index: int, lamp_frame: LampFrame, reach_m: float) -> Floats:
         """(cells, cells) distances at which static objects stop the light of a static lamp; computed once."""
         if (kind, index) not in self._fixed:
-            self._fixed[kind, index] = first_hits(self.casters.near(outlook.place_m, reach_m), outlook)
+            self._fixed[kind, index] = first_hits(self.casters.near(lamp_frame.place_m, reach_m), lamp_frame)
         return self._fixed[kind, index]
 
 
@@ -163,18 +163,25 @@ class SceneShadows:
     _maps: dict[tuple[str, int], ShadowMap] = field(default_factory=dict, init=False, repr=False)
 
     def map(self, kind: str, index: int, lamps: Lamps, *, stands: bool) -> ShadowMap:
-        """Of one lamp of a kind; before those that do not stand only road users throw shadows."""
+        """The shadow map of one lamp. In the light of moving lamps only road users cast shadows.
+
+        Args:
+            kind: kind of the lamp.
+            index: its index within the kind.
+            lamps: all lamps of the kind.
+            stands: whether the lamp is a static one of the town.
+        """
         if (kind, index) not in self._maps:
             place_m, axis = lamps.position_m[index], lamps.axis[index]
-            outlook = LampFrame.of(place_m, axis, STANDING if stands else DRIVING)
+            lamp_frame = LampFrame.of(place_m, axis, STANDING if stands else DRIVING)
             if stands:
-                comes_m = self.town.standing(kind, index, outlook, lamps.reach_m).copy()
+                stop_m = self.town.standing(kind, index, lamp_frame, lamps.reach_m).copy()
             else:
-                comes_m = outlook.layout.empty()
+                stop_m = lamp_frame.layout.empty()
             for user in self.users:
-                if user.is_before(outlook, lamps.reach_m):
-                    stop_behind(comes_m, user.points_m, user.spacing_m, outlook)
-            self._maps[kind, index] = ShadowMap(outlook=outlook, comes_m=comes_m)
+                if user.is_before(lamp_frame, lamps.reach_m):
+                    stop_behind(stop_m, user.points_m, user.spacing_m, lamp_frame)
+            self._maps[kind, index] = ShadowMap(lamp_frame=lamp_frame, stop_m=stop_m)
         return self._maps[kind, index]
 
 

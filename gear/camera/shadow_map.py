@@ -108,20 +108,20 @@ class ShadowMap:
     """The shadow map (Williams 1978) of one lamp.
 
     Attributes:
-        outlook: position and axes of the lamp.
-        comes_m: (cells, cells) float32 distance at which light is stopped, by direction; infinite where nothing stops
+        lamp_frame: position and axes of the lamp.
+        stop_m: (cells, cells) float32 distance at which light is stopped, by direction; infinite where nothing stops
             it, and in the border. It must not be changed afterwards.
     """
 
-    outlook: LampFrame
-    comes_m: Floats
+    lamp_frame: LampFrame
+    stop_m: Floats
     _least_m: Floats = field(init=False, repr=False)
     _most_m: Floats = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         nine = np.ones((3, 3), np.uint8)
-        object.__setattr__(self, "_least_m", cv2.erode(self.comes_m, nine))
-        object.__setattr__(self, "_most_m", cv2.dilate(self.comes_m, nine))
+        object.__setattr__(self, "_least_m", cv2.erode(self.stop_m, nine))
+        object.__setattr__(self, "_most_m", cv2.dilate(self.stop_m, nine))
 
     def through(self, unit: Floats, away_m: FloatImage, facing: FloatImage, up: FloatImage) -> Floats:
         """(N,) share of the light that reaches surfaces, 0..1.
@@ -132,16 +132,16 @@ class ShadowMap:
             facing: (N,) cosines between the surfaces' normals and the direction to the lamp.
             up: (N,) upward components of the normals; level ground does not shadow itself.
         """
-        layout = self.outlook.layout
+        layout = self.lamp_frame.layout
         # Directions outside of the map are clamped to its border, where nothing stops light.
-        across, along = (np.clip(place, 1, layout.cells - 1.001) for place in self.outlook.places(unit))
+        across, along = (np.clip(place, 1, layout.cells - 1.001) for place in self.lamp_frame.places(unit))
         column, row = across.astype(np.int32), along.astype(np.int32)
         cosine = np.clip(facing, np.float32(1e-3), 1)
         tilt = np.minimum(np.sqrt(1 - cosine * cosine) / cosine, np.float32(_MOST_TILT))
         tilt[up > _LEVEL] = 0
         reach_m = away_m * (1 - np.float32(_STEEP * layout.grain_rad) * tilt) - np.float32(_SLACK_M)
         middle = row * layout.cells + column
-        is_free = (self._least_m.reshape(-1)[middle] >= reach_m) | (self.outlook.frame[2] @ unit <= 0)
+        is_free = (self._least_m.reshape(-1)[middle] >= reach_m) | (self.lamp_frame.frame[2] @ unit <= 0)
         through: Floats = is_free.astype(np.float32)
         edge = np.flatnonzero(~is_free & (self._most_m.reshape(-1)[middle] >= reach_m))
         through[edge] = self._at_edges(middle[edge], (across - column)[edge], (along - row)[edge], reach_m[edge])
@@ -149,11 +149,11 @@ class ShadowMap:
 
     def _at_edges(self, middle: npt.NDArray[np.int32], x: Floats, y: Floats, reach_m: Floats) -> Floats:
         """Shares of light where some of the nine cells around a direction stop it."""
-        cells, comes_m = self.outlook.layout.cells, self.comes_m.reshape(-1)
+        cells, stop_m = self.lamp_frame.layout.cells, self.stop_m.reshape(-1)
         through = np.zeros_like(reach_m)
         for down, high in zip((-cells, 0, cells), _weights(y), strict=True):
             for aside, wide in zip((-1, 0, 1), _weights(x), strict=True):
-                through += high * wide * (comes_m[middle + (down + aside)] >= reach_m)
+                through += high * wide * (stop_m[middle + (down + aside)] >= reach_m)
         return through
 
 
@@ -163,17 +163,17 @@ def _weights(share: Floats) -> tuple[Floats, Floats, Floats]:
     return half - half * share, half, half * share
 
 
-def first_hits(corners_m: Floats, outlook: LampFrame) -> Floats:
+def first_hits(corners_m: Floats, lamp_frame: LampFrame) -> Floats:
     """(cells, cells) float32 distances at which (N, 3, 3) triangles stop a lamp's light.
 
     Back faces are skipped: the front of the same body is nearer.
     """
-    layout = outlook.layout
-    corners = _split(corners_m - outlook.place_m, outlook.frame[2])
+    layout = lamp_frame.layout
+    corners = _split(corners_m - lamp_frame.place_m, lamp_frame.frame[2])
     flat = np.ascontiguousarray(corners.reshape(-1, 3).T)
     corner_m = lengths(flat)
     unit = np.asarray(flat / np.maximum(corner_m, _EDGE_ON), np.float32)
-    places = np.stack(outlook.places(unit), axis=1).reshape(-1, 3, 2)
+    places = np.stack(lamp_frame.places(unit), axis=1).reshape(-1, 3, 2)
     corner_m = corner_m.reshape(-1, 3)
     away_m = corner_m.mean(axis=1)
     shown = np.flatnonzero((np.abs(places) < 2 * layout.cells).all(axis=(1, 2)) & (away_m > OWN_GLASS_M))
@@ -187,11 +187,11 @@ def first_hits(corners_m: Floats, outlook: LampFrame) -> Floats:
     met = shown[painted[row, column]]
     first = corners[met, 0]
     normal = _normals(corners[met])
-    slope = np.einsum("nd,nd->n", normal, outlook.directions(column, row))
+    slope = np.einsum("nd,nd->n", normal, lamp_frame.directions(column, row))
     plane_m = np.einsum("nd,nd->n", normal, first) / np.minimum(slope, np.float32(-_EDGE_ON))
-    comes_m = layout.empty()
-    comes_m[row, column] = np.clip(plane_m, corner_m[met].min(axis=1), corner_m[met].max(axis=1))
-    return comes_m
+    stop_m = layout.empty()
+    stop_m[row, column] = np.clip(plane_m, corner_m[met].min(axis=1), corner_m[met].max(axis=1))
+    return stop_m
 
 
 def _split(corners: Floats, axis: Floats) -> Floats:
@@ -221,18 +221,18 @@ def _quartered(corners: Floats) -> Floats:
     return np.concatenate([np.stack(three, axis=1) for three in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
 
 
-def stop_behind(comes_m: Floats, points_m: Floats, spacing_m: float, outlook: LampFrame) -> None:
+def stop_behind(stop_m: Floats, points_m: Floats, spacing_m: float, lamp_frame: LampFrame) -> None:
     """Adds a body, given by (N, 3) points with a spacing, to a map, in place.
 
     Light is stopped at the body's far side, so that it does not shadow itself; its shadow begins at its soles.
     """
-    layout = outlook.layout
-    away = np.ascontiguousarray(points_m.T) - outlook.place_m[:, None]
+    layout = lamp_frame.layout
+    away = np.ascontiguousarray(points_m.T) - lamp_frame.place_m[:, None]
     away_m = lengths(away)
-    keep = (away_m > OWN_GLASS_M) & (outlook.frame[2] @ away > 0)
+    keep = (away_m > OWN_GLASS_M) & (lamp_frame.frame[2] @ away > 0)
     away_m = away_m[keep]
     unit: Floats = away[:, keep] / away_m
-    column, row = (np.rint(place).astype(np.int64) for place in outlook.places(unit))
+    column, row = (np.rint(place).astype(np.int64) for place in lamp_frame.places(unit))
     inside = np.minimum(column, row) >= BORDER
     inside &= np.maximum(column, row) < layout.cells - BORDER
     if not inside.any():
@@ -245,5 +245,5 @@ def stop_behind(comes_m: Floats, points_m: Floats, spacing_m: float, outlook: La
     gap = min(math.ceil(spacing_m / (layout.grain_rad * float(away_m.min()))), _CLOSED_CELLS)
     if gap > 1:
         ends_m = cv2.morphologyEx(ends_m, cv2.MORPH_CLOSE, np.ones((gap, gap), np.uint8))
-    part = comes_m[top : top + size[0], left : left + size[1]]
+    part = stop_m[top : top + size[0], left : left + size[1]]
     np.minimum(part, np.where(ends_m > 0, ends_m - np.float32(_SOLE_M), np.float32(np.inf)), out=part)

@@ -31,9 +31,11 @@ ORIGINAL_KEYS = frozenset(
 ORIGINAL_ONLY = frozenset(("basepath", "town_name", "billboard", "patch_folder"))
 SIMULATION_NAMES = ("SEED_VALUES", "ITERATION_VALUES", "MAX_VEHICLE_NPC", "MAX_WALKER_NPC")
 TABLES = SIMULATION_NAMES[:2]
-LOOKS = frozenset(("copy", "get", "items", "keys", "values"))
-READERS = frozenset(("dict", "len", "list", "max", "min", "print", "repr", "set", "sorted", "str", "sum", "tuple"))
-"""Methods of dictionaries and functions that leave what they are given as it is."""
+READING_METHODS = frozenset(("copy", "get", "items", "keys", "values"))
+READING_FUNCTIONS = frozenset(
+    ("dict", "len", "list", "max", "min", "print", "repr", "set", "sorted", "str", "sum", "tuple")
+)
+"""Methods of dictionaries, and functions, that do not change their arguments."""
 
 COMPUTED = "is computed, and gear runs no configs; write it as YAML: `splits: {test: {seed: 363, samples: 50}}`"
 TASKS = {"ss": "semseg", "2dod": "detect2d", "3dod": "stereo3d", "depth": "depth"}
@@ -154,9 +156,9 @@ def _may_change(name: ast.Name, parent: ast.AST) -> bool:
         case ast.Subscript(value=held):
             return held is not name or not isinstance(parent.ctx, ast.Load)
         case ast.Attribute(attr=method):
-            return method not in LOOKS
+            return method not in READING_METHODS
         case ast.Call(func=ast.Name(id=function)):
-            return function not in READERS
+            return function not in READING_FUNCTIONS
         case ast.For(iter=held) | ast.comprehension(iter=held):
             return held is not name
     return not isinstance(parent, ast.BinOp | ast.Compare | ast.FormattedValue)

@@ -22,4 +22,4 @@ def data_dir(name: str) -> Path:
     for folder in (package / "data" / name, package.parent / name):
         if folder.is_dir():
             return folder
-    raise FileNotFoundError(f"gear's data folder {name!r} is missing beside {package}; install gear again")
+    raise FileNotFoundError(f"gear's data folder {name!r} is missing next to {package}; install gear again")

@@ -122,7 +122,7 @@ def pixel_of(x_m: float, y_m: float) -> tuple[int, int]:
 
 def left_of(shading: ContactShadows, record: SceneRecord, depth_m: np.ndarray | None = None) -> np.ndarray:
     depth_m = plane_depth_m() if depth_m is None else depth_m
-    left = shading.left(depth_m, np.isfinite(depth_m), camera(), record)
+    left = shading.factors(depth_m, np.isfinite(depth_m), camera(), record)
     assert left is not None
     return left
 
@@ -162,7 +162,7 @@ def test_only_ground_is_shaded_and_half_of_its_outline() -> None:
     is_ground = np.isfinite(depth_m)
     row, column = pixel_of(8.0, 0.0)
     is_ground[row - 3 : row + 4, column - 3 : column + 4] = False
-    whole, left = left_of(shade(), record), shade().left(depth_m, is_ground, camera(), record)
+    whole, left = left_of(shade(), record), shade().factors(depth_m, is_ground, camera(), record)
     assert left is not None
     assert left[row, column] == 1
     assert left[row, column - 3] == pytest.approx(1 - OUTLINE * (1 - whole[row, column - 4]), abs=0.02)
@@ -203,4 +203,4 @@ def test_display_values_are_shaded_by_a_root() -> None:
 def test_assets_without_a_shape_shade_nothing() -> None:
     depth_m, record = plane_depth_m(), scene(8.0)
     unknown = replace(record, actors=(replace(record.actors[0], asset="ghost"),))
-    assert shade().left(depth_m, np.isfinite(depth_m), camera(), unknown) is None
+    assert shade().factors(depth_m, np.isfinite(depth_m), camera(), unknown) is None

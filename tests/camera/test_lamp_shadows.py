@@ -92,15 +92,15 @@ def test_light_ends_where_rays_first_meet_something(seed: int) -> None:
     boxes = [box(tuple(rng.uniform((-12, -12, 0), (12, 12, 6))), tuple(rng.uniform(0.6, 5, 3))) for _ in range(12)]
     corners = np.concatenate([one for one in boxes if np.abs(one - LAMP_M).max(axis=2).min() > 2])
     axis = DOWN + rng.uniform(-0.3, 0.3, 3)
-    outlook = LampFrame.of(LAMP_M, axis, STANDING)
-    comes_m = first_hits(corners, outlook)
+    lamp_frame = LampFrame.of(LAMP_M, axis, STANDING)
+    stop_m = first_hits(corners, lamp_frame)
     row, column = (rng.integers(4, STANDING.cells - 4, 3000) for _ in range(2))
-    rays = outlook.directions(column, row).astype(float)
+    rays = lamp_frame.directions(column, row).astype(float)
     before = rays @ (axis / np.linalg.norm(axis)) > 0.05
     row, column, rays = row[before], column[before], rays[before]
-    np.testing.assert_allclose(outlook.places(rays.T.astype(np.float32)), [column, row], atol=2e-3)
+    np.testing.assert_allclose(lamp_frame.places(rays.T.astype(np.float32)), [column, row], atol=2e-3)
     expected = np.min([hits(triangle.astype(float), LAMP_M, rays) for triangle in corners], axis=0)
-    found = comes_m[row, column]
+    found = stop_m[row, column]
     open_way = np.isinf(expected)
     same = np.where(open_way, np.isinf(found), np.abs(found - np.where(open_way, 0, expected)) < 0.02)
     # What is painted reaches half a cell over its outline.
@@ -190,10 +190,10 @@ def test_a_lamp_is_not_in_its_own_way() -> None:
 
 
 def test_nothing_is_stopped_behind_a_lamp_or_outside_of_its_map() -> None:
-    outlook = LampFrame.of(LAMP_M, np.array([1.0, 0.0, 0.0]), Layout(cells=64, zoom=2.0))
-    comes_m = outlook.layout.empty()
-    comes_m[BORDER:-BORDER, BORDER:-BORDER] = 3.0
-    one = ShadowMap(outlook=outlook, comes_m=comes_m)
+    lamp_frame = LampFrame.of(LAMP_M, np.array([1.0, 0.0, 0.0]), Layout(cells=64, zoom=2.0))
+    stop_m = lamp_frame.layout.empty()
+    stop_m[BORDER:-BORDER, BORDER:-BORDER] = 3.0
+    one = ShadowMap(lamp_frame=lamp_frame, stop_m=stop_m)
     angle = np.radians([0, 30, 45, 100, 180, 260])
     unit = np.stack([np.cos(angle), np.sin(angle), np.zeros(6)]).astype(np.float32)
     flat = np.ones(6, np.float32)
@@ -202,14 +202,14 @@ def test_nothing_is_stopped_behind_a_lamp_or_outside_of_its_map() -> None:
 
 
 def test_sparse_points_near_a_lamp_have_no_holes_between_them() -> None:
-    outlook = LampFrame.of(LAMP_M, DOWN, STANDING)
-    comes_m = outlook.layout.empty()
+    lamp_frame = LampFrame.of(LAMP_M, DOWN, STANDING)
+    stop_m = lamp_frame.layout.empty()
     x, y = (grid.reshape(-1) for grid in np.meshgrid(*[np.arange(-0.6, 0.61, 0.07)] * 2))
-    stop_behind(comes_m, np.stack([x, y, np.full(len(x), 5.5)], axis=1).astype(np.float32), 0.07, outlook)
+    stop_behind(stop_m, np.stack([x, y, np.full(len(x), 5.5)], axis=1).astype(np.float32), 0.07, lamp_frame)
     places = along_x(*np.linspace(-1.2, 1.2, 50), y_m=0.3)
     away = (places - LAMP_M).astype(np.float32).T
     away_m = np.linalg.norm(away, axis=0)
-    through = ShadowMap(outlook=outlook, comes_m=comes_m).through(
+    through = ShadowMap(lamp_frame=lamp_frame, stop_m=stop_m).through(
         away / away_m, away_m, -away[2] / away_m, np.ones(50, np.float32)
     )
     np.testing.assert_array_equal(through, 0)
@@ -235,15 +235,15 @@ def test_views_of_one_scene_share_its_maps_and_another_scene_has_its_own() -> No
     one = scene.map("k", 0, one_lamp(), stands=True)
     assert town.scene(first).map("k", 0, one_lamp(), stands=True) is one
     other = town.scene(second).map("k", 0, one_lamp(), stands=True)
-    assert not np.array_equal(other.comes_m, one.comes_m)
+    assert not np.array_equal(other.stop_m, one.stop_m)
     np.testing.assert_array_equal(
-        town.scene(record(walker(6.0))).map("k", 0, one_lamp(), stands=True).comes_m, one.comes_m
+        town.scene(record(walker(6.0))).map("k", 0, one_lamp(), stands=True).stop_m, one.stop_m
     )
 
 
 def test_layouts_say_how_far_they_reach() -> None:
     assert Layout(cells=256, zoom=1.0).half_angle_rad > math.pi / 2
     wide = Layout(cells=64, zoom=2.2)
-    outlook = LampFrame.of(LAMP_M, DOWN, wide)
-    corner = outlook.directions(np.array([0]), np.array([0]))[0]
+    lamp_frame = LampFrame.of(LAMP_M, DOWN, wide)
+    corner = lamp_frame.directions(np.array([0]), np.array([0]))[0]
     assert math.acos(corner @ DOWN) == pytest.approx(wide.half_angle_rad, rel=0.03)

@@ -119,7 +119,7 @@ class Effect(ABC):
         """
 
     def torch_at(self, pixels: tuple[Pixels, Pixels], exposure: Exposure, like: Tensor) -> Callable[[Tensor], Tensor]:
-        """The effect on some pixels, for effects that change each pixel by itself and are not linear.
+        """The effect on some pixels, for effects that are not linear and change each pixel independently.
 
         Args:
             pixels: (N,) rows and (N,) columns.

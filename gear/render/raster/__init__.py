@@ -1,8 +1,8 @@
-"""gear's own physically based renderer, through OpenGL: it shows a street as Filament does, in a fraction of the time.
+"""gear's physically based OpenGL renderer: it shows a street as Filament does, in a fraction of the time.
 
-Filament shades every sample with one general shader that comes compiled with MuJoCo. This renderer has a shader for
-each kind of material, draws ids and depth first so that no surface is shaded that nobody sees, draws the shadows of
-what stands still once, and adds light up in 16 bits instead of eight.
+Filament shades every sample with one general shader that is compiled into MuJoCo. This renderer has a shader for each
+kind of material, draws ids and depth first so that hidden surfaces are not shaded, draws the shadows of static objects
+once, and sums light in 16 bits instead of eight.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def open_raster(model: mujoco.MjModel, *, quality: Quality = "film") -> RasterRe
     """
     backend = choose_backend("raster")
     if backend != "egl":
-        # OSMesa's library has no symbols for what is newer than OpenGL 1.3, and PyOpenGL looks for nothing else.
+        # PyOpenGL finds functions of OSMesa by the symbols of its library, which end with OpenGL 1.3.
         setting = backend_setting()
         if setting is not None:
             problem = f"it needs EGL, and {setting} is {os.environ[setting]}"
