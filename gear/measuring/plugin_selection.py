@@ -20,6 +20,9 @@ from gear.values.serial import Json
 CAMERA = ("hfov_deg", "baseline_m")
 """Options that a model shares with its task, because pictures do not say them."""
 
+OWN_PINHOLE = ("focal_px", "focal_y_px", "principal_px")
+"""Options of tasks for pinholes that `hfov_deg` does not describe."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Chosen:
@@ -112,6 +115,13 @@ def check_optics(model: Chosen, options: Json, collected: str, flag: str) -> Non
         GearError: the model assumes another camera.
     """
     config = read_node(model.found.spec.config, model.options, "")
+    own = [name for name in OWN_PINHOLE if options.get(name) is not None]
+    if own and hasattr(config, "hfov_deg"):
+        raise GearError(
+            f"{collected} with {' and '.join(own)}, but model {model.found.spec.name!r} assumes a pinhole whose"
+            " principal point is the middle of the picture and whose focal lengths are equal; collect with hfov_deg"
+            " instead"
+        )
     for name in CAMERA:
         assumed, taken = getattr(config, name, None), options.get(name)
         if assumed is not None and taken is not None and assumed != taken:
