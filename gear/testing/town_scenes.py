@@ -113,15 +113,15 @@ def disagreement(town: TownUnderTest, min_agreement: float) -> list[str]:
         distance_m, geom = rays.first_hit(pose.translation_m, np.ascontiguousarray(along))
         pixel_id, depth_m = int(view.geom_id[row, column]), float(view.depth_m[row, column])
         if pixel_id != geom or (geom >= 0 and abs(depth_m / distance_m - 1) > DEPTH_TOLERANCE):
-            told = (
+            pair = (
                 f"{_named(rays, pixel_id)} at {depth_m:.2f} m" if pixel_id >= 0 else "nothing",
                 f"{_named(rays, geom)} at {distance_m:.2f} m" if geom >= 0 else "nothing",
             )
-            wrong[told] = wrong.get(told, 0) + 1
+            wrong[pair] = wrong.get(pair, 0) + 1
     share = 1 - sum(wrong.values()) / max(1, len(chosen))
     if share >= min_agreement:
         return []
-    common = sorted(wrong, key=lambda told: -wrong[told])[:3]
+    common = sorted(wrong, key=lambda pair: -wrong[pair])[:3]
     examples = "; ".join(f"rendered {pixel}, hit {ray}" for pixel, ray in common)
     return [f"scene {record.scene}: only {share:.1%} of {len(chosen)} pixels agree with rays ({examples})"]
 

@@ -89,9 +89,9 @@ class EgoSampler:
             problems[problem] += 1
             if problem == "with a face out of the picture":
                 camera_is_cause += self.judge(road_users, self._level_rig) != "out of the picture"
-        told = ", ".join(f"{count} {what}" for what, count in problems.most_common())
+        found = ", ".join(f"{count} {what}" for what, count in problems.most_common())
         advice = CAMERA_ADVICE if camera_is_cause > EGO_TRIES // 2 else self._advice
-        raise PlacementError(self.scene_name, f"no place for the ego car in {EGO_TRIES} tries ({told}); {advice}")
+        raise PlacementError(self.scene_name, f"no place for the ego car in {EGO_TRIES} tries ({found}); {advice}")
 
     def empty(self) -> RoadUsers:
         """No road users, and the whole pool free."""
@@ -232,11 +232,11 @@ class EgoSampler:
         verdicts = [self._judge_piece(int(piece)) for piece in inside]
         seen = inside[[verdict == "seen" for verdict in verdicts]]
         if not len(seen):
-            told = ", ".join(f"{count} have a face {what}" for what, count in Counter(verdicts).most_common())
+            found = ", ".join(f"{count} have a face {what}" for what, count in Counter(verdicts).most_common())
             with_level = [self._judge_piece(int(piece), self._level_rig) for piece in inside]
             advice = CAMERA_ADVICE if "seen" in with_level else self._advice
             raise PlacementError(
-                self.scene_name, f"of {len(inside)} m of lanes within the ego car's limits {told}; {advice}"
+                self.scene_name, f"of {len(inside)} m of lanes within the ego car's limits {found}; {advice}"
             )
         return seen
 

@@ -1,4 +1,4 @@
-"""A weather as the camera needs it: CARLA's fog, what clear air scatters, rain and water on the ground."""
+"""The camera pipeline of a weather: fog and haze, rain, water on the ground, and shade below road users."""
 
 from __future__ import annotations
 
@@ -30,32 +30,32 @@ from gear.world.weather.light import (
 from gear.world.weather.presets import wetness
 
 DENSEST_FOG_PER_M = 0.05
-"""Extinction of CARLA's 100 percent: what is 60 m away can no longer be told."""
+"""Extinction of CARLA's fog density of 100 percent: objects at 60 m can no longer be recognised."""
 
 RAIN_PER_M = 0.0035
-"""Extinction of the hardest rain."""
+"""Extinction of rain of 100 percent."""
 
 RAIN_FROM_M, RAIN_FALLOFF = 0.75, 0.1
-"""Where its veil begins and how it thins, in the terms of CARLA's fog: as its presets have the fog in rain."""
+"""Distance and falloff of the veil of rain, in the terms of CARLA's fog; those of CARLA's presets for rain."""
 
 AEROSOL_PER_M = 1.6e-4
-"""Extinction of a town's clear air by dust and vapour: 24 km of sight, as on a good day."""
+"""Extinction of clear air by aerosol: a visibility of 24 km."""
 
 MOLECULES_PER_M = (7.6e-6, 1.16e-5, 2.3e-5)
-"""Rayleigh's extinction at 610, 550 and 465 nm, at sea level."""
+"""Extinction by Rayleigh scattering at 610, 550 and 465 nm, at sea level."""
 
 FALLOFF_PER_M = 0.0693
-"""A falloff of 1 halves the fog every ten metres, as the engine below CARLA does."""
+"""Rate at which fog thins with height at a falloff of 1: it halves every ten metres, as in Unreal Engine."""
 
 
 FULL_PUDDLES = 0.32
-"""Share of open ground under water at 100 percent of deposits."""
+"""Share of open ground under water at 100 percent of `precipitation_deposits`."""
 
 DROP_LIGHT = 1.25
-"""A drop shows a wide piece of the sky, brighter than the horizon."""
+"""Radiance of a drop relative to the horizon: it refracts light of a large, brighter part of the sky."""
 
 SHADE_SKY_FACE_PX = 8
-"""A small sky says as much about its light as a large one."""
+"""Size of the sky's faces where only the light is needed, not the picture."""
 
 _MIRROR_ROWS, _MIRROR_COLUMNS = 128, 512
 
@@ -104,25 +104,25 @@ def camera_pipeline(
 
 
 def contact_shadows_of(weather: Weather, renderer_name: str, shapes: Mapping[str, Shape]) -> ContactShadows:
-    """What assets keep from the ground of a weather's light."""
+    """The shade that assets cast on the ground around them in the light of a weather."""
     light = lighting_of(weather, sky_face_px=SHADE_SKY_FACE_PX)
     return ContactShadows(shapes=shapes, even_share=even_share(weather, light), is_display=renderer_name == "classic")
 
 
 def even_share(weather: Weather, light: Lighting) -> float:
-    """How much of the light on open level ground is not the sun's, 0..1."""
+    """Share of the light on open level ground that is not the sun's, 0..1."""
     even = ambient_radiance(weather)[0].mean()
     sun = light.sun.mean() * max(light.towards_sun[2], 0) / math.pi
     return float(even / (even + sun))
 
 
 def _shown(light: Floats, renderer_name: str) -> Floats:
-    """Light in units of a renderer's frames: classic's hold display values."""
+    """Converts linear light to the units of a renderer's frames; those of classic hold display values."""
     return encode_srgb(light) if renderer_name == "classic" else light
 
 
 def air_of(weather: Weather, renderer_name: str, left: float = 1.0) -> Air:
-    """The air of a weather, in the units of a renderer's frames; `left` is the share of its own light at night."""
+    """The air of a weather, in the units of a renderer's frames; `left` is the share of its light at night."""
     aerosol = AEROSOL_PER_M * weather.mie_scattering_scale / 0.03
     molecules = np.array(MOLECULES_PER_M) * weather.rayleigh_scattering_scale / 0.0331
     return Air(
@@ -133,10 +133,10 @@ def air_of(weather: Weather, renderer_name: str, left: float = 1.0) -> Air:
 
 
 def fogs_of(weather: Weather) -> tuple[Fog, ...]:
-    """The fog and the veil of rain, in the order of what they take of light; none that is not there.
+    """The fog and the veil of rain of a weather; empty in clear air.
 
-    CARLA's percent run from clear air to a thick fog. Where the fog begins and how it thins are its own: the veil hangs
-    as a usual fog does, and both are one where the fog is a usual one.
+    CARLA's percent run from clear air to a thick fog. The fog begins and thins as the weather says; the veil of rain
+    begins and thins as the fog of CARLA's presets does. Where both agree they become one fog.
     """
     fog = DENSEST_FOG_PER_M * (weather.fog_density / 100) ** 1.5
     rain = RAIN_PER_M * math.pow(weather.precipitation / 100, 1.5)
@@ -148,7 +148,7 @@ def fogs_of(weather: Weather) -> tuple[Fog, ...]:
         from_m=weather.fog_distance_m,
         thinning_per_m=_thinning(weather.fog_falloff),
     )
-    # As one they cost every frame half.
+    # One fog takes half of the time of two.
     if (own.from_m, own.thinning_per_m) == (usual.from_m, usual.thinning_per_m):
         both = dataclasses.replace(own, per_m=float(weather.scattering_intensity * (fog + rain)))
         return tuple(one for one in (both,) if one.per_m > 0)

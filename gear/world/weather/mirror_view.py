@@ -1,4 +1,4 @@
-"""What wet ground mirrors: the placed scene once more, from below, without its ground and with neutral surfaces."""
+"""Renders what wet ground mirrors: the placed scene seen from below, without its ground and with neutral surfaces."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ from gear.world.world import PlacedStage, World
 def render_mirror_view(
     world: World, renderer: Renderer, placed: PlacedStage, record: SceneRecord, pipeline: CameraPipeline
 ) -> tuple[MirrorView | None, ...]:
-    """One a camera, None where it needs none; surfaces are neutral, so that a patch changes nothing but itself.
+    """Renders the mirrored view of each camera of a sample.
+
+    Surfaces are neutral, so that a patch changes no pixel outside of its own surface.
 
     Args:
         world: that the scene was placed in.
@@ -20,6 +22,9 @@ def render_mirror_view(
         placed: the sample, placed last.
         record: the scene, with its cameras.
         pipeline: the camera pipeline of this weather; it says which cameras need a mirror view.
+
+    Returns:
+        One view for each camera; None for a camera that needs none, such as in dry weather.
     """
     cameras = [pipeline.mirror_camera(camera, record) for camera in record.cameras]
     looking = [camera for camera in cameras if camera is not None]
