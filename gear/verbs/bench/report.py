@@ -136,7 +136,7 @@ class TaskResult:
         """The change of the task's metric in a difference."""
         return None if self.metric is None or one is None else self.metric.among(one.metrics)
 
-    def beside(self, one: Difference | None) -> tuple[str, PairedTest] | None:
+    def outside_patch(self, one: Difference | None) -> tuple[str, PairedTest] | None:
         """The paired test over single samples with the name of its metric, outside the patch where the task offers
         that.
         """
@@ -200,13 +200,13 @@ def _result_json(task: TaskResult, one: Result, out: Path) -> Json:
     pools = {}
     for pool in one.evaluation.pools:
         against = one.against(pool)
-        value, change, beside = task.value(pool), task.change(against), task.beside(against)
+        value, change, outside = task.value(pool), task.change(against), task.outside_patch(against)
         pools[pool.name] = {
             "samples": pool.samples,
             "value": None if value is None else value.as_json(),
             "against": None if against is None else against.against,
             "change": None if change is None else change.as_json(),
-            "beside": None if beside is None else {"metric": beside[0], **beside[1].as_json()},
+            "outside_patch": None if outside is None else {"metric": outside[0], **outside[1].as_json()},
             "auroc": None if against is None or against.auroc is None else against.auroc.as_json(),
             "defense": dict(pool.as_json()["defense"]),
             "cost": dict(pool.cost),

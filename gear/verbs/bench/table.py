@@ -29,9 +29,9 @@ def title(task: TaskResult) -> str:
 def legend() -> str:
     """One line that explains the columns."""
     return (
-        "in brackets 95 % intervals; change and AUROC: of patches against a random one, that against none; beside: "
-        "mean change of a picture, outside the patch where the task can tell, and p, how often chance alone changes as "
-        "much"
+        "in brackets: 95 % intervals; change and AUROC: of a patch against a random one, and of a random one against "
+        "none; outside patch: mean change of a picture, without the pixels of the patch where the task can leave them "
+        "out; p: how often chance alone changes as much"
     )
 
 
@@ -45,7 +45,7 @@ def columns(task: TaskResult) -> list[list[str]]:
 def head(task: TaskResult) -> list[str]:
     """The titles of the columns."""
     metric = "" if task.metric is None else task.metric.title
-    return ["network", "defense", "patch", metric, "change", "beside", "p", "AUROC", "mask IoU", "s/picture"]
+    return ["network", "defense", "patch", metric, "change", "outside patch", "p", "AUROC", "mask IoU", "s/picture"]
 
 
 def lines(task: TaskResult) -> Iterator[list[str]]:
@@ -58,8 +58,8 @@ def lines(task: TaskResult) -> Iterator[list[str]]:
 def line(task: TaskResult, one: Result, pool: Pool) -> list[str]:
     """The cells of one row."""
     against = one.against(pool)
-    beside = task.beside(against)
-    test = None if beside is None or not beside[1].pairs else beside[1]
+    outside = task.outside_patch(against)
+    test = None if outside is None or not outside[1].pairs else outside[1]
     return [
         one.model,
         one.defense or ALONE,

@@ -87,7 +87,7 @@ def _check_metrics(report: BenchReport) -> None:
             control, change = task.value(one.pool(against.against)), task.change(against)
             assert control is not None and change is not None
             assert change.value == pytest.approx(value.value - control.value)
-            found = task.beside(against)
+            found = task.outside_patch(against)
             assert found is not None and found[0] == "outside_patch.miou" and found[1].pairs == 4
             assert (against.auroc is not None) == (one.defense == "fpda")
 
