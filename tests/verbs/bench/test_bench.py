@@ -107,7 +107,7 @@ def _check_files(out: Path, report: BenchReport) -> None:
     assert {line["scene"] for line in lines} == {"all", "tiny-board", "tiny-double"}
     assert (out / "table.txt").read_text().startswith("semseg: miou (more is better)\n")
     page = (out / "report.html").read_text()
-    against = "change and AUROC: of patches against a random one, that against none"
+    against = "change and AUROC: of a patch against a random one, and of a random one against none"
     assert all(against in shown for shown in (page, (out / "table.txt").read_text()))
     assert "other pictures of a scene in each weather" in page, "a patch is made on those of all weathers together"
     patched = 2 * 2  # against two networks, alone and behind a defense that is looked through
