@@ -1,4 +1,4 @@
-"""Where gear keeps its own files inside a dataset: everything under `gear/`, one folder a split."""
+"""Paths of gear's own files in a dataset: all lie below `gear/`, in one folder per split."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ GEAR = "gear"
 
 
 def split_folder(split: str) -> str:
-    """Folder of one split's sidecars and manifest."""
+    """The folder of one split's sidecars, plan and manifest."""
     return f"{GEAR}/{split}"
 
 
@@ -16,25 +16,25 @@ def sidecar_path(split: str, index: int) -> str:
 
 
 def auxiliary_path(split: str, kind: str, index: int, name: str) -> str:
-    """A file that a sample owns beside its task's: `kind` is its folder."""
+    """The path of an auxiliary file of a sample; `kind` is the name of its folder, such as `probes`."""
     return f"{split_folder(split)}/{kind}/{index:06d}_{name}"
 
 
 def plan_path(split: str) -> str:
-    """What the split was begun with; written first."""
+    """The plan of a split: what decides its bytes. Written first."""
     return f"{split_folder(split)}/plan.json"
 
 
 def begun_path(split: str, what: str) -> str:
-    """Names files that are being written, a sample's or the index files, until what makes them whole is there."""
+    """A note that lists the files being written of a sample or of the indexes, deleted when they are complete."""
     return f"{split_folder(split)}/begun/{what}.json"
 
 
 def manifest_path(split: str) -> str:
-    """What the finished split holds; written last."""
+    """The manifest: lists all files of a finished split. Written last."""
     return f"{split_folder(split)}/manifest.json"
 
 
 def patch_path(label: str, name: str) -> str:
-    """A copy of the patch that was used."""
+    """The copy of a picture of the patch that a split shows."""
     return f"{GEAR}/patches/{label}/{name}"

@@ -1,6 +1,6 @@
-"""Which runs are at work on a dataset or on results: locks of folders, which the system lets go of with a killed run.
+"""Locks on folders, by which runs know of each other. The system releases the locks of a run that is killed.
 
-Where a file system knows no locks, or the system has none of this kind, all runs are taken for lone ones.
+On a file system without such locks every run proceeds as if it were the only one.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ __all__ = ["alone_at_work", "at_work", "is_at_work", "turn"]
 
 @contextlib.contextmanager
 def turn(root: Path) -> Iterator[None]:
-    """Runs that begin or forget splits of one dataset do so one after the other; makes the root where it is missing.
+    """Waits until no other run starts or removes splits of a dataset, and locks it. Creates a missing root.
 
     Raises:
         DatasetError: the root cannot be made.
@@ -31,7 +31,7 @@ def turn(root: Path) -> Iterator[None]:
         with explained(root):
             root.mkdir(parents=True, exist_ok=True)
         with _locked(root, alone=True, wait=True) as lock:
-            # Who had the turn before may have taken back all of it, the folder that was waited for included.
+            # The run that held the lock may have removed the folder that this one waited for.
             if lock is not None and not _is_still(root, lock):
                 continue
             yield
@@ -40,14 +40,14 @@ def turn(root: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def at_work(folder: Path) -> Iterator[None]:
-    """While a run writes what belongs to a split; `folder` is gear's own of it. Several may, if they make the same."""
+    """Shares a lock on a split's own folder while a run writes samples; several runs of one plan may."""
     with _locked(folder, alone=False, wait=True):
         yield
 
 
 @contextlib.contextmanager
 def alone_at_work(root: Path) -> Iterator[None]:
-    """While a run writes results into a folder of its own, which is made where it is missing.
+    """Locks a folder of results for one run. Creates a missing folder.
 
     Raises:
         DatasetError: another run is at work there, or the folder cannot be made.
@@ -64,7 +64,7 @@ def alone_at_work(root: Path) -> Iterator[None]:
 
 
 def is_at_work(folder: Path) -> bool:
-    """Whether some run is `at_work` there, this one included."""
+    """Whether any run, this one included, holds the lock of `at_work` on a folder."""
     try:
         with _locked(folder, alone=True, wait=False):
             return False
@@ -74,10 +74,10 @@ def is_at_work(folder: Path) -> bool:
 
 @contextlib.contextmanager
 def _locked(folder: Path, *, alone: bool, wait: bool) -> Iterator[int | None]:
-    """The folder's descriptor while it is locked; None where there is no lock to be had.
+    """Locks a folder and yields its descriptor, or None where it cannot be locked.
 
     Raises:
-        BlockingIOError: others have it, and waiting was not asked for.
+        BlockingIOError: another run holds the lock, and `wait` is False.
     """
     descriptor = _lock(folder, alone=alone, wait=wait)
     try:
@@ -92,7 +92,7 @@ def _lock(folder: Path, *, alone: bool, wait: bool) -> int | None:
         return None
     try:
         descriptor = os.open(folder, os.O_RDONLY)
-    except OSError:  # there is no such folder, or it is not for us to read
+    except OSError:  # missing, or unreadable
         return None
     try:
         fcntl.flock(descriptor, (fcntl.LOCK_EX if alone else fcntl.LOCK_SH) | (0 if wait else fcntl.LOCK_NB))

@@ -1,4 +1,4 @@
-"""What a task gives to be written or looked at, held to its contract first."""
+"""Checks what the methods of a task return, before it is written or shown."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from gear.values.frames import UInt8Image
 
 
 def check_encoded(given: Any, method: str) -> Encoded:
-    """Takes what `method` of a task returned, and gives it back.
+    """Checks the return value of a task's `method` and returns it.
 
     Raises:
-        TypeError: it is no `Encoded`, a file in it is not bytes, or its facts hold what JSON has no word for.
-        ValueError: its facts hold numbers that JSON has no word for.
+        TypeError: it is no `Encoded`, a file in it is not bytes, or its facts hold values that JSON cannot represent.
+        ValueError: its facts hold numbers that JSON cannot represent.
     """
     if not isinstance(given, Encoded):
         raise TypeError(f"{method} must give an Encoded, got {type(given).__name__}")
@@ -33,7 +33,7 @@ def check_encoded(given: Any, method: str) -> Encoded:
 
 
 def check_previews(given: Any) -> dict[str, UInt8Image]:
-    """Takes what `preview` of a task returned, and gives it back by name.
+    """Checks the return value of a task's `preview` and returns it as a dictionary of (H, W, 3) uint8 pictures.
 
     Raises:
         TypeError: one is no (H, W, 3) uint8 picture, or they are no mapping.
@@ -49,7 +49,7 @@ def check_previews(given: Any) -> dict[str, UInt8Image]:
 
 
 def check_metrics(given: Any, method: str) -> dict[str, float]:
-    """Takes what `method` of a task's evaluator returned, and gives it back by name.
+    """Checks the return value of an evaluator's `method` and returns it as a dictionary.
 
     Raises:
         TypeError: it is no mapping of names to numbers.

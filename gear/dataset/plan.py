@@ -1,4 +1,4 @@
-"""What a split was begun with. A run with another configuration must not mix its samples in."""
+"""The plan of a split: everything that decides its bytes. Samples of two plans are never mixed in one split."""
 
 from __future__ import annotations
 
@@ -65,14 +65,14 @@ def _digest(value: Json) -> str:
 
 
 def refuse_copy(root: Path, split: str) -> None:
-    """A split is that of its folder: a copied or renamed one names the files of the split that it was.
+    """Refuses a split whose folder was copied or renamed: it names the files of the split that it was copied from.
 
     Raises:
-        DatasetError: its plan, however old, is that of another split.
+        DatasetError: the plan, of whatever version, is that of another split.
     """
     try:
         there = load_sealed(inside(root, plan_path(split)))
-    except DatasetError:  # gone or damaged
+    except DatasetError:  # missing or damaged
         return
     _refuse_copy(root, split, there)
 
@@ -86,11 +86,12 @@ def _refuse_copy(root: Path, split: str, there: Json) -> None:
 
 
 def read_plan(root: Path, split: str) -> Plan | None:
-    """The plan of a split that was begun, or None.
+    """The plan of a split, or None where there is no such split.
 
     Raises:
-        ReplaceableError: it is of another version of gear.
-        DatasetError: it cannot be read, or is another split's.
+        ReplaceableError: the plan is of another version of gear.
+        DamagedError: its bytes are not those that gear wrote.
+        DatasetError: it cannot be read, or is the plan of another split.
     """
     path = inside(root, plan_path(split))
     if not path.exists():
@@ -109,12 +110,12 @@ def read_plan(root: Path, split: str) -> Plan | None:
 
 
 def refuse_other_tasks(root: Path, plan: Plan, *, besides: str = "") -> None:
-    """A root holds splits of one task.
+    """Refuses to mix tasks: all splits of a root are of one task.
 
     Args:
         root: of the dataset.
         plan: what is to be collected into it.
-        besides: a split that is not looked at.
+        besides: a split that is not checked.
 
     Raises:
         DatasetError: the root holds another task's dataset, or a plan there cannot be read.
@@ -128,11 +129,11 @@ def refuse_other_tasks(root: Path, plan: Plan, *, besides: str = "") -> None:
 
 
 def begin(root: Path, plan: Plan) -> None:
-    """Writes the plan, or checks that the one there is the same; more samples than before are welcome.
+    """Writes the plan of a new split, or checks that an existing split has the same one, with at most as many samples.
 
     Raises:
-        OutdatedError: the split was begun with another patch, and does not differ otherwise.
-        ReplaceableError: it was begun with another configuration, or with more samples.
+        OutdatedError: the existing split shows another patch, and does not differ otherwise.
+        ReplaceableError: the existing split has another configuration, or more samples.
         DatasetError: the root holds another task's dataset, or a plan there cannot be read.
     """
     split = plan.info.split
@@ -162,7 +163,7 @@ def write_plan(root: Path, plan: Plan) -> None:
 
 
 def differences(old: Json, new: Json, key: str = "") -> list[str]:
-    """Keys in which two JSON values differ, with both values."""
+    """One text for each key in which two JSON values differ, with both values."""
     if isinstance(old, dict) and isinstance(new, dict):
         found: list[str] = []
         for name in sorted(old.keys() | new.keys()):

@@ -1,4 +1,4 @@
-"""Datasets read back: samples with typed fields, and twins."""
+"""Reads datasets: samples with typed fields, and pairs of twins."""
 
 from __future__ import annotations
 
@@ -25,14 +25,13 @@ SHOWN = 4
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Dataset(Sequence[SampleT], Generic[SampleT]):
-    """One finished split: a sequence of samples, each decoded when it is asked for.
+    """One finished split: a sequence of samples, each read and decoded on access.
 
     Attributes:
-        root: its folder.
-        plan: what it was made with.
+        root: folder of the dataset.
+        plan: everything that decided the bytes of the split.
         task: the task that wrote it.
-        manifest: versions, renderer, configuration and file hashes; of sidecars, where it was written by a gear that
-            says them.
+        manifest: versions, renderer, configuration and hashes of all files (of sidecars since a later version).
     """
 
     root: Path
@@ -74,7 +73,7 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
         return (self[i] for i in range(len(self)))
 
     def sidecar(self, index: int) -> Sidecar:
-        """The scene record, surfaces and facts of one sample, without its pictures.
+        """The sidecar of one sample: its scene record, surfaces, facts and file hashes, without pictures.
 
         Raises:
             IndexError: there is no such sample.
@@ -95,10 +94,10 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
                 check_hash(self.root, relative, digest)
 
     def named(self, what: str) -> str:
-        """Name of the `renderer` or the `weather` that the manifest says it was made with.
+        """The name of the `renderer` or the `weather` in the manifest.
 
         Raises:
-            DatasetError: it says none.
+            DatasetError: the manifest has no such name.
         """
         entry = self.manifest.get(what)
         name = entry.get("name") if isinstance(entry, dict) else None
@@ -108,10 +107,10 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
         return name
 
     def content(self, kind: type[T], *keys: str) -> T:
-        """What its plan says of its content, by key, and key in key.
+        """A value in the `content` of the plan, by its path of keys.
 
         Raises:
-            DatasetError: nothing of that kind: the plan was damaged, or edited.
+            DatasetError: there is no such value of that type: the plan was edited.
         """
         value, name = self.plan.content, ".".join(("content", *keys))
         try:
@@ -124,7 +123,7 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
             raise DatasetError(path, f"is not of this version of gear ({problem}); collect the split again") from error
 
     def verify(self) -> list[str]:
-        """Files that are missing or differ from the manifest's hashes, by relative path."""
+        """Relative paths of files that are missing or do not match the manifest; `gear.verify` checks more."""
         wanted: dict[str, str] = {**self.manifest["indexes"], **self.manifest.get("sidecars", {})}
         for sample in self.manifest["samples"]:
             wanted.update(sample["files"])
@@ -160,8 +159,8 @@ def read_manifest(root: Path, plan: Plan) -> Json:
     """The manifest of a finished split.
 
     Raises:
-        DatasetError: it is not there, or further samples were begun, so that the split is not finished; or it does
-            not say which files there are.
+        DatasetError: the split is not finished (it has no manifest, or more samples than that lists), or the manifest
+            is damaged or lists no files.
     """
     split = plan.info.split
     path = inside(root, manifest_path(split))
@@ -190,22 +189,22 @@ def read_manifest(root: Path, plan: Plan) -> Json:
 
 
 def _holds_more(root: Path, split: str, count: int) -> bool:
-    """Whether there are samples that a manifest of so many does not have: where more were asked for and none was made,
-    a split is as whole as before.
+    """Whether a split has more samples than its manifest lists. A split for which more samples were requested, none of
+    which exists yet, still counts as finished.
     """
     samples = inside(root, sidecar_path(split, 0)).parent
     return sum(1 for _ in samples.glob("*.json")) > count
 
 
 def scenes_of(dataset: Dataset[Any]) -> tuple[str, int]:
-    """What decides which scenes a dataset shows, however they are rendered: `town/scene`, and the seed."""
+    """What decides which scenes a dataset shows, independent of their rendering: `town/scene` and the seed."""
     info = dataset.plan.info
     return f"{info.town}/{info.scene}", info.seed
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Twins(Sequence[tuple[SampleT, SampleT]], Generic[SampleT]):
-    """Two splits that differ in nothing but their patch, sample by sample."""
+    """Two splits that differ only in their patch, as a sequence of pairs of samples."""
 
     first: Dataset[SampleT]
     second: Dataset[SampleT]
@@ -240,7 +239,7 @@ def pair_twins(first: Dataset[Sample], second: Dataset[Sample]) -> Twins[Sample]
     """Pairs two splits by index.
 
     Raises:
-        DatasetError: they differ in more than their patch.
+        DatasetError: the splits differ in more than their patch.
     """
     if first.plan.twin_key != second.plan.twin_key:
         raise DatasetError(

@@ -1,7 +1,7 @@
-"""Whether a sidecar can be true, beyond its types: what is drawn, measured and attacked relies on it.
+"""Checks of a sidecar's values beyond their types.
 
-Files on disk are damaged, edited and written by others; a picture of no width or an outline of two corners would end in
-the middle of whatever reads it, far from the file that says so.
+Files on disk may be damaged, edited or written by other programs. A picture without width, or an outline of two
+corners, is refused here with the name of the file, and does not fail later in the code that draws, measures or attacks.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from gear.values.serial import Json
 
 MOST_SIDE_PX = 8192
 LARGEST = 1e12
-"""No metre, pixel, degree or second of a scene comes near it; squares and cubes of it are still numbers."""
+"""Far above every number of metres, pixels, degrees or seconds in a scene; its cube is still finite."""
 
 SEED = "seed"
-"""The one number that may be as large as it likes."""
+"""The only number without an upper limit."""
 
 QUATERNION_TOLERANCE = 1e-3
 
 
 def check_numbers(content: Json, name: str) -> None:
-    """Looks at the record or the surfaces as they are written.
+    """Checks the size of every number in a sidecar's record or surfaces.
 
     Raises:
-        FieldError: a number is larger than anything in a scene; says where.
+        FieldError: a number is larger than `LARGEST`; names its place.
     """
     where = _absurd(content)
     if where is not None:
@@ -37,10 +37,10 @@ def check_numbers(content: Json, name: str) -> None:
 
 
 def check_sidecar(sidecar: Sidecar) -> None:
-    """Looks at the record and the surfaces; facts are the task's own.
+    """Checks the record and the surfaces of a sidecar. Its facts are checked by the task that wrote them.
 
     Raises:
-        FieldError: something cannot be; says where.
+        FieldError: a value is impossible; names its place.
     """
     record = sidecar.record
     _check_record(record)
@@ -115,7 +115,7 @@ def _check_surface(truth: SurfaceTruth, record: SceneRecord, where: str) -> None
 
 
 def _absurd(value: Json) -> str | None:
-    """Where the first number is that no scene has, below a value; None where all are modest."""
+    """The place of the first number above `LARGEST` in a JSON value, or None."""
     if isinstance(value, (int, float)):
         return "" if abs(value) > LARGEST else None
     inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()

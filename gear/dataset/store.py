@@ -1,4 +1,4 @@
-"""One split being written: which samples are whole, how a sample becomes files, how the split is closed."""
+"""Writes a split: knows which samples are complete, writes the files of a sample, closes the split."""
 
 from __future__ import annotations
 
@@ -39,18 +39,18 @@ def check_output(root: Path, instead: str) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Store:
-    """A split on disk that is being collected."""
+    """A split that is being collected."""
 
     root: Path
     plan: Plan
 
     @property
     def split(self) -> str:
-        """Its name."""
+        """Name of the split."""
         return self.plan.info.split
 
     def open(self, patch_files: Mapping[str, bytes]) -> None:
-        """Begins the split or takes it up again; one that was killed before its first sample was not begun.
+        """Starts the split or continues it. A split without any sample is started anew.
 
         Raises:
             DatasetError: it cannot be written, was made with another configuration, has a sidecar that is no longer
@@ -78,7 +78,7 @@ class Store:
                 raise DamagedError(path, f"is not what the manifest says that was collected; {REPAIR}")
 
     def _keep_patch(self, relative: str, data: bytes) -> None:
-        """Copies a patch into the dataset, unless another split shows another one of the same name."""
+        """Copies a picture of the patch into the dataset, unless another split shows another one of that name."""
         self._refuse_other_patch(relative, data)
         target = inside(self.root, relative)
         if not (target.exists() and target.read_bytes() == data):
@@ -97,7 +97,7 @@ class Store:
                 raise DatasetError(self.root, problem)
 
     def _replace(self, patch_files: Mapping[str, bytes]) -> None:
-        """Removes the split, once nothing in the splits beside it can refuse the new one."""
+        """Removes the split, after all checks that could refuse the new one."""
         _forget_empty(self.root, self.plan, besides=self.split)
         refuse_other_tasks(self.root, self.plan, besides=self.split)
         for name, data in patch_files.items():
@@ -106,15 +106,15 @@ class Store:
 
     @contextlib.contextmanager
     def begun(self, patch_files: Mapping[str, bytes], *, force: bool = False) -> Iterator[None]:
-        """`open` for as long as a run is at work; where what follows fails before a new split has a sample, all of it
-        is taken back: what made nothing must not stand in the way of the next try, with another configuration.
+        """`open`, for as long as a run writes samples. When a new split fails before its first sample, it is removed
+        again, so that it does not block the next run with another configuration.
 
         Args:
             patch_files: as of `open`.
-            force: removes the split that is there first, unless another one refuses what would take its place.
+            force: whether an existing split is removed first, unless another split refuses the new one.
 
         Raises:
-            DatasetError: as `open`, or another run is at work on what would have to be removed.
+            DatasetError: as `open`, or another run is writing the split that would have to be removed.
         """
         refuse_links(self.root)
         was_there = {folder for folder in self._folders() if folder.exists()}
@@ -141,7 +141,7 @@ class Store:
         return [self.root, *self.root.parents]
 
     def _take_back(self, was_there: Set[Path]) -> None:
-        """Removes the split and all folders that are empty then, but for those that were there before."""
+        """Removes the split and all folders that become empty, except those that existed before."""
         with contextlib.suppress(OSError, DatasetError):
             if self.root.is_dir():
                 with turn(self.root):
@@ -153,7 +153,7 @@ class Store:
                         folder.rmdir()
 
     def missing(self) -> list[int]:
-        """Indices of samples that have no sidecar yet; a sample with one is whole and is never made again."""
+        """Indices of the samples that have no sidecar; a sample that has one is complete."""
         folder = inside(self.root, split_folder(self.split)) / "samples"
         there = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
         return [i for i in range(self.plan.samples) if f"{i:06d}.json" not in there]
@@ -191,9 +191,12 @@ class Store:
     def write(
         self, sample: Sample, encoded: Encoded, auxiliary: Mapping[str, tuple[Auxiliary, bytes]] | None = None
     ) -> None:
-        """Writes one sample's files, then its sidecar.
+        """Writes the files of one sample, then its sidecar.
 
-        `auxiliary` holds further files of the sample by name.
+        Args:
+            sample: the sample.
+            encoded: its files and facts, from its task.
+            auxiliary: further files of the sample, such as probes, with their bytes, by name.
 
         Raises:
             DatasetError: the disk refuses.
@@ -217,10 +220,10 @@ class Store:
         remove_file(self.root, begun)
 
     def sidecars(self) -> list[Sidecar]:
-        """All of them, in order of index.
+        """The sidecars of all samples, in order of index.
 
         Raises:
-            DatasetError: one is missing or broken.
+            DatasetError: one is missing or damaged.
         """
         return [read_sidecar(inside(self.root, sidecar_path(self.split, i))) for i in range(self.plan.samples)]
 
@@ -235,10 +238,12 @@ class Store:
         return {"patches": {_relative(self.root, path): sha256(read_bytes(path)) for path in paths}} if paths else {}
 
     def close(self, task: Task[Any, Any], facts: Mapping[str, Json]) -> None:
-        """Writes the format's index files and then the manifest; nothing where a run of more samples has begun since:
-        the split is whole when that one closes it.
+        """Writes the index files of the format and then the manifest. Does nothing when a run with more samples has
+        started meanwhile: that run closes the split.
 
-        `facts` are what the manifest says of versions, renderer and configuration.
+        Args:
+            task: the task, which makes the index files.
+            facts: entries of the manifest on versions, renderer and configuration.
 
         Raises:
             DatasetError: the disk refuses, or a sample is missing.
@@ -287,10 +292,10 @@ class Store:
         sync_folder(target.parent)
 
     def _indexes(self, task: Task[Any, Any], sidecars: Sequence[Sidecar]) -> Mapping[str, bytes]:
-        """What the format has of a whole split.
+        """The index files of the format, by path.
 
         Raises:
-            DatasetError: a sidecar, perhaps of a former run, does not say what the task must know.
+            DatasetError: a sidecar lacks something that the task needs.
         """
         views = {camera.name for camera in task.rig().cameras}
         for sidecar in sidecars:
@@ -313,7 +318,7 @@ class Store:
 
 
 def _forget_empty(root: Path, plan: Plan, *, besides: str = "") -> None:
-    """Removes splits that were begun otherwise and hold no sample, where they stand in the way of a plan."""
+    """Removes splits without samples that conflict with a plan."""
     for path in sorted((root / GEAR).glob("*/plan.json")):
         split = path.parent.name
         if (
@@ -330,10 +335,10 @@ def _forget_empty(root: Path, plan: Plan, *, besides: str = "") -> None:
 
 
 def _remove_idle(root: Path, split: str) -> None:
-    """`remove_split`, unless a run is at work on it.
+    """`remove_split`, unless a run is writing the split.
 
     Raises:
-        DatasetError: one is, or as `remove_split`.
+        DatasetError: a run is writing it, or as `remove_split`.
     """
     if is_at_work(inside(root, split_folder(split))):
         problem = f"another run is making split {split!r} just now; wait for its end, or use another --out"
@@ -402,13 +407,13 @@ def _load_if_json(path: Path) -> Json:
 
 
 def _names(value: Json, key: str) -> list[str]:
-    """Keys of an object inside another one."""
+    """The keys of an object that is an entry of another one."""
     inner = value.get(key) if isinstance(value, dict) else None
     return list(inner) if isinstance(inner, dict) else []
 
 
 def _patch_label(root: Path, split: str) -> str:
-    """What a split's patches are called; nothing where its plan is damaged."""
+    """The label of a split's patch; empty where its plan is damaged."""
     try:
         plan = read_plan(root, split)
     except DatasetError:
@@ -417,10 +422,10 @@ def _patch_label(root: Path, split: str) -> str:
 
 
 def splits_of(root: Path) -> Sequence[str]:
-    """Names of the splits that a root holds, finished or not.
+    """Names of the splits of a dataset, finished or not.
 
     Raises:
-        DatasetError: it is not a dataset of gear's.
+        DatasetError: the folder is not a dataset of gear's.
     """
     folder = root / "gear"
     names = sorted(p.parent.name for p in folder.glob("*/plan.json")) if folder.is_dir() else []
@@ -430,10 +435,10 @@ def splits_of(root: Path) -> Sequence[str]:
 
 
 def plan_of(root: Path, split: str) -> Plan:
-    """The plan of one split, for those who read it.
+    """The plan of one split, for reading it.
 
     Raises:
-        DatasetError: there is no such split, or it cannot be read.
+        DatasetError: there is no such split, or its plan cannot be read.
     """
     try:
         plan = read_plan(root, split)
