@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass
+from importlib.metadata import version
 from itertools import zip_longest
 from pathlib import Path
 
 from gear.contracts.tasks import SplitInfo
 from gear.dataset.files import inside, write_whole
-from gear.dataset.layout import GEAR, plan_path
-from gear.dataset.sealed_json import load_sealed, sealed_json
+from gear.dataset.layout import GEAR, manifest_path, plan_path
+from gear.dataset.sealed_json import REPAIR, DamagedError, load_sealed, sealed_json
 from gear.values.errors import DatasetError, FieldError, OutdatedError, ReplaceableError
 from gear.values.serial import Json, from_json, to_json
 
@@ -96,7 +97,10 @@ def read_plan(root: Path, split: str) -> Plan | None:
     path = inside(root, plan_path(split))
     if not path.exists():
         return None
-    content = load_sealed(path)
+    try:
+        content = load_sealed(path)
+    except DamagedError as error:
+        raise _damaged(root, split, error.problem.partition(";")[0]) from error
     _refuse_copy(root, split, content)
     try:
         plan: Plan = from_json(Plan, content, "plan")
@@ -105,8 +109,25 @@ def read_plan(root: Path, split: str) -> Plan | None:
                 raise FieldError(f"plan.{field}", f"must have a {key}")
         return plan
     except FieldError as error:
+        if _manifest(root, split).get("versions", {}).get("gear") == version("mujoco-gear"):
+            raise _damaged(root, split, f"is damaged ({error})") from error
         problem = f"{plan_path(split)}: is not of this version of gear ({error})"
         raise ReplaceableError(root, problem, split=split) from error
+
+
+def _manifest(root: Path, split: str) -> dict[str, Json]:
+    """The manifest of a split; empty where it is missing or damaged."""
+    try:
+        there = load_sealed(inside(root, manifest_path(split)))
+    except DatasetError:
+        return {}
+    return there if isinstance(there, dict) else {}
+
+
+def _damaged(root: Path, split: str, problem: str) -> DamagedError:
+    """The error of a damaged plan: a finished split has a manifest, from which the plan can be made again."""
+    remedy = REPAIR if _manifest(root, split) else "delete it and run the same collection again; samples are kept"
+    return DamagedError(root / plan_path(split), f"{problem}; {remedy}")
 
 
 def refuse_other_tasks(root: Path, plan: Plan, *, besides: str = "") -> None:
@@ -140,6 +161,8 @@ def begin(root: Path, plan: Plan) -> None:
     refuse_other_tasks(root, plan)
     there = read_plan(root, split)
     if there is not None and there.content_key != plan.content_key:
+        if _manifest(root, split).get("content_key") == plan.content_key:
+            raise _damaged(root, split, "is damaged: the manifest is of another plan, the one that is collected now")
         what = ", ".join(differences(there.as_json(), plan.as_json())[:4])
         is_same_otherwise = there.twin_key == plan.twin_key and there.auxiliary == plan.auxiliary
         raise (OutdatedError if is_same_otherwise else ReplaceableError)(

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from gear.dataset.plan import Plan, differences
+from gear.dataset.sealed_json import DamagedError
+from gear.dataset.store import Store
 from gear.testing.task_contract import INFO
 from gear.values.serial import Json, from_json
+from tests.dataset.splits import fill, plan, tree
 
 PLAN = Plan(
     task={"name": "semseg", "version": "1"},
@@ -72,3 +77,28 @@ def test_differences_are_named_with_both_values_but_for_what_may_differ() -> Non
 )
 def test_differences_in_lists_are_named_by_their_place(now: list[Json], expected: list[str]) -> None:
     assert differences({"boards": [BOARD]}, {"boards": now}) == expected
+
+
+@pytest.mark.parametrize("is_closed", [True, False])
+def test_a_damaged_plan_never_ends_in_the_advice_to_replace_the_split(tmp_path: Path, is_closed: bool) -> None:
+    fill(tmp_path, plan(), is_closed=is_closed)
+    whole, path = tree(tmp_path), tmp_path / "gear/test/plan.json"
+    for old, new in (("scene", "scenf"), ("billboard01", "billboard02"), ('"options"', '"optionz"'), ("{", "[")):
+        path.write_bytes(whole["gear/test/plan.json"].replace(old.encode(), new.encode(), 1))
+        with pytest.raises(DamagedError) as caught:
+            Store(tmp_path, plan()).open({})
+        remedy = "`gear verify DIR --repair`" if is_closed else "delete it and run the same collection again"
+        assert remedy in str(caught.value) and "--force" not in str(caught.value)
+    path.unlink()
+    fill(tmp_path, plan(), is_closed=is_closed)
+    assert tree(tmp_path) == whole
+
+
+def test_a_plan_that_another_program_has_damaged_is_known_by_the_manifest(tmp_path: Path) -> None:
+    fill(tmp_path, plan())
+    path = tmp_path / "gear/test/plan.json"
+    content = json.loads(path.read_text())
+    path.write_text(json.dumps(content | {"content": {"scenf": "billboard01", "seed": 5}}))
+    with pytest.raises(DamagedError, match="the manifest is of another plan") as caught:
+        Store(tmp_path, plan()).open({})
+    assert "--force" not in str(caught.value)
