@@ -1,6 +1,7 @@
-"""Makes the pictures of README and docs from collections of fixed seeds: `python docs/make_pictures.py [NAME ...]`.
+"""Makes the pictures of the README and the documents: `python docs/make_pictures.py [NAME ...]`.
 
-They are to be made again, looked at and committed when the look of the towns has changed; some minutes on two cores.
+The pictures come from collections with fixed seeds and take some minutes on two cores. When the appearance of the towns has
+changed visibly, make them again, look at them and commit them.
 """
 
 from __future__ import annotations
@@ -125,7 +126,7 @@ PICTURES: dict[str, Callable[[Path], Picture]] = {"towns": towns, "night": night
 
 
 def main() -> None:
-    """Makes those that are named, or all."""
+    """Makes the pictures that are named, or all."""
     for name in sys.argv[1:] or PICTURES:
         with tempfile.TemporaryDirectory() as folder:
             picture = PICTURES[name](Path(folder))
