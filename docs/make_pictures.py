@@ -1,7 +1,7 @@
 """Makes the pictures of the README and the documents: `python docs/make_pictures.py [NAME ...]`.
 
-The pictures come from collections with fixed seeds and take some minutes on two cores. When the appearance of the towns has
-changed visibly, make them again, look at them and commit them.
+The pictures come from collections with fixed seeds and take some minutes on two cores. When the appearance of the towns
+has changed visibly, make them again, look at them and commit them.
 """
 
 from __future__ import annotations
