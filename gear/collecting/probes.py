@@ -114,5 +114,5 @@ def compute_probes(
 
 def _unclipped(black: UInt16Image, white: UInt16Image, grey: UInt16Image, grey_weight: float) -> UInt16Image:
     """White without clipping; the rendered white where nothing is clipped."""
-    reckoned = black + (grey.astype(np.float32) - black) / np.float32(grey_weight)
-    return np.where(reckoned > white + np.float32(UNSURE), reckoned + np.float32(0.5), white).astype(np.uint16)
+    computed = black + (grey.astype(np.float32) - black) / np.float32(grey_weight)
+    return np.where(computed > white + np.float32(UNSURE), computed + np.float32(0.5), white).astype(np.uint16)

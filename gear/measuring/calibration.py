@@ -31,7 +31,7 @@ class Calibration:
     Attributes:
         clean: dataset without patches; None where none was given.
         patched: the same dataset with patches; None where none was given.
-        told: called with (samples read for the first time, samples of both datasets).
+        on_fit_progress: called with (samples read for the first time, samples of both datasets).
     """
 
     clean: Dataset[Any] | None = None
@@ -39,10 +39,10 @@ class Calibration:
     on_fit_progress: Progress | None = None
 
     def fit(self, defense: Chosen, product: Defense, model: Model, cameras: Sequence[str], seed: int) -> Any:
-        """What the defense makes of them for a model that looks through these cameras; None where there are none.
+        """The defense's state after calibration for a model with these cameras; None without calibration data.
 
         Raises:
-            GearError: they do not suit it, or a third party's code fails.
+            GearError: the data do not suit the defense, or a third party's code fails.
         """
         if self.clean is None:
             return None
@@ -102,18 +102,17 @@ def opened_calibration(
     flag: str = "--set ",
     on_fit_progress: Progress | None = None,
 ) -> Calibration:
-    """Opens what is there.
+    """Opens the calibration data and checks them.
 
     Args:
         clean, patched: roots of datasets; None for none.
-        models: that look at them.
-        defense: what is to learn.
+        models: models that the defense guards.
+        defense: name of the defense.
         flag: how the user sets one of the models' options.
-        told: of (samples that the defense has read for the first time, samples of both).
+        on_fit_progress: called with (samples that the defense has read for the first time, samples of both).
 
     Raises:
-        GearError: they cannot be read or are swapped, models cannot look at them, or there is nothing to learn or
-            nobody to.
+        GearError: a dataset cannot be read or does not suit a model, both are swapped, or there is no defense.
     """
     if clean is None and patched is None:
         return NOTHING

@@ -31,10 +31,10 @@ class CheckedDefense:
         learn: Callable[[], Any] = lambda: None,
     ) -> None:
         """Args:
-        found: whose it is.
-        defense: the thing itself.
-        model: what it guards, for a defense that looks into it.
-        learn: gives what its `fit` makes of calibration data; called once, before the first sample.
+        found: the defense's plugin.
+        defense: the built defense.
+        model: the guarded model, for a defense that uses its feature maps or predictions.
+        learn: calibrates the defense and returns its state; called once, before the first sample.
         """
         self._found, self._defense, self._model, self._learn = found, defense, model, learn
 

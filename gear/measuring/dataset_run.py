@@ -41,7 +41,7 @@ class Row:
 def evaluate_row(
     dataset: Dataset[Any], scorer: Scorer, guarded: GuardedModel, *, batch: int, workers: int, done: SampleDone
 ) -> Row:
-    """Takes up what is kept and predicts the rest.
+    """Reads the predictions of an earlier run and makes the others.
 
     Batches are always the same samples, those that are finished already among them, and there are as many lanes as the
     whole dataset has work for: networks round a batch otherwise than one sample, and on several threads otherwise than

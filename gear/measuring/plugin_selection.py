@@ -126,7 +126,7 @@ def check_optics(model: Chosen, options: Json, collected: str, flag: str) -> Non
         assumed, taken = getattr(config, name, None), options.get(name)
         if assumed is not None and taken is not None and assumed != taken:
             raise GearError(
-                f"{collected} with {name} {taken:g}, but model {model.found.spec.name!r} reckons with {assumed:g}; say "
+                f"{collected} with {name} {taken:g}, but model {model.found.spec.name!r} assumes {assumed:g}; say "
                 f"{flag}{name}={taken:g}"
             )
 

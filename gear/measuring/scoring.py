@@ -91,11 +91,11 @@ class Scorer:
         self, dataset: Dataset[Any], root: Path, folder: str, reports: tuple[str, ...], model: PluginEntry
     ) -> None:
         """Args:
-        dataset: whose samples they are.
-        root: of the evaluation.
-        folder: of this dataset in it.
-        reports: further metrics by name.
-        model: whose predictions they are.
+        dataset: the samples.
+        root: folder of the evaluation.
+        folder: name of this dataset's folder in it.
+        reports: names of further metrics.
+        model: plugin of the model that predicts.
         """
         self._dataset, self._root, self._folder, self._model = dataset, root, folder, model
         self._task = dataset.task
@@ -197,9 +197,9 @@ class Scorer:
 
     @contextmanager
     def _blamed(self, index: int) -> Iterator[None]:
-        """A prediction that does not suit the task is its model's fault, or, with one of gear's, that of its weights.
+        """Names the model's plugin, or the weights of one of gear's models, when a prediction cannot be measured.
 
-        Threads must not share a redirected stdout, so this is not `gear.plugins.build.blamed`.
+        `gear.plugins.build.blamed` redirects stdout, which threads must not share.
         """
         try:
             yield
@@ -215,8 +215,10 @@ class Scorer:
 
 
 def _read_note(path: Path) -> dict[str, Any]:
-    """Raises:
-    DatasetError: it is none that gear wrote.
+    """The note of a sample, as JSON with checked types.
+
+    Raises:
+        DatasetError: the file is no note that gear wrote.
     """
     there = load_json(path)
     if not isinstance(there, dict) or not there.keys() >= KEPT.keys():

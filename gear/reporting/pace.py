@@ -36,8 +36,7 @@ class Pace:
         count = f"{self.done} of {self.total}" if self.total else str(self.done)
         parts = [f"{count} {plural(self.unit, self.total or self.done)}"]
         rate, left_s = self.rate(now_s), self.left_s(now_s)
-        if rate:
-            parts.append(rate_text(rate))
+        parts.append(rate_text(rate) if rate else f"{duration_text(now_s - self.first_s)} so far")
         if left_s:
             parts.append(f"{duration_text(left_s)} left")
         return ", ".join(parts)

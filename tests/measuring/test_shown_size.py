@@ -53,7 +53,7 @@ def test_attack_and_gap_tell_of_it(
         assert "note:" not in capsys.readouterr().err
     # What the user can put right in the models is not an option of the attack.
     assert main([*attack, "--model-set=hfov_deg=60", f"--out={tmp_path / 'lens'}"]) == 2
-    assert re.search(r"reckons with 60; say --model-set hfov_deg=\d+", capsys.readouterr().err)
+    assert re.search(r"assumes 60; say --model-set hfov_deg=\d+", capsys.readouterr().err)
 
 
 @pytest.mark.parametrize(

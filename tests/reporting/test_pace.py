@@ -17,7 +17,7 @@ def test_only_what_this_run_did_counts_for_the_rate() -> None:
 def test_nothing_is_promised_before_there_is_a_rate() -> None:
     pace = Pace("query", first_done=4, first_s=1.0, done=4, total=9)
     assert (pace.rate(1.0), pace.rate(50.0), pace.left_s(50.0)) == (0.0, 0.0, None)
-    assert pace.line(50.0) == "4 of 9 queries"
+    assert pace.line(50.0) == "4 of 9 queries, 49 seconds so far"
     assert Pace("file", 0, 0.0, 6, 0).line(2.0) == "6 files, 3 per second", "an unknown total"
 
 

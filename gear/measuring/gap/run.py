@@ -131,7 +131,7 @@ def sample_gaps(
     index: int,
     effect: Effect | None,
 ) -> list[SampleGap]:
-    """The metrics of each view of one sample that shows a patch."""
+    """Compares each view of one sample that shows a patch; also adds the sample to the effect, if there is one."""
     clean, rendered = pairs[index]
     composed: dict[str, dict[str, UInt8Image]] = {name: dict(clean.images) for name in engines}
     found = []
@@ -161,7 +161,13 @@ def sample_gaps(
 
 
 def composed_picture(engine: BaseCompositor, images: Sequence[UInt8Image], index: int, view: str) -> UInt8Image:
-    """(H, W, 3) uint8 of one sample with patches, through a compositor that rounds."""
+    """One view of a sample with patches in it, (H, W, 3) uint8 sRGB.
+
+    Args:
+        engine: a compositor that rounds as the camera does.
+        images: patches, (h, w, 3) uint8 sRGB, one per surface.
+        index, view: which picture.
+    """
     import torch
 
     patches = [torch.from_numpy(image.copy()).permute(2, 0, 1).float() / 255 for image in images]

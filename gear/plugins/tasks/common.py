@@ -178,7 +178,7 @@ def draw_polygon(picture: UInt8Image, points_px: Sequence[Sequence[float]], rgb:
 
 
 FAR_PX = 4 * 8192
-"""What is drawn ends so far outside at most: OpenCV reckons with 32 bits."""
+"""Largest distance of a drawn point from the picture in pixels: OpenCV computes with 32 bits."""
 
 
 def draw_segments(

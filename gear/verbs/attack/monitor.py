@@ -47,7 +47,7 @@ class Recorder:
         every: steps between two validations.
         patience: validations without improvement after which the attack stops; 0 for never.
         queries: budget of queries, for attacks that count queries.
-        told: called with the finished and the allowed steps, or queries.
+        on_progress: called with the finished and the allowed steps, or queries.
         curves: values by name, one per step.
         judged: (step, harm) of every validation.
         best: patches with the largest harm in a validation.

@@ -1,5 +1,7 @@
-"""What `gear defend` keeps of a sample: its files, and the marker that says from what they were made and that they are
-whole. Samples whose pictures are others since, or whose files were damaged, are cleaned again."""
+"""The files that `gear defend` writes for a sample, and a marker with their hashes and those of the source pictures.
+
+A sample whose source pictures changed, or whose files are damaged, is cleaned again.
+"""
 
 from __future__ import annotations
 
@@ -21,15 +23,15 @@ from gear.values.errors import DatasetError, FieldError
 from gear.values.serial import from_json, to_json
 
 FOLDER = "defense"
-"""Masks, scores and what the run was begun with lie under it, one folder a split."""
+"""Folder of masks, scores and the run's plan, with one folder per split."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Marker:
-    """Written last, beside a sample's files.
+    """The record of a cleaned sample, which is written after its files.
 
     Attributes:
-        score: of the defense; None where it gives none.
+        score: the defense's score, 0..1; None for a defense without one.
         source: sha256 of the dataset's pictures that were cleaned, by path in the dataset.
         files: sha256 of what was written, by path in the folder of the cleaned pictures.
     """
@@ -40,8 +42,7 @@ class Marker:
 
 
 def kept_marker(root: Path, dataset: Dataset[Any], index: int, spec: DefenseSpec[Any]) -> Marker | None:
-    """What was noted of a sample that is cleaned; None where it is not, where the dataset's pictures are others now, or
-    where what was written is damaged."""
+    """The marker of a cleaned sample; None where there is none, the source pictures changed, or a file is damaged."""
     path = inside(root, marker_path(dataset.plan.info.split, index))
     if not path.is_file():
         return None
@@ -56,7 +57,7 @@ def kept_marker(root: Path, dataset: Dataset[Any], index: int, spec: DefenseSpec
 def write_sample(
     root: Path, dataset: Dataset[Any], index: int, sample: Any, spec: DefenseSpec[Any], result: DefenseResult
 ) -> Marker:
-    """Writes what the defense gives of one sample, and last the marker that says it is whole."""
+    """Writes the results of the defense for one sample, and its marker after them."""
     info = dataset.plan.info
     cleans = "images" in spec.outputs
     pictures = _picture_files(dataset, dataclasses.replace(sample, images=dict(result.views)) if cleans else sample)
@@ -77,12 +78,12 @@ def write_sample(
 
 
 def marker_path(split: str, index: int) -> str:
-    """Of one sample."""
+    """Path of a sample's marker, relative to the output folder."""
     return f"{FOLDER}/{split}/samples/{index:06d}.json"
 
 
 def _picture_files(dataset: Dataset[Any], sample: Any) -> dict[str, bytes]:
-    """Of a sample's files those that hold its pictures, whatever the task: those that change with them."""
+    """Those of a sample's encoded files, by path, that change with its pictures; works for any task."""
     info = dataset.plan.info
     inverted = {name: np.subtract(255, picture, dtype=np.uint8) for name, picture in sample.images.items()}
     other = dataset.task.encode(dataclasses.replace(sample, images=inverted), info).files
@@ -90,5 +91,9 @@ def _picture_files(dataset: Dataset[Any], sample: Any) -> dict[str, bytes]:
 
 
 def _are_whole(root: Path, digests: Mapping[str, str]) -> bool:
-    """Whether files are there and have these digests."""
+    """Whether all files have the given sha256.
+
+    Raises:
+        DatasetError: a file is missing.
+    """
     return all(sha256(read_bytes(inside(root, relative))) == digest for relative, digest in digests.items())

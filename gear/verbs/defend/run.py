@@ -65,8 +65,9 @@ def defend(
     progress: bool = False,
     on_progress: Progress | None = None,
 ) -> DefendReport:
-    """Writes a dataset's pictures as a defense cleans them; takes up again what was begun, and cleans again what comes
-    of pictures that are others now, or was damaged.
+    """Writes a dataset's pictures after a defense has cleaned them.
+
+    An interrupted run is resumed. Samples whose source pictures changed, or whose files are damaged, are cleaned again.
 
     The cleaned pictures have the relative paths of the dataset's. Beside them lie, for each split,
     `defense/<split>/masks/<index>_<camera>.png` (16 bits, 65535 is 1) and `defense/<split>/scores.json`, as far as the

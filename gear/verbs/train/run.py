@@ -55,7 +55,7 @@ Paths = str | Path | Sequence[str | Path]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrainReport:
-    """What a training came to.
+    """The result of a training.
 
     Attributes:
         root: folder of the results.
@@ -76,7 +76,7 @@ class TrainReport:
     metric: str
 
     def summary(self) -> str:
-        """One line for a person."""
+        """The result in one line."""
         name = self.metric or "loss"
         value = self.metrics.get(name, float("nan"))
         return (
@@ -109,7 +109,7 @@ def train(
     on_progress: Progress | None = None,
     on_warning: Warn | None = None,
 ) -> TrainReport:
-    """Trains a network; takes up again what was begun in `out`, and does nothing where it is finished.
+    """Trains a network; resumes an interrupted training in `out`, and does nothing where it is finished.
 
     The same seed, data and settings give the same weights on the CPU of one machine, stopped and taken up again or not,
     unless time is the budget.
@@ -306,7 +306,7 @@ def _parts(origin: Origin, root: Path, callbacks: Callbacks) -> Parts:
 
 
 def _plan(origin: Origin) -> Json:
-    """What the bytes of a training follow from."""
+    """Everything on which the weights depend, as JSON."""
     config: Any = to_plain(origin.config)
     for name in CHANGE_NOTHING:
         config.pop(name)

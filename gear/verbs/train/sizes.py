@@ -1,4 +1,4 @@
-"""How large pictures and crops are: on a CPU a step over large ones takes longer than it teaches."""
+"""The size of pictures and crops in a training: steps over large ones are slow on a CPU."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from gear.values.errors import GearError
 from gear.verbs.train.config import CROPS_PX, TrainConfig
 
 PIXELS_A_SECOND = (1 << 18) / 600
-"""Pixels of a picture for each second of the budget: 724 x 362 for ten minutes, in which two cores make some 700 steps
-over batches of eight with a network of DDRNet's size."""
+"""Pixels of a picture per second of the time budget: 724 x 362 for ten minutes, in which two cores make about 700 steps
+over batches of eight pictures with a network of DDRNet's size."""
 
 LEAST_PIXELS = 1 << 16
 
@@ -25,13 +25,13 @@ NEARLY_WHOLE = 0.9
 
 
 def picture_scale(found: PluginEntry, config: TrainConfig, samples: Samples) -> float:
-    """Share of their size at which pictures are shown.
+    """The factor by which pictures are scaled down for training, at most 1.
 
-    What the config says; else 1 without a time budget, on a GPU, where crops are smaller than pictures anyway, and
-    where the weights could not say at which size they are to be used afterwards.
+    The value of the config, if it has one. Otherwise 1 without a time budget, on a GPU, with crops (which are smaller
+    than pictures), and for networks whose weights cannot record the factor for their later use.
 
     Raises:
-        GearError: smaller pictures are wanted together with adversarial patches.
+        GearError: smaller pictures are requested together with adversarial patches.
     """
     if config.picture_scale is not None:
         if config.picture_scale < 1 and config.adversarial.attack:
@@ -43,7 +43,7 @@ def picture_scale(found: PluginEntry, config: TrainConfig, samples: Samples) -> 
         return 1.0
     sample = samples[0]
     geometry = geometry_of(sample)
-    if geometry is None or geometry.is_centred:  # difficulties of boxes in space are told by pixels
+    if geometry is None or geometry.is_centred:  # the difficulty of a 3D box depends on its height in pixels
         return 1.0
     height, width = next(iter(sample.images.values())).shape[:2]
     share = math.sqrt(max(PIXELS_A_SECOND * config.time_budget_s, LEAST_PIXELS) / (height * width))
@@ -51,7 +51,7 @@ def picture_scale(found: PluginEntry, config: TrainConfig, samples: Samples) -> 
 
 
 def without_empty_margins(config: TrainConfig, samples: Samples) -> TrainConfig:
-    """Crops no larger than the largest picture is ever shown, if that is a crop: beyond there is only padding."""
+    """The config with crops that are not larger than the largest scaled picture, beyond which there is only padding."""
     if config.crop_px is None:
         return config
     cameras = [camera for dataset in samples.datasets for camera in dataset.sidecar(0).record.cameras]

@@ -33,11 +33,11 @@ FLAGS = {"weights": "--init", "seed": "--seed", "device": "--device", "precision
 
 
 def check_options(found: PluginEntry, config: TrainConfig) -> None:
-    """Whether the network's options are left to the training where the training sets them: weights that were slipped in
-    here would be noted as random ones, and a precision would hold for validation, too.
+    """Checks that no option of the network is given that the training itself sets: first weights given as an option
+    would be recorded as random ones, and a precision would apply to validation too.
 
     Raises:
-        GearError: one of them is given.
+        GearError: one of these options is given.
     """
     fields = {field.name for field in dataclasses.fields(found.spec.config)}
     given = config.options.entries if isinstance(config.options, Mapping) else {}
@@ -47,18 +47,18 @@ def check_options(found: PluginEntry, config: TrainConfig) -> None:
 
 
 def sizes_note(found: PluginEntry, config: TrainConfig, samples: Samples) -> str:
-    """What to know where pictures have several sizes and the network would have noted one; nothing elsewhere."""
+    """A note for pictures of several sizes, where the weights would record the scale of one size; empty otherwise."""
     widths_px = _widths_px(samples)
     if len(widths_px) == 1 or not _notes_share(found, config):
         return ""
     return (
-        f"pictures are {', '.join(map(str, sorted(widths_px)))} px wide: the network sees each as it is, and its"
+        f"pictures are {', '.join(map(str, sorted(widths_px)))} px wide: the network sees each unscaled, and its"
         f" weights will be used on pictures of the task's own size; --set options.{SCALE}=SHARE says otherwise"
     )
 
 
 def picture_share(samples: Samples, spec: TaskSpec[Any]) -> float:
-    """Width of the pictures as a share of the width that the task has by itself; 1 where there is no saying."""
+    """Width of the pictures divided by the task's default width; 1 where pictures have several widths."""
     usual = getattr(spec.config(), "width_px", None)
     widths_px = _widths_px(samples)
     return width_share(widths_px.pop(), usual) if usual and len(widths_px) == 1 else 1.0
@@ -69,22 +69,22 @@ def _widths_px(samples: Samples) -> set[int]:
 
 
 def _notes_share(found: PluginEntry, config: TrainConfig) -> bool:
-    """Whether the network's weights say at which share of the task's own pictures they are used, and nobody said it."""
+    """Whether the network's weights record the scale of the pictures that they are used on, and no option sets it."""
     is_given = isinstance(config.options, Mapping) and SCALE in config.options.entries
     return getattr(found.spec.config(), SCALE, 1.0) is None and not is_given
 
 
 def with_scale(found: PluginEntry, config: TrainConfig, share: float, begun: Json = None) -> TrainConfig:
-    """Lets a network that would run at a share of its pictures' size see small pictures as they are, and those of the
-    task's own size at the share that the weights were trained for with which it begins.
+    """The config with the scale at which the network sees its pictures.
 
-    Its weights then say at which share of the task's own pictures they are to be used.
+    A network that scales its pictures down sees small training pictures unscaled, and pictures of the task's default
+    size at the scale that its first weights were trained for. The new weights record the scale for their later use.
 
     Args:
-        found: whose network it is.
+        found: the network's plugin.
         config: of the training.
-        share: as of `picture_share`.
-        begun: config of the training that is taken up again, which knows what weights said that are gone since.
+        share: result of `picture_share`.
+        begun: config of the training that is resumed; it has the scale of first weights that were deleted since.
     """
     if not _notes_share(found, config):
         return config
@@ -97,13 +97,13 @@ def with_scale(found: PluginEntry, config: TrainConfig, share: float, begun: Jso
 
 
 def goes_on_alone(found: PluginEntry, init: str, begun: Json) -> bool:
-    """Whether a training that was begun with weights must do without them: they are gone, and its checkpoint has all
-    that the next step depends on.
+    """Whether a resumed training continues without its first weights: their file is gone, and the checkpoint has
+    everything on which the next step depends.
 
     Args:
-        found: whose network it is.
-        init: what it begins with.
-        begun: config of the training that is there, or None.
+        found: the network's plugin.
+        init: the first weights, as in `TrainConfig`.
+        begun: config of the training in the folder; None without one.
     """
     spec = found.spec
     assert isinstance(spec, ModelSpec)
@@ -121,10 +121,10 @@ def _given_scale(begun: Json) -> Json:
 
 
 def _scale_of_start(found: PluginEntry, init: str) -> Json:
-    """What whole weights that a training begins with say of the share that they were trained for; None for nothing.
+    """The scale of pictures that the first weights were trained for; None where they do not record one.
 
     Raises:
-        GearError: they are not there, or no safetensors.
+        GearError: the file is missing or no safetensors file.
     """
     spec = found.spec
     assert isinstance(spec, ModelSpec)
@@ -134,9 +134,10 @@ def _scale_of_start(found: PluginEntry, init: str) -> Json:
 
 
 def precision_of(found: PluginEntry, config: TrainConfig) -> Literal["float32", "bfloat16"]:
-    """Of the training steps: what was asked for; half of it where time counts and the device is quicker so.
+    """The precision of the training steps: the requested one; for `auto`, bfloat16 with a time budget where the device
+    is quicker in it.
 
-    Without a time budget the same command gives the same weights, so there it does not depend on the device.
+    Without a time budget the same command gives the same weights, so that `auto` does not depend on the device.
     """
     if config.precision != "auto":
         return config.precision
@@ -149,10 +150,10 @@ def precision_of(found: PluginEntry, config: TrainConfig) -> Literal["float32", 
 def build_network(found: PluginEntry, config: TrainConfig, *, precision: str) -> Any:
     """The network with random weights from the seed, on the device.
 
-    Options that a network does not have are not given to it: one that knows no `precision` runs at torch's.
+    Options that a network does not have are left out: one without `precision` runs at torch's default.
 
     Raises:
-        ConfigError: its options do not fit.
+        ConfigError: an option does not fit.
         PluginError: a third party's `build` failed.
     """
     wanted = {"weights": NONE, "seed": str(config.seed), "device": config.device, "precision": precision}
@@ -162,29 +163,33 @@ def build_network(found: PluginEntry, config: TrainConfig, *, precision: str) ->
     for name, text in wanted.items():
         if name in fields:
             options = with_value(options, (name,), Scalar(text, False, place))
-    with seeded(config.seed):  # for those that draw their weights from torch's own generator
+    with seeded(config.seed):  # for networks that draw their weights from torch's global generator
         return build(found, options)
 
 
 def go_on_from(model: Any, init: str) -> None:
-    """Lets a network that begins with weights train only what they leave to be trained.
-
-    Those of another network's trunk may be few: what stays random is to be trained.
+    """Freezes the parts that are not trained after published weights; a network with random or trunk weights is trained
+    as a whole.
     """
     if init not in ("", NONE) and not init.startswith(TRUNK):
         freeze_trunks(model.module())
 
 
 def begin_with(found: PluginEntry, model: Any, init: str) -> str:
-    """Puts first weights into a network: `shipped`, a file's, those that the network knows by name, or `trunk:` and a
-    file or the name of another network with reference weights, for what the two have in common.
+    """Loads first weights into a network.
+
+    Args:
+        found: the network's plugin.
+        model: the built network.
+        init: `shipped`, a file, a name that the network declares, or `trunk:` followed by a file or by the name of
+            another network with reference weights, of which the parts that both have in common are loaded.
 
     Returns:
-        What the user should know of it; mostly nothing.
+        A note for the user; empty where there is none.
 
     Raises:
-        GearError: there are none, or they do not fit.
-        UnknownNameError: neither a file nor a name that the network knows.
+        GearError: there are no such weights, or they do not fit.
+        UnknownNameError: `init` is neither a file nor a name that the network declares.
     """
     spec = found.spec
     assert isinstance(spec, ModelSpec)
@@ -211,7 +216,7 @@ def begin_with(found: PluginEntry, model: Any, init: str) -> str:
 
 
 def _kept_at_random(spec: ModelSpec[Any], model: Any) -> str:
-    """What to know of a network of which part is never trained, since published weights are what it begins with."""
+    """A note for a network with random weights in a part that is never trained; empty where there is no such part."""
     kept = sum(one.numel() for one in model.module().parameters() if not one.requires_grad)
     if not kept:
         return ""
@@ -223,7 +228,7 @@ def _kept_at_random(spec: ModelSpec[Any], model: Any) -> str:
 
 
 def _trunk(source: str) -> Path:
-    """The file that `trunk:` is followed by, as itself or as the name of a network."""
+    """The weights file that follows `trunk:`, given as a path or as the name of a network with reference weights."""
     path = shipped(source) or Path(source)
     if not path.exists() and not path.suffix:
         raise UnknownNameError("reference weights", source, shipped_networks(), "or give a safetensors file")

@@ -85,7 +85,7 @@ def convert_weights(
     Nothing in the published file is run; what of it is not the network (an optimiser's state, criteria) is left out.
     Prefixes of wrappers (`module.`, `_orig_mod.`, `net.module.`) are taken off the keys. Where several entries of a
     checkpoint fit, such as `model` and `ema`, the report says which one was taken. The metadata of a safetensors file
-    are kept, and options that are given are noted with them.
+    are kept, and given options are added to them.
 
     Args:
         model: name of a model plugin.

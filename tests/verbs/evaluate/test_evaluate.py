@@ -357,7 +357,7 @@ def test_a_model_that_reckons_with_another_camera_is_refused(tmp_path: Path, sma
     data = small("stereo3d")
     install(replace(model_spec(lambda _: Oracle([data]), "stereo3d"), config=CameraConfig))
     for name, value, taken in (("baseline_m", "0.3", "0.54"), ("hfov_deg", "60", "90")):
-        message = f"collected with {name} {taken}, but model 'odd' reckons with {value}; say --set {name}={taken}"
+        message = f"collected with {name} {taken}, but model 'odd' assumes {value}; say --set {name}={taken}"
         with pytest.raises(GearError, match=message):
             evaluate(data, model="odd", model_settings=[f"{name}={value}"], out=tmp_path / "x")
     assert not (tmp_path / "x").exists()

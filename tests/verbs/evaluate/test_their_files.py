@@ -1,4 +1,4 @@
-"""What a third party's task gives that nobody can write or reckon with: one line names the method and the fault."""
+"""What a third party's task gives that cannot be written or measured: one line names the method and the fault."""
 
 from __future__ import annotations
 
