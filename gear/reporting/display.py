@@ -163,7 +163,7 @@ class _Lines:
             if self._pace is None or channel != self._channel:
                 self._pace = Pace(unit, done, time.monotonic(), done, total)
                 self._channel = channel
-            self._pace.done, self._pace.total = done, total
+            self._pace.report(done, total, time.monotonic())
 
     def write(self, line: str) -> None:
         with self._lock:

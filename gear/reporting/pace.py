@@ -13,6 +13,7 @@ class Pace:
         unit: what is counted, in the singular: `sample`, `step`.
         first_done, first_s: the first report: items that an earlier run finished, and the time in seconds.
         done, total: the last report; a total of 0 means that it is not known.
+        warm_done, warm_s: the report of this run's first finished items, which include all preparation.
     """
 
     unit: str
@@ -20,11 +21,21 @@ class Pace:
     first_s: float
     done: int
     total: int
+    warm_done: int = 0
+    warm_s: float | None = None
+
+    def report(self, done: int, total: int, now_s: float) -> None:
+        """Takes in a report."""
+        if self.warm_s is None and done > self.first_done:
+            self.warm_done, self.warm_s = done, now_s
+        self.done, self.total = done, total
 
     def rate(self, now_s: float) -> float:
-        """Items per second of this run; 0 before the first one."""
-        elapsed_s = now_s - self.first_s
-        return (self.done - self.first_done) / elapsed_s if elapsed_s > 0 else 0.0
+        """Items per second of this run, without the first ones as soon as there are others; 0 before the first one."""
+        is_warm = self.warm_s is not None and self.done > self.warm_done
+        begun, begun_s = (self.warm_done, self.warm_s or 0.0) if is_warm else (self.first_done, self.first_s)
+        elapsed_s = now_s - begun_s
+        return (self.done - begun) / elapsed_s if elapsed_s > 0 else 0.0
 
     def left_s(self, now_s: float) -> float | None:
         """Seconds until all items are done; None where the rate or the total is not known."""

@@ -14,6 +14,14 @@ def test_only_what_this_run_did_counts_for_the_rate() -> None:
     assert pace.line(20.0) == "130 of 200 samples, 3 per second, 23 seconds left"
 
 
+def test_the_first_items_with_their_preparation_do_not_count() -> None:
+    pace = Pace("sample", first_done=0, first_s=0.0, done=0, total=10)
+    pace.report(1, 10, 100.0)
+    assert pace.rate(100.0) == 0.01, "there is no other yet"
+    pace.report(3, 10, 104.0)
+    assert pace.rate(104.0) == 0.5 and pace.left_s(104.0) == 14.0
+
+
 def test_nothing_is_promised_before_there_is_a_rate() -> None:
     pace = Pace("query", first_done=4, first_s=1.0, done=4, total=9)
     assert (pace.rate(1.0), pace.rate(50.0), pace.left_s(50.0)) == (0.0, 0.0, None)
