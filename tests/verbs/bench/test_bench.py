@@ -148,7 +148,7 @@ def test_the_command_collects_in_processes_of_their_own(
     told: list[bool] = []
 
     def collected(**arguments: Any) -> None:
-        told.append(arguments["apart"])
+        told.append(arguments["in_subprocess"])
         raise GearError("far enough")
 
     monkeypatch.setitem(VERBS, "collect", collected)

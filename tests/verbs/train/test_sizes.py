@@ -106,7 +106,7 @@ def test_half_precision_is_for_time_budgets_on_devices_that_are_quicker_so(
 
 def test_validation_and_weights_know_of_smaller_pictures(street: Street, scaled: None, tmp_path: Path) -> None:
     said: list[str] = []
-    arguments: dict[str, Any] = {"epochs": 1, "batch": 2, "workers": 1, "noted": said.append}
+    arguments: dict[str, Any] = {"epochs": 1, "batch": 2, "workers": 1, "on_warning": said.append}
     report = train(
         "semseg", "tiny_segmenter", street("semseg"), out=tmp_path, settings=["picture_scale=0.5"], **arguments
     )
