@@ -26,7 +26,7 @@ _MAKING = threading.Lock()
 """Of several threads that predict, one makes the copy that all of them use."""
 
 
-class InStep(Generic[Made]):
+class KeptCopy(Generic[Made]):
     """A value computed from a graph, kept until the graph changes."""
 
     def __init__(self) -> None:
@@ -34,7 +34,7 @@ class InStep(Generic[Made]):
         self._held: list[Tensor] = []
         self._made: Made | None = None
 
-    def __reduce__(self) -> tuple[type[InStep[Made]], tuple[()]]:
+    def __reduce__(self) -> tuple[type[KeptCopy[Made]], tuple[()]]:
         """Copied or pickled without its value, so that a copy of the network computes its own."""
         return type(self), ()
 

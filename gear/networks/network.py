@@ -13,7 +13,7 @@ import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 
-from gear.networks.fused_inference import InStep, quick_copy
+from gear.networks.fused_inference import KeptCopy, quick_copy
 from gear.networks.options import NetworkOptions
 from gear.networks.runtime import autocast, device_of, prepare
 from gear.values.frames import UInt8Image
@@ -44,7 +44,7 @@ class Network(nn.Module, ABC):
         self.options = options
         self.device = device_of(options.device)
         self._views = tuple(views)
-        self._quick: InStep[Network] = InStep()
+        self._quick: KeptCopy[Network] = KeptCopy()
         self.to(self.device)
         self.eval()
 
@@ -84,8 +84,8 @@ class Network(nn.Module, ABC):
             with torch.inference_mode():
                 batch = as_batch([samples[index] for index in chosen], self._views, self.device)
                 quick = self.for_predictions(batch)
-                outputs = quick._outputs(quick.run_for_answers, batch)
-                for index, answer in zip(chosen, self.answers(outputs, size), strict=True):
+                outputs = quick._outputs(quick.run_for_predictions, batch)
+                for index, answer in zip(chosen, self.predictions(outputs, size), strict=True):
                     answers[index] = answer
         return answers
 
@@ -118,8 +118,8 @@ class Network(nn.Module, ABC):
         """What `losses` takes: the outputs, or more for networks with heads that are used in training alone."""
         return self.run(pictures)
 
-    def run_for_answers(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """What `answers` takes: the outputs, or less for networks that predict faster from something else."""
+    def run_for_predictions(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        """What `predictions` takes: the outputs, or less for networks that predict faster from something else."""
         return self.run(pictures)
 
     @abstractmethod
@@ -127,8 +127,8 @@ class Network(nn.Module, ABC):
         """Scalar losses by name, which training minimises."""
 
     @abstractmethod
-    def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
-        """The task's predictions from what `run_for_answers` returns, for pictures of (height, width)."""
+    def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
+        """The task's predictions from what `run_for_predictions` returns, for pictures of (height, width)."""
 
 
 class Normalise(nn.Module):

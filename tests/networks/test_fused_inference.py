@@ -53,7 +53,7 @@ class Mean(Network):
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
         return {"mean": outputs["features"].mean()}
 
-    def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
+    def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
         return [features.mean(dim=(1, 2)).numpy() for features in outputs["features"]]
 
 

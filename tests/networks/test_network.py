@@ -27,7 +27,7 @@ class Brightness(Network):
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
         return {"error": (outputs["means"][:, 0] - torch.tensor(targets)).abs().mean()}
 
-    def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
+    def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
         return [(tuple(means.tolist()), size_px, len(outputs["means"])) for means in outputs["means"]]
 
 

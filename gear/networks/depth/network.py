@@ -57,7 +57,7 @@ class DepthNetwork(Network):
         depth_m = torch.from_numpy(np.stack([target.depth_m for target in targets])).to(outputs[DEPTH])
         return self.depth_losses(outputs, depth_m)
 
-    def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[FloatImage]:
+    def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[FloatImage]:
         """(H, W) float32 depth in metres for each picture."""
         return [depth_m.cpu().numpy() for depth_m in outputs[DEPTH]]
 

@@ -105,7 +105,7 @@ class FasterRcnnDetector(Detector):
             proposal_losses = self._proposal_losses(outputs, wanted)
             return self._box_losses(outputs, proposals, wanted) | proposal_losses
 
-    def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[Detection, ...]]:
+    def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[Detection, ...]]:
         """Detections of each picture, by falling score."""
         heads: Any = self.graph.get_submodule("roi_heads")
         answers = []

@@ -70,7 +70,7 @@ class RetinaNetDetector(Detector):
         losses: dict[str, Tensor] = graph.head.compute_loss(truth, outputs, list(outputs[ANCHORS]), matches)
         return losses
 
-    def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[Detection, ...]]:
+    def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[Detection, ...]]:
         """Detections of each picture, by falling score."""
         graph: Any = self.graph
         size = (size_px[0], size_px[1])

@@ -138,7 +138,7 @@ class FolderSegmenter(FolderNetwork):
         each = functional.cross_entropy(outputs[LOGITS], ids.where(is_known, 0), reduction="none")
         return {"cross_entropy": (each * is_known).sum() / is_known.sum().clamp_min(1)}
 
-    def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
+    def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
         """(H, W) uint8 Cityscapes label ids for each picture."""
         labels = np.array(LABEL_ID_OF_TRAIN_ID, dtype=np.uint8)
         return [labels[best_class(logits)] for logits in outputs[LOGITS]]
@@ -180,7 +180,7 @@ class FolderDepth(FolderNetwork):
         error = (outputs[DEPTH].log() - truth.where(is_known, 1.0).log()).abs()
         return {"log_l1": (error * is_known).sum() / is_known.sum().clamp_min(1)}
 
-    def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[FloatImage]:
+    def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[FloatImage]:
         """(H, W) float32 depth in metres for each picture."""
         return [depth_m.cpu().numpy() for depth_m in outputs[DEPTH]]
 
@@ -219,7 +219,7 @@ class FolderDetector(FolderNetwork):
         with autocast(self.device, self.options.precision):
             return {"set_loss": self.said(outputs["seen"], labels=labels).loss}
 
-    def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[Detection, ...]]:
+    def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[Detection, ...]]:
         """Detections of COCO classes with at least the least score, by falling score."""
         scale = torch.tensor([size_px[1], size_px[0]] * 2, device=self.device)
         answers = []

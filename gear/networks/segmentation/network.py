@@ -75,7 +75,7 @@ class SemsegNetwork(Network):
         picture = pictures[VIEW]
         return {LOGITS: self._resized(self._maps(picture, auxiliary=False)[0], picture.shape[2:])}
 
-    def run_for_answers(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+    def run_for_predictions(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """On a CPU `maps`: the graph's own smaller logits, from which predictions are faster; `logits` elsewhere."""
         if self.device.type != "cpu":
             return self.run(pictures)
@@ -97,7 +97,7 @@ class SemsegNetwork(Network):
         """The losses with which the network was built, by name."""
         return self._losses(outputs, targets)
 
-    def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
+    def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
         """(H, W) uint8 label ids of each picture."""
         if LOGITS in outputs:
             return [LABEL_IDS[best_class(logits)] for logits in outputs[LOGITS]]

@@ -66,7 +66,7 @@ class StereoCentreNetwork(Network):
         bins_px = self.graph.log_bins.exp() * ratio[0]
         return centre_losses(outputs, centre_targets(targets, KINDS, grid), bins_px=bins_px, cell_px=grid.cell_px)
 
-    def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[KittiLabel, ...]]:
+    def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[KittiLabel, ...]]:
         """Detections with scores as KITTI labels, for each picture."""
         ratio = self._ratio(size_px)
         cell_px = (STRIDE * ratio[0], STRIDE * ratio[1])

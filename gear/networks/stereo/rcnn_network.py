@@ -84,7 +84,7 @@ class StereoRcnnNetwork(Network):
                 found += self._placed(outputs, sample[LEFT].shape[:2], pair)
         return found
 
-    def answers(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[KittiLabel, ...]]:
+    def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[KittiLabel, ...]]:
         """The cars as boxes and corners alone determine them; `predict` also has the pictures, on which depth is
         aligned.
         """

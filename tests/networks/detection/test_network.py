@@ -252,7 +252,7 @@ def test_a_sure_anchor_is_a_detection_in_the_pictures_pixels(
     anchors = outputs["anchors_px"][1]
     inside = (anchors.min(dim=1).values >= 0) & (anchors[:, 2] <= WIDTH_PX) & (anchors[:, 3] <= HEIGHT_PX)
     chosen = int(inside.nonzero()[-1])
-    none, (one,) = model.answers(planted(model, outputs, 1, 15, chosen), (HEIGHT_PX, WIDTH_PX))
+    none, (one,) = model.predictions(planted(model, outputs, 1, 15, chosen), (HEIGHT_PX, WIDTH_PX))
     assert none == () and one.category_id == 15 and one.score == pytest.approx(1 / (1 + np.exp(-3.0)))
     assert one.box_px == pytest.approx(anchors[chosen].tolist(), abs=1e-3)
 
