@@ -20,7 +20,7 @@ from gear.verbs.verify import run as module
 from gear.verbs.verify.recipe import Sources
 from gear.verbs.verify.report import VerifyReport
 from tests.dataset.splits import tree
-from tests.verbs.conftest import Collected, Copy
+from tests.verbs.conftest import Collected, Copy, Install
 
 TASKS = ["semseg", "detect2d", "stereo3d", "depth"]
 
@@ -173,9 +173,9 @@ def test_the_command_has_lines_and_json_and_an_exit_code(
 
 
 def test_damage_is_not_passed_over_by_what_reads_it(
-    tmp_path: Path, collected: Collected, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, collected: Collected, install: Install, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    whole = collected("semseg")
+    whole = collected("semseg", probes=True)
     for suffix in (".png", ".json"):
         root = Path(shutil.copytree(whole, tmp_path / f"data{suffix}"))
         victim = next(path for path in sorted(root.rglob(f"*{suffix}")) if "gear/" not in path.as_posix())
@@ -184,7 +184,13 @@ def test_damage_is_not_passed_over_by_what_reads_it(
         with pytest.raises(DatasetError, match=r"is damaged: .*; `gear verify DIR --repair` makes it again"):
             list(dataset)
         sheet, page = str(tmp_path / "sheet.png"), str(tmp_path / "view.html")
-        for command in (["sheet", str(root), "--out", sheet], ["view", str(root), "--out", page]):
+        model = ["--model", "tiny_segmenter", "--data", str(root), "--out", str(tmp_path / f"out{suffix}")]
+        for command in (
+            ["sheet", str(root), "--out", sheet],
+            ["view", str(root), "--out", page],
+            ["evaluate", *model],
+            ["attack", *model, "--steps", "1", "--allow-test-data", "--set", "height_px=12", "--set", "width_px=24"],
+        ):
             capsys.readouterr()
             assert main(command) in (1, 2), command
             said = capsys.readouterr()
