@@ -35,13 +35,13 @@ class Scaled(Protocol):
         ...
 
 
-def input_scale_of(options: Scaled, name: str, habit: float = 1.0) -> float:
+def input_scale_of(options: Scaled, name: str, default: float = 1.0) -> float:
     """The factor by which pictures are resized before network `name`: above 0 and at most `LARGEST_SCALE`.
 
     Args:
         options: of the network.
         name: of the model plugin, for the shipped weights.
-        habit: where neither the options nor the weights state one.
+        default: where neither the options nor the weights state one.
 
     Raises:
         GearError: the weights do not exist, or what they state is no such factor.
@@ -50,7 +50,7 @@ def input_scale_of(options: Scaled, name: str, habit: float = 1.0) -> float:
         return options.input_scale
     said = trained_option(options.weights, name, OPTION)
     if said is None:
-        return habit
+        return default
     if isinstance(said, bool) or not isinstance(said, (int, float)) or not 0 < said <= LARGEST_SCALE:
         path: Path | None = resolve(options.weights, name)
         raise GearError(
