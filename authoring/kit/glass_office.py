@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from authoring.kit.cores import core
 from authoring.kit.facade import Facade, Opening, facades
 from authoring.kit.parts import Sink
 from authoring.kit.roofs import flat_roof, roof_machinery
@@ -35,6 +36,7 @@ def glass_office(
         else:
             facade.wall("ashlar", 0.0, 0.0, facade.width_m, LOBBY_M)
         facade.box(frame, (0.0, facade.width_m), (LOBBY_M - 0.25, LOBBY_M + 0.15), (0.0, 0.18))
+    core(sink, width_m, depth_m, top_m)
     flat_roof(sink, width_m, depth_m, top_m, wall="metal_panel", coping=frame, parapet_m=1.1)
     half_w, half_d = width_m * 0.28, depth_m * 0.25
     sink.tiled_box("metal_panel", (-half_w, -half_d, top_m), (half_w, half_d, top_m + 3.0), tile_m=2.0, skip="z")

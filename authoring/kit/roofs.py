@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from authoring.kit.cores import sheet
 from authoring.kit.facade import belt, facades
 from authoring.kit.parts import Sink
 from authoring.kit.shapes import cylinder, dome
@@ -26,6 +27,7 @@ def flat_roof(
 ) -> None:
     """Gravel behind a parapet whose outer face continues the wall."""
     belt(sink, wall, width_m, depth_m, [(0.0, top_m), (0.0, top_m + parapet_m)])
+    sheet(sink, wall, width_m, depth_m, top_m - 0.3, top_m + parapet_m + 0.08)
     cap = 0.05
     belt(
         sink,

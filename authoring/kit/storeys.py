@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from authoring.kit.cores import core
 from authoring.kit.extras import air_conditioner, downpipe, fire_escape, flower_box, oriel
 from authoring.kit.facade import SIDES, Facade, Opening, belt, facades
 from authoring.kit.ground import ground_floor
@@ -40,6 +41,7 @@ def storeyed_building(
                 facade, style, floors, top_m, ridge_m=_ridge_m(style, depth_m), covered_m=low_m.get(side, 0.0), rng=rng
             )
     _ornament(sink, style, width_m, depth_m, floors, top_m, sides)
+    core(sink, width_m, depth_m, top_m)
     if style.roof == "mansard":
         mansard(sink, width_m, depth_m, top_m, sides=sides, dormer_pitch_m=style.bay_m, rng=rng)
     elif style.roof == "gable" and depth_m < 16:

@@ -17,6 +17,15 @@ from authoring.towns.regions import KERB_M, Regions
 WATER_M = -1.7
 COPING_M = 0.6
 TACTILE_DEPTH_M = 0.8
+BACKING_M = 0.014
+"""How far the second layer of the ground lies below the one that is seen; yards, which are lower, lie above it."""
+
+BACKING_RIM_M = 0.5
+"""How far the second layer reaches below what borders it."""
+
+BACKING_CELL_M = 87.0
+"""Side of its pieces: not that of the layer above, so that no two joints lie one below the other."""
+
 YARD_M = KERB_M - 0.01
 """Yards lie a finger lower than what borders them: where a site reaches over one, the site is what is seen."""
 
@@ -41,6 +50,7 @@ def lay_ground(sink: Sink, regions: Regions, sites: BaseGeometry) -> None:
     for land in regions.blocks:
         for rim in solids.boundary_towards(land, regions.level_roads):
             solids.wall(sink, rim, 0.0, KERB_M, "kerb", "sidewalk")
+    lay_backing(sink, regions, unary_union(regions.blocks))
     quay = regions.canal.buffer(COPING_M, join_style="mitre").difference(regions.canal)
     taken = unary_union([sites, quay])
     for interior in regions.interiors:
@@ -50,6 +60,27 @@ def lay_ground(sink: Sink, regions: Regions, sites: BaseGeometry) -> None:
     for median in regions.medians.values():
         _median(sink, median)
     _canal(sink, regions)
+
+
+def lay_backing(sink: Sink, regions: Regions, land: BaseGeometry, paved: BaseGeometry | None = None) -> None:
+    """Lay a second layer below sidewalks and roads.
+
+    Stones, paving and asphalt meet in T-junctions, where a rasteriser leaves a pixel open here and there: through it
+    the sidewalk or the road of this layer is seen, and not what lies far below the town.
+
+    Args:
+        sink: takes the faces.
+        regions: the plan.
+        land: the level land beside the roads, at the height of the kerbs.
+        paved: asphalt at height 0 beside the plan's roads.
+    """
+    walked = unary_union([regions.sidewalks, regions.kerb_stones])
+    walked = walked.buffer(BACKING_RIM_M, join_style="mitre").intersection(land)
+    solids.flat(sink, walked, KERB_M - BACKING_M, "pavement", "sidewalk", cell_m=BACKING_CELL_M)
+    roads = regions.level_roads
+    beside = land if paved is None else unary_union([land, paved])
+    rim = roads.buffer(BACKING_RIM_M, join_style="mitre").intersection(beside)
+    solids.flat(sink, unary_union([roads, rim]), -BACKING_M, "asphalt", "road", cell_m=BACKING_CELL_M)
 
 
 def tactile_paving(regions: Regions) -> BaseGeometry:

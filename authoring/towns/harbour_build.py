@@ -15,7 +15,7 @@ from authoring.towns.bridges import build_bridge
 from authoring.towns.collision import town_solids
 from authoring.towns.document import bay_rows
 from authoring.towns.furniture import Furnisher
-from authoring.towns.ground import tactile_paving
+from authoring.towns.ground import lay_backing, tactile_paving
 from authoring.towns.harbour_far import QUAY, WATER, build_surroundings, plant_fields
 from authoring.towns.harbour_motorway import embankments, finish_bridge, lay_motorway, motorway_lanes, paved
 from authoring.towns.harbour_plots import Yards
@@ -94,6 +94,7 @@ def _lay_ground(sink: Sink, regions: Regions, yards: Yards) -> None:
     for land in regions.blocks:
         for rim in solids.boundary_towards(land, asphalt):
             solids.wall(sink, rim, 0.0, KERB_M, "kerb", "sidewalk")
+    lay_backing(sink, regions, unary_union(regions.blocks), paved())
     bare = unary_union([yards.ground(), regions.sidewalks, stones, QUAY, WATER])
     for land in regions.blocks:
         solids.flat(sink, land.difference(bare), KERB_M, "grass", "terrain")

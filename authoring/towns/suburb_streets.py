@@ -9,7 +9,7 @@ from shapely.ops import unary_union  # type: ignore[import-untyped]
 
 from authoring.kit.parts import Sink
 from authoring.towns import paths, solids, suburb
-from authoring.towns.ground import tactile_paving
+from authoring.towns.ground import lay_backing, tactile_paving
 from authoring.towns.markings import WHITE, Painter, paint_crossings, zebra
 from authoring.towns.network import CROSSING_M, STOP_LINE_GAP_M, Network, Street
 from authoring.towns.regions import KERB_M, Regions
@@ -74,6 +74,7 @@ def lay_streets(sink: Sink, regions: Regions, crossovers: BaseGeometry, paved: B
     for land in regions.blocks:
         for rim in solids.boundary_towards(land, roads):
             solids.wall(sink, rim, 0.0, KERB_M, "kerb", "sidewalk")
+    lay_backing(sink, regions, unary_union(regions.blocks).intersection(area))
     lawns = unary_union(list(regions.interiors)).intersection(area).difference(paved)
     solids.flat(sink, lawns, KERB_M, "grass", "terrain")
 

@@ -208,7 +208,7 @@ class TownContract:
         fail_if("scenes cannot be used", town_scenes.unusable(town, names, self.samples, self.min_visible))
 
     def test_the_ground_is_closed(self) -> None:
-        """No pixel shows the sky through a crack between meshes; a slab below the town closes them."""
+        """No pixel shows what lies behind ground or buildings: meshes that meet in a T-junction leave cracks."""
         fail_if("there are cracks in the ground", town_scenes.cracks(self.under_test(), self.samples))
 
     def test_ids_and_depth_are_those_of_rays(self) -> None:

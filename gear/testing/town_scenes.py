@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from gear.config.collection import SplitConfig
 from gear.render.registry import open_renderer
 from gear.testing.town_facts import VISIBLE_GROUPS, Rays, TownUnderTest
 from gear.values.errors import GearError
 from gear.values.frames import FloatImage, IdImage
-from gear.values.labels import GROUND_CODES
+from gear.values.labels import GROUND_CODES, LABEL_BY_NAME, LABELS
 from gear.values.rig import CameraMount, Rig
 from gear.values.rng import derive_rng
 from gear.values.scene import SceneRecord
@@ -23,6 +24,18 @@ from gear.world.world import PlacedStage, World
 RIG = Rig(cameras=(CameraMount(name="rgb", width_px=640, height_px=320),))
 FACE_GRID = (9, 5)
 PIXELS = 400
+NOTHING = 255
+"""Code of pixels that show nothing."""
+
+CLOSED = frozenset({*GROUND_CODES, LABEL_BY_NAME["building"].code, LABEL_BY_NAME["wall"].code})
+"""Codes of labels whose surfaces have no holes."""
+
+PINHOLES_A_MILLION = 5
+"""So many are allowed: an outline that meets another one within a pixel looks like a crack, too."""
+
+SURFACE_RATIO = 1.1
+"""Depths of neighbours on one surface differ by less than this factor."""
+
 DEPTH_TOLERANCE = 1e-3
 """Largest relative error of a depth of the classic renderer, whose depth buffer is a float up to a far plane."""
 
@@ -71,10 +84,12 @@ def unusable(town: TownUnderTest, names: Sequence[str], samples: int, min_visibl
 
 
 def cracks(town: TownUnderTest, samples: int) -> list[str]:
-    """Pixels below the horizon that show the sky while all pixels around them show ground."""
+    """Pixels below the horizon that show nothing though all around them is ground; and pinholes (`pinholes`), where
+    there are more than `PINHOLES_A_MILLION` in a million pixels."""
     world, _ = town.first_world
     planner = _planner(world, samples)
-    problems = []
+    problems: list[str] = []
+    holes: list[str] = []
     for index in range(samples):
         record = planner.plan(index)
         placed = world.place(record)
@@ -90,7 +105,44 @@ def cracks(town: TownUnderTest, samples: int) -> list[str]:
                 point_m = camera.intrinsics.unproject([column, row], float(view.depth_m[row, column]))
                 x_m, y_m, _ = camera.world_from_camera_transform.apply(point_m)
                 problems.append(f"scene {record.scene}, sample {index}: the sky shows near ({x_m:.1f}, {y_m:.1f})")
-    return problems
+        labels = np.append(placed.geoms.label_code, NOTHING)[view.geom_id]
+        for row, column in pinholes(labels, view.depth_m).tolist():
+            through = "the sky" if view.geom_id[row, column] < 0 else LABELS[labels[row, column]].name
+            within = LABELS[labels[row, column - 1]].name
+            point_m = camera.intrinsics.unproject([column - 1, row], float(view.depth_m[row, column - 1]))
+            x_m, y_m, z_m = camera.world_from_camera_transform.apply(point_m)
+            holes.append(
+                f"scene {record.scene}, sample {index}: {through} shows through {within} "
+                f"near ({x_m:.1f}, {y_m:.1f}, {z_m:.1f})"
+            )
+    pixels = samples * RIG.cameras[0].width_px * RIG.cameras[0].height_px
+    return problems + (holes if len(holes) > PINHOLES_A_MILLION * pixels / 1e6 else [])
+
+
+def pinholes(label_code: npt.NDArray[np.uint8], depth_m: FloatImage) -> npt.NDArray[np.int64]:
+    """Single pixels through which something farther is seen amid one closed surface: cracks between meshes.
+
+    Args:
+        label_code: (H, W) codes of labels, `NOTHING` for the sky.
+        depth_m: (H, W) planar z, NaN for the sky.
+
+    Returns:
+        (N, 2) rows and columns. All eight neighbours of such a pixel have one label of `CLOSED`, and their depths are
+        within `SURFACE_RATIO`; the pixel has another label and is farther than all of them by more than that ratio.
+    """
+    depths = np.nan_to_num(depth_m, nan=np.inf)
+    steps = [(dy, dx) for dy in (0, 1, 2) for dx in (0, 1, 2) if (dy, dx) != (1, 1)]
+    height, width = label_code.shape
+    around = [np.s_[dy : height - 2 + dy, dx : width - 2 + dx] for dy, dx in steps]
+    first, inner = label_code[around[0]], np.s_[1:-1, 1:-1]
+    is_hole = np.isin(first, list(CLOSED)) & (label_code[inner] != first)
+    nearest, farthest = depths[around[0]].copy(), depths[around[0]].copy()
+    for part in around:
+        is_hole &= label_code[part] == first
+        np.minimum(nearest, depths[part], out=nearest)
+        np.maximum(farthest, depths[part], out=farthest)
+    is_hole &= (farthest < SURFACE_RATIO * nearest) & (depths[inner] > SURFACE_RATIO * farthest)
+    return np.argwhere(is_hole) + 1
 
 
 def disagreement(town: TownUnderTest, min_agreement: float) -> list[str]:

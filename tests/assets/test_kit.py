@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from authoring import kit
+from authoring.kit.cores import core
 from authoring.kit.leaves import lump, on_masses
 from authoring.kit.parts import Sink
 from authoring.kit.props import MAKERS, PROPS, write_prop
@@ -117,6 +118,29 @@ def test_any_draw_of_a_building_is_sound(style: str, seed: int) -> None:
         sides=("back", "left", "front"),
     )
     check_sound(parts)
+
+
+def test_whatever_comes_through_a_wall_meets_the_core_or_the_ceiling() -> None:
+    """Lines of sight from the street through any point of the front, four metres off its corners, up to the ceiling."""
+    width, depth, top = 14.0, 11.0, 12.0
+    sink = Sink("building")
+    core(sink, width, depth, top)
+    (part,) = sink.parts()
+    corners = np.asarray(part.mesh.vertices)[np.asarray(part.mesh.faces)]
+    origin, first, second = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    rng = np.random.default_rng(5)
+    for _ in range(400):
+        eye = np.array([rng.uniform(-12, 12), -depth / 2 - rng.uniform(6, 30), 1.65])
+        entry = np.array([rng.uniform(4, width - 4) - width / 2, -depth / 2, rng.uniform(0.6, top - 0.05)])
+        along = entry - eye
+        # Moeller and Trumbore, 1997, for the faces that look at the eye.
+        across = np.cross(along, second)
+        facing = (first * across).sum(1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            u = ((entry - origin) * across).sum(1) / facing
+            other = np.cross(entry - origin, first)
+            v, t = (other @ along) / facing, (second * other).sum(1) / facing
+        assert ((facing > 1e-9) & (u >= 0) & (v >= 0) & (u + v <= 1) & (t >= 0)).any(), (eye, entry)
 
 
 def test_a_building_keeps_to_its_plot_but_for_what_hangs_over_the_street() -> None:

@@ -1,0 +1,53 @@
+"""What closes a building from within.
+
+Walls are laid in panels around their openings, so that panels meet in T-junctions. A rasteriser leaves a pixel open
+here and there along them, and all behind it is seen from inside and is not drawn: the sky shows through the house. A
+core stands behind the walls, deeper than any recess in them, a ceiling hangs below the roof, and a sheet stands behind
+the joint of walls and roof.
+"""
+
+from __future__ import annotations
+
+from authoring.kit.facade import belt
+from authoring.kit.parts import Sink
+
+DEEP_M = 0.95
+"""From the walls to the core; the deepest recess, a shop's door, is 0.72 m deep."""
+
+INSET_M = 0.05
+"""From the walls to the ceiling's rim, and from the roof down to the ceiling."""
+
+SHEET_M = 0.03
+"""From the walls to the sheet behind the joint of walls and roof."""
+
+SWATCH = "concrete_dark"
+
+
+def core(sink: Sink, width_m: float, depth_m: float, top_m: float) -> None:
+    """Close a building's inside.
+
+    Args:
+        sink: takes the faces.
+        width_m, depth_m: of the footprint, centred at the origin.
+        top_m: height of the walls.
+    """
+    x, y = width_m / 2 - DEEP_M, depth_m / 2 - DEEP_M
+    ceiling_m = top_m - INSET_M
+    if x > 0 and y > 0:
+        sink.swatch_box(SWATCH, (-x, -y, 0.0), (x, y, ceiling_m), skip="zZ")
+    x, y = width_m / 2 - INSET_M, depth_m / 2 - INSET_M
+    rim = [(-x, y, ceiling_m), (x, y, ceiling_m), (x, -y, ceiling_m), (-x, -y, ceiling_m)]
+    sink.swatch_quad(SWATCH, rim)
+    sheet(sink, SWATCH, width_m, depth_m, top_m - 0.3, top_m + 0.02)
+
+
+def sheet(sink: Sink, material: str, width_m: float, depth_m: float, low_m: float, high_m: float) -> None:
+    """A sheet around a building, just behind the outer faces of its walls, which closes a joint between two heights.
+
+    Args:
+        sink: takes the faces.
+        material: a tiling material or a palette swatch.
+        width_m, depth_m: of the footprint, centred at the origin.
+        low_m, high_m: where it begins and ends.
+    """
+    belt(sink, material, width_m - 2 * SHEET_M, depth_m - 2 * SHEET_M, [(0.0, low_m), (0.0, high_m)])
