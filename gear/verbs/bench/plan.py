@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,6 +12,7 @@ from gear.config.dump import to_plain
 from gear.contracts.evaluation import Maskable, Reports
 from gear.contracts.specs import AttackSpec
 from gear.contracts.tasks import NO_PATCH, RANDOM_PATCH
+from gear.measuring.guard import Guard
 from gear.measuring.reports import OUTSIDE_PATCH
 from gear.plugins.build import build, find
 from gear.values.rng import derive_rng
@@ -249,8 +250,7 @@ class Plan:
                 **({"queries": attack.queries} if attack.queries else {"steps": attack.steps}),
                 "settings": tuple(settings_of(attack.set)),
                 "model_settings": model.settings,
-                **_guarded(defense),
-                **self._learnt(contest, model, defense),
+                **_keywords(self._guard(contest, model, defense)),
                 "compositor": attack.compositor,
                 "seed": self.config.seed,
             },
@@ -263,8 +263,7 @@ class Plan:
             arguments={
                 "model": match.model.plugin,
                 "model_settings": match.model.settings,
-                **_guarded(match.defense),
-                **self._learnt(match.contest, match.model, match.defense),
+                **_keywords(self._guard(match.contest, match.model, match.defense)),
                 "data": [str(root) for roots in match.pools.values() for root in roots],
                 "reports": reports_of(match.contest),
                 "out": str(match.out),
@@ -273,14 +272,18 @@ class Plan:
             },
         )
 
-    def _learnt(self, contest: Contest, model: Entrant, defense: Entrant | None) -> dict[str, Any]:
-        """Calibration data of one defense in front of one network."""
-        if defense is None or not defense.learns:
-            return {}
-        return {
-            "calibration": str(self._lesson(contest, NO_PATCH)),
-            "calibration_patched": str(self._lesson(contest, model.label)),
-        }
+    def _guard(self, contest: Contest, model: Entrant, defense: Entrant | None) -> Guard | None:
+        """A defense in front of one network, with the calibration data that it needs."""
+        if defense is None:
+            return None
+        guard = Guard(defense=defense.plugin, settings=defense.settings)
+        if not defense.learns:
+            return guard
+        return replace(
+            guard,
+            calibration=str(self._lesson(contest, NO_PATCH)),
+            calibration_patched=str(self._lesson(contest, model.label)),
+        )
 
 
 def reports_of(contest: Contest) -> tuple[str, ...]:
@@ -304,5 +307,10 @@ def weathers(configs: tuple[WeatherConfig, ...]) -> Iterator[Weather]:
         yield Weather(label=label, settings=tuple(settings if len(given) > 1 else [f"weather={one.preset}"]))
 
 
-def _guarded(defense: Entrant | None) -> dict[str, Any]:
-    return {} if defense is None else {"defense": defense.plugin, "defense_settings": defense.settings}
+def _keywords(guard: Guard | None) -> dict[str, Any]:
+    """The keywords of the verbs that stand for a guard."""
+    if guard is None:
+        return {}
+    calibration = {"calibration": guard.calibration, "calibration_patched": guard.calibration_patched}
+    given = {name: root for name, root in calibration.items() if root is not None}
+    return {"defense": guard.defense, "defense_settings": guard.settings, **given}
