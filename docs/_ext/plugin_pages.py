@@ -15,11 +15,11 @@ PROTOCOLS = (
     tasks.Task, tasks.Evaluator, models.Model, attacks.Attack, attacks.Compositor, attacks.Objective,
     attacks.HarmObjective, attacks.WithObjective, attacks.WithTaskOptions, attacks.WithInputFiles, models.Trainable,
     models.BatchPredictor, defenses.Defense, defenses.Taught,
-    defenses.Detecting,
+    defenses.Detecting, defenses.Reporting,
 )  # fmt: skip
 VALUES = (
     tasks.Sample, tasks.SplitInfo, tasks.Encoded, tasks.Sidecar, attacks.Patch, attacks.Budget, defenses.DefenseResult,
-    defenses.DefendedBatch,
+    defenses.DefendedBatch, defenses.FitReport,
 )  # fmt: skip
 
 

@@ -133,3 +133,25 @@ class Detecting(Protocol):
             state: what `fit` returned for this model.
         """
         ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FitReport:
+    """What a defense learnt, measured on its own calibration data.
+
+    Attributes:
+        values: numbers by name, such as the loss of what was learnt and that of the constant answer.
+        problems: one line for each reason not to trust what was learnt; shown as loudly as an error.
+    """
+
+    values: Mapping[str, float]
+    problems: tuple[str, ...] = ()
+
+
+@runtime_checkable
+class Reporting(Protocol):
+    """What `fit` returns, if it says what was learnt."""
+
+    def fit_report(self) -> FitReport:
+        """How well the defense knows its own calibration data."""
+        ...

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gear.contracts.defenses import Defense, DefenseResult
+from gear.contracts.defenses import Defense, DefenseResult, FitReport, Reporting
 from gear.contracts.models import Model
 from gear.plugins.build import blamed
 from gear.plugins.catalogue import PluginEntry
@@ -42,6 +42,11 @@ class CheckedDefense:
     def state(self) -> Any:
         """The result of calibration. It is computed when it is first needed, because calibration takes minutes."""
         return self._learn()
+
+    def fit_report(self) -> FitReport | None:
+        """What the defense learnt, if it has learnt and says so; None otherwise. Starts no calibration."""
+        state = self.__dict__.get("state")
+        return state.fit_report() if isinstance(state, Reporting) else None
 
     def apply(self, views: Mapping[str, UInt8Image], rng: np.random.Generator, index: int) -> DefenseResult:
         """Cleans one sample.

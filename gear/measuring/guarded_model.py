@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gear.contracts.defenses import DefenseResult
+from gear.contracts.defenses import DefenseResult, FitReport
 from gear.contracts.models import BatchPredictor, Model, Trainable
 from gear.contracts.specs import DefenseSpec, ModelSpec
 from gear.dataset.reading import Dataset
@@ -92,6 +92,10 @@ class GuardedModel:
         self._is_ours = model.found.owner.package == DISTRIBUTION and guard.defense is None
         self.lanes = lanes_of(bare) if self._is_ours else 1
         self._at_work, self._counting = 0, threading.Lock()
+
+    def fit_report(self) -> FitReport | None:
+        """What the defense learnt in this run, if it learnt and says so."""
+        return None if self._guard is None else self._guard.fit_report()
 
     def _guarded(self, defense: Chosen, bare: Model, calibration: Calibration) -> tuple[CheckedDefense, Model]:
         found = defense.found

@@ -16,6 +16,7 @@ from gear.compositor.base import CACHE_BYTES, Prepared
 from gear.compositor.cache import Cache
 from gear.config.dump import to_plain
 from gear.contracts.attacks import Budget, Objective, Patch, WithObjective, WithTaskOptions
+from gear.contracts.defenses import Reporting
 from gear.contracts.models import Model
 from gear.dataset.files import sha256
 from gear.dataset.json_text import dump_json
@@ -180,9 +181,12 @@ def run_attack(request: AttackRequest, callbacks: Callbacks) -> AttackReport:
         if there is not None:
             return AttackReport(out=root, patches=read_patches(root), facts=there, made=False)
         with traced(_asked(job), "forward"):
-            calibration_s = _calibrated(network)
+            calibration_s, fits = _calibrated(network, callbacks.on_warning)
             made = _optimised(job, product, network, root, plan, callbacks.on_progress)
-            facts = _facts(job, network, plan, made) | {"calibration_seconds": round(calibration_s, 3)}
+            facts = _facts(job, network, plan, made) | {
+                "calibration_seconds": round(calibration_s, 3),
+                "defense_fit": fits,
+            }
         names = ", ".join(one.found.spec.name for one in job.models)
         write_curves(root, f"{request.attack} on {names}", made.recorder.curves, made.recorder.judged)
         write_samples(root, made.seen.pairs(made.patches))
@@ -267,13 +271,21 @@ def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, o
     )
 
 
-def _calibrated(network: Model) -> float:
-    """Makes the defenses learn before any step, so that the time of steps is that of steps; returns the seconds."""
-    begun = time.monotonic()
-    for member in members_of(network).values():
-        if isinstance(member, Defended):
-            member.calibrate()
-    return time.monotonic() - begun
+def _calibrated(network: Model, on_warning: Warn) -> tuple[float, Json]:
+    """Makes the defenses learn before any step, so that the time of the steps is theirs alone.
+
+    Returns:
+        Seconds of the calibration, and what each model's defense learnt, as far as it says so.
+    """
+    begun, fits = time.monotonic(), {}
+    for name, member in members_of(network).items():
+        state = member.calibrate() if isinstance(member, Defended) else None
+        if isinstance(state, Reporting):
+            report = state.fit_report()
+            fits[name.rstrip("/")] = {"values": dict(report.values), "problems": list(report.problems)}
+            for problem in report.problems:
+                on_warning(f"WARNING: {problem}")
+    return time.monotonic() - begun, fits
 
 
 def _facts(job: Job, network: Model, plan: Json, made: _Made) -> Json:

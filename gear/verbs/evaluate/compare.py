@@ -23,7 +23,10 @@ from gear.measuring.statistics import (
     paired_p,
 )
 from gear.values.errors import DatasetError
-from gear.verbs.evaluate.report import Difference, Estimate, PairedTest, RowReport, Together
+from gear.verbs.evaluate.report import ALARMS, Difference, Estimate, PairedTest, RowReport, Together
+
+ALARM = 0.5
+"""Scores above this are alarms."""
 
 Street = tuple[str, int, int]
 """What a sample shows, in whatever weather: `town/scene`, the seed, the sample's number."""
@@ -111,13 +114,15 @@ def mean_cost(notes: Sequence[Note]) -> dict[str, float]:
 
 
 def mask_means(notes: Sequence[Note], *, has_patch: bool) -> dict[str, float]:
-    """Mean metrics of the masks of a defense, for a defense that gives masks.
+    """Mean metrics of the masks of a defense, and the share of pictures that raise its alarm, as far as it gives them.
 
     Without a patch there is nothing to find, and only what is masked by mistake counts.
     """
     masks = [note.mask for note in notes if note.mask is not None]
+    scores = [note.score for note in notes if note.score is not None]
+    alarms = {ALARMS: float(np.mean(np.array(scores) > ALARM))} if scores else {}
     keys = [key for key in (masks[0] if masks else {}) if key == "mask_area" or has_patch]
-    return {key: _known_mean([mask[key] for mask in masks]) for key in keys}
+    return {key: _known_mean([mask[key] for mask in masks]) for key in keys} | alarms
 
 
 def drive_note(dataset: Dataset[Any]) -> str | None:

@@ -10,6 +10,9 @@ from pathlib import Path
 from gear.measuring.metric_json import known_json
 from gear.values.serial import Json
 
+ALARMS = "alarms"
+"""Share of a dataset's pictures whose score is an alarm: on clean pictures, the false alarms."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate:

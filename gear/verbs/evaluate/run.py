@@ -19,6 +19,7 @@ from gear.dataset.store import check_output
 from gear.measuring.dataset_run import evaluate_row
 from gear.measuring.guard import Guard, open_guard
 from gear.measuring.guarded_model import GuardedModel
+from gear.measuring.metric_json import known_json
 from gear.measuring.notes import grouped
 from gear.measuring.open_datasets import opened, row_names
 from gear.measuring.plugin_selection import chosen_model
@@ -33,6 +34,9 @@ from gear.verbs.evaluate.pools import Pools, check_pools, pooled
 from gear.verbs.evaluate.report import EvaluateReport
 from gear.verbs.evaluate.request import EvaluateRequest
 from gear.verbs.evaluate.table import table
+
+FIT = "fit.json"
+"""What the defense of an evaluation learnt."""
 
 INTERVALS = "95 %: jackknife over streets, Student's t"
 """What results.json says of its intervals."""
@@ -141,6 +145,7 @@ def run_evaluate(request: EvaluateRequest, callbacks: Callbacks) -> EvaluateRepo
     with alone_at_work(root):
         _begin(root, facts)
         rows = _measured(request, datasets, names, guarded, callbacks)
+        learnt_facts = _fit_facts(root, guarded, request, callbacks.on_warning)
         said = [note for one in datasets for note in (size_note(chosen, one), drive_note(one), learnt.note(one))]
         more = {
             "reports": list(request.reports),
@@ -148,8 +153,10 @@ def run_evaluate(request: EvaluateRequest, callbacks: Callbacks) -> EvaluateRepo
                 name: one.facts() for name, one in rows[0].scorer.reports.items() if one.plugin is not None
             },
             "intervals": INTERVALS,
+            "timing": {"parallel_batches": guarded.lanes},
+            **({} if learnt_facts is None else {"fit": learnt_facts}),
             "versions": _versions(guarded),
-            "notes": grouped([*learnt.doubts(), *said]),
+            "notes": [*_problems(learnt_facts), *grouped([*learnt.doubts(), *said])],
         }
         found = EvaluateReport(
             out=root,
@@ -161,6 +168,28 @@ def run_evaluate(request: EvaluateRequest, callbacks: Callbacks) -> EvaluateRepo
         )
         _end(root, found)
     return found
+
+
+def _fit_facts(root: Path, guarded: GuardedModel, request: EvaluateRequest, on_warning: Warn) -> Json:
+    """What the defense learnt, on its own calibration data; kept for runs that find all samples finished.
+
+    Every problem is a warning.
+    """
+    report = guarded.fit_report()
+    if report is not None:
+        facts: Json = {"values": known_json(report.values), "problems": list(report.problems)}
+        write_whole(root, FIT, dump_json(facts))
+    path = inside(root, FIT)
+    if request.guard is None or not path.exists():
+        return None
+    facts = load_json(path)
+    for problem in _problems(facts):
+        on_warning(problem)
+    return facts
+
+
+def _problems(facts: Json) -> list[str]:
+    return [f"WARNING: {problem}" for problem in (facts or {}).get("problems", [])]
 
 
 def _measured(

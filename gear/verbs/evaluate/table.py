@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from gear.measuring.reports import TASK
 from gear.measuring.text_table import WIDTH, number_table
-from gear.verbs.evaluate.report import Difference, Estimate, EvaluateReport, RowReport
+from gear.verbs.evaluate.report import ALARMS, Difference, Estimate, EvaluateReport, RowReport
 
 COLUMNS, FURTHER = 4, 2
 """Number of metrics shown: of the task's own, and of each further report. results.json has all of them."""
@@ -25,14 +25,23 @@ def table(report: EvaluateReport, *, width: int = WIDTH) -> str:
     """
     columns = _columns(report)
     labels = row_labels(report.rows)
-    head = ["", "samples", *(metric_title(*column) for column in columns), "model s", "defense s", "mask IoU", "AUROC"]
+    head = [
+        "",
+        "samples",
+        *(metric_title(*column) for column in columns),
+        "model s",
+        "defense s",
+        "mask IoU",
+        ALARMS,
+        "AUROC",
+    ]
     lines = []
     for row in report.rows:
         lines.append([labels[row.name], *_row(row, columns)])
         lines += [_difference(one, report, columns) for one in report.differences if one.row == row.name]
     for pooled in report.together:
         metrics = [shown(pooled.metrics.get(name, {}).get(metric)) for name, metric in columns]
-        lines.append([f"all with patch {pooled.patch}", str(pooled.samples), *metrics, "", "", "", ""])
+        lines.append([f"all with patch {pooled.patch}", str(pooled.samples), *metrics, "", "", "", "", ""])
     used = [i for i, title in enumerate(head) if title in ("", "samples") or any(line[i] for line in lines)]
     text = number_table([[line[i] for i in used] for line in [head, *lines]], width=width)
     guarded = report.facts["defense"]
@@ -42,9 +51,26 @@ def table(report: EvaluateReport, *, width: int = WIDTH) -> str:
         *_paired(report, labels),
         *_limited(report, columns, labels),
         *_absent(report, labels),
+        *_times(report),
         *report.facts.get("notes", []),
     ]
     return "\n".join([title, *text, *notes]) + "\n"
+
+
+def _times(report: EvaluateReport) -> list[str]:
+    """What the seconds in the table are of."""
+    if report.facts["defense"] is not None:
+        return [
+            "model s: the network alone on defended pictures, one batch at a time; defense s: all that the defense "
+            "does, its own passes through the network included"
+        ]
+    together = report.facts.get("timing", {}).get("parallel_batches", 1)
+    if together == 1:
+        return []
+    return [
+        f"model s: a picture's share of the time while {together} batches run at once; behind a defense one runs at a "
+        "time, so such times do not compare"
+    ]
 
 
 def _columns(report: EvaluateReport) -> list[tuple[str, str]]:
@@ -65,13 +91,14 @@ def _row(row: RowReport, columns: Iterable[tuple[str, str]]) -> list[str]:
     metrics = [shown(row.metrics.get(report, {}).get(name)) for report, name in columns]
     defended = f"{row.cost['defense_s']:.3f}" if row.cost["defense_s"] else ""
     mask = number(row.defense.get("mask_iou")) if "mask_iou" in row.defense else ""
-    return [str(row.samples), *metrics, f"{row.cost['model_s']:.3f}", defended, mask, ""]
+    alarms = f"{row.defense[ALARMS]:.2f}" if ALARMS in row.defense else ""
+    return [str(row.samples), *metrics, f"{row.cost['model_s']:.3f}", defended, mask, alarms, ""]
 
 
 def _difference(one: Difference, report: EvaluateReport, columns: Iterable[tuple[str, str]]) -> list[str]:
     against = next(row for row in report.rows if row.name == one.against)
     metrics = [shown(one.metrics.get(name, {}).get(metric), is_signed=True) for name, metric in columns]
-    return [f"  minus {against.patch}", "", *metrics, "", "", "", shown(one.auroc)]
+    return [f"  minus {against.patch}", "", *metrics, "", "", "", "", shown(one.auroc)]
 
 
 def row_labels(rows: Sequence[RowReport]) -> dict[str, str]:

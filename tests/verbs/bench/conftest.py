@@ -22,7 +22,7 @@ tasks:
       second: {{plugin: other_segmenter, set: {{width: 6}}}}
     defenses:
       blur: {{plugin: gaussian}}
-      fpda: {{}}
+      fpda: {{set: {{false_alarms: 0.2}}}}
 places:
   {TINY_TOWN}: ["{TINY_SCENES}:board", "{TINY_SCENES}:double"]
 calibration: {{town: {TINY_TOWN}, scene: "{TINY_SCENES}:truck"}}
@@ -39,7 +39,7 @@ collect:
 
 FEW = (
     ("      second: {plugin: other_segmenter, set: {width: 6}}\n", ""),
-    ("      fpda: {}\n", ""),
+    ("      fpda: {set: {false_alarms: 0.2}}\n", ""),
     (f', "{TINY_SCENES}:double"', ""),
     ("transfer: true", "transfer: false"),
     ("adaptive: true", "adaptive: false"),

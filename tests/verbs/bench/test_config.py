@@ -55,7 +55,11 @@ def prepared(config: str | Path, *, out: Path, **given: Any) -> Plan:
         ("{steps: 2}", "{plugin: eot, set: {share: 9}}", r"bench\.yml:14:.* attack\.set: .*share: must be 0\.01 to 1"),
         ("attack: 2", "attack: 0", r"samples\.attack: must be 1 to"),
         ("transfer: true", "transfers: true", r"unknown key \(did you mean 'transfer'\?\)"),
-        ("      fpda: {}", "      fpda: {set: {layer: {}}}", r"bench\.yml:9:7: .*fpda: .*layer: expected str"),
+        (
+            "      fpda: {set: {false_alarms: 0.2}}",
+            "      fpda: {set: {layer: {}}}",
+            r"bench\.yml:9:7: .*fpda: .*layer: expected str",
+        ),
         ("quality: fast", "qualty: fast", r"bench\.yml:.*did you mean 'quality'"),
         ("width_px: 256", "width_px: 7", r"bench\.yml:.*width_px"),
         ("samples:", "weathers: [ClearNon]\nsamples:", r"did you mean ClearNoon"),
@@ -94,7 +98,10 @@ def arguments(plan: Plan, verb: str) -> list[dict[str, Any]]:
     return [step.arguments for step in plan.steps() if step.verb == verb]
 
 
-LEARNS = ("      fpda: {}\n", "      fpda: {}\n      zmask: {}\n")
+LEARNS = (
+    "      fpda: {set: {false_alarms: 0.2}}\n",
+    "      fpda: {set: {false_alarms: 0.2}}\n      zmask: {set: {false_alarms: 0.2}}\n",
+)
 """A change that adds a defense that learns and changes pictures."""
 
 

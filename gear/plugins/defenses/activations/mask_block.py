@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,6 +13,12 @@ from torch.nn import functional
 
 LEARNING_RATE, BATCH, CELLS = 0.01, 15, 4096
 NUMBERS = 8
+
+COVERED_FROM = 0.5
+"""Mask from which a cell is covered."""
+
+LEAST_GAIN, LEAST_IOU = 0.95, 0.05
+"""A block that ends above this share of the constant answer's loss, or below this IoU, has learnt nothing."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -71,9 +78,7 @@ def learn(examples: Sequence[Example], steps: int, rng: np.random.Generator) -> 
     """
     numbers = torch.tensor(rng.uniform(0, 1, NUMBERS), dtype=torch.float32, requires_grad=True)
     optimiser = torch.optim.Adam([numbers], lr=LEARNING_RATE)
-    shallow, deep, truth = (
-        torch.stack([getattr(one, name).flatten() for one in examples]) for name in ("shallow", "deep", "truth")
-    )
+    shallow, deep, truth = _stacked(examples)
     count, cells = shallow.shape
     with torch.enable_grad():
         for _ in range(steps):
@@ -85,3 +90,49 @@ def learn(examples: Sequence[Example], steps: int, rng: np.random.Generator) -> 
             loss.backward()  # type: ignore[no-untyped-call]
             optimiser.step()
     return MaskBlock(numbers.detach())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fit:
+    """How well a block knows its own examples.
+
+    Attributes:
+        loss: mean cross-entropy with the true masks.
+        constant_loss: that of the best constant answer, which knows nothing of the maps.
+        iou: of the mask from 0.5 on with the true one, over all examples together.
+        share: of the cells that show a patch.
+    """
+
+    loss: float
+    constant_loss: float
+    iou: float
+    share: float
+
+    @property
+    def has_learnt(self) -> bool:
+        """Whether the maps tell the block more than a constant, and it finds some of the patches."""
+        return self.loss < LEAST_GAIN * self.constant_loss and self.iou >= LEAST_IOU
+
+
+def fit_of(block: MaskBlock, examples: Sequence[Example]) -> Fit:
+    """Measures a block on examples of one grid."""
+    shallow, deep, truth = _stacked(examples)
+    said = block.mask(shallow, deep)
+    share = float(truth.double().mean())
+    covered, is_patch = said > COVERED_FROM, truth > COVERED_FROM
+    either = int((covered | is_patch).sum())
+    entropy = -sum(p * math.log(p) for p in (share, 1 - share) if p > 0)
+    return Fit(
+        loss=float(functional.binary_cross_entropy(said, truth)),
+        constant_loss=entropy,
+        iou=int((covered & is_patch).sum()) / either if either else 0.0,
+        share=share,
+    )
+
+
+def _stacked(examples: Sequence[Example]) -> tuple[Tensor, Tensor, Tensor]:
+    """(examples, cells) shallow and deep heat maps, and truth."""
+    shallow, deep, truth = (
+        torch.stack([getattr(one, name).flatten() for one in examples]) for name in ("shallow", "deep", "truth")
+    )
+    return shallow, deep, truth

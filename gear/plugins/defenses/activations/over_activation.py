@@ -89,6 +89,21 @@ def refined(pooled: Sequence[Tensor]) -> Tensor:
     return result
 
 
+def cell_auroc(heat: Tensor, truth: Tensor) -> float:
+    """How often a cell of the patch is hotter than another cell: area under the ROC curve; NaN without both kinds.
+
+    Args:
+        heat: (rows, columns).
+        truth: (rows, columns), 1 where the patch is, 0 elsewhere.
+    """
+    is_patch = truth.flatten() > 0
+    inside, others = int(is_patch.sum()), int((~is_patch).sum())
+    if not inside or not others:
+        return float("nan")
+    ranks = heat.flatten().argsort().argsort().double()
+    return float((ranks[is_patch].sum() - inside * (inside - 1) / 2) / (inside * others))
+
+
 def _nearest(cells: int, grid: int) -> Tensor:
     """(grid, cells): 1 where a place of the grid takes its value from a cell."""
     return functional.interpolate(torch.eye(cells)[None], size=grid, mode="nearest")[0].T

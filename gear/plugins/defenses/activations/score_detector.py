@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -9,18 +10,26 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from gear.contracts.defenses import DefendedBatch, DefenseResult
+from gear.contracts.defenses import DefendedBatch, DefenseResult, FitReport
 from gear.contracts.models import Model
 from gear.plugins.defenses.activations.feature_maps import deepest, feature_maps, tapped
-from gear.plugins.defenses.activations.z_scores import Usual, alarm_level, sureness, sureness_tensor, usual
+from gear.plugins.defenses.activations.z_scores import (
+    Moments,
+    Usual,
+    alarm_level,
+    false_alarm_interval,
+    moments,
+    sureness,
+    sureness_tensor,
+)
 from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
 
 Views = Mapping[str, UInt8Image]
 
-HELD_BACK = 4
-"""One in so many clean pictures says how high clean scores are; the others, what is usual. Pictures that have taught
-what is usual look more usual than new ones."""
+FOLDS = 4
+"""Each quarter of the clean pictures is scored by what is usual in the others: pictures that have taught what is usual
+look more usual than new ones."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -31,11 +40,17 @@ class Learnt:
         layer: the tap that it looks at.
         usual: its numbers in clean pictures.
         level: raw score at which it raises the alarm.
+        report: what it learnt.
     """
 
     layer: str
     usual: Usual
     level: float
+    report: FitReport
+
+    def fit_report(self) -> FitReport:
+        """The alarm level, and how often clean pictures of the same kind exceed it."""
+        return self.report
 
 
 class Detector:
@@ -64,18 +79,23 @@ class Detector:
         """Learns from clean pictures alone.
 
         Raises:
-            GearError: there are fewer than four, they differ in size, or the model has no such feature map.
+            GearError: there are too few, they differ in size, or the model has no such feature map.
         """
         assert model is not None
-        if len(clean) < HELD_BACK:
-            raise GearError(
-                f"calibration needs at least {HELD_BACK} clean pictures, and better a hundred; there are {len(clean)}"
-            )
+        if len(clean) < FOLDS:
+            raise GearError(f"calibration needs at least {FOLDS} clean pictures; there are {len(clean)}")
         layer = self._layer or deepest(model, clean[0])
-        held_back = range(HELD_BACK - 1, len(clean), HELD_BACK)
-        learnt = usual(self._numbers(model, clean[i], layer) for i in range(len(clean)) if i not in held_back)
-        scores = [self._raw(learnt, self._numbers(model, clean[i], layer)) for i in held_back]
-        return Learnt(layer=layer, usual=learnt, level=alarm_level(scores, self._false_alarms))
+        folds = [range(first, len(clean), FOLDS) for first in range(FOLDS)]
+        parts = [moments(self._numbers(model, clean[i], layer) for i in fold) for fold in folds]
+        scores = []
+        for number, fold in enumerate(folds):
+            others = functools.reduce(Moments.merged, parts[:number] + parts[number + 1 :]).usual()
+            scores += [self._raw(others, self._numbers(model, clean[i], layer)) for i in fold]
+        level = alarm_level(scores, self._false_alarms)
+        low, high = false_alarm_interval(len(scores), self._false_alarms)
+        values = {"clean_pictures": len(scores), "level": level, "false_alarms_low": low, "false_alarms_high": high}
+        learnt = functools.reduce(Moments.merged, parts).usual()
+        return Learnt(layer=layer, usual=learnt, level=level, report=FitReport(values=values))
 
     def apply(self, views: Views, model: Model | None, state: Learnt, rng: np.random.Generator) -> DefenseResult:
         """The pictures as they came, and the score."""

@@ -45,32 +45,107 @@ class Usual:
         return (values.double() - self.mean) / (self.deviation + FLOOR * self.deviation.mean()).clamp_min(1e-12)
 
 
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Moments:
+    """Sums over samples from which means and deviations follow.
+
+    Attributes:
+        count: samples.
+        mean: of each number, float64.
+        squares: sum of squared deviations from the mean, of each number.
+    """
+
+    count: int
+    mean: Tensor
+    squares: Tensor
+
+    def merged(self, other: Moments) -> Moments:
+        """Of the samples of both (Chan, Golub and LeVeque, 1979).
+
+        Raises:
+            GearError: their shapes differ.
+        """
+        if not self.count or not other.count:
+            return self if self.count else other
+        if self.mean.shape != other.mean.shape:
+            raise GearError("calibration pictures must all have one size")
+        count, change = self.count + other.count, other.mean - self.mean
+        mean = self.mean + change * (other.count / count)
+        squares = self.squares + other.squares + change * change * (self.count * other.count / count)
+        return Moments(count=count, mean=mean, squares=squares)
+
+    def usual(self) -> Usual:
+        """Mean and deviation.
+
+        Raises:
+            GearError: there are fewer than two samples.
+        """
+        if self.count < 2:
+            raise GearError(f"a calibration needs at least two pictures to say what is usual, got {self.count}")
+        return Usual(mean=self.mean, deviation=(self.squares / (self.count - 1)).sqrt())
+
+
+NO_MOMENTS = Moments(count=0, mean=torch.zeros(()), squares=torch.zeros(()))
+
+
+def moments(samples: Iterable[Tensor]) -> Moments:
+    """Over samples of one shape, in one pass.
+
+    Raises:
+        GearError: shapes differ.
+    """
+    total = NO_MOMENTS
+    for sample in samples:
+        values = sample.double()
+        total = total.merged(Moments(count=1, mean=values, squares=torch.zeros_like(values)))
+    return total
+
+
 def usual(samples: Iterable[Tensor]) -> Usual:
-    """Means and deviations over samples of one shape, in one pass (Welford, 1962).
+    """Means and deviations over samples of one shape, in one pass.
 
     Raises:
         GearError: there are fewer than two, or shapes differ.
     """
-    count, mean, squares = 0, torch.zeros(()), torch.zeros(())
-    for sample in samples:
-        values = sample.double()
-        if count and values.shape != mean.shape:
-            raise GearError("calibration pictures must all have one size")
-        count += 1
-        if count == 1:
-            mean, squares = values.clone(), torch.zeros_like(values)
-            continue
-        change = values - mean
-        mean = mean + change / count
-        squares = squares + change * (values - mean)
-    if count < 2:
-        raise GearError(f"a calibration needs at least two pictures to say what is usual, got {count}")
-    return Usual(mean=mean, deviation=(squares / (count - 1)).sqrt())
+    return moments(samples).usual()
 
 
 def alarm_level(clean: Sequence[float], false_alarms: float) -> float:
-    """What the share `false_alarms` of clean scores exceeds."""
-    return float(np.quantile(np.asarray(clean, dtype=np.float64), 1 - false_alarms))
+    """The score that new clean pictures exceed with a probability of at most `false_alarms`.
+
+    It is the score of rank ceil((n + 1)(1 - false_alarms)) of n clean ones: averaged over all draws of the calibration
+    pictures, the bound holds for any distribution of the scores (Vovk et al., 2005). A quantile between scores would
+    not hold it.
+
+    Raises:
+        GearError: there are too few scores for such a rank.
+    """
+    rank = _rank(len(clean), false_alarms)
+    if rank > len(clean):
+        needed = math.ceil(1 / false_alarms - 1)
+        raise GearError(
+            f"{len(clean)} clean calibration pictures are too few for an alarm level that at most {false_alarms:g} of "
+            f"clean pictures exceed; give at least {needed} (--calibration DIR), or raise it with "
+            "--defense-set false_alarms=SHARE"
+        )
+    return float(np.sort(np.asarray(clean, dtype=np.float64))[rank - 1])
+
+
+def false_alarm_interval(count: int, false_alarms: float) -> tuple[float, float]:
+    """In which share of new clean pictures of the same kind the level raises the alarm, with 95 %.
+
+    The share that exceeds the k-th of n scores has the distribution Beta(n + 1 - k, k) over draws of the n calibration
+    pictures. Pictures of other scenes may exceed it more often still.
+    """
+    from scipy import stats
+
+    rank = _rank(count, false_alarms)
+    low, high = stats.beta.ppf((0.025, 0.975), count + 1 - rank, rank)
+    return float(low), float(high)
+
+
+def _rank(count: int, false_alarms: float) -> int:
+    return math.ceil(round((count + 1) * (1 - false_alarms), 9))
 
 
 def sureness(raw: float, level: float) -> float:

@@ -15,27 +15,31 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from gear.contracts.defenses import DefendedBatch, DefenseResult
+from gear.contracts.defenses import DefendedBatch, DefenseResult, FitReport
 from gear.contracts.models import Model
 from gear.plugins.defenses.activations.feature_maps import feature_maps, spread, tapped
-from gear.plugins.defenses.activations.mask_block import Example, MaskBlock, learn
+from gear.plugins.defenses.activations.mask_block import COVERED_FROM, Example, Fit, MaskBlock, fit_of, learn
 from gear.plugins.defenses.activations.over_activation import (
     Cells,
     ChannelStatistics,
+    cell_auroc,
     channel_statistics,
     mean_of,
     pooled_sizes,
     refined,
 )
 from gear.plugins.defenses.activations.twin_masks import patch_area
-from gear.plugins.defenses.activations.z_scores import alarm_level, sureness, sureness_tensor
+from gear.plugins.defenses.activations.z_scores import alarm_level, false_alarm_interval, sureness, sureness_tensor
 from gear.plugins.defenses.activations.zmask_layers import Layers, Look, Views, layers_of, looks
 from gear.plugins.defenses.activations.zmask_options import ZMaskConfig
 from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
 
-COVERED_FROM = 0.5
-"""Of the mask, and of the score where `only_if_sure` asks for it."""
+LEAST_AUROC = 0.75
+"""Of the cells of a layer's heat map, for the layer to be looked at."""
+
+LAYER_PICTURES = 12
+"""Patched pictures by which layers are chosen, at most."""
 
 MOSTLY = 0.5
 """Share of a cell that the patch must take to be there."""
@@ -53,12 +57,18 @@ class Learnt:
         statistics: of their channels.
         block: makes masks of heat maps.
         level: raw score that the share `false_alarms` of clean pictures exceeds.
+        report: how well all that knows the calibration pictures.
     """
 
     layers: Layers
     statistics: Mapping[str, ChannelStatistics]
     block: MaskBlock
     level: float
+    report: FitReport
+
+    def fit_report(self) -> FitReport:
+        """The mask block's loss and mask IoU on the calibration's own patches, and the alarm level."""
+        return self.report
 
 
 class ZMask:
@@ -88,6 +98,7 @@ class ZMask:
             )
         layers = layers_of(model, self._settings.shallow, self._settings.deep)
         statistics = self._statistics(clean, model, layers)
+        layers = self._telling(clean, patched, model, layers, statistics)
         examples = list(self._examples(clean, patched, model, layers, statistics))
         if not examples:
             raise GearError("no patch is seen in the patched calibration data: Z-Mask has nothing to learn from")
@@ -97,7 +108,8 @@ class ZMask:
             for sample in spread(clean, self._settings.learning_pictures)
         ]
         level = alarm_level(scores, self._settings.false_alarms)
-        return Learnt(layers=layers, statistics=statistics, block=block, level=level)
+        report = _fit_report(fit_of(block, examples), len(examples), len(scores), self._settings.false_alarms, level)
+        return Learnt(layers=layers, statistics=statistics, block=block, level=level, report=report)
 
     def apply(self, views: Views, model: Model | None, state: Learnt, rng: np.random.Generator) -> DefenseResult:
         """Covers what over-activates the network; the score is that of the camera that shows most of it."""
@@ -182,8 +194,7 @@ class ZMask:
             area = patch_area(without.views[look.camera], look.views[look.camera], number)
             if area.any():
                 shallow, deep = self._seen(model, look, layers, statistics)
-                share = cv2.resize(area.astype(np.float32), shallow.shape[::-1], interpolation=cv2.INTER_AREA)
-                truth = torch.from_numpy((share >= MOSTLY).astype(np.float32))
+                truth = _truth(area, (shallow.shape[0], shallow.shape[1]))
                 yield Example(shallow=shallow, deep=deep, truth=truth)
 
     def _grid(self, height: int, width: int) -> Cells:
@@ -206,17 +217,94 @@ class ZMask:
         statistics: Mapping[str, ChannelStatistics],
     ) -> tuple[Tensor, Tensor]:
         """The shallow and the deep heat map of one camera's features: cell by cell the largest of the layers'."""
+        heats = self._layer_heats(maps, grid, layers, statistics)
+        first, second = (torch.stack(list(heats[kind].values())).amax(dim=0) for kind in ("shallow", "deep"))
+        return first, second
+
+    def _layer_heats(
+        self,
+        maps: Mapping[str, Tensor],
+        grid: Cells,
+        layers: Layers,
+        statistics: Mapping[str, ChannelStatistics],
+    ) -> dict[str, dict[str, Tensor]]:
+        """Heat maps of one camera's features by layer, `shallow` and `deep`."""
         shallow, deep = self._settings.shallow_kernels, self._settings.deep_kernels
-        heats: dict[str, list[Tensor]] = {"shallow": [], "deep": []}
+        heats: dict[str, dict[str, Tensor]] = {"shallow": {}, "deep": {}}
         for name, features in maps.items():
             z = statistics[name].z_scores(features)
             pooled = {rows: pooled_sizes(z, grid, (rows, 2 * rows)) for rows in {*shallow, *deep}}
             if name in layers.shallow:
-                heats["shallow"].append(refined([pooled[rows] for rows in shallow]))
+                heats["shallow"][name] = refined([pooled[rows] for rows in shallow])
             if name in layers.deep:
-                heats["deep"].append(refined([pooled[rows] for rows in deep]))
-        first, second = (torch.stack(maps).amax(dim=0) for maps in heats.values())
-        return first, second
+                heats["deep"][name] = refined([pooled[rows] for rows in deep])
+        return heats
+
+    def _telling(
+        self,
+        clean: Sequence[Views],
+        patched: Sequence[Views],
+        model: Model,
+        layers: Layers,
+        statistics: Mapping[str, ChannelStatistics],
+    ) -> Layers:
+        """Those of the layers whose heat maps tell where the calibration's patches are.
+
+        Published layers were chosen by hand for one network's weights. A layer that tells nothing drowns the others,
+        since the largest heat counts in each cell. In `ddrnet23_slim_depth` cells on its patches are hotter than others
+        in `rb1` and `rb2` (0.94 and 0.93), not in `rbb1` and `rbb2` (0.58 and 0.53). With all four the block learnt
+        nothing (loss 0.205, the constant answer's; mask IoU 0), with the first two it does (0.125 and 0.36).
+
+        Layers are kept whose cells on the patch are hotter than others with a probability of `LEAST_AUROC`, or else the
+        best one. Each of them may be shallow and deep, as in the supplement. What the options name is kept as it is.
+        """
+        every = Layers(shallow=layers.all(), deep=layers.all())
+        areas: dict[str, dict[str, list[float]]] = {"shallow": {}, "deep": {}}
+        for number in spread(range(len(patched)), LAYER_PICTURES):
+            without, look = looks(clean[number])[0], looks(patched[number])[0]
+            grid = self._grid(*look.views[look.camera].shape[:2])
+            truth = _truth(patch_area(without.views[look.camera], look.views[look.camera], number), grid)
+            maps = feature_maps(model, look.views, every.all())
+            for kind, heats in self._layer_heats(maps, grid, every, statistics).items():
+                for name, heat in heats.items():
+                    area = cell_auroc(heat, truth)
+                    areas[kind].setdefault(name, []).extend([area] * (area == area))
+        chosen = {}
+        for kind, by_name in areas.items():
+            means = {name: sum(found) / len(found) for name, found in by_name.items() if found}
+            kept = tuple(name for name, mean in means.items() if mean >= LEAST_AUROC)
+            chosen[kind] = kept or tuple(sorted(means, key=lambda name: -means[name])[:1])
+        return Layers(
+            shallow=self._settings.shallow or chosen["shallow"] or layers.shallow,
+            deep=self._settings.deep or chosen["deep"] or layers.deep,
+        )
+
+
+def _truth(area: npt.NDArray[np.bool_], grid: Cells) -> Tensor:
+    """(rows, columns) of 0 and 1: cells that the patch takes most of."""
+    share = cv2.resize(area.astype(np.float32), grid[::-1], interpolation=cv2.INTER_AREA)
+    return torch.from_numpy((share >= MOSTLY).astype(np.float32))
+
+
+def _fit_report(fit: Fit, examples: int, clean: int, false_alarms: float, level: float) -> FitReport:
+    low, high = false_alarm_interval(clean, false_alarms)
+    values = {
+        "examples": examples,
+        "patch_share": fit.share,
+        "loss": fit.loss,
+        "constant_loss": fit.constant_loss,
+        "mask_iou": fit.iou,
+        "clean_pictures": clean,
+        "level": level,
+        "false_alarms_low": low,
+        "false_alarms_high": high,
+    }
+    problem = (
+        f"zmask learnt nothing: on its own {examples} calibration patches its mask has IoU {fit.iou:.3f} and loss "
+        f"{fit.loss:.3f}, a constant answer has loss {fit.constant_loss:.3f}; its masks mean nothing (other layers: "
+        "--defense-set shallow=[TAP] deep=[TAP])"
+    )
+    return FitReport(values=values, problems=() if fit.has_learnt else (problem,))
 
 
 def _flipped(heats: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:

@@ -8,7 +8,14 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gear.plugins.defenses.activations.z_scores import FLOOR, alarm_level, sureness, usual
+from gear.plugins.defenses.activations.z_scores import (
+    FLOOR,
+    alarm_level,
+    false_alarm_interval,
+    moments,
+    sureness,
+    usual,
+)
 from gear.values.errors import GearError
 
 
@@ -46,8 +53,23 @@ def test_maps_of_another_size_are_refused_with_both() -> None:
 def test_one_clean_picture_in_twenty_raises_the_alarm() -> None:
     scores = np.linspace(1, 2, 101).tolist()
     level = alarm_level(scores, 0.05)
-    assert level == pytest.approx(1.95)
+    assert level == pytest.approx(1.96), "rank 97 of 102: new pictures count, too"
     assert np.mean([sureness(score, level) > 0.5 for score in scores]) == pytest.approx(0.05, abs=0.01)
+
+
+def test_too_few_pictures_tell_no_level() -> None:
+    with pytest.raises(GearError, match=r"18 clean calibration pictures are too few.*at least 19"):
+        alarm_level([1.0] * 18, 0.05)
+    assert alarm_level(list(range(19)), 0.05) == 18
+    low, high = false_alarm_interval(40, 0.05)
+    assert 0 < low < 0.05 < 0.12 < high, "forty pictures leave open whether one in eight raises the alarm"
+
+
+def test_merged_moments_are_those_of_all() -> None:
+    values = torch.randn(7, 3, generator=torch.Generator().manual_seed(1))
+    merged = moments(values[:3]).merged(moments(values[3:])).usual()
+    assert torch.allclose(merged.mean, values.double().mean(0))
+    assert torch.allclose(merged.deviation, values.double().std(0))
 
 
 @given(st.floats(0, 1e6), st.floats(0, 1e6), st.floats(0, 1e3))
