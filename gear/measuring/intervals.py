@@ -7,8 +7,8 @@ unequal weight (Satterthwaite, Biometrics 1946).
 
 Why no bootstrap: a mean over classes, such as mIoU or mAP, leaves out classes that no drawn sample shows. Resamples
 show fewer classes than the dataset does, so their percentiles are biased, and they are too narrow for few streets. In
-simulations with a known truth (docs/results/intervals.md, `benchmarks/coverage.py`) percentiles of 95 % cover 79 to
-93 %, BCa over a fixed set of classes 71 to 93 %, and these intervals 92 to 97 %.
+simulations with a known truth (docs/results/intervals.md, `benchmarks/coverage.py`) percentiles of 95 % cover 80 to
+94 % for mIoU, BCa 75 to 93 %, and these intervals 95 to 97 % for mIoU and 92 to 97 % for other metrics.
 
 What such an interval is of: the metric over the classes that the dataset shows. A class that is in no sample cannot be
 known.
