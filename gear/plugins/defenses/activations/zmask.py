@@ -45,7 +45,8 @@ MOSTLY = 0.5
 """Share of a cell that the patch must take to be there."""
 
 FILL = np.array([124, 116, 104], np.uint8)
-"""ImageNet's mean: what is covered is 0 to a network that normalises by it."""
+"""ImageNet's mean in bytes: what is covered is 0, as published, to a network that normalises by it. To a network with
+another normalisation it is a grey near the middle, which is gear's choice."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
