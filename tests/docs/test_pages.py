@@ -44,7 +44,7 @@ def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
 
 
 RESULTS = [page for page in pages() if page.parent.name == "results" and page.stem != "index"]
-LINES = ("Date", "Commit", "Machine", "Command")
+LINES = ("Date", "Commit", "Machine", "Command", "Inputs")
 
 
 @pytest.mark.parametrize("page", RESULTS, ids=lambda page: page.stem)
@@ -53,7 +53,7 @@ def test_every_section_of_results_says_where_its_figures_come_from(page: Path) -
     assert sections
     for section in sections:
         heading, *lines = section.splitlines()
-        found = [re.match(r"- \*\*(\w+):\*\* \S", line) for line in lines[1:5]]
+        found = [re.match(r"- \*\*(\w+):\*\* \S", line) for line in lines[1:6]]
         assert [match and match[1] for match in found] == list(LINES), heading
         assert re.search(r"\d{4}-\d{2}-\d{2}", lines[1]) and re.search(r"\b[0-9a-f]{8}\b", lines[2]), heading
 
@@ -75,6 +75,25 @@ def test_commits_of_results_are_in_the_history() -> None:
         ["git", "cat-file", "--batch-check"], cwd=ROOT, input=asked, capture_output=True, text=True, check=True
     ).stdout
     assert [line for line in answer.splitlines() if " commit " not in line] == []
+
+
+def test_the_list_of_stale_figures_is_fresh() -> None:
+    made = runpy.run_path(str(DOCS / "stale_results.py"))
+    assert made["INDEX"].read_text(encoding="utf-8") == made["index"](), "run: python docs/stale_results.py"
+
+
+def test_figures_are_stale_when_a_file_that_they_depend_on_changes(tmp_path: Path) -> None:
+    digest = runpy.run_path(str(DOCS / "stale_results.py"))["digest"]
+    (tmp_path / "town").mkdir()
+    (tmp_path / "town" / "a.xml").write_text("one")
+    first = digest(tmp_path)
+    (tmp_path / "town" / "a.xml").write_text("two")
+    second = digest(tmp_path)
+    (tmp_path / "town" / "a.xml").rename(tmp_path / "town" / "b.xml")
+    assert len({first, second, digest(tmp_path)}) == 3
+    (tmp_path / "town" / "b.xml").rename(tmp_path / "town" / "a.xml")
+    (tmp_path / "town" / "a.xml").write_text("one")
+    assert digest(tmp_path) == first
 
 
 def test_the_map_of_rooms_is_what_the_code_is() -> None:
