@@ -14,9 +14,10 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
+import numpy.typing as npt
 from scipy import stats
 
 from gear.contracts.evaluation import Draws
@@ -33,6 +34,7 @@ METHODS = ("percentile", "bca", "jackknife")
 SAMPLES = (6, 10, 20, 50)
 
 Rng = np.random.Generator
+Indices = npt.NDArray[np.integer[Any]]
 
 
 class Kind(Protocol):
@@ -44,7 +46,7 @@ class Kind(Protocol):
 
     limits: Interval
 
-    def measure(self, chosen: Values, draws: Draws) -> tuple[float, Values, float]:
+    def measure(self, chosen: Indices, draws: Draws) -> tuple[float, Values, float]:
         """The metric over some pictures, over each draw of these, and the truth that it estimates.
 
         Args:
@@ -94,9 +96,9 @@ class MeanIou:
         """(P, classes, classes) pixels by truth and prediction."""
         right = pixels / (1 + np.exp(-logit))
         spread = pixels / pixels.sum(axis=1, keepdims=True)
-        return (pixels - right)[:, :, None] * spread[:, None] + np.eye(len(self._ids)) * right[:, :, None]
+        return np.asarray((pixels - right)[:, :, None] * spread[:, None] + np.eye(len(self._ids)) * right[:, :, None])
 
-    def measure(self, chosen: Values, draws: Draws) -> tuple[float, Values, float]:
+    def measure(self, chosen: Indices, draws: Draws) -> tuple[float, Values, float]:
         """See `Kind`."""
         value, replicates, truth = self._of(self._clean, chosen, draws)
         if self._patched is None:
@@ -104,7 +106,7 @@ class MeanIou:
         other, others, other_truth = self._of(self._patched, chosen, draws)
         return other - value, others - replicates, other_truth - truth
 
-    def _of(self, population: Values, chosen: Values, draws: Draws) -> tuple[float, Values, float]:
+    def _of(self, population: Values, chosen: Indices, draws: Draws) -> tuple[float, Values, float]:
         parts = population[chosen]
         overall = self._metrics(parts.sum(axis=0)[None])
         every = self._truths[id(population)]
@@ -144,7 +146,7 @@ class MeanAp:
         whole = [self._part(category, np.arange(POPULATION)) for category in range(len(self._matches))]
         self._truths = np.array([average_precision(one, np.ones(POPULATION, np.int64))[0] for one in whole])
 
-    def _part(self, category: int, chosen: Values) -> Matches:
+    def _part(self, category: int, chosen: Indices) -> Matches:
         """Of some pictures, each with its place there as its number; a picture may be chosen several times."""
         is_hit, wanted, of_picture = self._matches[category]
         numbers = [of_picture[number] for number in chosen]
@@ -155,7 +157,7 @@ class MeanAp:
         counts = np.ones((1, len(order)), np.bool_)
         return Matches(owner=places, hit=is_hit[order][None], counts=counts, wanted=wanted[chosen])
 
-    def measure(self, chosen: Values, draws: Draws) -> tuple[float, Values, float]:
+    def measure(self, chosen: Indices, draws: Draws) -> tuple[float, Values, float]:
         """See `Kind`."""
         parts = [self._part(category, chosen) for category in range(len(self._matches))]
         whole = np.concatenate([average_precision(one, np.ones(len(chosen), np.int64)) for one in parts])
@@ -175,17 +177,18 @@ class Auroc:
     def __init__(self, rng: Rng) -> None:
         street = rng.normal(0, 0.7, POPULATION)
         self._high, self._low = (street + rng.normal(mean, 0.7, POPULATION) for mean in (1.0, 0.0))
-        self._truth = auroc(self._high, self._low)
+        self._truth = auroc(self._high.tolist(), self._low.tolist())
 
-    def measure(self, chosen: Values, draws: Draws) -> tuple[float, Values, float]:
+    def measure(self, chosen: Indices, draws: Draws) -> tuple[float, Values, float]:
         """See `Kind`."""
         high, low = self._high[chosen], self._low[chosen]
         rows = [row[row != LEFT_OUT] for row in draws]
-        return auroc(high, low), np.array([auroc(high[row], low[row]) for row in rows]), self._truth
+        values = np.array([auroc(high[row].tolist(), low[row].tolist()) for row in rows])
+        return auroc(high.tolist(), low.tolist()), values, self._truth
 
-    def interval(self, chosen: Values) -> Interval | None:
+    def interval(self, chosen: Indices) -> Interval | None:
         """As an evaluation gives it, also where the scores are separated."""
-        return auroc_interval(self._high[chosen], self._low[chosen], range(len(chosen)))
+        return auroc_interval(self._high[chosen].tolist(), self._low[chosen].tolist(), range(len(chosen)))
 
 
 class MeanError:
@@ -196,7 +199,7 @@ class MeanError:
     def __init__(self, rng: Rng) -> None:
         self._errors = rng.lognormal(1.5, 0.4, POPULATION)
 
-    def measure(self, chosen: Values, draws: Draws) -> tuple[float, Values, float]:
+    def measure(self, chosen: Indices, draws: Draws) -> tuple[float, Values, float]:
         """See `Kind`."""
         often = _often(draws, len(chosen))
         values = self._errors[chosen]
