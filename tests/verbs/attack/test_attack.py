@@ -286,7 +286,7 @@ def test_a_plan_that_names_no_task_is_one_line(small: Small, install: Install, t
     data = shutil.copytree(small(), tmp_path / "data")
     (path,) = data.glob("gear/*/plan.json")
     path.write_text(plan)
-    with pytest.raises(DatasetError, match=r"plan\.json: is not of this version of gear .*; collect the split again$"):
+    with pytest.raises(DatasetError, match=r"plan\.json: is damaged \(plan.*gear verify DIR --repair"):
         attack(data, model="tiny_segmenter", out=tmp_path / "x", steps=1, settings=SMALL)
 
 

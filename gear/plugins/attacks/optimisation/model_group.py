@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -141,20 +142,26 @@ class Cleaned(Defended):
         clean: Callable[[Mapping[str, UInt8Image]], Mapping[str, UInt8Image]],
         calibrate: Callable[[], object] = lambda: None,
     ) -> None:
-        super().__init__(model, defense, bare, calibrate=calibrate)
-        self._clean = clean
+        super().__init__(model, defense, bare, partial(_cleaned_as_bytes, clean), calibrate=calibrate)
 
     def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
-        """The model's, of the cleaned pictures."""
+        """The model's outputs or losses on the cleaned pictures, without gradients."""
         with torch.no_grad():
-            given = {name: _as_bytes(batch) for name, batch in views.items()}
-            count = len(next(iter(given.values())))
-            cleaned = [self._clean({name: batch[i] for name, batch in given.items()}) for i in range(count)]
-            seen = {}
-            for name, batch in views.items():
-                pictures = torch.from_numpy(np.stack([one[name] for one in cleaned])).permute(0, 3, 1, 2)
-                seen[name] = pictures.to(batch.device, batch.dtype) / 255
-            return self.model.forward(seen, targets)
+            return super().forward(views, targets)
+
+
+def _cleaned_as_bytes(
+    clean: Callable[[Mapping[str, UInt8Image]], Mapping[str, UInt8Image]], views: Mapping[str, Tensor]
+) -> Mapping[str, Tensor]:
+    """Cleans (B, 3, H, W) pictures in 0..1 one sample at a time, as uint8 pictures and without gradients."""
+    given = {name: _as_bytes(batch.detach()) for name, batch in views.items()}
+    count = len(next(iter(given.values())))
+    cleaned = [clean({name: batch[i] for name, batch in given.items()}) for i in range(count)]
+    seen = {}
+    for name, batch in views.items():
+        pictures = torch.from_numpy(np.stack([one[name] for one in cleaned])).permute(0, 3, 1, 2)
+        seen[name] = pictures.to(batch.device, batch.dtype) / 255
+    return seen
 
 
 def _as_bytes(batch: Tensor) -> UInt8Image:
