@@ -23,7 +23,7 @@ def text_table(
     Args:
         head: titles of the columns.
         rows: cells, one sequence as long as `head` per row. The last column takes the room that the others leave.
-        width: most characters of a line.
+        width: most characters of a line, where the other columns leave room for `SHORTEST` of the last one.
         wrap: continue a long description on the next line instead of cutting it.
 
     Returns:
@@ -40,7 +40,9 @@ def text_table(
     for row in rows:
         table.add_row(*row)
     out = io.StringIO()
-    Console(file=out, width=width, color_system=None, markup=False, highlight=False, emoji=False).print(table)
+    # Rich would cut the names, not the descriptions, to fit a line that is too short for both.
+    wide = max(width, sum(widths) + GAP * len(head))
+    Console(file=out, width=wide, color_system=None, markup=False, highlight=False, emoji=False).print(table)
     return [line.rstrip() for line in out.getvalue().splitlines()]
 
 

@@ -23,6 +23,7 @@ from gear.collecting.job import resolve
 from gear.collecting.run import CollectReport
 from gear.config.load import load_collection
 from gear.dataset.files import sha256
+from gear.dataset.sealed_json import sealed_json
 from gear.formats import rle
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import (
@@ -169,7 +170,9 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path: Path, collect_small: Collec
     assert 3 <= len(kept) < 200
     total = len(kept) + 2
     plan = out / "gear/debug/plan.json"
-    plan.write_text(plan.read_text().replace('"samples": 200', f'"samples": {total}'))
+    content = json.loads(plan.read_text().replace('"samples": 200', f'"samples": {total}'))
+    del content["sha256"]
+    plan.write_bytes(sealed_json(content))
     report = collect_small("depth", out, samples=total)
     assert report.made == total - len(kept)
     assert all((samples / name).stat().st_mtime_ns == stamp for name, stamp in kept.items())

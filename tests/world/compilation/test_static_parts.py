@@ -120,7 +120,7 @@ def asset(folder: Path, text: str = ASSET) -> Path:
 
 
 def test_an_asset_keeps_its_classes_and_its_meshes_stay_where_they_are(tmp_path: Path) -> None:
-    split = split_asset(asset(tmp_path))
+    split = split_asset(AssetFile(asset(tmp_path)))
     assert split.text is not None and "<default" not in split.text
     assert split.defaults.startswith('<default class="cart/"><default class="cart/seen"><mesh')
     assert '<default class="cart/car.paint"' in split.defaults
@@ -140,7 +140,7 @@ def test_an_asset_keeps_its_classes_and_its_meshes_stay_where_they_are(tmp_path:
     ids=["reference", "site", "named", "include", "two"],
 )
 def test_an_asset_with_anything_else_is_left_whole(found: str, put: str, tmp_path: Path) -> None:
-    assert split_asset(asset(tmp_path, ASSET.replace(found, put, 1))) == SplitAsset()
+    assert split_asset(AssetFile(asset(tmp_path, ASSET.replace(found, put, 1)))) == SplitAsset()
 
 
 def test_a_mesh_that_is_not_there_is_named(tmp_path: Path) -> None:
