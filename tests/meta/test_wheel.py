@@ -51,5 +51,5 @@ def test_the_wheel_collects_from_an_empty_folder(wheel: Path, tmp_path: Path) ->
     )
     done = subprocess.run([sys.executable, "-P", "-c", code], cwd=empty, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("data/depth/town10-billboard01-ClearNoon/none: 1 samples in split 'debug'")
+    assert done.stdout.startswith("data/depth/town10-billboard01-ClearNoon/none: 1 sample in split 'debug'")
     assert len(list(empty.rglob("*.tiff"))) == 1
