@@ -1,7 +1,7 @@
 """PNG files checked chunk by chunk, before a decoder sees them.
 
-libpng writes messages about a damaged file to stderr, where a command's one-line error belongs. Computing the checksums
-of a 3 MB file takes 1 ms; decoding it takes 30.
+libpng writes messages about a damaged file to stderr, where a command's one-line error belongs. The check of
+a 3 MB file takes 2 ms, and OpenCV decodes it in 5 ms (two cores, noise of 1000 x 1000 pixels).
 """
 
 from __future__ import annotations

@@ -55,7 +55,7 @@ class Counted:
 
 
 class Watching:
-    """A `Watch` that records what it is told, and can start from a state."""
+    """A `Watch` that records the values of every step, and can start from a saved state."""
 
     def __init__(self, start: State | None = None) -> None:
         self.start = start
