@@ -85,7 +85,7 @@ def boundary(mask: npt.NDArray[np.bool_], width_px: int) -> npt.NDArray[np.bool_
     """
     padded = np.pad(mask, 1).astype(np.uint8)
     inner = cv2.erode(padded, np.ones((3, 3), np.uint8), iterations=width_px)[1:-1, 1:-1]
-    return mask & (inner == 0)
+    return mask & np.asarray(inner == 0, dtype=np.bool_)
 
 
 def _mean(counts: Counts) -> float:
