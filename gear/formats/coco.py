@@ -85,6 +85,8 @@ class Picture:
         file_name: relative to the folder of the split's pictures.
         height_px, width_px: its size.
         annotations: of its objects.
+        ignored_px: boxes in which a detection of any category that finds no object counts neither way. They are for
+            evaluations; annotation files do not have them.
     """
 
     id: int
@@ -92,6 +94,7 @@ class Picture:
     height_px: int
     width_px: int
     annotations: tuple[Annotation, ...]
+    ignored_px: tuple[BoxPx, ...] = ()
 
 
 def dataset_json(pictures: Sequence[Picture], *, description: str, created: str) -> Json:

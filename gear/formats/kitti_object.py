@@ -138,6 +138,12 @@ def from_edge_pixels(box_px: BoxPx, intrinsics: Intrinsics) -> BoxPx:
     return (max(0.0, left), max(0.0, top), min(most_x, right), min(most_y, bottom))
 
 
+def to_edge_pixels(box_px: BoxPx) -> BoxPx:
+    """A box in index pixels, such as a label's, in edge pixels."""
+    left, top, right, bottom = (side + 0.5 for side in box_px)
+    return (left, top, right, bottom)
+
+
 def truncation(box_px: BoxPx, clipped_px: BoxPx) -> float:
     """Share of a projected box that lies outside the picture, 0..1."""
     whole = (box_px[2] - box_px[0]) * (box_px[3] - box_px[1])

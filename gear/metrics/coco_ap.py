@@ -63,7 +63,7 @@ class CocoEvaluator(Generic[SampleT]):
         return single_metrics(
             boxes([(box, item.category_id, 1.0) for box, item in edges if not item.is_crowd]),
             boxes([(one.box_px, one.category_id, one.score) for one in found]),
-            np.array([box for box, item in edges if item.is_crowd]).reshape(-1, 4),
+            np.array([*(box for box, item in edges if item.is_crowd), *picture.ignored_px]).reshape(-1, 4),
             low_px,
         )
 
@@ -112,8 +112,12 @@ class CocoEvaluator(Generic[SampleT]):
 
     def _matched(self) -> Any:
         """pycocotools' evaluation with every picture matched."""
+        occurring = sorted({item.category_id for item in _labelled(self.pictures)})
         # The same picture may come twice, so pictures are numbered here.
-        pictures = [replace(picture, id=number) for number, picture in enumerate(self.pictures)]
+        pictures = [
+            replace(picture, id=number, annotations=(*picture.annotations, *_ignored(picture, occurring)))
+            for number, picture in enumerate(self.pictures)
+        ]
         truth = dataset_json(pictures, description="", created="2022-01-01")
         lines = [line for number, found in enumerate(self.detections) for line in results_json(number, found)]
         for number, line in enumerate(lines):
@@ -155,6 +159,19 @@ def _edges(box_xywh: tuple[float, float, float, float]) -> tuple[float, float, f
 
 def _labelled(pictures: Sequence[Picture]) -> list[Annotation]:
     return [item for picture in pictures for item in picture.annotations if not item.is_crowd]
+
+
+def _ignored(picture: Picture, category_ids: Sequence[int]) -> list[Annotation]:
+    """The picture's ignored boxes as pycocotools ignores a place: by a crowd of each category."""
+    found = []
+    for left, top, right, bottom in picture.ignored_px:
+        box_xywh = (left, top, right - left, bottom - top)
+        area_px = round(box_xywh[2] * box_xywh[3])
+        found += [
+            Annotation(category_id=category_id, box_xywh=box_xywh, area_px=area_px, rle="", is_crowd=True, extras={})
+            for category_id in category_ids
+        ]
+    return found
 
 
 def _known(value: float) -> float:

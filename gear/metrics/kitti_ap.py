@@ -31,6 +31,7 @@ from gear.metrics.kitti_match import (
 )
 from gear.metrics.single_picture import boxes, single_metrics
 from gear.values.geometry import Array
+from gear.values.ground_truth import BoxPx
 
 SampleT = TypeVar("SampleT", contravariant=True)
 
@@ -41,9 +42,17 @@ STEPS = 40
 class KittiEvaluator(Generic[SampleT]):
     """Gathers pictures; everything is computed at the end."""
 
-    def __init__(self, labels_of: Callable[[SampleT], Sequence[KittiLabel]]) -> None:
-        """Args: labels_of: the lines of a sample's label file, DontCare regions with them."""
-        self._labels_of = labels_of
+    def __init__(
+        self,
+        labels_of: Callable[[SampleT], Sequence[KittiLabel]],
+        ignored_of: Callable[[SampleT], Sequence[BoxPx]] = lambda _: (),
+    ) -> None:
+        """Args:
+        labels_of: the lines of a sample's label file, DontCare regions with them.
+        ignored_of: boxes in the picture, in index pixels. They excuse detections as DontCare regions do, for overlaps
+            from above and in space, too.
+        """
+        self._labels_of, self._ignored_of = labels_of, ignored_of
         self.pictures: list[PictureBoxes] = []
 
     def update(self, sample: SampleT, prediction: Sequence[KittiLabel]) -> Mapping[str, float]:
@@ -58,14 +67,15 @@ class KittiEvaluator(Generic[SampleT]):
         for found in prediction:
             _check(found)
         labels = self._labels_of(sample)
-        self.pictures.append(picture_boxes(labels, prediction))
+        ignored_px = self._ignored_of(sample)
+        self.pictures.append(picture_boxes(labels, prediction, ignored_px))
         wanted = [label for label in labels if label.type in NEIGHBOURS]
         return single_metrics(
             boxes([(label.box_px, TYPES.index(label.type), 1.0) for label in wanted]),
             boxes(
                 [(one.box_px, TYPES.index(one.type), one.score or 0.0) for one in prediction if one.type in NEIGHBOURS]
             ),
-            np.array([label.box_px for label in labels if label.type not in NEIGHBOURS]).reshape(-1, 4),
+            np.array([*(label.box_px for label in labels if label.type not in NEIGHBOURS), *ignored_px]).reshape(-1, 4),
         )
 
     def merge(self, other: Any) -> None:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from gear.formats.kitti_object import KittiLabel
 from gear.metrics.boxes import iou_2d, iou_ground_and_space, share_of_first
 from gear.values.geometry import Array
+from gear.values.ground_truth import BoxPx
 
 Bools = npt.NDArray[np.bool_]
 Overlap = Literal["2d", "bev", "3d"]
@@ -49,27 +50,42 @@ class PictureBoxes:
         detections: every one with a score.
         overlaps: (labels, detections) by kind.
         in_dont_care: (detections,) largest share of a detection's own box that lies in one DontCare region.
+        in_ignored: (detections,) the same for regions that are ignored for overlaps from above and in space, too.
     """
 
     labels: tuple[KittiLabel, ...]
     detections: tuple[KittiLabel, ...]
     overlaps: dict[Overlap, Array]
     in_dont_care: Array
+    in_ignored: Array
 
 
-def picture_boxes(labels: Sequence[KittiLabel], detections: Sequence[KittiLabel]) -> PictureBoxes:
-    """Computes all overlaps of a picture once."""
+def picture_boxes(
+    labels: Sequence[KittiLabel], detections: Sequence[KittiLabel], ignored_px: Sequence[BoxPx] = ()
+) -> PictureBoxes:
+    """Computes all overlaps of a picture once.
+
+    Args:
+        labels: with DontCare regions.
+        detections: every one with a score.
+        ignored_px: boxes in the picture, in index pixels, that excuse detections of all overlaps.
+    """
     things = tuple(label for label in labels if label.type != "DontCare")
     regions = _boxes_px([label for label in labels if label.type == "DontCare"])
     found = tuple(detections)
     ground, space = iou_ground_and_space(_boxes_m(things), _boxes_m(found))
-    shares = share_of_first(_boxes_px(found), regions)
     return PictureBoxes(
         labels=things,
         detections=found,
         overlaps={"2d": iou_2d(_boxes_px(things), _boxes_px(found)), "bev": ground, "3d": space},
-        in_dont_care=shares.max(axis=1) if regions.size else np.zeros(len(found)),
+        in_dont_care=_largest_share(_boxes_px(found), regions),
+        in_ignored=_largest_share(_boxes_px(found), np.array(ignored_px, dtype=np.float64).reshape(-1, 4)),
     )
+
+
+def _largest_share(boxes_px: Array, regions_px: Array) -> Array:
+    """(N,) largest share of each box that lies in one region."""
+    return np.asarray(share_of_first(boxes_px, regions_px).max(axis=1, initial=0.0))
 
 
 def _boxes_px(labels: Sequence[KittiLabel]) -> Array:
@@ -91,7 +107,7 @@ class Chosen:
         scores: (detections,).
         overlaps: (labels, detections).
         angle_gain: (labels, detections) (1 + cos of the difference of alpha) / 2.
-        excused: (detections,) lies in a DontCare region.
+        excused: (detections,) lies in a DontCare region or in an ignored one.
         min_overlap: that a match needs.
     """
 
@@ -151,7 +167,8 @@ def choose(
         overlaps=picture.overlaps[overlap],
         angle_gain=np.asarray((1 + np.cos(label_alpha[:, None] - found_alpha[None])) / 2),
         # DontCare regions have no place in space, so they excuse in the picture alone.
-        excused=(picture.in_dont_care > MIN_OVERLAP[kind]) & (overlap == "2d"),
+        excused=((picture.in_dont_care > MIN_OVERLAP[kind]) & (overlap == "2d"))
+        | (picture.in_ignored > MIN_OVERLAP[kind]),
         min_overlap=MIN_OVERLAP[kind] if min_overlap is None else min_overlap,
     )
 

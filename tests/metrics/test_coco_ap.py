@@ -1,15 +1,20 @@
+import contextlib
+import io
 import math
+from dataclasses import replace
+from typing import Any
 
+import numpy as np
 import pytest
+from pycocotools.coco import COCO
+from pycocotools.cocoeval import COCOeval
 
 from gear.formats import rle
-from gear.formats.coco import Annotation, Detection, Picture
+from gear.formats.coco import Annotation, Detection, Picture, dataset_json, results_json
 from gear.metrics.coco_ap import CocoEvaluator
 
 
 def picture(number: int, *boxes: tuple[int, tuple[float, float, float, float], bool]) -> Picture:
-    import numpy as np
-
     annotations = []
     for category_id, (x, y, w, h), is_crowd in boxes:
         mask = np.zeros((200, 200), dtype=np.bool_)
@@ -100,3 +105,81 @@ def test_bad_detections_are_refused() -> None:
     for bad in (found(math.nan), found(math.inf), found(0.9, (20, 20, math.inf, 80))):
         with pytest.raises(ValueError, match="finite"):
             evaluator().update(picture(0, CAR), [bad])
+
+
+IGNORED = ((100.0, 90.0, 180.0, 190.0), (5.0, 120.0, 60.0, 180.0))
+
+
+def crowded(seed: int) -> tuple[Picture, list[Detection]]:
+    """A picture of cars and persons, and detections near them, in ignored boxes, across their edges, and elsewhere."""
+    rng = np.random.default_rng(seed)
+
+    def box(low: float = 0.0) -> tuple[float, float, float, float]:
+        x, y = rng.integers(low, 140, 2)
+        width, height = rng.integers(10, 60, 2)
+        return float(x), float(y), float(width), float(height)
+
+    labels = [(int(rng.choice([1, 3])), box(), bool(rng.random() < 0.15)) for _ in range(5)]
+    shown = picture(seed + 1, *labels)
+    found = []
+    for x, y, w, h in [*(label[1] for label in labels), *(box(80.0) for _ in range(6))]:
+        dx, dy, dw, dh = rng.normal(0, 3, 4)
+        edges = (x + dx, y + dy, x + dx + w + abs(dw), y + dy + h + abs(dh))
+        found.append(Detection(category_id=int(rng.choice([1, 3, 3])), box_px=edges, score=float(rng.random())))
+    return shown, found
+
+
+def by_hand(pictures: list[tuple[Picture, list[Detection]]]) -> list[float]:
+    """pycocotools' first twelve numbers, of an annotation file into which crowds are written by hand."""
+    content = dataset_json([shown for shown, _ in pictures], description="", created="2022-01-01")
+    for shown, _ in pictures:
+        for left, top, right, bottom in shown.ignored_px:
+            for category_id in (1, 3):
+                content["annotations"].append({
+                    "id": len(content["annotations"]) + 1, "image_id": shown.id, "category_id": category_id,
+                    "bbox": [left, top, right - left, bottom - top], "area": (right - left) * (bottom - top),
+                    "iscrowd": 1, "segmentation": {"size": [200, 200], "counts": ""},
+                })  # fmt: skip
+    truth = COCO()
+    with contextlib.redirect_stdout(io.StringIO()):
+        truth.dataset = content
+        truth.createIndex()
+        lines: list[Any] = [line for shown, found in pictures for line in results_json(shown.id, found)]
+        evaluation = COCOeval(truth, truth.loadRes(lines), "bbox")
+        evaluation.evaluate()
+        evaluation.accumulate()
+        evaluation.summarize()
+    return [float(value) for value in evaluation.stats]
+
+
+@pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
+@pytest.mark.parametrize("seed", range(4))
+def test_ignored_boxes_are_crowds_of_every_category(seed: int) -> None:
+    pictures = [crowded(20 * seed + i) for i in range(12)]
+    silent = [(replace(shown, ignored_px=IGNORED), found) for shown, found in pictures]
+    results = []
+    for some in (pictures, silent):
+        metric = evaluator()
+        for shown, found in some:
+            metric.update(shown, found)
+        results.append(list(metric.result().values())[:12])
+        assert results[-1] == pytest.approx([v if v >= 0 else math.nan for v in by_hand(some)], nan_ok=True)
+    assert results[1][0] > results[0][0] + 0.01
+
+
+@pytest.mark.parametrize(("left", "alarms"), [(60.0, 1), (85.0, 0)])
+def test_half_of_it_in_an_ignored_box_is_no_false_alarm(left: float, alarms: int) -> None:
+    """A detection of any category, 40 wide: the ignored box begins at 100."""
+    shown = replace(picture(0, CAR), ignored_px=IGNORED)
+    made_up = found(0.9, (left, 100, left + 40, 140), category_id=73)
+    assert evaluator().update(shown, [found(0.9), made_up]) == {"found_share": 1, "false_alarms": alarms}
+
+
+def test_an_object_in_an_ignored_box_is_still_to_be_found() -> None:
+    shown = replace(picture(0, (3, (110.0, 100.0, 50.0, 60.0), False)), ignored_px=IGNORED)
+    metric = evaluator()
+    metric.update(shown, [])
+    assert metric.result()["ap"] == 0
+    metric = evaluator()
+    metric.update(shown, [found(0.9, (110, 100, 160, 160)), found(0.95, (112, 110, 178, 180))])
+    assert metric.result()["ap"] == pytest.approx(1)

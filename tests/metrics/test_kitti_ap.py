@@ -13,6 +13,7 @@ from gear.formats.kitti_object import KittiLabel, dont_care, label_corners
 from gear.metrics.kitti_ap import KittiEvaluator
 from gear.metrics.kitti_match import DIFFICULTIES, choose, count, matched_scores, picture_boxes
 from gear.metrics.kitti_reference import NearCars
+from gear.values.ground_truth import BoxPx
 
 LEVELS = {"easy": (40, 0, 0.15), "moderate": (25, 1, 0.3), "hard": (25, 2, 0.5)}
 NEIGHBOUR = {"Car": "Van", "Pedestrian": "Person_sitting", "Cyclist": None}
@@ -48,10 +49,12 @@ def steps_of_recall(scores: Sequence[float], wanted: int) -> list[float]:
 class BruteForce:
     """The devkit's two passes for one class, level and overlap."""
 
-    def __init__(self, pictures: Sequence[Picture], name: str, level: str, kind: str) -> None:
+    def __init__(
+        self, pictures: Sequence[Picture], name: str, level: str, kind: str, ignored_px: Sequence[BoxPx] = ()
+    ) -> None:
         self.name, self.kind, self.least = name, kind, OVERLAP[name]
         self.min_height, self.max_occluded, self.max_truncated = LEVELS[level]
-        self.pictures = pictures
+        self.pictures, self.ignored_px = pictures, ignored_px
 
     def label_role(self, label: KittiLabel) -> str:
         if label.type == self.name:
@@ -107,8 +110,9 @@ class BruteForce:
             if j in taken or self.found_role(detections[j]) != "wanted":
                 continue
             own = shapely.box(*detections[j].box_px)
-            shares = [own.intersection(shapely.box(*region.box_px)).area / own.area for region in regions]
-            fp += not (self.kind == "2d" and any(share > self.least for share in shares))
+            boxes = [region.box_px for region in regions] if self.kind == "2d" else []
+            shares = [own.intersection(shapely.box(*box)).area / own.area for box in (*boxes, *self.ignored_px)]
+            fp += not any(share > self.least for share in shares)
         return {"tp": tp, "fp": fp, "fn": fn, "scores": scores, "similarity": similarity}
 
     def curves(self) -> tuple[list[float], list[float]]:
@@ -168,8 +172,8 @@ def picture(seed: int) -> Picture:
     return labels, found
 
 
-def evaluate(pictures: Sequence[Picture]) -> dict[str, float]:
-    evaluator: KittiEvaluator[list[KittiLabel]] = KittiEvaluator(lambda labels: labels)
+def evaluate(pictures: Sequence[Picture], ignored_px: Sequence[BoxPx] = ()) -> dict[str, float]:
+    evaluator: KittiEvaluator[list[KittiLabel]] = KittiEvaluator(lambda labels: labels, lambda _: ignored_px)
     for labels, found in pictures:
         evaluator.update(labels, found)
     return dict(evaluator.result())
@@ -190,6 +194,26 @@ def test_agrees_with_the_second_evaluator(seed: int) -> None:
                     aos = f"{name.lower()}_aos_{level}_r40"
                     assert result[aos] == pytest.approx(np.mean(orientation[1:]), abs=1e-9, nan_ok=True), aos
     assert 0.05 < result["car_2d_hard_r40"] < 0.999
+
+
+IGNORED = ((0.0, 80.0, 400.0, 240.0), (700.0, 150.0, 1000.0, 300.0))
+
+
+def test_ignored_boxes_excuse_detections_of_every_overlap() -> None:
+    """As a DontCare region does in the picture, and from above and in space, too."""
+    pictures = [picture(300 + i) for i in range(12)]
+    plain, silent = evaluate(pictures), evaluate(pictures, IGNORED)
+    for name in NEIGHBOUR:
+        for kind in ("2d", "bev", "3d"):
+            precision, _ = BruteForce(pictures, name, "moderate", kind, IGNORED).curves()
+            stem = f"{name.lower()}_{kind}_moderate_r40"
+            assert silent[stem] == pytest.approx(np.mean(precision[1:]), abs=1e-9, nan_ok=True), stem
+    for kind in ("2d", "bev", "3d"):
+        assert silent[f"car_{kind}_hard_r40"] > plain[f"car_{kind}_hard_r40"]
+    regions = [([*labels, *map(dont_care, IGNORED)], found) for labels, found in pictures]
+    described = evaluate(regions)
+    for name in NEIGHBOUR:
+        assert silent[f"{name.lower()}_2d_hard_r40"] == described[f"{name.lower()}_2d_hard_r40"]
 
 
 CAR = KittiLabel(

@@ -9,6 +9,7 @@ from typing import Literal
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from gear.augment.geometry import (
     Geometry,
@@ -22,6 +23,7 @@ from gear.augment.geometry import (
     flip_box,
 )
 from gear.augment.registry import register
+from gear.contracts.evaluation import Masks
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Encoded, Evaluator, Sample, Sidecar, SplitInfo
@@ -32,6 +34,7 @@ from gear.formats.mask_polygons import mask_polygons
 from gear.formats.png import encode_rgb
 from gear.groundtruth.boxes import box_in_camera
 from gear.groundtruth.objects import observe_objects
+from gear.groundtruth.regions import MOSTLY, part_boxes
 from gear.groundtruth.strays import without_strays
 from gear.groundtruth.visibility import Visibility
 from gear.metrics.coco_ap import CocoEvaluator
@@ -113,9 +116,12 @@ class Detect2dSample(Sample):
 
     Attributes:
         objects: labelled and ignored ones.
+        ignored_px: boxes, in edge pixels, in which detections that find no object count neither way; datasets have
+            none (`Detect2dTask.without`).
     """
 
     objects: tuple[Object2d, ...]
+    ignored_px: tuple[BoxPx, ...] = ()
 
 
 class Detect2dTask:
@@ -205,6 +211,20 @@ class Detect2dTask:
         """`reference`: AP50 of traffic's categories, of objects that are tall enough."""
         return {"reference": TallObjects(self._as_shown)}
 
+    def without(self, sample: Detect2dSample, masks: Masks) -> Detect2dSample:
+        """Ignores what lies in the mask, as COCO ignores crowds.
+
+        The box of each connected part of the mask is a crowd of every category: a detection that finds no object is
+        ignored at an overlap threshold t if a share of at least t of its own box lies there. An object with more than
+        half of its visible pixels in the mask is ignored.
+        """
+        mask = masks[VIEW]
+        objects = tuple(
+            replace(thing, is_ignored=thing.is_ignored or _share_inside(thing, mask) > MOSTLY)
+            for thing in sample.objects
+        )
+        return replace(sample, objects=objects, ignored_px=(*sample.ignored_px, *part_boxes(mask)))
+
     def encode_prediction(
         self, sample: Detect2dSample, prediction: Sequence[coco.Detection], info: SplitInfo
     ) -> Encoded:
@@ -260,7 +280,8 @@ class Detect2dTask:
     def _as_shown(self, sample: Detect2dSample) -> coco.Picture:
         """At the size of the sample's own picture, which may be smaller than the one that was rendered."""
         height, width = sample.images[VIEW].shape[:2]
-        return replace(self._as_picture(sample.record, sample.objects), height_px=height, width_px=width)
+        picture = self._as_picture(sample.record, sample.objects)
+        return replace(picture, height_px=height, width_px=width, ignored_px=sample.ignored_px)
 
     def _as_picture(self, record: SceneRecord, objects: tuple[Object2d, ...]) -> coco.Picture:
         camera = record.camera(VIEW)
@@ -284,6 +305,17 @@ def _with_polygons(item: coco.Annotation, picture: coco.Picture) -> coco.Annotat
     left, top, width, height = (round(side) for side in item.box_xywh)
     mask = rle.decode_crop(item.rle, picture.height_px, picture.width_px, (left, top, left + width, top + height))
     return replace(item, polygons=mask_polygons(mask, left, top))
+
+
+def _share_inside(thing: Object2d, mask: npt.NDArray[np.bool_]) -> float:
+    """Share of an object's visible pixels that lie in an (H, W) mask, 0..1."""
+    left, top, right, bottom = (round(side) for side in thing.box_px)
+    crop = mask[top:bottom, left:right]
+    if not crop.any():
+        return 0.0
+    height, width = mask.shape
+    visible = rle.decode_crop(thing.rle, height, width, (left, top, right, bottom))
+    return float((visible & crop).sum() / max(1, visible.sum()))
 
 
 def _name(index: int) -> str:
@@ -351,6 +383,7 @@ def flip(sample: Detect2dSample) -> Detect2dSample:
         images={name: flip_array(picture) for name, picture in sample.images.items()},
         surfaces=(),
         objects=tuple(_flipped(thing, height, width) for thing in sample.objects),
+        ignored_px=tuple(flip_box(box, width) for box in sample.ignored_px),
     )
 
 
@@ -374,11 +407,13 @@ def cut(sample: Detect2dSample, window: Window) -> Detect2dSample:
     """
     height, width = sample.images[VIEW].shape[:2]
     moved = (_cut(thing, window, height, width) for thing in sample.objects)
+    boxes = (_inside(cut_box(box, window), window.out_height_px, window.out_width_px) for box in sample.ignored_px)
     return replace(
         sample,
         images={name: cut_picture(picture, window) for name, picture in sample.images.items()},
         surfaces=(),
         objects=tuple(thing for thing in moved if thing is not None),
+        ignored_px=tuple(box for box in boxes if box_area(box) > 0),
     )
 
 

@@ -9,8 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from gear.augment.geometry import Geometry, Window, box_area, clipped, cut_box, cut_picture, flip_array
+from gear.augment.geometry import Geometry, Window, box_area, clipped, cut_picture, flip_array
+from gear.augment.pinhole import cut_index_box, index_frame, mirrored_pinhole, windowed_pinhole
 from gear.augment.registry import register
+from gear.contracts.evaluation import Masks
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Encoded, Evaluator, Sample, Sidecar, SplitInfo
@@ -29,11 +31,13 @@ from gear.formats.kitti_object import (
     occlusion_level,
     parse_labels,
     split_lists,
+    to_edge_pixels,
 )
 from gear.formats.png import encode_rgb
 from gear.groundtruth.boxes import Box3d, box_in_camera, project_box
 from gear.groundtruth.objects import observe_objects
 from gear.groundtruth.raster import NEAR_M
+from gear.groundtruth.regions import MOSTLY, least_share_inside, part_boxes
 from gear.groundtruth.visibility import Visibility, VisibilityLimits
 from gear.metrics.kitti_ap import KittiEvaluator
 from gear.metrics.kitti_reference import NearCars
@@ -139,10 +143,13 @@ class Stereo3dSample(Sample):
     Attributes:
         calibration: of the pair; the left camera is the reference frame.
         objects: labelled and ignored ones.
+        ignored_px: boxes in the left picture, in index pixels, in which detections that find no object count neither
+            way; datasets have none (`Stereo3dTask.without`).
     """
 
     calibration: Calibration
     objects: tuple[Object3d, ...]
+    ignored_px: tuple[BoxPx, ...] = ()
 
 
 class Stereo3dTask:
@@ -220,11 +227,28 @@ class Stereo3dTask:
 
     def evaluator(self) -> Evaluator[Stereo3dSample, tuple[KittiLabel, ...]]:
         """KITTI's average precisions."""
-        return KittiEvaluator(_lines)
+        return KittiEvaluator(_lines, _ignored)
 
     def reports(self) -> Mapping[str, Evaluator[Stereo3dSample, tuple[KittiLabel, ...]]]:
         """`reference`: cars seen from above, at IoU 0.5, below 40 m."""
-        return {"reference": NearCars(_lines)}
+        return {"reference": NearCars(_lines, _ignored)}
+
+    def without(self, sample: Stereo3dSample, masks: Masks) -> Stereo3dSample:
+        """Ignores what lies in the left camera's mask, as KITTI ignores DontCare regions.
+
+        The box of each connected part of the mask is such a region: a detection that finds no object is ignored if more
+        than the benchmark's share of its own box (0.7 of a car, 0.5 of a person or a cyclist) lies there. The devkit's
+        own regions excuse in the picture alone; these regions also excuse from above and in space. An object is ignored
+        if more than half of its visible pixels must lie in the mask, because its box has too few other pixels.
+        """
+        mask = masks[LEFT]
+        objects, regions = [], list(part_boxes(mask))
+        for thing in sample.objects:
+            is_inside = least_share_inside(to_edge_pixels(thing.box_px), thing.visible_px, mask) > MOSTLY
+            objects.append(replace(thing, is_ignored=thing.is_ignored or is_inside))
+            regions += [to_edge_pixels(thing.box_px)] if is_inside else []
+        boxes = tuple(from_edge_pixels(box, sample.calibration.intrinsics) for box in regions)
+        return replace(sample, objects=tuple(objects), ignored_px=(*sample.ignored_px, *boxes))
 
     def encode_prediction(self, sample: Stereo3dSample, prediction: Sequence[KittiLabel], info: SplitInfo) -> Encoded:
         """A result file."""
@@ -305,6 +329,10 @@ def _lines(sample: Stereo3dSample) -> tuple[KittiLabel, ...]:
     return parse_labels(format_labels(thing.label() for thing in sample.objects).decode())
 
 
+def _ignored(sample: Stereo3dSample) -> tuple[BoxPx, ...]:
+    return sample.ignored_px
+
+
 def _name(index: int) -> str:
     return f"{index:06d}"
 
@@ -315,6 +343,7 @@ def flip(sample: Stereo3dSample) -> Stereo3dSample:
     Occlusion was measured by the left camera, and is taken over for the right one. The silhouette in the right picture
     is not stored: each side of its box lies as far from the side in the left picture as the same side of the projected
     3D box does. Where the border cuts an object, the other sides of its box are those of the left picture's part.
+    Ignored boxes are left out: where they lie in the right picture is not known.
     """
     baseline_m, intrinsics = sample.calibration.baseline_m, sample.calibration.intrinsics
     moved = (_mirrored(thing, baseline_m, intrinsics) for thing in sample.objects)
@@ -322,16 +351,10 @@ def flip(sample: Stereo3dSample) -> Stereo3dSample:
         sample,
         images={LEFT: flip_array(sample.images[RIGHT]), RIGHT: flip_array(sample.images[LEFT])},
         surfaces=(),
-        calibration=Calibration(intrinsics=mirrored(intrinsics), baseline_m=baseline_m),
+        calibration=Calibration(intrinsics=mirrored_pinhole(intrinsics), baseline_m=baseline_m),
         objects=tuple(thing for thing in moved if thing is not None),
+        ignored_px=(),
     )
-
-
-def mirrored(pinhole: Intrinsics) -> Intrinsics:
-    """The pinhole of pictures that are mirrored left to right."""
-    if pinhole.principal_px is None:
-        return pinhole
-    return replace(pinhole, principal_px=(pinhole.width_px - 1 - pinhole.cx_px, pinhole.cy_px))
 
 
 def _mirrored(thing: Object3d, baseline_m: float, intrinsics: Intrinsics) -> Object3d | None:
@@ -339,7 +362,10 @@ def _mirrored(thing: Object3d, baseline_m: float, intrinsics: Intrinsics) -> Obj
     x, y, z = thing.box.bottom_m
     turned = wrap_angle_rad(math.pi - thing.box.rotation_y_rad)
     box = replace(thing.box, bottom_m=(baseline_m - x, y, z), rotation_y_rad=turned)
-    before, after = project_box(thing.box.corners_m, intrinsics), project_box(box.corners_m, mirrored(intrinsics))
+    before, after = (
+        project_box(thing.box.corners_m, intrinsics),
+        project_box(box.corners_m, mirrored_pinhole(intrinsics)),
+    )
     if before is None or after is None:
         return None
     last = intrinsics.width_px - 1.0
@@ -348,7 +374,7 @@ def _mirrored(thing: Object3d, baseline_m: float, intrinsics: Intrinsics) -> Obj
     tight, whole = np.add(boxes[1], shift), np.add(boxes[2], shift)
     # Where the border cut the box, more of the silhouette may lie in the other picture.
     was_cut = np.equal(boxes[1], (0.0, 0.0, last, intrinsics.height_px - 1.0))
-    frame = _frame(intrinsics.width_px, intrinsics.height_px)
+    frame = index_frame(intrinsics.width_px, intrinsics.height_px)
     return _placed(thing, box, _box(np.where(was_cut, whole, tight)), _box(whole), frame, frame)
 
 
@@ -364,17 +390,18 @@ def cut(sample: Stereo3dSample, window: Window) -> Stereo3dSample:
     if 2 * window.left_px + window.width_px != width or 2 * window.top_px + window.height_px != height:
         raise ValueError(f"a window of a stereo pair must share the picture's centre, got {window}")
     before = sample.calibration.intrinsics
-    intrinsics = _windowed(before, window)
+    intrinsics = windowed_pinhole(before, window)
     # The rest of the window is padding.
-    frame = _frame(width, height)
-    shown = clipped(_in_window(frame, window), _frame(window.out_width_px, window.out_height_px))
+    frame = index_frame(width, height)
+    shown = clipped(cut_index_box(frame, window), index_frame(window.out_width_px, window.out_height_px))
+    boxes = (clipped(cut_index_box(box, window), shown) for box in sample.ignored_px)
     area = window.scale_x * window.scale_y
     moved = (
         _placed(
             replace(thing, visible_px=round(thing.visible_px * area)),
             thing.box,
-            _in_window(thing.box_px, window),
-            _in_window(thing.amodal_box_px, window),
+            cut_index_box(thing.box_px, window),
+            cut_index_box(thing.amodal_box_px, window),
             frame,
             shown,
         )
@@ -386,30 +413,8 @@ def cut(sample: Stereo3dSample, window: Window) -> Stereo3dSample:
         surfaces=(),
         calibration=Calibration(intrinsics=intrinsics, baseline_m=sample.calibration.baseline_m),
         objects=tuple(thing for thing in moved if thing is not None),
+        ignored_px=tuple(box for box in boxes if box_area(box) > 0),
     )
-
-
-def _windowed(pinhole: Intrinsics, window: Window) -> Intrinsics:
-    """The pinhole of a window's picture."""
-    focal_y_px = None if pinhole.focal_y_px is None else pinhole.focal_y_px * window.scale_y
-    principal_px = None
-    if pinhole.principal_px is not None:
-        left, top, _, _ = _in_window((pinhole.cx_px, pinhole.cy_px, pinhole.cx_px, pinhole.cy_px), window)
-        principal_px = (left, top)
-    focal_px = pinhole.focal_px * window.scale_x
-    return Intrinsics(window.out_width_px, window.out_height_px, focal_px, focal_y_px, principal_px)
-
-
-def _in_window(box_px: BoxPx, window: Window) -> BoxPx:
-    """A box in index pixels of the picture, in index pixels of the window's picture; not clipped."""
-    left, top, right, bottom = box_px
-    edges = cut_box((left + 0.5, top + 0.5, right + 0.5, bottom + 0.5), window)
-    return (edges[0] - 0.5, edges[1] - 0.5, edges[2] - 0.5, edges[3] - 0.5)
-
-
-def _frame(width_px: int, height_px: int) -> BoxPx:
-    """The outer borders of a picture in index pixels."""
-    return (-0.5, -0.5, width_px - 0.5, height_px - 0.5)
 
 
 def _box(sides: Array) -> BoxPx:

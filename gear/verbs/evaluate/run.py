@@ -86,8 +86,8 @@ def evaluate(
         split: of the datasets; may be left out where each has only one.
         calibration: dataset from which the defense learns.
         calibration_patched: the same with patches.
-        reports: further metrics: the task's own (`reference`); `outside_patch`, the ground truth on the patch and 5 px
-            around it left out; or metric plugins, as `NAME` or `NAME:KEY=VALUE,KEY=VALUE`.
+        reports: further metrics: the task's own (`reference`); `outside_patch`, without the patch and 5 px around
+            it; or metric plugins, as `NAME` or `NAME:KEY=VALUE,KEY=VALUE`.
         out: folder for everything; `evaluations/<task>/<model>[+<defense>]` by default.
         batch: samples that go through the model together; one, or up to four small ones for gear's own, unless given.
         workers: threads that read, and threads that measure and write, beside the model.

@@ -13,11 +13,12 @@ from pycocotools.cocoeval import COCOeval
 
 from gear.augment.apply import shrunk
 from gear.formats import rle
+from gear.formats.coco import Detection
 from gear.groundtruth.visibility import Visibility
-from gear.plugins.tasks.detect2d import Detect2dConfig, Detect2dTask, detect2d
+from gear.plugins.tasks.detect2d import Detect2dConfig, Detect2dTask, detect2d, flip
 from gear.testing.synthetic import synthetic_frame
 from gear.testing.task_contract import INFO, TaskContract
-from gear.testing.things import CAR, CYCLIST, PERSON, Part, Thing, box_part
+from gear.testing.things import CAR, CYCLIST, PERSON, Part, Thing, board, box_part
 
 # pycocotools 2.0.11 has not caught up with NumPy 2's protocol.
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
@@ -205,3 +206,48 @@ def test_annotations_keep_the_masks_order(tmp_path: Path) -> None:
     assert rle.decode(left.rle, 400, 667)[:, :333].any() and not rle.decode(left.rle, 400, 667)[:, 333:].any()
     assert rle.decode(right.rle, 400, 667)[:, 334:].any()
     assert json.dumps(left.rle)
+
+
+def test_without_the_patch_ignores_its_box_and_objects_that_lie_on_it() -> None:
+    """A car beside a board, a person in front of it, and detections here and there."""
+    task = Detect2dTask(Detect2dConfig(width_px=667, height_px=400, visibility=Visibility(preset="coco")))
+    things = [
+        car(12.0, 4.0),
+        board(14.0, -2.0),
+        Thing(parts=PERSON, position_m=(9.0, -1.3, 0.0), object_id=3, role="pedestrian"),
+    ]
+    sample = task.ground_truth(*synthetic_frame(task.rig(), things))
+    (surface,) = sample.surfaces
+    patch = rle.decode(surface.mask_rle, 400, 667)
+    silent = task.without(sample, {"left": patch})
+    (region,) = silent.ignored_px
+    rows, columns = np.nonzero(patch)
+    assert region == (columns.min(), rows.min(), columns.max() + 1, rows.max() + 1)
+    assert silent.objects == sample.objects, "the person hides the patch, not the other way round"
+    left, top, right, bottom = region
+    on_it = coco_detection(8, (left + 5, top + 5, right - 5, bottom - 5))
+    beside = coco_detection(8, (left - 60, top, left + 10, bottom))
+    truth = task.as_prediction(sample)
+    for given, expected in (((on_it,), (1, 0)), ((beside,), (1, 1)), ((on_it, beside), (2, 1))):
+        alarms = tuple(task.evaluator().update(one, (*truth, *given))["false_alarms"] for one in (sample, silent))
+        assert alarms == expected
+    whole = rle.decode(next(o for o in sample.objects if o.object_id == 2).rle, 400, 667)
+    covered = task.without(sample, {"left": whole})
+    assert [o.object_id for o in covered.objects if o.is_ignored] == [2]
+    for kept, is_ignored in ((0.45, False), (0.55, True)):
+        part = whole & (np.cumsum(whole).reshape(whole.shape) <= kept * whole.sum())
+        assert any(o.is_ignored for o in task.without(sample, {"left": part}).objects) == is_ignored
+
+
+def coco_detection(category_id: int, box_px: tuple[float, float, float, float]) -> Detection:
+    return Detection(category_id=category_id, box_px=box_px, score=0.9)
+
+
+def test_ignored_boxes_move_with_the_picture() -> None:
+    task = Detect2dTask(Detect2dConfig(width_px=667, height_px=400))
+    sample = task.ground_truth(*synthetic_frame(task.rig(), [car(12.0), board(14.0, -2.0)]))
+    patch = rle.decode(sample.surfaces[0].mask_rle, 400, 667)
+    silent = task.without(sample, {"left": patch})
+    assert flip(silent).ignored_px == task.without(sample, {"left": patch[:, ::-1]}).ignored_px
+    (region,) = shrunk(silent, 0.5).ignored_px
+    assert region == pytest.approx([side / 2 for side in silent.ignored_px[0]], abs=0.6)

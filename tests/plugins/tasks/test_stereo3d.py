@@ -7,13 +7,15 @@ import cv2
 import numpy as np
 import pytest
 
+from gear.augment.geometry import whole_window
 from gear.camera.effects import Lens
+from gear.formats import rle
 from gear.formats.kitti_object import format_labels, parse_calibration, parse_labels, read_baseline_m
 from gear.groundtruth.visibility import Visibility
-from gear.plugins.tasks.stereo3d import Stereo3dConfig, Stereo3dTask, stereo3d
+from gear.plugins.tasks.stereo3d import Stereo3dConfig, Stereo3dTask, cut, stereo3d
 from gear.testing.synthetic import behind_lens, synthetic_frame
 from gear.testing.task_contract import TaskContract
-from gear.testing.things import CAR, CYCLIST, VAN, Thing, street
+from gear.testing.things import CAR, CYCLIST, VAN, Thing, board, street
 from gear.values.errors import FieldError
 from gear.values.rig import Rig
 
@@ -246,3 +248,39 @@ def test_an_empty_road_has_an_empty_label_file() -> None:
 def test_a_bad_baseline_is_refused() -> None:
     with pytest.raises(FieldError, match="baseline_m"):
         Stereo3dConfig(baseline_m=0.0)
+
+
+def test_without_the_patch_is_a_region_that_excuses_in_space_too() -> None:
+    """Cars that a detector sees on the board count in no overlap; the labelled car must still be found."""
+    task = Stereo3dTask(Stereo3dConfig(width_px=612, height_px=185))
+    sample = task.ground_truth(*synthetic_frame(task.rig(), [car(12.0, 3.0, 0.3), board(14.0, -2.0)]))
+    patch = rle.decode(sample.surfaces[0].mask_rle, 185, 612)
+    silent = task.without(sample, {"left": patch})
+    assert silent.objects == sample.objects
+    (region,) = silent.ignored_px
+    (truth,) = task.as_prediction(sample)
+    made_up = replace(truth, box_px=region, location_m=(2.0, 1.65, 13.5), score=2.0)
+    for seen, expected in ((sample, 0.5), (silent, 1.0)):
+        evaluator = task.evaluator()
+        for _ in range(60):
+            alarms = evaluator.update(seen, (truth, made_up))["false_alarms"]
+        result = evaluator.result()
+        assert alarms == (seen is sample)
+        for overlap in ("2d", "bev", "3d"):
+            assert result[f"car_{overlap}_moderate_r40"] == pytest.approx(expected, abs=0.01)
+
+
+def test_an_object_that_fills_the_mask_is_ignored_wherever_it_is_found() -> None:
+    task = Stereo3dTask(Stereo3dConfig(width_px=612, height_px=185))
+    sample = task.ground_truth(*synthetic_frame(task.rig(), [car(12.0, 3.0, 0.3), car(11.0, -3.0, 0.2, part_id=4)]))
+    left, top, right, bottom = (round(side + 0.5) for side in sample.objects[0].box_px)
+    mask = np.zeros((185, 612), np.bool_)
+    mask[top:bottom, left:right] = True
+    silent = task.without(sample, {"left": mask})
+    assert [thing.is_ignored for thing in silent.objects] == [True, False]
+    evaluator = task.evaluator()
+    for _ in range(60):
+        evaluator.update(silent, task.as_prediction(sample))
+    assert evaluator.result()["car_3d_moderate_r40"] == pytest.approx(1)
+    halved = cut(silent, whole_window((185, 612), 0.5)).ignored_px
+    assert np.allclose(halved, (np.array(silent.ignored_px) + 0.5) / 2 - 0.5, atol=0.6)

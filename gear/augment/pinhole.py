@@ -1,0 +1,39 @@
+"""Pinholes and boxes in index pixels of pictures that are mirrored or cut."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from gear.augment.geometry import Window, cut_box
+from gear.values.geometry import Intrinsics
+from gear.values.ground_truth import BoxPx
+
+
+def mirrored_pinhole(pinhole: Intrinsics) -> Intrinsics:
+    """The pinhole of pictures that are mirrored left to right."""
+    if pinhole.principal_px is None:
+        return pinhole
+    return replace(pinhole, principal_px=(pinhole.width_px - 1 - pinhole.cx_px, pinhole.cy_px))
+
+
+def windowed_pinhole(pinhole: Intrinsics, window: Window) -> Intrinsics:
+    """The pinhole of a window's picture."""
+    focal_y_px = None if pinhole.focal_y_px is None else pinhole.focal_y_px * window.scale_y
+    principal_px = None
+    if pinhole.principal_px is not None:
+        left, top, _, _ = cut_index_box((pinhole.cx_px, pinhole.cy_px, pinhole.cx_px, pinhole.cy_px), window)
+        principal_px = (left, top)
+    focal_px = pinhole.focal_px * window.scale_x
+    return Intrinsics(window.out_width_px, window.out_height_px, focal_px, focal_y_px, principal_px)
+
+
+def cut_index_box(box_px: BoxPx, window: Window) -> BoxPx:
+    """A box in index pixels of the picture, in index pixels of the window's picture; not clipped."""
+    left, top, right, bottom = box_px
+    edges = cut_box((left + 0.5, top + 0.5, right + 0.5, bottom + 0.5), window)
+    return (edges[0] - 0.5, edges[1] - 0.5, edges[2] - 0.5, edges[3] - 0.5)
+
+
+def index_frame(width_px: int, height_px: int) -> BoxPx:
+    """The outer borders of a picture in index pixels."""
+    return (-0.5, -0.5, width_px - 0.5, height_px - 0.5)
